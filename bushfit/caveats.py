@@ -1,12 +1,14 @@
 """What a prediction cannot say: sentences on what was not fitted, what is extrapolated, and what a model leaves out."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import chain
+
+import numpy as np
 
 from bushfit.effects import Level, effect_named
 from bushfit.effects.contract import Array
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Z95
-from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.units import number, told
 
@@ -15,11 +17,22 @@ from bushfit.units import number, told
 MARGIN = 0.01
 #: Share by which a finite bulk modulus lowers the radial stiffness, from which that is said: that of the other errors.
 _NOTED_LOWERING = 0.01
+#: Relative difference of two stiffnesses that is none.
+_SAME = 1e-6
+
+
+def warnings_of(result: Result, found: Iterable[Iterable[str]] = (), notes: Iterable[str] = ()) -> list[str]:
+    """All that a reader of a result's numbers must know: notes, the fit's, of predictions, of the result; each once."""
+    return list(dict.fromkeys((*notes, *result.warnings, *chain.from_iterable(found), *caveats(result))))
 
 
 def caveats(result: Result) -> list[str]:
-    """Sentences on what holds of a model's prediction in every direction."""
-    lines = []
+    """Sentences on what holds of a result itself, whatever is predicted with it."""
+    fitted = result.measured.directions if result.measured else ()
+    lines = [line for name in fitted for line in unfitted(result, result.place(name))]
+    for name in result.unresolved:
+        twins = " or ".join(effect_named(name).twins)
+        lines.append(f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}")
     if "springpot" not in result.model.effects:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:
@@ -102,10 +115,31 @@ def _radial_error(bushing: Bushing) -> str:
     return f'{off}, by which shape = "calibrated" goes'
 
 
-def circumstances(model: Model, temperature: float | None) -> Iterator[str]:
-    """What is taken of the circumstances that the model depends on, where they are not asked for."""
+def of_points(
+    result: Result, place: Place, at: Array, if_rigs: Array | None, measured: Array | None, temperature: float | None
+) -> Iterator[str]:
+    """Warnings of |K| at operating points, (3, n): frequency [Hz], amplitude, |K| [SI], which may be the rig's in part,
+    or was measured otherwise, (n,)."""
+    frequency, amplitude, stiffness = at
+    yield from unfitted(result, place)
+    yield from extrapolations(result, place, frequency, amplitude)
     known = set() if temperature is None else {"temperature"}
-    yield from (effect.taken for effect in model.records if effect.taken and not known & {*effect.under})
+    effects = result.model.without(Level.INSTRUMENT).records
+    yield from (effect.taken for effect in effects if effect.taken and not known & {*effect.under})
+    rig = rig_effects(result)
+    if rig and measured is not None and not np.isnan(measured).all():
+        off = percent_off(stiffness / np.abs(measured))
+        yield f"{place}: without {' and '.join(rig)} the predicted stiffness is {off} against what was measured"
+    if if_rigs is not None:
+        ratio, if_so = if_rigs / stiffness, f"if {' and '.join(result.unresolved)} is the rig's"
+        off = f"{percent_off(ratio)} {if_so}; low and high span both"
+        yield f"{place}: stiffness {f'the same {if_so}' if np.allclose(ratio, 1.0, atol=_SAME) else off}"
+
+
+def percent_off(ratio: Array) -> str:
+    """How far ratios are off 1, in words: "+1.2 to +3.4 %"."""
+    ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratio), np.nanmax(ratio))]
+    return f"{' to '.join(dict.fromkeys(ends))} %"
 
 
 def extrapolations(

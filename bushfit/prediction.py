@@ -6,7 +6,7 @@ may be either's, an effect with a twin that these tests cannot tell from it, giv
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations
@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from bushfit.caveats import MARGIN, circumstances, extrapolations, rig_effects, unfitted
-from bushfit.effects import Level, effect_named
+from bushfit.caveats import MARGIN, extrapolations, of_points, unfitted
+from bushfit.effects import Level
 from bushfit.effects.contract import Array, Circumstances
 from bushfit.errors import ModelError
 from bushfit.fitting.data_sets import SweepData
@@ -28,8 +28,6 @@ from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
 from bushfit.units import number
 
-#: Relative difference of two stiffnesses that is none.
-_SAME = 1e-6
 #: Strain at which the resonance of a mass is looked for first; chosen: small for any rubber.
 _SMALL_STRAIN = 1e-4
 #: Lowest and highest frequency about a resonance over that of small strain.
@@ -118,12 +116,10 @@ def predict(
     found = replace(first, if_rigs=others[-1] if others else None, measured=measured)
     every = (first, *others)
     bands: dict[str, Any] = {name: _spanned([getattr(each, name) for each in every]) for name in _BANDS}
-    told = (
-        *unfitted(result, direction),
-        *extrapolations(result, direction, frequency, amplitude),
-        *circumstances(models[0], temperature),
-    )
-    return replace(found, **bands, warnings=(*told, *([] if rig else _left_out(result, found))))
+    at = np.array((frequency, amplitude, first.stiffness.value))
+    if_rigs = others[-1].stiffness.value if others else None
+    told = of_points(result, direction, at, if_rigs, None if rig else measured, temperature)
+    return replace(found, **bands, warnings=tuple(told))
 
 
 def _readings(result: Result) -> list[Model]:
@@ -191,28 +187,6 @@ def _measured(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequ
     near = (np.abs(f / frequency[:, None] - 1.0) <= MARGIN) & (far <= MARGIN)
     count = near.sum(axis=1)
     return np.where(count > 0, near @ stiffness / np.maximum(count, 1), np.nan)
-
-
-def _left_out(result: Result, found: Prediction) -> Iterator[str]:
-    """By how much the prediction differs from the measurement for want of the rig, and if what is unresolved is its."""
-    place, stiffness = found.direction, found.stiffness.value
-    rig, measured = rig_effects(result), found.measured
-    if rig and measured is not None and not np.isnan(measured).all():
-        off = percent_off(stiffness / np.abs(measured))
-        yield f"{place}: without {' and '.join(rig)} the predicted stiffness is {off} against what was measured"
-    if found.if_rigs:
-        for name in result.unresolved:
-            twins = " or ".join(effect_named(name).twins)
-            yield f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}"
-        ratio, if_so = found.if_rigs.stiffness.value / stiffness, f"if {' and '.join(result.unresolved)} is the rig's"
-        off = f"{percent_off(ratio)} {if_so}; low and high span both"
-        yield f"{place}: stiffness {f'the same {if_so}' if np.allclose(ratio, 1.0, atol=_SAME) else off}"
-
-
-def percent_off(ratio: Array) -> str:
-    """How far ratios are off 1, in words: "+1.2 to +3.4 %"."""
-    ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratio), np.nanmax(ratio))]
-    return f"{' to '.join(dict.fromkeys(ends))} %"
 
 
 @dataclass(frozen=True, eq=False)

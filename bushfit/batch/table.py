@@ -8,6 +8,7 @@ from bushfit.batch.ledger import ROWS
 from bushfit.batch.limits import Judgement
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import OF_FIT, Quantity, figures
+from bushfit.report.tables import BETWEEN
 
 #: Columns of every batch, before its numbers.
 _FIRST = ("name", "campaign", "folder", "status", "error")
@@ -56,4 +57,4 @@ class Table:
             value = found.get(quantity.name, (None,) * 4)[_PARTS[part]]
             cells.append(None if value is None else value * quantity.factor)
         bounds = ", ".join(f"{name} ({end})" for name, end in record.get("at_bound", {}).items())
-        return [*cells, bounds, "; ".join(record.get("warnings", ()))]
+        return [*cells, bounds, BETWEEN.join(record.get("warnings", ()))]

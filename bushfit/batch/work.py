@@ -14,6 +14,7 @@ from bushfit.batch.document import Found, Record
 from bushfit.batch.manifest import Row, Settings
 from bushfit.batch.points import Point
 from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.caveats import warnings_of
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import effect_named
 from bushfit.effects.contract import Parameter
@@ -194,14 +195,14 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> F
         parameters[name] = [*map(_finite, (value, *(interval or (None, None)), stderr)), parameter.unit]
         if name in result.at_bound and not _vanishes(name, parameter, value):
             at_bound[name] = result.at_bound[name]
-    warnings, at = [*notes, *result.warnings], {}
+    said, at = [], {}
     for point in points:
         if (place := result.place(point.place)).motion != point.motion:
             expected = f"an amplitude in {place.display.displacement.name}"
             raise BatchError("this amplitude is none of the place", found=str(point), expected=expected)
         prediction = predict(result, place, [point.frequency], [point.amplitude])
         at[str(point)] = {"stiffness": _band(prediction.stiffness), "loss factor": _band(prediction.loss_factor)}
-        warnings += [line for line in prediction.warnings if line not in warnings]
+        said.append(prediction.warnings)
     quality = result.quality
     return {
         "parameters": parameters,
@@ -209,7 +210,7 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> F
         "nrmse": quality.nrmse if quality else None,
         "reduced_chi_square": quality.reduced_chi_square if quality else None,
         "points": at,
-        "warnings": warnings,
+        "warnings": warnings_of(result, said, notes),
     }
 
 

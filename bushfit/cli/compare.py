@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 #: What --families means without names.
 _ALL = "all"
-#: Warnings that the terminal shows at most without -v.
-_MOST_WARNINGS = 8
 
 
 @command_called("compare")
@@ -105,10 +103,7 @@ def _tell(options: Options, outcome: Compared) -> None:
         options.console.print(table)
     for line in (*outcome.judged, *(outcome.words if options.verbose or not outcome.families else ())):
         options.say(line)
-    shown = outcome.warnings if options.verbose else outcome.warnings[:_MOST_WARNINGS]
-    warn(options, shown)
-    if left := len(outcome.warnings) - len(shown):
-        options.say(f"and {left} more warnings; -v shows them, compare.json has all")
+    warn(options, outcome.warnings)
 
 
 def _tell_parameters(options: Options, outcome: Compared) -> None:

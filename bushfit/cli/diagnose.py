@@ -69,7 +69,7 @@ def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
     if diagnosis.added or options.verbose:
         title = "model with what was added" if diagnosis.added else "model as it was"
         options.console.print(parameter_table(title, diagnosis.result))
-    warn(options, list(dict.fromkeys((*diagnosis.notes, *diagnosis.result.warnings))))
+    warn(options, outcome.document["warnings"])
 
 
 def tell_verdict(options: Options, name: str, outcome: Diagnosed) -> None:

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 #: Amplitudes of a direction that the terminal shows at most, spread from first to last; the CSV has all.
 _MOST_AMPLITUDES = 8
-#: Warnings of the fit that a prediction repeats at most; the model file has all.
-_MOST_OF_FIT = 3
 
 
 @command_called("predict")
@@ -57,9 +55,6 @@ def command(
     from bushfit.units import temperature as kelvin
 
     result, notes = open_model(model), list[str]()
-    of_fit = [f"of the fit: {line}" for line in result.warnings[:_MOST_OF_FIT]]
-    if more := len(result.warnings) - len(of_fit):
-        of_fit.append(f"of the fit: {more} more, under warnings in {model}")
     if bushing:
         result, note = carried(result, load_bushing(bushing))
         notes.append(note)
@@ -85,7 +80,6 @@ def command(
     for part in outcome.arms:
         options.say(part.sentence)
     tell_tests(options, outcome.tests, outcome.usable)
-    warn(options, of_fit)
     options.write(folder, options.formats.files(outcome.contents_beside), outcome.document)
 
 

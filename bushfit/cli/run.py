@@ -11,7 +11,7 @@ from bushfit.cli.common import Options, Task, with_task
 from bushfit.cli.diagnose import tell_findings, tell_verdict
 from bushfit.cli.options import command_called
 from bushfit.cli.predict import tell_predictions
-from bushfit.cli.show import new_table, report, tell_fit, tell_result, tell_sources, warn
+from bushfit.cli.show import new_table, report, tell_fit, tell_result, tell_sources
 from bushfit.units import alike, for_people, number
 
 if TYPE_CHECKING:
@@ -56,7 +56,6 @@ def tell_run(options: Options, name: str, outcome: Ran) -> None:
         tell_findings(options, found)
     if result.measured:
         _tell_range(options, outcome, result.measured)
-    warn(options, list(dict.fromkeys((*result.warnings, *(found.diagnosis.notes if found else ())))))
     tell_sources(options, result)
     tell_predictions(options, outcome.predicted)
     if options.verbose:

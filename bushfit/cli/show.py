@@ -33,8 +33,10 @@ def tell_fit(options: Options, name: str, outcome: Fitted) -> None:
 
 def report(options: Options, title: str, result: Result) -> None:
     """The parameters of a result, its quality, and its warnings."""
+    from bushfit.caveats import warnings_of
+
     tell_result(options, title, result)
-    warn(options, result.warnings)
+    warn(options, warnings_of(result))
     tell_sources(options, result)
 
 

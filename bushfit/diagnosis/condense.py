@@ -21,7 +21,7 @@ _BANDS = 100
 #: Lines of a sweep, levels mostly, that are looked at; chosen for time: each is searched without.
 _MOST_LINES = 40
 #: Rows of all loops together that are looked at; chosen for memory: hundreds of shapes of effects change each.
-_MOST_ROWS = 200_000
+_MOST_ROWS = 50_000
 
 
 class _Means(NamedTuple):

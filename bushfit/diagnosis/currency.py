@@ -149,7 +149,7 @@ class Ledger:
     def _products(self) -> "_Products":
         every, scatters = self._every, self._scatters
         first = 1 + len(self.jacobian)
-        parts = [every[:, scatters], every[:, ~scatters]]
+        parts = [_columns(every, scatters), _columns(every, ~scatters)]
         wide = max((len(block.kinds) for block in self.blocks), default=0)
         inner, along = np.zeros((len(self.blocks), wide, wide)), np.zeros((len(self.blocks), wide, len(every)))
         kinds = np.full((len(self.blocks), wide), -1)
@@ -161,7 +161,7 @@ class Ledger:
         return _Products(
             tuple(part[:first] @ part.T for part in parts),
             tuple(np.einsum("cn,cn->c", part, part) for part in parts),
-            [tuple(part[own] @ part[own].swapaxes(-1, -2) for part in parts) for _, own in self._alike],
+            [tuple(_grams(part, own) for part in parts) for _, own in self._alike],
             inner,
             along,
             kinds,
@@ -254,8 +254,8 @@ class Ledger:
         return [found[number] for number in range(len(self.groups))]
 
     def amounts(self, number: int) -> tuple[Array, Array]:
-        """Mean and covariance of the amounts of a group whose columns move together, over all sizes and the nodes
-        within the class of the rig, (g,) and (g, g)."""
+        """Mean, (g,), and covariance, (g, g), of the amounts of a group whose columns move together, over all sizes and
+        the nodes within the class of the rig."""
         kind, place = next((kind, own.index(number)) for kind, (own, _) in enumerate(self._alike) if number in own)
         size, vectors = np.linalg.eigh(self._solved.grams[kind][self._within, place])
         along = self._solved.along[self._within][:, self._places[number] - 1 - len(self.jacobian)]
@@ -280,6 +280,22 @@ class Ledger:
         likeliest = float(SIZES[int(np.argmax(share.sum(axis=(0, 1))))])
         log_evidence = float(top + np.log(total) - np.log(whole.shape[1] * SIZES.size))
         return Worth(log_evidence, size, likeliest, whole.max(axis=(1, 2)))
+
+
+def _columns(every: Array, chosen: Array) -> Array:
+    """Some columns of all rows, (n,) bool; without a copy where they stand side by side."""
+    places = np.flatnonzero(chosen)
+    if places.size and places[-1] - places[0] + 1 == places.size:
+        return every[:, places[0] : places[-1] + 1]
+    return every[:, places]
+
+
+def _grams(part: Array, own: Array) -> Array:
+    """Inner products of the rows of each group, (m, g) -> (m, g, g); most have nothing in loops, or in sweeps."""
+    there = part.any(axis=1)[own].any(axis=1)
+    found, rows = np.zeros((*own.shape, own.shape[1])), part[own[there]]
+    found[there] = rows @ rows.swapaxes(-1, -2)
+    return found
 
 
 def _of_one(group: Group, size: Array, along: Array) -> tuple[Array, Array]:

@@ -25,12 +25,6 @@ from bushfit.fitting.data_sets import DataSet, SweepData, parted
 from bushfit.fitting.solve import Bounds, jacobian, residual
 from bushfit.reading.measurement import Stepped
 
-#: Held-out gap, in units of noise, that counts as closed: noise and its own estimate make 1.1.
-_CLOSED = 1.2
-#: Share of the held-out gap before, below which the gap after counts as closed too.
-_SHRUNK = 0.5
-#: Factor by which the gap of a single part may grow: chance makes about a tenth.
-_MOST_WORSENED = 1.1
 #: Share of all sweep points, those of the highest steps, that is one part.
 _TOP = 1.0 / 3.0
 #: By what is stepped in sweeps: what is held, and what the top third is of.
@@ -65,7 +59,7 @@ class HeldOut:
     Args:
         part: what was held out, in words.
         before, after: in units of noise, as it is shown.
-        whitened: before and after in units of noise and of the prediction's own error, by which is decided.
+        whitened: before and after in units of noise and of the prediction's own error.
     """
 
     part: str
@@ -95,7 +89,7 @@ class HoldOut:
 
     Args:
         before, after: root mean square over all parts, in units of noise; None where nothing can be held out.
-        whitened: the same in units of noise and of the prediction's own error, by which is decided.
+        whitened: the same in units of noise and of the prediction's own error.
     """
 
     parts: tuple[HeldOut, ...] = ()
@@ -113,15 +107,6 @@ class HoldOut:
         figures = {name: _figures(pair) for name, pair in told.items()}
         every = _figures(np.concatenate(list(told.values()), axis=-1))
         return cls(tuple(HeldOut(name, *each) for name, each in figures.items()), tuple(skipped), *every)
-
-    @property
-    def passed(self) -> bool:
-        """Whether the gap shrinks where it was not fitted, and nowhere grows; where nothing is held out, it does."""
-        before, after = self.whitened
-        closed = after <= max(_CLOSED, _SHRUNK * before)
-        return closed and all(
-            after <= max(_MOST_WORSENED * before, _CLOSED) for before, after in (part.whitened for part in self.parts)
-        )
 
 
 def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:

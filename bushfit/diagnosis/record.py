@@ -6,6 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from bushfit.caveats import warnings_of
 from bushfit.diagnosis.document import (
     Description,
     DiagnosisFile,
@@ -100,11 +101,13 @@ class Odds:
         nothing: probability that nothing is missing beyond noise and tolerance.
         told: explanations in words with their probabilities, if anything is missing; the most probable first.
         values: of the parameters under each of these, as far as it was fitted; else none.
+        labels: each of these by the names of its parts, joined by " + ".
     """
 
     nothing: float
     told: tuple[tuple[str, float], ...] = ()
     values: tuple[Mapping[str, float], ...] = ()
+    labels: tuple[str, ...] = ()
 
     def averaged(self, result: Result) -> Result:
         """A result whose covariance counts that another explanation may hold: each adds the square of how far its
@@ -192,7 +195,7 @@ class Diagnosis:
             "gap": self._gap(),
             "usable": self._usable(),
             "next_test": self.next_test,
-            "warnings": list(dict.fromkeys((*self.notes, *self.result.warnings))),
+            "warnings": warnings_of(self.result, notes=self.notes),
         }
         return plain(document, DiagnosisFile)
 

@@ -13,7 +13,7 @@ from bushfit.diagnosis.currency import Block, Node
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import LoopData, SweepData, parted, repeats_of
+from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted
 from bushfit.fitting.rig_class import ASSUMED, of_class
 from bushfit.fitting.solve import jacobian, residual
 
@@ -44,7 +44,7 @@ def scattering_alone(evidence: Evidence) -> Evidence:
 def nodes(evidence: Evidence) -> list[Node]:
     """Sizes of the rig's errors with their prior weights; the scatter has some of its own where few repeats tell it."""
     sweeps = parted(evidence.data_sets)[1]
-    freedom = max((each.freedoms.scatter for each in sweeps), default=0)
+    freedom = max((each.noise.scatter_freedom for each in sweeps), default=0)
     thirds = (np.arange(3) + 0.5) / 3
     scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < KNOWN else [1.0]
     runs = RUNS if sweeps else ((0.0, 1.0),)
@@ -60,10 +60,9 @@ def blocks(evidence: Evidence, rig: RigSettings) -> list[Block]:
     loops, sweeps = parted(evidence.data_sets)
     gain = of_class(rig, ASSUMED)
     found = [block for sweep in sweeps for block in _of_sweep(evidence, sweep, gain)]
-    groups = {tuple(np.flatnonzero(row).tolist()) for row in repeats_of(loops)} if loops else set()
-    for group in sorted(groups):
-        rows = np.concatenate([np.arange(*_ends(evidence, loops[place])) for place in group])
-        column = gain[0] * np.concatenate([loops[place].unit_gain for place in group])
+    for group in alike(loops):
+        rows = np.concatenate([np.arange(*_ends(evidence, loop)) for loop in group])
+        column = gain[0] * np.concatenate([loop.unit_gain for loop in group])
         found.append(Block(rows, column[None], np.array([_LOOP]), scatters=False))
     return found
 

@@ -8,13 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.diagnosis.beam import Hypothesis, Search
+from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.described import describe
 from bushfit.diagnosis.document import Description, Verdict
 from bushfit.diagnosis.evidence import Evidence, result_of
 from bushfit.diagnosis.explanations import FaultyPlace
 from bushfit.diagnosis.holdout import HoldOut, hold_out
+from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where, chances
@@ -154,7 +155,7 @@ class Told:
         told = sorted(self.finding.told, key=lambda each: -each.probability)
         values = (each.best.weighed.state.evidence.model.values if each.best.refitted else {} for each in told)
         pairs = ((self._in_words(each), each.probability) for each in told)
-        return Odds(self.finding.nothing, tuple(pairs), tuple(values))
+        return Odds(self.finding.nothing, tuple(pairs), tuple(values), tuple(map(self.label, told)))
 
     def _in_words(self, each: Composition) -> str:
         """A composition as it is told to people: what each of its parts is, with its name."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from bushfit.diagnosis.beam import Hypothesis
 from bushfit.diagnosis.document import Verdict
+from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.priors import DOES_NOT_FIT, MOST_TOLD, MOSTLY, NAMED, NOTHING
 from bushfit.effects import effect_named
 
@@ -88,6 +88,8 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
     if sure:  # all that is probable has these parts; what else there is is not shown
         found = _of_one(sure, nothing)
         return replace(found, told=(sure, *(each for each in told if each is not sure)))
+    if common and all(part.startswith("place: ") for part in common):  # whatever else there is, this has to go first
+        return Finding("unexplained", nothing, tuple(told[:MOST_TOLD]), _leads(compositions))
     unnamed = sum(each.probability for each in told if "unnamed" in each.kinds)
     if len(told) <= MOST_TOLD and unnamed < 0.5:
         return Finding("ambiguous", nothing, tuple(told))

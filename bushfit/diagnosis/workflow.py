@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from bushfit.diagnosis.beam import Asked, Search
+from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.claims import adopted
 from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit_from
+from bushfit.diagnosis.hypotheses import Asked
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.verdict import Told
 from bushfit.diagnosis.words import judged

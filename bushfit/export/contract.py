@@ -1,9 +1,10 @@
 """What every export format is given, and what it gives back."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from bushfit.caveats import warnings_of
 from bushfit.export.systems import UnitSystem
 from bushfit.geometry import Place
 from bushfit.model.arms import Arms
@@ -36,6 +37,11 @@ class Order:
     units: UnitSystem | None = None
     dialect: Dialect = "nastran"
     decimal_comma: bool = False
+
+    def said(self, losses: Iterable[str]) -> list[tuple[str, str]]:
+        """What every format says beside its numbers: what it leaves out, and all warnings."""
+        found = warnings_of(self.result, [prediction.warnings for prediction in self.predictions])
+        return [*(("left out", loss) for loss in losses), *(("warning", line) for line in found)]
 
     @property
     def places(self) -> tuple[Place, ...]:

@@ -28,7 +28,7 @@ def commented(mark: str, lines: Iterable[str]) -> list[str]:
 
 
 def heading(order: Order, units: str, losses: Iterable[str]) -> list[str]:
-    """What every deck says of itself: bushing, model and hash, units, axes, and what it leaves out."""
+    """What every deck says of itself: bushing, model and hash, units, axes, what it leaves out, and warnings."""
     bushing, source = order.result.model.bushing, order.source
     sizes = (bushing.inner_radius, bushing.outer_radius, bushing.length) if bushing else ()
     return [
@@ -39,7 +39,7 @@ def heading(order: Order, units: str, losses: Iterable[str]) -> list[str]:
         f"sha256: {source.sha256}",
         f"units: {units}",
         "axes: z along the bushing (axial 3, torsion 6), x and y across (radial 1, 2)",
-        *(f"left out: {loss}" for loss in losses),
+        *map(": ".join, order.said(losses)),
     ]
 
 

@@ -105,6 +105,7 @@ def model_c(found: InTime) -> str:
 def description(order: Order, found: InTime, name: str, guid: str) -> bytes:
     """modelDescription.xml: what an importer is told."""
     about = f"Rubber bushing, displacement in and force out, of {order.source.file} (SHA-256 {order.source.sha256})"
+    about = "; ".join([about, *map(": ".join, order.said(found.losses))])
     root = ET.Element("fmiModelDescription", {
         "fmiVersion": "2.0", "modelName": _text(order.result.name), "guid": guid, "description": _text(about),
         "generationTool": f"bushfit {__version__}", "variableNamingConvention": "flat", "numberOfEventIndicators": "0",

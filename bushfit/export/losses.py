@@ -5,11 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bushfit.caveats import percent_off
 from bushfit.effects import Level
 from bushfit.effects.contract import Array
 from bushfit.export.contract import Order
 from bushfit.export.levels import DOFS, Table, directions, middle, tables
-from bushfit.prediction import Prediction, percent_off
+from bushfit.prediction import Prediction
 from bushfit.units import number
 
 #: What every law over frequency leaves out.

@@ -103,10 +103,6 @@ class Data:
         noise = self.sweeps[0].noise
         return replace(self, sweeps=with_level_errors(new, noise.level, noise.level_freedom))
 
-    def with_level_errors(self, error: tuple[float, float], freedom: int) -> "Data":
-        """The same data with an error of each level of the sweeps; see `data_sets.with_level_errors`."""
-        return replace(self, sweeps=with_level_errors(self.sweeps, error, freedom))
-
     @property
     def given(self) -> dict[str, float]:
         """Values the campaign gives, to start from or to hold."""

@@ -7,7 +7,7 @@ of `DataSet` and need not know which kind of test it is.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from functools import wraps
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -16,22 +16,6 @@ from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 from bushfit.model.result import Outlier
 from bushfit.reading.measurement import Loop, Source, Sweep
-
-
-class Freedoms(NamedTuple):
-    """Degrees of freedom behind the noise of a rig.
-
-    Args:
-        rig: what tests of one rig have in common; None where nothing is estimated.
-        shared: behind the errors that blocks share; 0 where these are not measured.
-        scatter: behind what scatters from point to point; 0 where it counts as known.
-        level: behind the errors that all runs of a level share; 0 where they count as known.
-    """
-
-    rig: Hashable
-    shared: int
-    scatter: int
-    level: int = 0
 
 
 class DataSet(ABC):
@@ -117,21 +101,6 @@ class DataSet(ABC):
     @abstractmethod
     def relative_noise(self) -> float:
         """Standard deviation of one point, relative to |K| or to half a loop's force range."""
-
-    @property
-    def blocks(self) -> Sequence[Array]:
-        """Indices of the residuals that share an error of the rig, a group each."""
-        return ()
-
-    @property
-    def levels(self) -> Sequence[Array]:
-        """The same of the errors that all runs of a level share, which hold whole blocks each; else none."""
-        return ()
-
-    @property
-    def freedoms(self) -> Freedoms:
-        """How well the noise of the rig is known that the test was made on."""
-        return Freedoms(None, 0, 0)
 
     @abstractmethod
     def residual(self, model: Model, values: Values | None = None) -> Array:
@@ -223,10 +192,6 @@ class DataSet(ABC):
             Per variance, (k, size): the influence times the whitened derivative of the residuals' covariance by that
             variance, times its standard error.
         """
-
-    @abstractmethod
-    def contrasts(self) -> Array:
-        """Whitened residuals of all that is smooth, (c, size): slow in frequency, or low harmonics of a loop."""
 
     @abstractmethod
     def smooth_misfit(self, model: Model) -> float:

@@ -58,6 +58,12 @@ def repeats_of(loops: Sequence[LoopData]) -> Array:
     return np.all(np.abs(at[:, None] - at) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
 
 
+def alike(loops: Sequence[LoopData]) -> list[list[LoopData]]:
+    """Loops in groups that repeat one another; each is in one, that of the first that it repeats."""
+    first = np.argmax(repeats_of(loops), axis=1) if loops else np.empty(0, dtype=int)
+    return [[loops[place] for place in np.flatnonzero(first == lead).tolist()] for lead in np.unique(first).tolist()]
+
+
 def sweep_data(
     sweeps: Sequence[Sweep], residuals: Residuals = "complex", stated: RigSettings = UNSTATED
 ) -> list[SweepData]:

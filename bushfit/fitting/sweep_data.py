@@ -3,15 +3,13 @@
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
-from bushfit.fitting.data_set import DataSet, Freedoms, keep, kept, shown_amplitude
+from bushfit.fitting.data_set import DataSet, keep, kept, shown_amplitude
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import outlying_points, unlike
 from bushfit.fitting.repeats import FLOOR, unit
@@ -118,23 +116,6 @@ class SweepData(DataSet):
     @property
     def relative_noise(self) -> float:
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
-
-    @property
-    def freedoms(self) -> Freedoms:
-        return Freedoms(id(self.noise), self.noise.freedom, self.noise.scatter_freedom, self.noise.level_freedom)
-
-    @property
-    def blocks(self) -> list[Array]:
-        return self._rows_from(self.block_starts)
-
-    @property
-    def levels(self) -> list[Array]:
-        return self._rows_from(self._line_starts) if any(self.noise.level) else []
-
-    def _rows_from(self, starts: Array) -> list[Array]:
-        """Indices of the residuals of stretches of points that begin there, gains, then phases."""
-        count = self.frequency.size
-        return [part + np.arange(first, last) for part in (0, count) for first, last in pairwise([*starts, count])]
 
     def at_amplitudes(self, amplitudes: Sequence[float] | Array) -> Self:
         """The part of the sweep at some of its levels, with the same noise."""
@@ -336,12 +317,6 @@ class SweepData(DataSet):
             line = Line(self.name, self.direction, self.sweep.stepped, frequency, amplitude, mean / counts, noise)
             lines.append(line)
         return lines
-
-    def contrasts(self) -> Array:
-        """Gain and phase of each line as polynomials in the logarithm of its step, as whitened residuals, (c, 2 n)."""
-        lines = np.split(self.step, self._line_starts[1:])
-        columns = block_diag(*(_polynomials(step).T for step in lines))
-        return self.whiten(np.concatenate((columns, 1.0j * columns)))
 
     def smooth_misfit(self, model: Model) -> float:
         return max(float(np.abs(line.smooth).max()) for line in self.lines(model))

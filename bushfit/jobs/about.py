@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from bushfit.caveats import warnings_of
 from bushfit.errors import typed
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, SweepData
@@ -12,8 +13,8 @@ from bushfit.model.result import Result
 
 
 def document_of(result: Result, campaign: Mapping[str, Any]) -> dict[str, Any]:
-    """The JSON document of a result, with the campaign that it comes from."""
-    return {**to_document(result), "campaign": campaign}
+    """The JSON document of a result, with all its warnings, and the campaign that it comes from."""
+    return {**to_document(result), "warnings": warnings_of(result), "campaign": campaign}
 
 
 def about(data: Data, command: str, options: Iterable[str] = ()) -> dict[str, Any]:

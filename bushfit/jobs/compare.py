@@ -10,7 +10,7 @@ from typing import Any
 from bushfit import __version__
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
-from bushfit.caveats import caveats
+from bushfit.caveats import warnings_of
 from bushfit.comparison import Comparison, compare, holm, with_holm
 from bushfit.diagnosis.evidence import result_of
 from bushfit.diagnosis.families import FittedFamily, fit_families, known_families
@@ -90,17 +90,14 @@ class Compared:
     @cached_property
     def warnings(self) -> list[str]:
         """What a user must know, each once, with the labels of those that it holds of."""
+        contrasts = [found.contrasts for found in self.comparisons]
+        predicted = [[pair.reference for pairs in contrasts for pair in pairs]]
+        predicted += [[pair.other for pair in pairs] for pairs in contrasts]
         of_each: dict[str, list[str]] = {}
-        first, *others = self.labels
-        for label, found in zip(others, self.comparisons, strict=True):
-            for contrast in found.contrasts:
-                for who, prediction in ((first, contrast.reference), (label, contrast.other)):
-                    for line in prediction.warnings:
-                        of_each.setdefault(line, []).append(who)
-        for label, entry in zip(self.labels, self.entries, strict=True):
-            for line in (*caveats(entry.result), *(f"of the fit: {line}" for line in entry.result.warnings)):
+        for label, entry, found in zip(self.labels, self.entries, predicted, strict=True):
+            for line in warnings_of(entry.result, [prediction.warnings for prediction in found]):
                 of_each.setdefault(line, []).append(label)
-        told = [f"{', '.join(dict.fromkeys(who))}: {line}" for line, who in of_each.items()]
+        told = [f"{', '.join(who)}: {line}" for line, who in of_each.items()]
         return [*self.notes, *self._shared(), *told]
 
     def _shared(self) -> list[str]:

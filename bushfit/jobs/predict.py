@@ -10,7 +10,7 @@ import pandas as pd
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
-from bushfit.caveats import caveats
+from bushfit.caveats import warnings_of
 from bushfit.effects import Level
 from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
@@ -76,9 +76,9 @@ class Predicted:
 
     @property
     def warnings(self) -> list[str]:
-        """Of the carried model, of each place, its resonance, then of all; each once."""
+        """Of the carried model, of the fit, of each place, its resonance, then of all; each once."""
         of_each = [found.warnings for found in self.predictions] + [found.warnings for found in self.resonances]
-        return list(dict.fromkeys([*self.notes, *(line for lines in of_each for line in lines), *caveats(self.result)]))
+        return warnings_of(self.result, of_each, self.notes)
 
     @cached_property
     def tests(self) -> tuple[Misfit, ...]:

@@ -101,7 +101,8 @@ class Run:
         joint = Fit().run(data)
         diagnosed = Diagnose(joint=joint).run(data) if joint.result.fitted else None
         found = (diagnosed or joint).result
-        return Ran(data, static, two_step, why_not, joint, diagnosed, Predict().run(found, data.campaign))
+        notes = diagnosed.diagnosis.notes if diagnosed else ()
+        return Ran(data, static, two_step, why_not, joint, diagnosed, Predict().run(found, data.campaign, notes))
 
 
 def _two_step(data: Data) -> tuple[TwoStep | None, str]:

@@ -222,5 +222,6 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
     there = [name for name in result.covariance.names if name in model.values]
     fitted = tuple(name for name in result.fitted if name in model.values)
     covariance = result.covariance.restricted(there)
-    carried_there = Result(model, fitted, covariance, None, measured, inputs=result.inputs, specimens=result.specimens)
+    told = tuple(f"{result.name}: {line}" for line in result.warnings)
+    carried_there = Result(model, fitted, covariance, None, measured, told, result.inputs, specimens=result.specimens)
     return replace(carried_there, unresolved=tuple(name for name in result.unresolved if name in kept)), said

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from bushfit.campaign.naming import folder_name
-from bushfit.caveats import caveats, rig_effects
+from bushfit.caveats import rig_effects, warnings_of
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import Level
 from bushfit.fitting.data_sets import LoopData, SweepData
@@ -44,7 +44,7 @@ def prediction_contents(
         curves = predict(result, prediction.direction, *grid)
         rig = predict(result, prediction.direction, *grid, rig=True) if rig_effects(result) else None
         bare = result.model.without(Level.INSTRUMENT)
-        note = ". ".join(text[0].upper() + text[1:] for text in (*notes, *caveats(result), *prediction.warnings))
+        note = ". ".join(text[0].upper() + text[1:] for text in warnings_of(result, [prediction.warnings], notes))
         title = result.name if isinstance(prediction.direction, Direction) else str(prediction.direction)
         return plots.prediction.prediction_figure(
             prediction, measured, title, curves=curves, rig=rig, model=bare, note=note

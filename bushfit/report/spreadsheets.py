@@ -78,6 +78,4 @@ def _said(order: Order) -> Iterator[tuple[str, str]]:
         yield "test", str(source.file)
         yield "test, sha256", source.sha256
     yield "bushfit", __version__
-    yield "left out", NO_LOOPS
-    for line in dict.fromkeys(line for prediction in order.predictions for line in prediction.warnings):
-        yield "warning", line
+    yield from order.said([NO_LOOPS])

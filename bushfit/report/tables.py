@@ -33,6 +33,8 @@ TEXTS = frozenset(
         *("named effects", "cannot be told from", "on a bound", "warnings"),
     )
 )
+#: What stands between the warnings of a bushing in the table of a batch: they hold semicolons.
+BETWEEN = " | "
 #: Units of amplitudes, by SI, as people read them.
 DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
 #: End of the headers, and name of the line, of what holds where an unresolved effect belongs to the rig.

@@ -210,8 +210,11 @@ def _share(measure: str, hits: Sequence[bool], low: float = 0.0, high: float = 1
     share = float(np.mean(hits))
     ends = binomtest(sum(hits), len(hits)).proportion_ci()  # exact, after Clopper and Pearson (1934)
     figure = f"{100 * share:.1f} % ({100 * ends.low:.1f} to {100 * ends.high:.1f})"
-    met = True if low <= ends.low and ends.high <= high else None if low <= share <= high else False
-    return Row(measure, figure, len(hits), target, met if target else None)
+    if low <= ends.low and ends.high <= high:
+        return Row(measure, figure, len(hits), target, True if target else None)
+    both = low > 0.0 and high < 1.0  # where a few that are all right are no miss
+    may_be = ends.low <= high and low <= ends.high if both else low <= share <= high
+    return Row(measure, figure, len(hits), target, None if may_be else False)
 
 
 def confusion(outcomes: Sequence[Outcome]) -> dict[str, Counter[str]]:

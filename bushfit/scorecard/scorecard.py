@@ -140,7 +140,7 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
         task,
         truth,
         diagnosis.verdict,
-        tuple((effect.label, *_names(effect.alternatives)) for effect in diagnosis.effects),
+        tuple(tuple(dict.fromkeys((effect.label, *_names(effect.alternatives)))) for effect in diagnosis.effects),
         max((judged.gain or 0.0 for judged in diagnosis.candidates if not mistake_named(judged.name)), default=0.0),
         heldout["after"],
         tuple(covered),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import json
+import re
 import shutil
 from collections.abc import Callable
 from functools import partial
@@ -52,13 +54,17 @@ def test_files_and_streams(done: Done, found: Path) -> None:
     assert done.stdout == (found / "diagnosis.json").read_text(encoding="utf-8")
     for words in ("case 001: named", "inertia", "95 %", "data fitted", "held out", "where", "next test:", "wrote "):
         assert words in done.stderr
+    assert "all but sure: moving mass between bushing and load cell (inertia)\n" in done.stderr
 
 
 def test_the_document_is_that_of_the_interface(found: Path) -> None:
     document = json.loads((found / "diagnosis.json").read_text())
-    assert document["schema"] == "bushfit/diagnosis/2"
+    assert document["schema"] == "bushfit/diagnosis/3"
     assert {"verdict", "effects", "description", "where", "gap", "usable", "next_test"} <= document.keys()
     assert document["verdict"] == "named"
+    (odds,) = document["odds"]
+    assert 0.0 <= document["nothing"] < 0.01 < 0.97 < odds["probability"] <= 1.0
+    assert (odds["words"], odds["chances"]) == ("moving mass between bushing and load cell (inertia)", "all but sure")
     (effect,) = document["effects"]
     assert {"name", "level", "twins", "alternatives", "replaces", "parameters", "evidence"} <= effect.keys()
     assert (effect["name"], effect["level"], effect["alternatives"]) == ("inertia", "instrument", [])
@@ -73,7 +79,6 @@ def test_the_document_is_that_of_the_interface(found: Path) -> None:
         assert pair["after"] < 1.1 < pair["before"]
     assert "mass" in document["next_test"]
     assert document["description"] is None
-    assert document["gap"]["name_again"] == [7, 7]
     assert {"part", "before", "after", "whitened"} == document["gap"]["parts"][0].keys()
     assert [entry["part"] for entry in document["gap"]["skipped"]] == ["axial direction"]
     usable = document["usable"]
@@ -104,10 +109,11 @@ def test_every_candidate_is_in_the_table(found: Path) -> None:
     levels = table.set_index("effect").level
     assert (levels["sleeve_compliance"], levels["inertia"]) == ("unresolved", "instrument")
     assert table.why.notna().all()
-    assert table.set_index("effect").why["inertia"] == "kept"
+    assert table.set_index("effect").why["inertia"] == "part of the likeliest explanation"
     assert table.score.is_monotonic_decreasing
+    assert table.probability.between(0.0, 1.0).all()
+    assert table.effect[table.probability.idxmax()] == "inertia"
     refitted = table[table["chi-square gain"].notna()]
-    assert refitted["held-out gap [noise]"].notna().all()
     assert refitted.parameters.str.contains("=").all()
 
 
@@ -150,7 +156,29 @@ def test_a_clean_campaign(bushfit: Run, tmp_path: Path) -> None:
     assert run.returncode == 0, run.stderr
     assert run.stdout == ""
     assert "consistent" in run.stderr
-    assert json.loads((tmp_path / "x" / "diagnosis.json").read_text())["effects"] == []
+    assert ": nothing is missing\n" in run.stderr
+    document = json.loads((tmp_path / "x" / "diagnosis.json").read_text())
+    assert (document["effects"], document["odds"]) == ([], [])
+    assert document["nothing"] > 0.15
+
+
+def test_look_alikes_are_told_with_their_odds(root: Path, work: Path, bushfit: Run) -> None:
+    """And the page says what the terminal says."""
+    shutil.copytree(root / "data/practice/case_003", work / "case_003")
+    run = bushfit("diagnose", "case_003/bushing.toml", "-o", "alike", "--no-plots")
+    assert run.returncode == 0, run.stderr
+    document = json.loads((work / "alike/diagnosis.json").read_text())
+    assert document["verdict"] == "ambiguous"
+    shares = [each["probability"] for each in document["odds"]]
+    assert shares == sorted(shares, reverse=True)
+    assert 0.97 <= sum(shares) <= 1.0
+    page = html.unescape((work / "alike/report.html").read_text(encoding="utf-8"))
+    for each in document["odds"]:
+        line = f"{each['chances']}: {each['words']}"
+        assert re.search(r"\d in 10", line)
+        assert f"  {line}\n" in run.stderr
+        assert f"<li>{line}</li>" in page
+    assert f"<b>Next test:</b> {document['next_test']}." in page
 
 
 @pytest.mark.parametrize(

@@ -172,7 +172,7 @@ def written(tests: Path, writer: str, folder: Path) -> list[Path]:
     command, *options = shlex.split(writer)
     if command == "batch":
         (folder / "bushings.csv").write_text(f"campaign\n{tests / 'campaign.toml'}\n", encoding="utf-8")
-        well(folder, "batch", "bushings.csv", "--jobs", "1", "-o", "out", "--no-plots", "--report")
+        well(folder, "batch", "bushings.csv", "--jobs", "1", "-o", "out", "--reports")
     else:
         done = call(folder, command, tests / "campaign.toml", *options, "-o", "out", "--no-plots")
         if done.returncode == 2 and command in ("fit-static", "fit-dynamic"):
@@ -200,7 +200,8 @@ def taken(tests: Path, model: Path, folder: Path, formats: Sequence[str], *, who
     well(folder, "compare", model, tests / "truth.json", model, "-o", "compared", *plain)
     well(folder, "report", model.parent, "-o", "page", *plain)
     if whole:
-        well(folder, "predict", model, "--campaign", tests / "campaign.toml", "--arms", "-o", "predicted", *plain)
+        arms = ["--arms"] if "springpot" in document["effects"] else []
+        well(folder, "predict", model, "--campaign", tests / "campaign.toml", *arms, "-o", "predicted", *plain)
         well(folder, "plan", model, "--hours", "1", "-o", "planned", *plain)
         well(folder, "diagnose", tests / "campaign.toml", "--model", model, "-o", "anew", *plain)
     bushing = document["bushing"] is not None
@@ -232,6 +233,5 @@ def test_every_shape_of_campaign_by_every_command(
     campaign: Callable[[str], Path], tmp_path: Path, shape: str, writer: str
 ) -> None:
     tests = campaign(shape)
-    models = written(tests, writer, tmp_path)
-    for model in models:
-        taken(tests, model, tmp_path, FORMATS, whole=model == models[-1])
+    for model in written(tests, writer, tmp_path):
+        taken(tests, model, tmp_path, FORMATS, whole=model.stem == WRITERS[writer])

@@ -69,7 +69,7 @@ def test_json_is_utf8_in_any_code_page_and_no_text_steers_the_terminal(folder: P
     assert json.loads(done.stdout.decode("utf-8"))["truth"]["bushing"]["name"] == "衬套"
     done = subprocess.run([*BUSHFIT, *PREDICT[:2], "-o", "y", "--no-plots"], capture_output=True, check=False)
     assert done.returncode == 0
-    assert b"warning: of the fit: \\x1b[2J\\x9b2J\\u202ecleared" in done.stderr
+    assert b"warning: \\x1b[2J\\x9b2J\\u202ecleared" in done.stderr
     assert not any(sign in done.stderr.decode() for sign in "\x1b\x9b\u202e")
 
 

@@ -20,7 +20,8 @@ TWO = {"delay": {"tau": 1e-4}, "strain_stiffening": {"c3": 20.0}}
 
 def asked(campaign: Campaign, model: Model | None = None, **settings: object) -> Diagnosis:
     diagnosis = diagnose(Data.of(campaign), model, Settings(**settings))  # type: ignore[arg-type]
-    print(said(diagnosis), "|", diagnosis.summary, "|", "; ".join(diagnosis.notes))
+    odds = ", ".join(f"{words} {share:.3f}" for words, share in diagnosis.odds.told)
+    print(f"{said(diagnosis)} | {diagnosis.summary} | nothing {diagnosis.odds.nothing:.3g}; {odds}", *diagnosis.notes)
     return diagnosis
 
 

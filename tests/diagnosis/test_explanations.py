@@ -90,13 +90,13 @@ def test_the_place_that_went_wrong_is_the_likeliest(
 
 
 def test_a_place_touches_its_own_rows_alone(bare: Evidence) -> None:
-    (level,) = [each for each in places(bare) if each.name == "the axial level 0.2 mm"]
+    (columns,) = [each.columns for each in places(bare) if each.name == "the axial level 0.2 mm"]
     sweep = parted(bare.data_sets)[1][0]
     touched = np.tile(sweep.amplitude == LEVELS[1], 2)
-    rows = level.columns[:, bare.place[sweep]]
-    assert level.columns.shape[0] == 4  # gain and phase, each with a slope
+    rows = columns[:, bare.place[sweep]]
+    assert columns.shape[0] == 4  # gain and phase, each with a slope
     assert np.array_equal(np.any(rows != 0.0, axis=0), touched)
-    assert np.count_nonzero(level.columns) == np.count_nonzero(rows)
+    assert np.count_nonzero(columns) == np.count_nonzero(rows)
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,8 @@ def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) ->
     same = np.flatnonzero((sweep.amplitude == LEVELS[1]) & (sweep.repeat == 1))
     distance = np.log(sweep.frequency[same, None] / sweep.frequency[same])
     for how, length, short in (("smooth", 1.5, 0.02), ("rough", 0.5, 0.6)):
-        group = made[f"{how} axial"]
+        group = made[f"{how} axial"].group
+        assert group is not None
         own = group.columns[:, bare.place[sweep]].reshape(len(group.columns), 2, -1)[:, 0] / point
         off = np.exp(-0.5 * (distance / length) ** 2) - (own.T @ own)[np.ix_(same, same)]
         assert np.linalg.eigvalsh(off).min() > -0.01

@@ -1,4 +1,4 @@
-"""Held-out gaps are those of a real refit without the part, and a name that only memorises is taken back."""
+"""Held-out gaps are those of a real refit without the part."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from rigged import SHARED, Fitted, Measured
 
 from bushfit.diagnosis.evidence import fit
-from bushfit.diagnosis.holdout import HeldOut, HoldOut, hold_out, parts
+from bushfit.diagnosis.holdout import hold_out, parts
 from bushfit.fitting.solve import residual
 
 INERTIA = {"inertia": {"mass": 0.06}}
@@ -27,7 +27,6 @@ def test_parts_and_gaps(measured: Measured, fitted: Fitted) -> None:
         *(f"loop loop_axial_{n}" for n in (1, 2)),
     ]
     assert [skipped.part for skipped in found.skipped] == ["axial direction"]
-    assert found.passed
     assert found.before is not None
     assert found.after is not None
     assert found.after < 1.1 < 1.5 < found.before
@@ -67,20 +66,3 @@ def test_nothing_to_hold_out_is_nothing_tested(measured: Measured, fitted: Fitte
     found = hold_out(evidence, evidence, {})
     assert found.parts == ()
     assert found.before is found.after is None
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "each", "passed"),
-    [
-        (5.0, 1.1, [(5.0, 1.1)], True),
-        (5.0, 2.4, [(5.0, 2.4)], True),
-        (5.0, 2.6, [(5.0, 2.6)], False),
-        (1.5, 1.15, [(1.2, 1.3), (2.0, 1.0)], True),
-        (1.5, 1.15, [(1.2, 1.35), (2.0, 1.0)], False),
-    ],
-)
-def test_the_rule(before: float, after: float, each: list[tuple[float, float]], passed: bool) -> None:
-    """To at most 1.2 of the floor or less than half; no part more than 10 % worse: what is shown does not decide."""
-    held = tuple(HeldOut("", 9.0, 9.0, pair) for pair in each)
-    found = HoldOut(held, (), 9.0, 9.0, (before, after))
-    assert found.passed is passed

@@ -88,20 +88,6 @@ def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth: str, measure
     assert [line for line in mended.result.warnings if line.startswith("mended by --adopt ")]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("share", [0.98, 1.02])
-def test_a_mistake_has_to_gain_more_than_chance_makes_of_the_best_effect(
-    measured: Measured, monkeypatch: pytest.MonkeyPatch, share: float
-) -> None:
-    """One such claim came near the tests by chance where their gap was of another kind."""
-    campaign = MADE[AXIAL](measured(None, SHARED))
-    named = asked(campaign)
-    before, after = (evidence.chi_square for evidence in (named.before, named.after))
-    monkeypatch.setattr("bushfit.diagnosis.mistakes.critical_gain", lambda *_, **__: share * (before - after))
-    diagnosis = asked(campaign)
-    assert (AXIAL in [effect.label for effect in diagnosis.effects]) == (share < 1.0)
-
-
 def test_a_mistake_is_named_where_no_effect_may_be(measured: Measured) -> None:
     """There is no best effect then, of which chance could make something."""
     campaign = MADE[AXIAL](measured(None, SHARED))
@@ -122,17 +108,6 @@ def test_what_cannot_be_told_apart_is_ambiguous(measured: Measured) -> None:
         "twice_in_newton:sweep_axial + twice_in_newton:sweep_radial",
     }
     assert diagnosis.after is diagnosis.before
-
-
-def test_the_effect_of_which_a_mistake_is_one_value_is_said_with_it(measured: Measured) -> None:
-    """A clock at a tenth of its rate is a mistake that people make, and one value of loop_clock."""
-    truth = "ten_times_slower:loop_axial_1 ten_times_slower:loop_axial_2"
-    diagnosis = asked(MADE[truth](measured(None, SHARED)))
-    assert [(effect.label, effect.richer) for effect in diagnosis.effects] == [
-        (name, ("loop_clock",)) for name in truth.split()
-    ]
-    one = asked(on_loops(lambda x: replace(x, time=x.time / 10), 1)(measured(None, SHARED)))
-    assert [(effect.label, effect.richer) for effect in one.effects] == [("ten_times_slower:loop_axial_2", ())]
 
 
 def test_mended_repeats_still_share_the_error_of_their_gain(measured: Measured) -> None:

@@ -9,25 +9,26 @@ from typing import Any
 
 import pytest
 
-from bushfit.diagnosis.beam import Hypothesis
 from bushfit.diagnosis.explanations import Explanation
+from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.words import Finding, judged
 from bushfit.effects.mistakes import MISTAKES
 
 TOLERANCE = 0.01
 
 
-def one(parts: str, odds: float, *, size: float = 0.05, chance: float = 0.5) -> Hypothesis:
+def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, chance: float = 0.5) -> Hypothesis:
     """Of parts joined by +: effects, "unnamed", "levels", places as "kind:name", a mistake by its name; "" of none."""
     names = parts.split("+") if parts else []
-    places = tuple(Explanation("place", *name.split(":"), None) for name in names if ":" in name)
+    spots = [name.split(":") for name in names if ":" in name]
+    places: Any = tuple(Explanation("place", family, name, None) for family, name in spots)
     claims: list[Any] = [SimpleNamespace(mistake=MISTAKES[name], tests=(0,)) for name in names if name in MISTAKES]
     others = {"unnamed", "levels", *MISTAKES}
     effects = tuple(name for name in names if ":" not in name and name not in others)
     weighed: Any = SimpleNamespace(state=SimpleNamespace(effects=effects), first=SimpleNamespace(chance=chance))
     claim, curve = claims[0] if claims else None, "smooth all" if "unnamed" in names else ""
     size = size if names else 0.0
-    return Hypothesis(effects, claim, places, curve, "levels" in names, log(odds), size, weighed)
+    return Hypothesis(effects, claim, places, curve, "levels" in names, log(odds), size, last, weighed)
 
 
 def of(**odds: float) -> Finding:
@@ -85,14 +86,12 @@ def test_of_more_than_can_be_told_it_is_described_by_what_nearly_all_have_in_com
     assert of(**dict.fromkeys(others, 1.0)).leads == ()
 
 
-@pytest.mark.parametrize(("alone", "verdict"), [(-8.0, "partly"), (-15.0, "described")])
-def test_names_stand_beside_what_has_none_where_they_bring_most(alone: float, verdict: str) -> None:
-    """In ln evidence, of what both bring over nothing."""
-    logs = {"inertia+unnamed": 0.0, "inertia": alone, "": -100.0}
-    finding = judged([replace(one(parts, 1.0), log_posterior=each) for parts, each in logs.items()], TOLERANCE)
+@pytest.mark.parametrize(("last", "verdict"), [(0.002, "partly"), (0.02, "described")])
+def test_names_stand_beside_what_has_none_where_they_change_most(last: float, verdict: str) -> None:
+    finding = judged([one("inertia+unnamed", 0.99, size=0.05, last=last), one("inertia", 0.01)], TOLERANCE)
     assert finding.verdict == verdict
     assert finding.leads == (("inertia",) if verdict == "described" else ())
-    assert told(finding) == {"inertia+unnamed": 1.0}
+    assert told(finding) == {"inertia+unnamed": 0.99}
 
 
 @pytest.mark.parametrize("more", [(), ("inertia+delay",)])

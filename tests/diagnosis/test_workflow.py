@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from asking import (
     INERTIA,
-    SLIP,
     TWO,
     asked,
     missing_points,
-    names,
     no_loops,
     no_repeats,
     no_sweeps,
@@ -25,19 +22,16 @@ from asking import (
     one_loop,
     said,
 )
-from bushfit.diagnosis.search import Search
 from rigged import PLAN, SHARED, Diagnosed, Measured, changed
 from tries import some
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulateSettings
 from bushfit.diagnosis.record import Settings
-from bushfit.diagnosis.verdict import Remainder
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
 from bushfit.errors import BushfitError
 from bushfit.fitting.data import Data
-from bushfit.fitting.levels import LevelErrors
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
@@ -46,7 +40,7 @@ from bushfit.simulation.undisturbed import undisturbed
 
 
 @pytest.mark.parametrize("plan", [PLAN, SHARED], ids=["independent", "shared"])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3))])
 def test_a_clean_campaign_is_consistent_and_its_model_stays(
     diagnosed: Diagnosed, measured: Measured, plan: SimulateSettings, seed: int
 ) -> None:
@@ -83,7 +77,7 @@ def test_a_radial_stiffness_off_the_formula_is_not_blamed_on_the_rig(
     print(said(diagnosis))
     (found,) = diagnosis.effects
     alike = {found.name, *found.alternatives}
-    assert "stiffness_factor.radial" in alike
+    assert any("stiffness_factor.radial" in name.split(" + ") for name in alike)
     if diagnosis.verdict == "ambiguous":
         # a displacement gain is a near twin; where 2 % are off, so is what gives way
         assert ratio > 0.96 or alike == {"stiffness_factor.radial", "displacement_gain.radial"}
@@ -92,24 +86,6 @@ def test_a_radial_stiffness_off_the_formula_is_not_blamed_on_the_rig(
     low, high = diagnosis.result.interval("stiffness_factor.radial") or (0.0, 0.0)
     print(f"{shape}: finite elements {ratio:.4f}, found {low:.4f} to {high:.4f}")
     assert low - 0.003 < ratio < high + 0.003
-
-
-@pytest.mark.parametrize("truth", [INERTIA, SLIP, TWO], ids=lambda truth: "+".join(truth))
-def test_what_is_there_is_named_and_its_model_is_then_consistent(
-    diagnosed: Diagnosed, measured: Measured, truth: dict[str, dict[str, float]]
-) -> None:
-    first = diagnosed(truth, SHARED)
-    assert first.verdict == "named"
-    assert names(first) == set(truth)
-    assert first.result.model.effects[:3] == BASE
-    assert first.calibration[1] < 1.1 < 1.3 < first.calibration[0]
-    assert first.holdout.after is not None
-    assert first.holdout.after < 1.1
-    again = asked(measured(truth, SHARED), first.result.model)
-    assert again.verdict == "consistent"
-    assert again.result.model.effects == first.result.model.effects
-    for name, value in first.result.model.values.items():
-        assert again.result.model.values[name] == pytest.approx(value, rel=2e-3)
 
 
 def test_a_branch_of_the_paper_that_a_model_lacks_is_named(measured: Measured) -> None:
@@ -147,37 +123,6 @@ def test_with_less_no_bolder_name(measured: Measured, part: Callable[..., Campai
 
 def held(campaign: Campaign, **settings: ParameterSetting) -> Campaign:
     return replace(campaign, fit=FitSettings(parameters=settings))
-
-
-@pytest.mark.parametrize("remainder", [Remainder("a real gap stays", None), None], ids=["real", "chance"])
-def test_effects_of_a_model_that_is_far_off_are_not_exchanged(
-    measured: Measured, monkeypatch: pytest.MonkeyPatch, exchanged: list[Sequence[str]], remainder: Remainder | None
-) -> None:
-    """One of two effects may be added, and 8 % are left: whether that is more than chance decides."""
-    monkeypatch.setattr("bushfit.diagnosis.verdict.leads", lambda _: "")  # which search on their own
-    monkeypatch.setattr("bushfit.diagnosis.workflow.find_remainder", lambda *_: remainder)
-    diagnosis = asked(measured(TWO, SHARED), max_effects=1)
-    assert bool(exchanged) == (remainder is None)
-    assert diagnosis.verdict in ("unexplained", "described", "partly")
-
-
-@pytest.mark.parametrize("searches", [1, 2])
-def test_errors_of_levels_that_matter_start_the_search_once_more(
-    measured: Measured, monkeypatch: pytest.MonkeyPatch, searches: int
-) -> None:
-    errors = LevelErrors((2e-3, 2e-3), 10, 50.0, matters=True)
-    begun = list[object]()
-    begin = Search.begin
-
-    def counted(*args: Any, **options: Any) -> Search:
-        begun.append(args)
-        return begin(*args, **options)
-
-    monkeypatch.setattr(Search, "begin", counted)
-    monkeypatch.setattr("bushfit.diagnosis.workflow._errors_beside", lambda *_: errors if searches > 1 else None)
-    diagnosis = asked(measured(INERTIA, SHARED))
-    assert len(begun) == searches
-    assert any("of each level" in note for note in diagnosis.notes) == (searches > 1)
 
 
 def test_held_parameters_stay(measured: Measured) -> None:

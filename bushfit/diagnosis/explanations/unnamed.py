@@ -9,7 +9,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import Explanation
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import nodes_among
-from bushfit.fitting.data_sets import SweepData, parted
+from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted
 
 #: Lengths in ln frequency and ln strain over which a curve changes: smooth, and rough.
 _LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
@@ -24,12 +24,19 @@ def unnamed(evidence: Evidence) -> list[Explanation]:
     loops, sweeps = parted(evidence.data_sets)
     found = [(f"{how} {where}", columns) for how in _LENGTHS for where, columns in _processes(evidence, sweeps, how)]
     if loops:
-        own = [evidence.embedded(column, loop) for loop in loops for column in loop.contrasts()]
-        found.append(("loops", np.array(own)))
+        found.append(("loops", np.concatenate([_harmonics(evidence, group) for group in alike(loops)])))
     return [
         Explanation("unnamed", "unnamed", name, Group(columns, np.ones(len(columns)), together=True))
         for name, columns in found
     ]
+
+
+def _harmonics(evidence: Evidence, loops: Sequence[LoopData]) -> Array:
+    """What the harmonics of loops that repeat one another share, (c, n)."""
+    columns = np.zeros((len(loops[0].contrasts()), evidence.residual.size))
+    for loop in loops:
+        columns[:, evidence.place[loop]] = loop.contrasts()
+    return columns
 
 
 def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Iterator[tuple[str, Array]]:

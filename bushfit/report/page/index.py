@@ -18,6 +18,7 @@ from bushfit.report.contents import Contents, Documents, Tables
 from bushfit.report.page import rendered
 from bushfit.report.page.chart import LIMIT, Rule, Series, chart
 from bushfit.report.page.readback import canonical, read_table
+from bushfit.report.tables import BETWEEN
 from bushfit.units import for_people, number
 from bushfit.validation import Number, WholeNumber, check_tables
 
@@ -36,7 +37,8 @@ _FEWEST = 3
 #: How the rows are ordered: what needs a look first.
 _ORDER = ("failed", "fail", "conditional fail", "conditional pass")
 #: Columns of words, and those that end a row as remarks.
-_WORDS, _REMARKS = ("status", "limits", "verdict", "named effects"), ("out of limits", "on the edge", "on a bound")
+_WORDS = ("status", "limits", "verdict", "named effects")
+_REMARKS = ("out of limits", "on the edge", "on a bound", "warnings")
 #: What lies further from the median than this, in standard deviations of the batch, is drawn at the edge of a chart.
 _FURTHEST = 12.0
 #: Limits are told by these words, and coloured so.
@@ -83,7 +85,7 @@ def read_batch(folder: Path, base: str = "", rows: Path | None = None) -> Conten
     require_schema(document, file, "a batch", SCHEMA, hint="run the batch again with --resume")
     check_tables(document, file, Batch, kind=ModelError)
     table = read_table(folder, "batch")
-    if table is None or not {"name", "status", "folder"} <= set(table):
+    if table is None or not {"name", "status", "folder", "warnings"} <= set(table):
         raise ModelError(
             "the table of the batch is missing", file=folder / "batch.csv", hint="run the batch again with --resume"
         )
@@ -108,6 +110,10 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
     shown = [name for name in _WORDS if name in table and any(table[name])]
     rows = _ordered(table)
     most = max(1, _MOST_CELLS // (len(shown) + len(quantities) + 1))
+    warned = [cell.split(BETWEEN) if cell else [] for cell in table["warnings"]]
+    footnotes = list(dict.fromkeys(line for at in rows[:most] for line in warned[at]))
+    for at in rows[:most]:
+        table.loc[at, "warnings"] = ", ".join(str(footnotes.index(line) + 1) for line in warned[at])
     charts = sorted(quantities, key=lambda header: all(end is None for end in quantities[header].allowed))
     charts = [header for header in charts if np.isfinite(table[header]).sum() >= _FEWEST]
     return rendered(
@@ -120,6 +126,7 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
             "left_charts": max(0, len(charts) - _MOST_CHARTS),
             "heads": [*shown, *(_for_people(header, each)[0] for header, each in quantities.items())],
             "remarked": any(any(table[name]) for name in _REMARKS if name in table),
+            "footnotes": footnotes,
             "texts": len(shown),
             "rows": [_row(table.iloc[at], shown, quantities, reported, base) for at in rows[:most]],
             "left_rows": max(0, len(rows) - most),

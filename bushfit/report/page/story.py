@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from bushfit.caveats import of_points, warnings_of
 from bushfit.diagnosis.document import BeforeAfter, EffectEntry
 from bushfit.diagnosis.record import odds_in_words
 from bushfit.geometry import Bushing, Place, Specimen
@@ -16,7 +17,7 @@ from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, t
 from bushfit.report.page.gathered import places_of
 from bushfit.report.page.readback import Checked
 from bushfit.report.parameters import interval_kind, parameter_rows
-from bushfit.report.tables import DISPLAYS, columns_of, complete, spread
+from bushfit.report.tables import DISPLAYS, IF_RIGS, columns_of, complete, numbers, spread
 from bushfit.units import alike, for_people, number, told
 
 #: How a verdict is coloured: nothing to do, something to know, something to do.
@@ -33,11 +34,9 @@ _CONDITIONS = {
 _CLOSE = 0.9
 #: Frequencies and amplitudes of a place whose predicted values are tabled.
 _FREQUENCIES, _AMPLITUDES = 3, 2
-#: Letters from which on two warnings, of the fit and of the diagnosis, say the same with other figures.
-_SAME_LETTERS = 40
 #: Rows of predicted values of all places together.
 _ROWS = 12
-#: Warnings, regions, and tests that a page lists at most: the documents have all.
+#: Regions and tests that a page lists at most: the documents have all.
 MOST = 12
 
 
@@ -45,8 +44,6 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
     """All that the template of a report asks for."""
     result, diagnosis, about = found.result, found.diagnosis, found.about
     tests = about.tests if about else ()
-    said = (*result.warnings, *(diagnosis["warnings"] if diagnosis else ()))
-    warnings = list({line[:_SAME_LETTERS]: line for line in reversed(said)}.values())[::-1]
     return {
         "name": about.name if about else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
@@ -74,14 +71,23 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
         "gap": gap_panels(result, tables, tests),
         "gaps": (gaps := _gaps(found)),
         "added": any(before != after for _, before, after in gaps if after),
-        "warnings": warnings[:MOST],
-        "more_warnings": max(0, len(warnings) - MOST),
-        "unresolved": result.unresolved,
+        "warnings": warnings_of(result, _of_tables(result, tables), diagnosis["warnings"] if diagnosis else ()),
         "outliers": len(result.outliers),
         "about": about,
         "files": _files(found),
         "versions": found.versions,
     }
+
+
+def _of_tables(result: Result, tables: Tables) -> Iterator[Iterator[str]]:
+    """The warnings of what is predicted in the table of each place."""
+    for name, place in places_of(result, tables).items():
+        (amplitude, stiffness, _), ((_, length), _, (_, unit)) = columns_of(place), place.display
+        headers = "frequency [Hz]", amplitude, stiffness
+        if name in tables and len(table := complete(tables[name], *headers)):
+            others = (f"{stiffness}, {IF_RIGS}", f"measured {stiffness}")
+            rigs, measured = (numbers(table, each)[0] / unit if each in table else None for each in others)
+            yield of_points(result, place, numbers(table, *headers) / [[1.0], [length], [unit]], rigs, measured, None)
 
 
 def _bodies(result: Result) -> Iterator[tuple[str, str]]:

@@ -98,6 +98,7 @@ def test_what_it_says_is_what_the_documents_say(results: Results) -> None:
         *("Mystery mount", "inner diameter 24 mm, outer diameter 48 mm, length 50 mm", "Verdict: named"),
         *(diagnosis["summary"], diagnosis["next_test"], "rig_compliance"),
         "sleeve_compliance.compliance = 0.01398 mm/kN",
+        "all but sure: a sleeve flexes in series with the rubber (sleeve_compliance)",
         *("0.77928", "0.77858 to 0.77997", "1.2 %", "bushfit run mystery_mount.toml"),
         *(where["reading"] for where in diagnosis["where"]),
         *(source["sha256"] for source in model["provenance"]["inputs"]),
@@ -260,7 +261,7 @@ FOREIGN = {
         (lambda folder: change(folder / "model.json", campaign={"name": 3}), ("model.json, campaign.",)),
         (
             lambda folder: change(folder / "diagnosis.json", schema="bushfit/diagnosis/1"),
-            ("diagnosis.json, schema", "bushfit/diagnosis/2"),
+            ("diagnosis.json, schema", "bushfit/diagnosis/3 or bushfit/diagnosis/2"),
         ),
         (lambda folder: change(folder / "diagnosis.json", gap=7), ("diagnosis.json, gap", "a table")),
         (
@@ -334,6 +335,21 @@ def test_results_of_older_versions_have_a_page(root: Path, tmp_path: Path) -> No
     assert "axial: stiffness" in text
     (folder / "sweeps.csv").unlink()
     assert "Lines" not in parsed(pages_of(read_results(folder))["report.html"].decode()).text
+
+
+def test_a_diagnosis_of_an_older_version_has_a_page_and_is_compared(root: Path, tmp_path: Path) -> None:
+    """diagnosis_2.json was written before there were probabilities."""
+    folder = tmp_path / "x"
+    shutil.copytree(root / "data/reports/mystery_mount", folder)
+    shutil.copy(Path(__file__).with_name("diagnosis_2.json"), folder / "diagnosis.json")
+    done = call(tmp_path, "report", "x")
+    assert done.returncode == 0, done.stderr
+    text = parsed(page_of(folder)).text
+    for words in ("Verdict: named", "sleeve_compliance closes the gap", "Told without odds", "put a steel dummy"):
+        assert words in text
+    assert "all but sure" not in text
+    done = call(tmp_path, "compare", "x", root / "data/reports/mystery_mount", "-o", "y", "--no-plots")
+    assert done.returncode == 0, done.stderr
 
 
 def test_the_command(root: Path, tmp_path: Path) -> None:

@@ -1,0 +1,75 @@
+"""Effects that were refitted, counted by Laplace's method: what the prior of their own coordinates costs."""
+
+from math import log
+
+import numpy as np
+from scipy.special import logsumexp
+
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.priors import LARGEST, SIZES
+from bushfit.diagnosis.propose import probes
+from bushfit.effects import effect_named, qualified
+
+#: Sizes over which the prior of an amount is averaged, and the least relative error that they resolve.
+_FINE, _SHARPEST = 1000, 0.01
+
+
+def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dict[str, float], float]:
+    """Of an effect that was refitted: ln of the prior density of its own coordinates with the factor of Laplace's
+    method, their precision, and what it changes, relative to |K|.
+
+    What an amount changes is log-uniform from the least size on. A shape is uniform over what the tests
+    could show; at rest on an end of that it moves no further, and the fall of the likelihood away from the end tells
+    how much of it counts. Of an effect in place of a branch each parameter beyond the branch's two is uniform over a
+    factor of 20.
+    """
+    effect, names = effect_named(name), evidence.solution.coordinates.names
+    data_sets, model = evidence.data_sets, evidence.model
+    other = model.without(name) if effect.replaces is None else before.model
+    size = max(each.change(model, other) for each in data_sets)
+    density, precision, count = 0.0, {}, 0
+    jacobian = evidence.solution.jacobian
+    variances = np.diag(np.linalg.pinv(jacobian @ jacobian.T, rcond=1e-12, hermitian=True))
+    if effect.replaces is not None:
+        count = max(len(effect.parameters) - 2, 0)
+        own = {qualified(effect, parameter): 0.5 for parameter in effect.parameters}
+        return count * (0.5 * log(2.0 * np.pi) - log(3.0)), own, size
+    for parameter in effect.parameters:
+        coordinate = qualified(effect, parameter)
+        if coordinate not in names:
+            continue
+        count += 1
+        if parameter is effect.amount:
+            amount = max(abs(model.values[coordinate] - (parameter.neutral or 0.0)) / parameter.typical, 1e-12)
+            precision[coordinate] = 0.25 if parameter.log else 0.25 / amount**2
+            error = (1.0 if parameter.log else 1.0 / amount) * np.sqrt(variances[names.index(coordinate)])
+            density += _of_amount(size, float(error)) - (0.0 if parameter.log else log(amount))
+            density -= 0.0 if parameter.neutral == parameter.bounds[0] else log(2.0)
+            continue
+        tried = probes(data_sets, model, parameter)
+        if parameter.log:
+            wide = max(log(tried.max() / max(tried.min(), 1e-30)), 1.0)
+        else:
+            wide = max(float(np.ptp(tried)) / parameter.typical, 1.0)
+        density -= log(wide)
+        if coordinate in evidence.solution.at_bound:
+            count -= 1
+            pull = abs(float(evidence.solution.jacobian[names.index(coordinate)] @ evidence.residual))
+            density += log(min(wide, 1.0 / max(pull, 1e-12)))
+            precision[coordinate] = np.inf
+        else:
+            precision[coordinate] = 12.0 / wide**2
+    return density + 0.5 * count * log(2.0 * np.pi), precision, size
+
+
+def _of_amount(size: float, error: float) -> float:
+    """Logarithm of the mean prior density of an amount, per relative change, over its likelihood.
+
+    Args:
+        size: of what it changes as fitted, relative to |K|.
+        error: standard error of the amount, relative to it.
+    """
+    times = np.geomspace(SIZES[0], LARGEST, _FINE) / max(size, 1e-12)
+    error = max(error, _SHARPEST)
+    exponent = -0.5 * np.square((times - 1.0) / error)
+    return float(logsumexp(exponent)) - log(_FINE) - 0.5 * log(2.0 * np.pi) - log(error)

@@ -1,0 +1,153 @@
+"""The search weighs sets of explanations: what is there is the likeliest, alone, beside others, and in every order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from asking import INERTIA, SLIP, TWO, asked, names, said
+from rigged import LEVELS, SHARED, Diagnosed, Effects, Measured, changed
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.effects import BASE
+
+Tamper = Callable[[Campaign], Campaign]
+
+
+def level_too_stiff(campaign: Campaign) -> Campaign:
+    return changed(campaign, 0, np.where(campaign.sweeps[0].amplitude == LEVELS[1], 1.05, 1.0))
+
+
+def at_75_hz(campaign: Campaign) -> Campaign:
+    return changed(campaign, 1, np.where(campaign.sweeps[1].frequency == 75.0, 1.0 + 0.05j, 1.0))
+
+
+def repeat_off(campaign: Campaign) -> Campaign:
+    sweep = campaign.sweeps[0]
+    return changed(campaign, 0, np.where((sweep.amplitude == LEVELS[1]) & (sweep.repeat == 2), 1.1, 1.0))
+
+
+def loop_too_strong(campaign: Campaign) -> Campaign:
+    first, second = campaign.loops
+    return replace(campaign, loops=(first, replace(second, force=1.06 * second.force)))
+
+
+@pytest.mark.parametrize("truth", [INERTIA, SLIP, TWO], ids=lambda truth: "+".join(truth))
+def test_what_is_there_is_all_but_sure(diagnosed: Diagnosed, truth: Effects) -> None:
+    """A mass is no fixture resonance far above, which fits as well and says more; slip is no fault of one level."""
+    diagnosis = diagnosed(truth, SHARED)
+    assert diagnosis.verdict == "named"
+    assert names(diagnosis) == set(truth)
+    assert diagnosis.odds.nothing < 1e-6
+    (first, share), *_ = diagnosis.odds.told
+    assert set(first.split(" + ")) == set(truth)
+    assert share > 0.97
+    assert diagnosis.result.model.effects[:3] == BASE
+    assert diagnosis.calibration[1] < 1.1 < 1.3 < diagnosis.calibration[0]
+
+
+def test_a_model_that_was_found_is_then_consistent(measured: Measured, diagnosed: Diagnosed) -> None:
+    found = diagnosed(TWO, SHARED).result.model
+    again = asked(measured(TWO, SHARED), found)
+    assert (again.verdict, again.result.model.effects) == ("consistent", found.effects)
+    for name, value in found.values.items():
+        assert again.result.model.values[name] == pytest.approx(value, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("tamper", "place"),
+    [
+        (level_too_stiff, "the axial level 0.2 mm"),
+        (at_75_hz, "75 Hz in radial, at every amplitude"),
+        (repeat_off, "repeat 2 of the axial level 0.2 mm"),
+        (loop_too_strong, "the loop loop_axial_2"),
+    ],
+    ids=["level", "frequency", "repeat", "loop"],
+)
+def test_what_one_place_alone_shows_is_to_be_measured_again(measured: Measured, tamper: Tamper, place: str) -> None:
+    """However far the levels' own errors could stretch."""
+    diagnosis = asked(tamper(measured(plan=SHARED)))
+    assert said(diagnosis) == "unexplained "
+    assert diagnosis.after is diagnosis.before
+    assert place in diagnosis.summary
+    assert place in diagnosis.where[0].reading
+    assert diagnosis.next_test == f"measure again: {place}"
+    assert diagnosis.odds.told[0][0] == f"fault: {place}"
+
+
+def test_a_fault_beside_an_effect_leaves_the_name(measured: Measured) -> None:
+    diagnosis = asked(level_too_stiff(measured(INERTIA, SHARED)))
+    assert said(diagnosis) == "partly inertia"
+    assert "the axial level 0.2 mm" in diagnosis.summary
+    assert diagnosis.result.model.values["inertia.mass"] == pytest.approx(0.06, rel=0.1)
+
+
+def test_errors_of_every_level_within_the_class_are_nothing(measured: Measured) -> None:
+    campaign, random = measured(plan=SHARED), np.random.default_rng(3)
+    for number, sweep in enumerate(campaign.sweeps):
+        levels, place = np.unique(sweep.amplitude, return_inverse=True)
+        campaign = changed(campaign, number, (1.0 + 0.005 * random.standard_normal(levels.size))[place])
+    assert asked(campaign).verdict == "consistent"
+
+
+@pytest.mark.parametrize("off", [1.04, pytest.param(1.15, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("effects", [{}, SLIP], ids=["clean", "slip"])
+def test_a_wild_row_is_a_warning(measured: Measured, effects: Effects, off: float) -> None:
+    """One row of 288 is left out and named by its number; it neither makes a gap nor hides one."""
+    campaign = measured(effects, SHARED)
+    sweep = campaign.sweeps[0]
+    row = (sweep.amplitude == LEVELS[1]) & (sweep.repeat == 2) & (sweep.frequency == 65.0)
+    diagnosis = asked(changed(campaign, 0, np.where(row, off, 1.0)))
+    assert names(diagnosis) == set(effects)
+    swept = [(entry.test, entry.row) for entry in diagnosis.result.outliers if entry.test == "sweep_axial"]
+    assert swept == [("sweep_axial", int(np.flatnonzero(row)[0]) + 1)]
+
+
+def test_every_candidate_is_judged(diagnosed: Diagnosed) -> None:
+    """By its share in all that is probable."""
+    candidates = diagnosed(INERTIA, SHARED).candidates
+    assert all(judged.why for judged in candidates)
+    assert max(candidates, key=lambda judged: judged.probability).name == "inertia"
+    assert [judged.score for judged in candidates] == sorted((judged.score for judged in candidates), reverse=True)
+    refitted = {judged.name: judged for judged in candidates if judged.gain is not None}
+    assert all(judged.parameters for judged in refitted.values())
+    assert (refitted["inertia"].gain or 0.0) > 200.0
+
+
+def test_what_is_adopted_or_left_out_is_no_candidate(measured: Measured) -> None:
+    campaign = measured(INERTIA, SHARED)
+    adopted, without = asked(campaign, adopt=("inertia",)), asked(campaign, without=("inertia",))
+    assert (adopted.verdict, adopted.result.model.effects) == ("consistent", (*BASE, "inertia"))
+    assert without.verdict != "consistent"
+    for each in (adopted, without):
+        assert "inertia" not in {judged.name for judged in each.candidates} | names(each)
+
+
+@pytest.mark.slow
+def test_limits_of_what_is_added_and_of_what_counts(measured: Measured) -> None:
+    none = asked(measured(INERTIA, SHARED), max_effects=0)
+    assert (none.verdict, none.effects, none.after is none.before) == ("unexplained", (), True)
+    assert none.where
+    within = asked(measured(INERTIA, SHARED), tolerance=0.5)
+    assert (within.verdict, within.effects) == ("consistent", ())
+    one = asked(measured(TWO, SHARED), max_effects=1)
+    assert one.verdict in ("partly", "unexplained", "described")
+    assert len(one.result.model.effects) <= 4
+
+
+def test_chance_alone_names_nothing_however_small_a_gap_counts(measured: Measured) -> None:
+    """Something always fits noise a little."""
+    diagnosis = asked(measured({}, SHARED), tolerance=0.0)
+    assert max(judged.score for judged in diagnosis.candidates) > 1.0
+    assert said(diagnosis) == "consistent "
+
+
+@pytest.mark.slow
+def test_the_order_of_tests_does_not_matter(measured: Measured, diagnosed: Diagnosed) -> None:
+    campaign = measured(TWO, SHARED)
+    turned = replace(campaign, loops=campaign.loops[::-1], sweeps=campaign.sweeps[::-1])
+    one, other = diagnosed(TWO, SHARED), asked(turned)
+    assert names(one) == names(other)
+    assert one.odds.told[0][1] == pytest.approx(other.odds.told[0][1], abs=0.01)
