@@ -48,7 +48,7 @@ class Described:
     def description(self) -> Description | None:
         """The power law, where the gap is one."""
         found = self.fingerprint
-        if found is None or not found.is_power_law:
+        if found is None or not found.is_power_law or not any(found.told):
             return None
         return Description(found.phase_deg, found.frequency_power, found.amplitude_power, found.words)
 
@@ -104,13 +104,13 @@ def _words(correction: Correction, like: Fingerprint | None) -> str:
     """How large it is and what it is like."""
     largest, band = (number(100.0 * share, 2) for share in (correction.data.largest, Z95 * correction.band))
     said = [f"up to {largest} % of |K|, known within {band} % of itself"]
-    if like is None:
+    if like is None or not any(like.told):
         said.append("nothing is told of its form")
     elif like.is_power_law:
         said.append(like.words)
     else:
         said.append(
-            "it is no power law of frequency and amplitude" + (f"; nearest: {like.words}" if like.is_told else "")
+            "it is no power law of frequency and amplitude" + (f"; nearest: {like.words}" if all(like.told) else "")
         )
     if correction.data.peak:
         middle, width = (number(each, 2) for each in correction.data.peak)

@@ -87,10 +87,12 @@ class Fingerprint:
     is_power_law: bool
 
     @property
-    def is_told(self) -> bool:
-        """Whether these tests tell its phase and both powers."""
-        found = np.array([self.phase_deg, self.frequency_power, self.amplitude_power])
-        return bool((found[:, 2] - found[:, 1] < 2.0 * np.array([_PHASE_TOLD, _TOLD, _TOLD])).all())
+    def told(self) -> list[bool]:
+        """Whether these tests tell its phase, and each of its powers."""
+        found = zip(
+            (self.phase_deg, self.frequency_power, self.amplitude_power), (_PHASE_TOLD, _TOLD, _TOLD), strict=True
+        )
+        return [high - low < 2.0 * most for (_, low, high), most in found]
 
     @property
     def words(self) -> str:
@@ -101,7 +103,7 @@ class Fingerprint:
             _power_words(self.amplitude_power, "X", "amplitude"),
         )
         said = ", ".join((_phase_words(self.phase_deg), *powers, f"as {measures}"))
-        like = self._like() if self.is_told else ""
+        like = self._like() if all(self.told) else ""
         return f"{said}: acts like {like}" if like else said
 
     def _like(self) -> str:

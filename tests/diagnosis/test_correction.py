@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from asking import asked
+from asking import asked, no_loops, one_frequency, one_level
 from rigged import LEVELS, Fitted, Measured
 from test_schemas import complaints
 
@@ -151,6 +151,12 @@ def test_nothing_is_described_on_clean_campaigns(measured: Measured, fitted: Fit
     for seed in range(4):
         clean = fitted(measured(seed=seed))
         assert describe(clean, RigSettings(), clean.model.values, (), {}) is None
+
+
+def test_where_the_parameters_can_do_all_nothing_is_described(measured: Measured, fitted: Fitted) -> None:
+    """One frequency at one level in two directions: whatever is off there, they meet it."""
+    alone = fitted(one_frequency(one_level(no_loops(with_relaxation(measured())))))
+    assert describe(alone, RigSettings(), {}, (), {}) is None
 
 
 def test_errors_of_levels_are_not_described(measured: Measured, fitted: Fitted) -> None:
