@@ -77,17 +77,15 @@ def correct(fitted: Evidence, bare: Evidence, plain: Ledger) -> Correction | Non
         return None
     likeliest = replace(plain, groups=(), nodes=[plain.likeliest])
     names = tuple(dict.fromkeys(map(str, both[0].directions)))
-    each: Sequence[tuple[str, ...]] = [(name,) for name in names]
-    shared = [[names], each] if len(names) > 1 else [each]
-    found, worth = _of_most_evidence(both, likeliest, shared)
+    shared: list[Sequence[tuple[str, ...]]] = [[names], [(name,) for name in names]]
+    found, worth = _of_most_evidence(both, likeliest, shared[: len(names)])
     if (peak := _peak(both[1], likeliest)) is not None:
         peaked, worth_of_it = _of_most_evidence(both, likeliest, [found.directions], peak)
         if worth_of_it - log(_PEAKS**2) > worth:  # as likely beforehand as all peaks that are tried
             found, worth = peaked, worth_of_it
     if worth < likeliest.log_evidence:
         return None
-    correction = replace(found, ledger=replace(plain, groups=())).correction()
-    return correction if correction.band < 1.0 else None
+    return replace(found, ledger=replace(plain, groups=())).correction()
 
 
 def _of_most_evidence(
@@ -181,14 +179,16 @@ class _Process:
         """Of the tests with it."""
         return self._with_it.worths[0].log_evidence
 
-    def correction(self) -> Correction:
-        """As the tests leave it."""
+    def correction(self) -> Correction | None:
+        """As the tests leave it; None where its error is as large as the gap."""
         mean, covariance = self._with_it.amounts(0)
         mean, covariance = (self._free @ mean).reshape(2, -1), self._free @ covariance @ self._free.T
         here = np.concatenate([here for _, here in self._patches], axis=1)
         rows = np.array([np.concatenate((turned.real, -turned.imag), axis=1) for turned in (here, -1j * here)])
         errors = np.sqrt(np.maximum(np.sum(rows @ covariance * rows, axis=-1), 0.0))  # in phase, in quadrature, (2, p)
-        gap, size = here @ (mean[0] + 1j * mean[1]), self._with_it.worths[0].likeliest
+        error, gap = float(np.linalg.norm(errors)), float(np.linalg.norm(here @ (mean[0] + 1j * mean[1])))
+        if error >= gap:
+            return None
         patches, strengths = [], 2 if self.peak else 0
         own = np.split(mean, np.cumsum([each.shape[1] for _, each in self._patches])[:-1], axis=1)
         for names, (nodes, each), amounts in zip(self.directions, self._patches, own, strict=True):
@@ -196,9 +196,9 @@ class _Process:
             values = smooth @ each[nodes, : smooth.shape[1]].real.T
             lists = (*np.exp(self.both[0].points[nodes].T), *values, *errors[:, nodes], *peak)
             patches.append(Patch(names, *(tuple(one.tolist()) for one in lists)))
+        size = self._with_it.worths[0].likeliest
         data = Unnamed(size, self.lengths, tuple(patches), self.tilt, self.peak)
-        band = np.linalg.norm(errors) / np.linalg.norm(gap)
-        return Correction(data, self._held_out(size), float(band))
+        return Correction(data, self._held_out(size), error / gap)
 
     def _held_out(self, size: float) -> HoldOut:
         """Whole runs inside the range, in turn predicted from the others, without it and with it."""

@@ -1,6 +1,6 @@
 """What has no name, described: a smooth correction where it stands, and the power law that it is like."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,18 +48,21 @@ class Described:
     def description(self) -> Description | None:
         """The power law, where the gap is one."""
         found = self.fingerprint
-        if found is None or not found.is_power_law:
+        if found is None or not found.is_power_law or not any(found.told):
             return None
         return Description(found.phase_deg, found.frequency_power, found.amplitude_power, found.words)
 
 
-def describe(evidence: Evidence, rig: RigSettings, held: Sequence[str], bounds: Bounds) -> Described | None:
+def describe(
+    evidence: Evidence, rig: RigSettings, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
+) -> Described | None:
     """A smooth correction of a fitted model and its fingerprint; None where the tests are no likelier with it.
 
     The parameters are fitted again with each loop standing on its first harmonic, because nothing is known of the law
     in time of what has no name.
 
     Args:
+        start: values of the model's parameters read off the data, for a model that the gap has bent too far.
         held, bounds: parameters that do not move, and limits of the others inside their own.
     """
     if NAME in evidence.model.effects:
@@ -69,10 +72,7 @@ def describe(evidence: Evidence, rig: RigSettings, held: Sequence[str], bounds: 
         base = _refitted(base, (*held, *base.solution.at_bound), bounds)
     except FitError:  # too few points are left for the parameters
         return None
-    bare = scattering_alone(base)
-    rows, curves = bare.solution.jacobian, [each.group for each in unnamed(bare) if each.group]
-    plain = Ledger(bare.residual, rows, np.zeros(len(rows)), blocks(bare, rig), curves, nodes(bare))
-    plain = replace(plain, nodes=plain.likely(_NEAR))
+    bare, plain = weighed(base, rig)
     correction = correct(base, bare, plain)
     if correction is None:
         return None
@@ -80,9 +80,18 @@ def describe(evidence: Evidence, rig: RigSettings, held: Sequence[str], bounds: 
     model, names = replace(base.model, effects=effects, unnamed=correction.data), base.solution.coordinates.names
     left, rows = residual(model, base.data_sets), jacobian(model, base.data_sets, names)
     after = Evidence(replace(base.solution, model=model, residual=left, jacobian=rows), base.data_sets)
-    like = fingerprint(base, bare, plain, bounds)
+    like = fingerprint(base, bare, plain, start, bounds)
     whole = Evidence(replace(after.solution, residual=residual(model, evidence.data_sets)), evidence.data_sets)
     return Described(after, correction, like, _words(correction, like), _trusted(correction, whole))
+
+
+def weighed(fitted: Evidence, rig: RigSettings) -> tuple[Evidence, Ledger]:
+    """The fit with residuals in units of what scatters from point to point, and what anything smooth beside it is worth
+    at the sizes of the rig's errors that matter."""
+    bare = scattering_alone(fitted)
+    rows, curves = bare.solution.jacobian, [each.group for each in unnamed(bare) if each.group]
+    plain = Ledger(bare.residual, rows, np.zeros(len(rows)), blocks(bare, rig), curves, nodes(bare))
+    return bare, replace(plain, nodes=plain.likely(_NEAR))
 
 
 def _refitted(evidence: Evidence, held: Sequence[str], bounds: Bounds) -> Evidence:
@@ -95,13 +104,13 @@ def _words(correction: Correction, like: Fingerprint | None) -> str:
     """How large it is and what it is like."""
     largest, band = (number(100.0 * share, 2) for share in (correction.data.largest, Z95 * correction.band))
     said = [f"up to {largest} % of |K|, known within {band} % of itself"]
-    if like is None:
+    if like is None or not any(like.told):
         said.append("nothing is told of its form")
     elif like.is_power_law:
         said.append(like.words)
     else:
         said.append(
-            "it is no power law of frequency and amplitude" + (f"; nearest: {like.words}" if like.is_told else "")
+            "it is no power law of frequency and amplitude" + (f"; nearest: {like.words}" if all(like.told) else "")
         )
     if correction.data.peak:
         middle, width = (number(each, 2) for each in correction.data.peak)

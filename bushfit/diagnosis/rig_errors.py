@@ -24,9 +24,12 @@ _FEWEST = 4
 
 
 def scattering_alone(evidence: Evidence) -> Evidence:
-    """The same fit with residuals in units of what scatters from point to point: what points share is told apart."""
+    """The same fit with residuals in units of what scatters from point to point: what points share is told apart.
+
+    Of sweeps they are in ln K, whatever is fitted: relative to the measured, noise would shrink where a model is off.
+    """
     data_sets = tuple(
-        replace(each, noise=replace(each.noise, shared=(0.0, 0.0), level=(0.0, 0.0)))
+        replace(each, noise=replace(each.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), residuals="complex")
         if isinstance(each, SweepData)
         else replace(each, gain_error=0.0)
         if isinstance(each, LoopData)

@@ -1,6 +1,5 @@
 """Terms beside all parameters: what a stiffness that is added over frequency and motion does to the residuals."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -79,22 +78,35 @@ class Terms:
         """Values of the term at the points, (c, p), whose largest change of |K| is all of it."""
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
+    def off(self, model: Model) -> Array:
+        """The value with which a model meets the measured stiffness at every point, complex, (p,)."""
+        off = [each.measured - each.noise_free(model).measured for each in self.data_sets]
+        return np.concatenate(off) / self.unit(model)
+
     def columns(self, values: Array, model: Model, beside: Array | float = 0.0) -> Array:
         """What small values of the term at the points, complex (c, p), do to the whitened residuals, (c, n), beside a
         value that it has already, (p,)."""
-        unit, moved = self.unit(model), np.zeros((len(values), self.evidence.residual.size))
+        moved, unit = np.zeros((len(values), self.evidence.residual.size)), self.unit(model)
         change, there = values * unit, beside * unit
         for each, place in zip(self.data_sets, self.place, strict=True):
             moved[:, self.evidence.place[each]] = each.moved(change[:, place], model, there[place])
         return moved
 
-    def around(self, value: Array, model: Model, names: Sequence[str]) -> tuple[Array, Array]:
-        """Whitened residuals of a model with the term of a value at the points, complex (p,), exact, (n,), and their
-        derivatives by fit coordinate, (len(names), n)."""
-        left, rows = residual(model, self.evidence.data_sets), jacobian(model, self.evidence.data_sets, names)
-        slopes, added = Coordinates.of(model, names).slopes(model.values)[:, None], value * self.unit(model)
+    def residual(self, value: Array, model: Model) -> Array:
+        """Whitened residuals of a model with the term of a value at the points, complex (p,), exact, (n,)."""
+        left, added = residual(model, self.evidence.data_sets), value * self.unit(model)
         for each, place in zip(self.data_sets, self.place, strict=True):
-            own = self.evidence.place[each]
-            left[own] = each.residual_with(added[place], model)
-            rows[:, own] = slopes * each.jacobian_with(added[place], model, names, as_share=self.measure == "gain")
-        return left, rows
+            left[self.evidence.place[each]] = each.residual_with(added[place], model)
+        return left
+
+    def jacobian(self, value: Array, model: Model) -> Array:
+        """Derivatives of these by fit coordinate of the model, (k, n)."""
+        names, added = self.evidence.solution.coordinates.names, value * self.unit(model)
+        rows, slopes = (
+            jacobian(model, self.evidence.data_sets, names),
+            Coordinates.of(model, names).slopes(model.values),
+        )
+        for each, place in zip(self.data_sets, self.place, strict=True):
+            own = each.jacobian_with(added[place], model, names, as_share=self.measure == "gain")
+            rows[:, self.evidence.place[each]] = slopes[:, None] * own
+        return rows

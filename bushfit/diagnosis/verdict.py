@@ -128,7 +128,7 @@ class Told:
         lead = f"; no more than leads: {_all(finding.leads)}" if finding.leads else ""
         spot = self.first.best if self.first and finding.verdict == "unexplained" else None
         rig = self.data.campaign.rig
-        if not spot and asked.most and (found := describe(self.base, rig, asked.held, asked.bounds)):
+        if not spot and asked.most and (found := describe(self.base, rig, asked.start, asked.held, asked.bounds)):
             words = f"a real gap stays that no known effect closes: {found.words}{lead}"
             names = [Named(UNNAMED, found.evidence)]
             held = found.correction.held

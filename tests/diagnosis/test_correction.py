@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from asking import asked
+from asking import asked, no_loops, one_frequency, one_level
 from rigged import LEVELS, Fitted, Measured
 from test_schemas import complaints
 
@@ -18,7 +18,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
 from bushfit.caveats import caveats
 from bushfit.diagnosis.correction import Correction, correct
-from bushfit.diagnosis.described import Described, describe
+from bushfit.diagnosis.described import Described, describe, weighed
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.errors import ModelError
@@ -58,7 +58,7 @@ def with_mode(campaign: Campaign) -> Campaign:
 @pytest.fixture(scope="module")
 def resonant(measured: Measured, fitted: Fitted) -> Described:
     evidence = fitted(with_mode(measured()))
-    found = describe(evidence, evidence.model.values, (), {})
+    found = describe(evidence, RigSettings(), evidence.model.values, (), {})
     assert found is not None
     return found
 
@@ -70,15 +70,15 @@ def evidence(measured: Measured, fitted: Fitted) -> Evidence:
 
 @pytest.fixture(scope="module")
 def correction(evidence: Evidence) -> Correction:
-    found = correct(evidence)
+    found = correct(evidence, *weighed(evidence, RigSettings()))
     assert found is not None
-    print(found.held, found.log_score, found.band, found.data.size, found.data.lengths)
+    print(found.held, found.band, found.data.size, found.data.lengths)
     return found
 
 
 @pytest.fixture(scope="module")
 def described(evidence: Evidence) -> Described:
-    found = describe(evidence, evidence.model.values, (), {})
+    found = describe(evidence, RigSettings(), evidence.model.values, (), {})
     assert found is not None
     return found
 
@@ -97,9 +97,7 @@ def test_it_stands_where_it_was_not_fitted(correction: Correction) -> None:
     assert held.after is not None
     assert held.after - 1.0 < 0.5 * (held.before - 1.0)
     assert len(held.parts) == 3
-    assert correction.log_score > 0.0
     assert correction.band < 0.5
-    assert correction.kept
 
 
 def test_the_parameters_can_do_nothing_of_it(evidence: Evidence, described: Described) -> None:
@@ -127,7 +125,6 @@ def test_a_peak_is_found_where_it_is(resonant: Described) -> None:
     middle, width, size = MODE
     correction, model = resonant.correction, resonant.after.model
     print(correction.data.peak, correction.held)
-    assert correction.kept
     assert correction.data.peak == pytest.approx((middle, width), rel=0.1)
     assert correction.data.peak[0] == pytest.approx(middle, rel=0.01)
     assert "a peak, as of a resonance, at 47 Hz" in resonant.words
@@ -153,10 +150,16 @@ def test_the_model_file_holds_the_peak(resonant: Described) -> None:
 def test_nothing_is_described_on_clean_campaigns(measured: Measured, fitted: Fitted) -> None:
     for seed in range(4):
         clean = fitted(measured(seed=seed))
-        assert describe(clean, clean.model.values, (), {}) is None
+        assert describe(clean, RigSettings(), clean.model.values, (), {}) is None
 
 
-def test_a_fault_of_one_level_is_not_described(measured: Measured, fitted: Fitted) -> None:
+def test_where_the_parameters_can_do_all_nothing_is_described(measured: Measured, fitted: Fitted) -> None:
+    """One frequency at one level in two directions: whatever is off there, they meet it."""
+    alone = fitted(one_frequency(one_level(no_loops(with_relaxation(measured())))))
+    assert describe(alone, RigSettings(), {}, (), {}) is None
+
+
+def test_errors_of_levels_are_not_described(measured: Measured, fitted: Fitted) -> None:
     """The middle level 8 % off in both directions: nothing predicts it from the others."""
     campaign = replace(measured(), loops=())
     sweeps = [
@@ -164,22 +167,7 @@ def test_a_fault_of_one_level_is_not_described(measured: Measured, fitted: Fitte
         for sweep in campaign.sweeps
     ]
     wrong = fitted(replace(campaign, sweeps=tuple(sweeps)))
-    found = correct(wrong)
-    print(found and found.held)
-    assert found is None or not found.kept
-
-
-@pytest.mark.parametrize("frequency", [35.0, 65.0, 155.0])
-def test_a_fault_of_one_frequency_is_no_peak(measured: Measured, fitted: Fitted, frequency: float) -> None:
-    """One frequency 5 % off in both directions: a peak of it would be narrower than what its neighbours show."""
-    campaign = replace(measured(), loops=())
-    sweeps = [
-        replace(sweep, stiffness=sweep.stiffness * np.where(sweep.frequency == frequency, 1.05, 1.0))
-        for sweep in campaign.sweeps
-    ]
-    found = correct(fitted(replace(campaign, sweeps=tuple(sweeps))))
-    print(found and (found.held, found.data.peak))
-    assert found is None or (found.data.peak is None and not found.kept)
+    assert describe(wrong, RigSettings(), wrong.model.values, (), {}) is None
 
 
 def test_what_the_diagnosis_says(measured: Measured) -> None:

@@ -16,15 +16,16 @@ from scipy.stats import binomtest
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import Residuals
+from bushfit.diagnosis.described import weighed
 from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
-from bushfit.diagnosis.locate import contrasts
 from bushfit.diagnosis.terms import Measure, Terms
 from bushfit.effects.contract import Array
+from bushfit.fitting.data import Data
+from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, stiffness_per_modulus, unit_strain
 
 #: A term's stiffness, complex [N/m], by frequency [Hz], amplitude [m] and the stiffness without it.
 Term = Callable[[Array, Array, Array], Array]
-CHANCE = 0.998
 #: Campaigns with terms of random phase and powers.
 RANDOM = 100
 
@@ -45,8 +46,9 @@ def power_law(size: float, phase_deg: float, p: float, q: float) -> Term:
 
 
 def printed(campaign: Campaign, fitted: Fitted) -> Fingerprint:
-    evidence = fitted(campaign)
-    found = fingerprint(evidence, contrasts(evidence), CHANCE, evidence.model.values, {})
+    evidence, data = fitted(campaign), Data.of(campaign)
+    start = start_values(campaign.bushing, data.sweeps, {})
+    found = fingerprint(evidence, *weighed(evidence, campaign.rig), start, {})
     assert found is not None
     print(found.measure, found.phase_deg, found.frequency_power, found.amplitude_power, found.is_power_law, found.words)
     return found
@@ -80,15 +82,13 @@ def test_laws_are_found_with_their_phase_and_powers(
 
 
 @pytest.mark.parametrize("residuals", ["complex", "magnitude_loss_factor"])
-def test_it_fits_a_dashpot_no_worse_than_the_dashpot_does(residuals: Residuals, root: Path, fitted: Fitted) -> None:
-    """The dashpot of a practice campaign, a tenth of the stiffness, lies within it, and in the intervals."""
+def test_it_finds_the_dashpot_of_a_practice_campaign(residuals: Residuals, root: Path, fitted: Fitted) -> None:
+    """A tenth of the stiffness; in the intervals, whatever is fitted."""
     campaign = replace(load_campaign(root / "data/practice/case_004/bushing.toml"), loops=())
-    campaign = replace(campaign, fit=replace(campaign.fit, residuals=residuals))
-    found, truth = printed(campaign, fitted), fitted(campaign, "viscous")
-    print(f"chi-square {found.after.chi_square:.1f}, with the dashpot {truth.chi_square:.1f}")
-    assert found.after.chi_square <= truth.chi_square
+    found = printed(replace(campaign, fit=replace(campaign.fit, residuals=residuals)), fitted)
     for (_, low, high), true in ((found.phase_deg, 90.0), (found.frequency_power, 1.0), (found.amplitude_power, 0.0)):
         assert low <= true <= high
+    assert found.is_power_law
 
 
 @pytest.mark.parametrize("measure", ["stiffness", "modulus", "gain"])
@@ -101,10 +101,10 @@ def test_derivatives_beside_a_large_term(
     evidence = fitted(replace(campaign, fit=replace(campaign.fit, residuals=residuals)))
     terms, model = Terms(evidence, measure), evidence.model
     value = (0.06 + 0.08j) * np.exp((terms.points - terms.points.mean(axis=0)) @ (0.5, 0.1))
-    value *= np.mean(np.abs(terms.stiffness / terms.unit(model)))
+    value *= np.mean(np.abs(terms.stiffness(model) / terms.unit(model)))
     coordinates, step = evidence.solution.coordinates, 1e-5
     middle = coordinates.point(model.values)
-    for row, own in zip(terms.jacobian(value, model, coordinates.names), np.eye(middle.size) * step, strict=True):
+    for row, own in zip(terms.jacobian(value, model), np.eye(middle.size) * step, strict=True):
         ends = [terms.residual(value, model.with_values(coordinates.values(middle + off))) for off in (own, -own)]
         assert row == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-5, abs=1e-5 * np.abs(row).max())
     ends = [terms.residual(value * (1.0 + off), model) for off in (step, -step)]
