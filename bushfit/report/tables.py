@@ -355,5 +355,7 @@ def required(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
 
 
 def complete(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
-    """The rows of a table in which all these numbers are known; none of none, whatever their columns."""
-    return rows if rows.empty else rows.iloc[np.flatnonzero(np.isfinite(numbers(rows, *headers)).all(axis=0))]
+    """The rows of a table in which all these numbers are known; none of none, whatever columns it had before."""
+    if rows.empty:
+        return rows.reindex(columns=list(dict.fromkeys((*rows.columns, *headers))))
+    return rows.iloc[np.flatnonzero(np.isfinite(numbers(rows, *headers)).all(axis=0))]
