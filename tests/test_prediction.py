@@ -154,7 +154,7 @@ def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(eit
     assert list(table.columns[14:]) == rigs
     np.testing.assert_allclose(table[rigs[1]], found.if_rigs.loss_factor.value)
     print(*found.warnings, sep="\n")
-    said = "\n".join(found.warnings)
+    said = "\n".join((*found.warnings, *caveats(either)))
     assert "sleeve_compliance is taken as the bushing's, but these tests cannot tell it from rig_compliance" in said
     assert "% if sleeve_compliance is the rig's; low and high span both" in said
     assert predict(either, Direction.RADIAL, FREQUENCIES, AMPLITUDES, rig=True).warnings == told.warnings

@@ -292,7 +292,7 @@ def _columns(every: Array, chosen: Array) -> Array:
 
 def _grams(part: Array, own: Array) -> Array:
     """Inner products of the rows of each group, (m, g) -> (m, g, g); most have nothing in loops, or in sweeps."""
-    there = part.any(axis=1)[own].any(axis=1)
+    there = np.any(np.any(part, axis=1)[own], axis=1)
     found, rows = np.zeros((*own.shape, own.shape[1])), part[own[there]]
     found[there] = rows @ rows.swapaxes(-1, -2)
     return found

@@ -78,7 +78,7 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
         suggested = float(np.clip(amounts[first + best] * amount.typical, *amount.bounds))
         shape = shapes[best] | ({qualified(effect, amount): suggested} if amount.log else {})
         model = evidence.model.with_effect(effect.name, shape)
-        visible = bool(seen[first + best])
+        visible = bool(seen[first:last].any())
         found.append(Proposal(effect.name, model, float(possible_gains[best]), columns, sense, visible))
     for effect in missing:
         if effect.replaces in evidence.model.effects:

@@ -163,7 +163,8 @@ class Told:
         parts = [best.claim.words(self.data)] if best.claim else []
         parts += [f"{effect_named(name).phrase} ({name})" for name in best.effects]
         parts += [f"the tests are off: {place.name}" for place in best.places]
-        return ", and ".join((*parts, *_nameless(best)))
+        *most, last = (*parts, *_nameless(best))
+        return ", and ".join(filter(None, (", ".join(most), last)))
 
     def _evidence(self) -> str:
         """Why effects were named."""

@@ -64,8 +64,6 @@ def _of_effects(
     plain = [outcome for outcome in single if outcome.gain >= PLAIN]
     covered = [hit for outcome in good if outcome.exact for hit in outcome.covered]
     strange, hidden = [*outside, *lacking], [*single, *pair, *outside]
-    sizes = [len(members) for outcome in good for members in outcome.sets]
-    members = f"{np.mean(sizes):.2f} / {max(sizes)}" if sizes else "no case"
     return [
         _share("false alarm on clean campaigns", [o.seen for o in clean], high=0.01),
         _share("truth named alone or in a set of at most three", [o.truth_in_sets for o in single], low=0.97),
@@ -77,7 +75,6 @@ def _of_effects(
         _share("  of these a disturbance of the rig", [o.verdict != "named" for o in outside]),
         _share("  of these an effect the library lacks", [o.verdict != "named" for o in lacking]),
         _share("95 % interval covers the truth, where named", covered, low=0.93, high=0.97),
-        Row("size of the sets of names, mean / largest", members, len(sizes), "", None),
     ]
 
 

@@ -56,12 +56,11 @@ class Outcome:
         matters: of a mistake, whether it leaves more than the tolerance for a plain model, and more than 2 % of |K| or
             of a parameter.
         error: what went wrong, or "".
-        twins: per set, the names that the same data give its members at other levels.
         before: gap on held-out data before, as `heldout`.
         settled: what came of the planned session, where effects of the library were left open and it was asked for.
         decides: the test on the rig that is asked for, where the virtual rig can make none that decides.
         nothing: probability told of nothing; None where there is no diagnosis.
-        leader: what was told as likeliest, in words; "" where nothing was.
+        leader: what was told as likeliest, by the names of its parts; "" where nothing was.
         odds: probability told of the leader, if anything is missing.
     """
 
@@ -75,7 +74,6 @@ class Outcome:
     seconds: float = 0.0
     matters: bool = False
     error: str = ""
-    twins: tuple[tuple[str, ...], ...] = ()
     before: float | None = None
     settled: Settled | None = None
     decides: str = ""
@@ -117,7 +115,7 @@ class Outcome:
     @property
     def left_open(self) -> bool:
         """Whether look-alikes are left, or an effect whose level the rig has a twin of."""
-        return self.verdict == "ambiguous" or (self.verdict in _KEEPING and any(self.twins))
+        return self.verdict == "ambiguous" or (self.verdict in _KEEPING and any(twins for _, twins in self._claims))
 
     @property
     def settles(self) -> Settled:
@@ -140,8 +138,8 @@ class Outcome:
 
     @property
     def _claims(self) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
-        """Each set with the twins of its leader."""
-        return list(zip(self.sets, self.twins or ((),) * len(self.sets), strict=True))
+        """Each set with the names that the same data give its members at other levels."""
+        return [(names, tuple({twin for name in names for twin in twins_of(name)} - {*names})) for names in self.sets]
 
     @property
     def truth_in_sets(self) -> bool:

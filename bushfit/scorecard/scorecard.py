@@ -21,7 +21,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.locate import largest_smooth_misfit
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import effect_of, twins_of
+from bushfit.effects import effect_of
 from bushfit.effects.mistakes import mistake_named
 from bushfit.errors import MeasurementError
 from bushfit.fitting.data import Data
@@ -134,7 +134,7 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
     added = {name for name in task.hidden if name in result.model.effects}
     asked = [name for name in truth.values if task.kind == "swept" or effect_of(name) in added]
     intervals = {name: result.interval(name) for name in asked}
-    leader, odds = max(diagnosis.odds.told, key=lambda pair: pair[1], default=("", 0.0))
+    (_, odds), leader = next(zip(diagnosis.odds.told, diagnosis.odds.labels, strict=True), (("", 0.0), ""))
     covered = [ends[0] <= truth.values[name] <= ends[1] for name, ends in intervals.items() if ends is not None]
     return Outcome(
         task,
@@ -146,12 +146,6 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
         tuple(covered),
         seconds,
         task.kind == "mistake" and _matters(diagnosis.before, truth),
-        twins=tuple(
-            tuple(
-                twin for name in (effect.label, *_names(effect.alternatives)) for twin in twins_of(name) if twin != name
-            )
-            for effect in diagnosis.effects
-        ),
         before=heldout["before"],
         nothing=diagnosis.odds.nothing,
         leader=leader,

@@ -79,7 +79,7 @@ def test_the_line_on_two_steps_counts_no_meaningless_errors(
 def test_run_with_an_effect_shows_what_diagnose_shows(root: Path, tmp_path: Path) -> None:
     done = call(root, "run", "configs/mystery_mount.toml", "-o", str(tmp_path / "x"), "--no-plots")
     assert done.returncode == 0, done.stderr
-    for words in ("Mystery mount: named", "sleeve_compliance (", "  held out  ", "x noise: measured radial", "next test:"):
+    for words in ("Mystery mount: named", "sleeve_compliance (", "  held out  ", " x noise: measured r", "next test:"):
         assert done.stderr.count(words) == 1
     assert "model with what was added" in done.stderr
     assert "was not fitted, and the model misses it" not in done.stderr, "of the joint fit, which is not the one to use"

@@ -20,8 +20,12 @@ TWO = {"delay": {"tau": 1e-4}, "strain_stiffening": {"c3": 20.0}}
 
 def asked(campaign: Campaign, model: Model | None = None, **settings: object) -> Diagnosis:
     diagnosis = diagnose(Data.of(campaign), model, Settings(**settings))  # type: ignore[arg-type]
-    odds = ", ".join(f"{words} {share:.3f}" for words, share in diagnosis.odds.told)
-    print(f"{said(diagnosis)} | {diagnosis.summary} | nothing {diagnosis.odds.nothing:.3g}; {odds}", *diagnosis.notes)
+    odds = [
+        f"{label} {share:.3f}" for label, (_, share) in zip(diagnosis.odds.labels, diagnosis.odds.told, strict=True)
+    ]
+    print(
+        said(diagnosis), diagnosis.summary, f"nothing {diagnosis.odds.nothing:.3g}", *odds, *diagnosis.notes, sep=" | "
+    )
     return diagnosis
 
 

@@ -183,3 +183,10 @@ def test_shapes_without_a_response_are_left_out(paper_model: Model) -> None:
     assert 0 < len(shapes) == len(columns)
     assert all(shape["bump_stop.gap"] <= 5e-4 for shape in shapes)
     np.testing.assert_allclose(columns, 2.0 * stop.amount.typical, rtol=1e-6)
+
+
+def test_an_effect_is_visible_where_any_of_its_shapes_is(bare: Evidence) -> None:
+    """Of a second springpot one shape is the first, and noise may speak against all others."""
+    against = replace(bare, solution=replace(bare.solution, residual=-bare.residual))
+    for evidence in (bare, against):
+        assert all(each.proposal.visible for each in effects(evidence, (), ()) if each.name == "second_springpot")

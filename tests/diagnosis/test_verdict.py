@@ -6,12 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from asking import asked, no_loops, no_sweeps, one_direction, said
+from asking import asked, no_loops, no_repeats, no_sweeps, one_direction, said
 from rigged import SHARED, Measured
 
-from bushfit.campaign.schema import Loss
+from bushfit.campaign.schema import Loss, RigSettings
 from bushfit.diagnosis.next_test import MENU
 from bushfit.effects import BASE
+from bushfit.fitting.data import Data
 from bushfit.geometry import Direction
 from bushfit.jobs.diagnose import with_plan
 from bushfit.model.file import to_document
@@ -43,6 +44,17 @@ def test_what_the_tests_cannot_show_is_said(measured: Measured) -> None:
     (note,) = asked(no_sweeps(campaign)).notes
     assert {"viscous", "maxwell", "force_gain"} <= set(note.partition(": ")[2].split(", "))
     assert asked(campaign).notes == ()
+
+
+def test_the_class_of_a_rig_that_is_assumed_is_said(measured: Measured) -> None:
+    campaign = no_repeats(measured({}, SHARED))
+    for rig, words in (
+        (RigSettings(), "0.5 % gain and 0.25 deg phase, gain and phase assumed"),
+        (RigSettings(gain_error=4e-3), "0.4 % gain and 0.25 deg phase, phase assumed"),
+        (RigSettings(gain_error=4e-3, phase_error=3.5e-3), ""),
+    ):
+        assumed = Data.of(replace(campaign, rig=rig)).assumed
+        assert [note.partition(" class, ")[2] for note in assumed] == [words] * bool(words)
 
 
 @pytest.mark.parametrize("loss", ["linear", "soft_l1"])

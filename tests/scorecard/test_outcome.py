@@ -12,7 +12,6 @@ from bushfit.scorecard.hidden import Sealed
 from bushfit.scorecard.outcome import Outcome, Task
 
 EVERYWHERE, EITHER = ("sleeve_compliance",), ("sleeve_compliance", "sleeve_compliance.radial")
-RIG = (("rig_compliance", "rig_compliance.radial"),)
 
 
 def said(
@@ -35,15 +34,15 @@ def said(
         (said("ambiguous", ("delay", "viscous"), truths=("inertia",)), (), True),
         (said("ambiguous", ("delay", "viscous"), ("inertia",), truths=("viscous",)), ("inertia",), False),
         (said("named", ("stiffness_factor.radial",), truths=("stiffness_factor",)), (), False),
-        (said("named", ("interface_slip",), truths=("guide",), twins=(("guide",),)), (), False),
+        (said("named", ("interface_slip",), truths=("guide_friction",)), (), False),
         (said("named", ("viscous",), truths=("maxwell",)), (), False),
-        (said("named", EVERYWHERE, truths=("rig_compliance.radial",), twins=(("rig_compliance",),)), EVERYWHERE, False),
+        (said("named", EVERYWHERE, truths=("rig_compliance.radial",)), EVERYWHERE, False),
         (
             said("named", ("sleeve_compliance.radial",), truths=("rig_compliance",)),
             ("sleeve_compliance.radial",),
             False,
         ),
-        (said("ambiguous", EITHER, truths=("rig_compliance.radial",), twins=RIG), (), False),
+        (said("ambiguous", EITHER, truths=("rig_compliance.radial",)), (), False),
     ],
 )
 def test_every_wrong_name_counts(outcome: Outcome, kept: tuple[str, ...], wrong_set: bool) -> None:
@@ -52,9 +51,9 @@ def test_every_wrong_name_counts(outcome: Outcome, kept: tuple[str, ...], wrong_
 
 
 def test_a_level_that_stays_open_counts_as_told() -> None:
-    twin = said("named", ("interface_slip",), truths=("guide",), kind="alone", twins=(("guide",),))
+    twin = said("named", ("interface_slip",), truths=("guide_friction",), kind="alone")
     assert twin.truth_in_sets
-    assert not said("named", ("interface_slip",), truths=("guide",), kind="alone").truth_in_sets
+    assert not said("named", ("inertia",), truths=("guide_friction",), kind="alone").truth_in_sets
 
 
 def test_what_a_session_settles() -> None:
@@ -67,7 +66,7 @@ def test_what_a_session_settles() -> None:
         said("unexplained", truths=("viscous",)).settles,
     ]
     assert then == ["rightly", "wrongly", "open", "open"]
-    twin = said("named", ("interface_slip",), truths=("guide",), twins=(("guide",),))
+    twin = said("named", ("interface_slip",), truths=("guide_friction",))
     assert [each.left_open for each in (was, twin, said("named", ("delay",)))] == [True, True, False]
     outcomes = [replace(was, settled=settled) for settled in (*then, "elsewhere")]
     rows = {row.measure.strip(): row for row in card([*outcomes, replace(twin, settled="elsewhere")], "faults")}
