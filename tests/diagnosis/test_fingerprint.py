@@ -45,10 +45,14 @@ def power_law(size: float, phase_deg: float, p: float, q: float) -> Term:
     return lambda frequency, amplitude, _: turn * (frequency / 50.0) ** p * (amplitude / 2e-4) ** q
 
 
-def printed(campaign: Campaign, fitted: Fitted) -> Fingerprint:
+def found_in(campaign: Campaign, fitted: Fitted) -> Fingerprint | None:
     evidence, data = fitted(campaign), Data.of(campaign)
     start = start_values(campaign.bushing, data.sweeps, {})
-    found = fingerprint(evidence, *weighed(evidence, campaign.rig), start, {})
+    return fingerprint(evidence, *weighed(evidence, campaign.rig), start, {})
+
+
+def printed(campaign: Campaign, fitted: Fitted) -> Fingerprint:
+    found = found_in(campaign, fitted)
     assert found is not None
     print(found.measure, found.phase_deg, found.frequency_power, found.amplitude_power, found.is_power_law, found.words)
     return found
@@ -138,13 +142,15 @@ def test_intervals_hold_the_phase_and_the_powers_in_95_of_100(measured: Measured
             replace(sweep, stiffness=sweep.stiffness * (1.0 + size / largest * share))
             for sweep, share in zip(campaign.sweeps, shares, strict=True)
         ]
-        found = printed(replace(campaign, sweeps=tuple(sweeps), loops=()), fitted)
+        if (found := found_in(replace(campaign, sweeps=tuple(sweeps), loops=()), fitted)) is None:
+            continue  # the parameters can do most of it
         truths = {"phase": (found.phase_deg, phase), "p": (found.frequency_power, p), "q": (found.amplitude_power, q)}
         for name, ((value, low, high), true) in truths.items():
             off = (true - value + 180.0) % 360.0 - 180.0
             held[name].append(low - value <= off <= high - value)
     for name, hits in held.items():
         print(f"{name}: {sum(hits)} of {len(hits)}, {binomtest(sum(hits), len(hits)).proportion_ci()}")
+    assert len(held["p"]) > 0.9 * RANDOM
     every = [hit for hits in held.values() for hit in hits]
     ends = binomtest(sum(every), len(every)).proportion_ci()
     print(f"all: {sum(every)} of {len(every)}, {ends}")
