@@ -159,7 +159,7 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
     campaign = shop / "bushings/b1/bushing.toml"
     campaign.write_text(campaign.read_text() + '\n[fit.mu]\nmax = "0.2 MPa"\n')
     (shop / "limits.toml").write_text('[parameters.mu]\nmax = "1 GPa"\n')
-    done = typed("batch", "bushings/b[0-2]/bushing.toml", "-o", "all", "--limits", "limits.toml", "--json")
+    done = typed("batch", "bushings/b[013]/bushing.toml", "-o", "all", "--limits", "limits.toml", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["conditional"] == ["b1"]
     assert json.loads((shop / "all/bushings/b1/model.json").read_text())["parameters"]["mu"]["at_bound"] == "max"
@@ -170,7 +170,7 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
     assert "at the max of its fit" in held["on the edge"]
     assert "warning: 1 bushing with a parameter at rest on a bound of its fit" in done.stderr
     assert "conditional pass: b1: mu = 0.2" in done.stderr
-    none = typed("batch", "bushings/b[0-2]/bushing.toml", "-o", "none", "--effect", "inertia", "--json")
+    none = typed("batch", "bushings/b[013]/bushing.toml", "-o", "none", "--effect", "inertia", "--json")
     assert json.loads((shop / "none/bushings/b1/model.json").read_text())["parameters"]["mu"]["at_bound"] == "max"
     assert not any("inertia" in row["on a bound"] for row in rows(shop / "none")), "no mass is an answer"
     assert none.returncode == 0
@@ -235,7 +235,9 @@ def test_another_form_replaces_the_table_and_does_again_only_what_has_tables_of_
     (sheet,) = openpyxl.load_workbook(shop / "all/batch.xlsx")
     header, *lines = sheet.iter_rows(values_only=True)
     model = json.loads((shop / "all/bushings/b1/model.json").read_text())
-    assert dict(zip(header, lines[1], strict=True))["mu [MPa]"] == 1e-6 * model["parameters"]["mu"]["value"]
+    assert dict(zip(header, lines[1], strict=True))["mu [MPa]"] == pytest.approx(
+        1e-6 * model["parameters"]["mu"]["value"], rel=1e-15
+    )
     tables = ("batch", few, "-o", "all", "--resume", "--json", "--tables")
     assert json.loads(typed(*tables).stdout)["kept"] == 0
     assert json.loads(typed(*tables, "--table-format", "decimal-comma").stdout)["kept"] == 0
@@ -249,8 +251,8 @@ def test_results_of_rows_that_are_gone_do_not_stay_unsaid(typed: Callable[..., A
     names = sorted(path.name for path in (shop / "all/bushings").iterdir())
     resumed = typed("batch", "bushings/b[0-2]/bushing.toml", "-o", "all", "--resume", "--json")
     assert resumed.returncode == 0, resumed.stderr
-    (said,) = [line for line in json.loads(resumed.stdout)["warnings"] if "column warnings" not in line]
-    assert "results of 2 bushings of an earlier batch" in said
+    (said,) = [line for line in json.loads(resumed.stdout)["warnings"] if "of an earlier batch" in line]
+    assert "results of 2 bushings" in said
     assert "--force removes them" in said
     assert sorted(path.name for path in (shop / "all/bushings").iterdir()) == names
     forced = typed("batch", "bushings/b[0-2]/bushing.toml", "-o", "all", "--force")
