@@ -134,7 +134,8 @@ class Search:
     def _grown(self, weighed: Weighed, depth: int) -> list[Weighed]:
         """The state with each of its most promising effects, refitted, and places; and without an effect that may only
         have led the way."""
-        grown = self._with_effects(weighed, self._promising(weighed, *REFITS[min(depth, 1)]), depth)
+        first = 2 if weighed.state.evidence.reduced > _BENT else 0
+        grown = self._with_effects(weighed, self._promising(weighed, *REFITS[1 if depth else first]), depth)
         grown += [each for other in grown for each in self._without_earlier(other.state)]
         return grown + self._with_places(weighed, depth)
 

@@ -25,8 +25,9 @@ KNOWN = 30
 FAR = 12.0
 #: States of the search that are kept, in the first round and later, and rounds.
 BEAM, ROUNDS = (4, 3), 3
-#: Refits of a state likewise, of what has most evidence by a linear count, and of what takes most off chi-square.
-REFITS = ((4, 3), (2, 2))
+#: Refits of what has most evidence by a linear count, and of what takes most off chi-square: in the first round, later,
+#: and in the first where the gap is so large that a linear count tells little.
+REFITS = ((4, 3), (2, 2), (8, 12))
 #: Probability of nothing, from which on a verdict is `consistent`.
 NOTHING = 0.15
 #: Probability from which on an explanation is named; a set that reaches it is told, of so many at most.
