@@ -32,16 +32,13 @@ def command(
 ) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 
-    FILE may be a folder, or a workbook with several tests; what holds no test is told and left out. The columns tell
-    what a test is; names of file and sheet, or columns, its direction, and names an amplitude or frequency without a
-    column (Dyn_axial_A0,05mm.csv). What only you can know, such as a unit, is asked for in an error that names the
-    option. An option holds for all files of its kind, and but for a direction goes before names; numbers have a decimal
-    point. Where files differ, edit the campaign. Raw histories go through `bushfit reduce` first. Tests of a modulus,
-    or with --area and --thickness of a stiffness, are of a specimen and need no size of a bushing.
+    FILE may be a folder, or a workbook with several tests; what holds no test is told and left out. Columns tell what a
+    test is; names of file and sheet, or columns, its direction; names an amplitude or frequency without a column
+    (Dyn_axial_A0,05mm.csv). What only you can know, such as a unit, is asked for in an error that names the option. An
+    option holds for all files of its kind; where they differ, edit the campaign. Raw histories go through `bushfit
+    reduce` first. Tests of a modulus, or with --area and --thickness of a stiffness, need no size of a bushing.
 
-    Writes campaign.toml, which names the files as seen from its folder; -o may name it: -o my_bushing.toml. Where a
-    column tells of several parts, it writes a campaign of each, and batch.toml, their list for bushfit batch;
-    --specimen-number takes one part.
+    Writes campaign.toml, or -o my_bushing.toml; of several parts a campaign each, and batch.toml, their list.
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.draft import campaign_text, campaigns_of_parts, named_apart

@@ -39,11 +39,11 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     how every column was understood, in which unit, and its range; cycles, sampling, waveform, noise, frequencies,
     amplitudes, repeats; and what is odd beyond noise, in sentences with figures. Odd is an amplitude or frequency
     other than the file's name says, a gap, rows that stand still, cut-off tops, outliers, drift, cycles that still
-    settle, a motion off zero, a force that counts the other way; in sweeps copied rows, missing frequencies, a
-    repeat that is off or drifts, loss factors below zero. Rows count from 1 below the header.
+    settle, a motion off zero, a force of the other sign; in sweeps copied rows, missing frequencies, a repeat that is
+    off, loss factors below zero. Rows count from 1 below the header.
 
-    The text for the campaign goes to standard output; it names files by their full path, so that any campaign takes it.
-    A file that cannot be used does not keep the others from being told; then nothing is written, exit status 2.
+    The text for the campaign goes to standard output, with full paths. A file that cannot be used does not keep the
+    others from being told; then nothing is written, exit status 2.
 
     Writes inspect.png, and inspect_2.png and so on of more than five files.
     """

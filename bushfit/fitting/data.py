@@ -149,7 +149,7 @@ class Data:
             )
         return chosen
 
-    def static_loops(self) -> list[DataSet]:
+    def static_loops(self) -> list[LoopData]:
         """The loops `fit-static` uses: the axial ones, else those of the bushing, else all."""
         hint = "add a quasi-static loop, or run bushfit fit for the sweeps alone"
         return [*_first(self.some(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))]

@@ -80,7 +80,7 @@ def test_the_document_is_that_of_the_interface(found: Path) -> None:
     assert "mass" in document["next_test"]
     assert document["description"] is None
     assert {"part", "before", "after", "whitened"} == document["gap"]["parts"][0].keys()
-    assert [entry["part"] for entry in document["gap"]["skipped"]] == ["axial direction"]
+    assert document["gap"]["skipped"] == []
     usable = document["usable"]
     assert 0.0 < usable["stiffness"] == max(place["stiffness"] for place in usable["places"]) < 0.02
     assert usable["held_out"] is True
@@ -97,7 +97,7 @@ def test_every_residual_is_in_the_table(found: Path) -> None:
         values = table[columns].to_numpy().ravel()
         values = values[~np.isnan(values)]
         print(f"{when}: {np.sqrt(np.mean(values**2)):.4f} over {values.size} residuals")
-        assert np.sqrt(np.mean(values**2)) == pytest.approx(gap[when], rel=0.01)
+        assert np.sqrt(np.mean(values**2)) == pytest.approx(gap[when], rel=0.02)  # a loop's rows share its gain
     assert table[table.kind == "sweep"].groupby("test").size().to_dict() == {"sweep_axial": 144, "sweep_radial": 144}
     assert set(table[table.kind == "loop"].test) == {"loop_axial_1", "loop_axial_2"}
 
