@@ -218,7 +218,7 @@ def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
     pairs, freedom = np.concatenate([line.shared for line in lines]), sum(line.shared_freedom for line in lines)
     usual = np.abs(pairs) <= _OUTLYING_PAIR * np.median(np.abs(pairs), axis=0) if len(pairs) else np.empty((0, 2), bool)
     usual |= len(pairs) < FEWEST_SOUGHT
-    variance = np.where(usual.any(axis=0), np.mean(pairs, axis=0, where=usual), 0.0)
+    variance = np.sum(pairs, axis=0, where=usual) / np.maximum(usual.sum(axis=0), 1)
     measured = min(freedom / _ENOUGH, 1.0)
     return np.sqrt(measured * np.maximum(variance, 0.0) + (1.0 - measured) * np.square(of_class(rig)))
 

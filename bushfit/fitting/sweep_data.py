@@ -103,7 +103,7 @@ class SweepData(DataSet):
             * (len(rows) > _MOST_LISTED)
             for share, *_ in apart[:1]
         ]
-        return [*told, *(words for name, words in self.noise.beyond.items() if name == self.name)]
+        return [*super().notes, *told, *(words for name, words in self.noise.beyond.items() if name == self.name)]
 
     @property
     def size(self) -> int:

@@ -75,7 +75,7 @@ IN_CAMPAIGN = [
     ('file = "sweep.csv"', 'file = "sweep.csv"\namplitude = "rms"', "campaign.toml, sweeps #1.amplitude: this value is not understood", "'zero-to-peak' or 'peak-to-peak'"),
     ('file = "sweep.csv"', 'file = "loop.csv"', "loop.csv, line 1: no pair of columns gives a complex stiffness", 'correct the header, or name the columns in the campaign: columns = { stiffness = "..." }'),
     ('file = "sweep.csv"', 'file = "sweep.csv"\nforce_sign = -1', "campaign.toml, sweeps #1.force_sign: unknown key", "one of encoding, delimiter, decimal, thousands, header_line, sheet, file, direction,"),
-    ('[[sweeps]]\nfile = "sweep.csv"\ndirection = "axial"\n', '[[loops]]\nfile = "./loop.csv"\ndirection = "axial"\n', "campaign.toml: a file is listed twice", "each file once"),
+    ('[[sweeps]]\nfile = "sweep.csv"\ndirection = "axial"\n', '[[loops]]\nfile = "./loop.csv"\ndirection = "axial"\n', "loop.csv, line 1: a file is listed twice", "each file once, or a column that tells its tests apart"),
     ('file = "sweep.csv"', 'file = "sweep.csv"\nat_amplitude = "0.1 mm"', 'sweep.csv, line 8, column "amplitude [mm]": the amplitude is not the one that is stated', "take at_amplitude out of the campaign"),
     ('file = "sweep.csv"', 'file = "sweep.csv"\nat_frequency = "5 Hz"', 'sweep.csv, line 3, column "frequency [Hz]": the frequency is not the one that is stated', "take at_frequency out of the campaign"),
     ('file = "sweep.csv"', 'file = "sweep.csv"\nat_amplitude = "0.1 %"', "campaign.toml, sweep.csv: the unit does not fit", "a length, such as mm"),

@@ -72,7 +72,8 @@ def test_a_parameter_at_nothing_shows_no_interval(bushfit: Run, work: Path, tmp_
     sweep = pd.read_csv(work / "data/cmp_15961/sweep_axial.csv")
     sweep["stiffness [N/mm]"] *= (sweep["frequency [Hz]"] / 5.0) ** -0.15
     sweep.to_csv(work / "data/cmp_15961/falling.csv", index=False)
-    (work / "configs/falling.toml").write_text((work / CAMPAIGN).read_text().replace("sweep_axial", "falling"))
+    campaign = (work / CAMPAIGN).read_text().replace("sweep_axial", "falling")
+    (work / "configs/falling.toml").write_text(campaign + '\n[rig]\ngain_error = "0 %"\n')
     done = bushfit("fit", "configs/falling.toml", "-o", str(tmp_path / "x"), "--no-plots")
     assert done.returncode == 0, done.stderr
     result = load_result(tmp_path / "x" / "model.json")

@@ -51,6 +51,6 @@ def test_a_gap_has_every_residual_before_and_after(data: Data, paper_model: Mode
     for when, model in (("before", softer), ("after", paper_model)):
         columns = [f"{part} {when} [noise]" for part in ("force", "storage", "loss")]
         values = table[columns].to_numpy()
-        chi_square = sum(float(np.sum(data_set.residual(model) ** 2)) for data_set in data_sets)
+        chi_square = sum(float(np.sum(data_set.misfit(model) ** 2)) for data_set in data_sets)
         assert np.nansum(values**2) == pytest.approx(chi_square, rel=1e-9)
     assert list(dict.fromkeys(table["kind"])) == ["loop", "sweep"]
