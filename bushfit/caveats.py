@@ -29,7 +29,8 @@ def warnings_of(result: Result, found: Iterable[Iterable[str]] = (), notes: Iter
 def caveats(result: Result) -> list[str]:
     """Sentences on what holds of a result itself, whatever is predicted with it."""
     fitted = result.measured.directions if result.measured else ()
-    lines = [line for name in fitted for line in unfitted(result, result.place(name))]
+    own = {*Direction, *(specimen.name for specimen in result.specimens)}  # a compound was fitted on other bodies
+    lines = [line for name in fitted if name in own for line in unfitted(result, result.place(name))]
     for name in result.unresolved:
         twins = " or ".join(effect_named(name).twins)
         lines.append(f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}")

@@ -25,7 +25,8 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.data import Data
 from bushfit.units import number
 
-#: What is said where there is no gap.
+#: What is said of what was weighed and is not told, and where there is no gap.
+_LESS_LIKELY = "another explanation is likelier"
 _NOTHING = "nothing is missing beyond noise and tolerance"
 
 
@@ -217,7 +218,8 @@ class Told:
 
     @cached_property
     def candidates(self) -> list[Judged]:
-        """Every effect of the library beside the model as it came: its score, its refit and its probability."""
+        """Every effect of the library beside the model as it came, and every mistake in the record that was weighed: its
+        score, its refit and its probability."""
         chance = self.hypotheses[0].log_posterior
         weight = {id(each): float(np.exp(each.log_posterior - chance)) for each in self.hypotheses}
         whole = sum(weight.values())
@@ -226,7 +228,13 @@ class Told:
             for each in self.hypotheses
             if each.refitted and len(each.effects) == 1 and len(each.key) == 1
         }
-        found = []
+        found = list[Judged]()
+        for hypothesis in self.hypotheses:
+            if (claim := hypothesis.claim) and len(hypothesis.key) == 1:
+                share = weight[id(hypothesis)] / whole
+                gain = self.base.chi_square - hypothesis.weighed.state.evidence.chi_square
+                why = "closes the gap" if self.first and self.first.best is hypothesis else _LESS_LIKELY
+                found.append(Judged(" + ".join(claim.labels(self.data)), gain, gain, share, {}, why))
         for each in self.search.root.effects:
             share = sum(weight[id(other)] for other in self.hypotheses if each.name in other.effects) / whole
             found.append(
@@ -241,7 +249,7 @@ class Told:
         after = alone.weighed.state.evidence
         own = {key: value for key, value in after.model.values.items() if key not in self.base.model.values}
         told = self.first and name in self.first.best.effects
-        why = "part of the likeliest explanation" if told else "another explanation is likelier"
+        why = "part of the likeliest explanation" if told else _LESS_LIKELY
         return Judged(name, score, self.base.chi_square - after.chi_square, share, own, why)
 
     def _notes(self) -> tuple[str, ...]:
