@@ -218,7 +218,7 @@ class Told:
 
     @cached_property
     def candidates(self) -> list[Judged]:
-        """Every effect of the library beside the model as it came, and every mistake in the record that was weighed: its
+        """Every effect of the library beside the model as it came, and every mistake in the record weighed: its
         score, its refit and its probability."""
         chance = self.hypotheses[0].log_posterior
         weight = {id(each): float(np.exp(each.log_posterior - chance)) for each in self.hypotheses}
