@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.effects import temperature
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, parted, repeats_of
+from bushfit.fitting.data_sets import DataSet, LoopData, parted, repeats_of
 from bushfit.fitting.solve import Coordinates, jacobian, residual
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus
 from bushfit.model.covariance import Covariance
@@ -81,11 +81,23 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     by_value, reaction = answer * slopes[:, None], reaction * slopes[:, None]
     carried = reaction[:, : len(held.names)] / slopes[: len(held.names)]
     spread = [carried @ part @ carried.T for part in held.spread]
-    matrix = by_value @ by_value.T
-    for part, lost in _unsure(stages, [(reaction[:, own], basis) for own, basis in bases]):
+    influences = [reaction[:, own] @ basis for own, basis in bases]
+    matrix = by_value @ by_value.T + sum(_of_gains(*each) for each in zip(stages, influences, strict=True))
+    for part, lost in _unsure(stages, influences, [basis for _, basis in bases]):
         spread.append(part)
         matrix = matrix + 2.0 * _positive(lost, np.sqrt(np.diag(matrix)))
     return Covariance(names, matrix, tuple(spread))
+
+
+def _of_gains(stage: Stage, influence: Array) -> Array:
+    """What errors of the loops' gains add to the covariance, (k, k), by the influence of each residual, (k, n)."""
+    ends = np.cumsum([0, *(data_set.size for data_set in stage.data_sets)])
+    added = np.zeros((len(influence), len(influence)))
+    for data_set, first, last in zip(stage.data_sets, ends[:-1], ends[1:], strict=True):
+        if isinstance(data_set, LoopData):
+            moved = data_set.gain_error * (influence[:, first:last] @ data_set.unit_gain)
+            added += np.outer(moved, moved)
+    return added
 
 
 def _excess(model: Model, stage: Stage) -> list[tuple[DataSet, float]]:
@@ -115,14 +127,15 @@ def linear_errors(slope: Array) -> Array:
     return np.linalg.norm(_inverse(np.linalg.qr(slope.T)[1]), axis=1)
 
 
-def _unsure(stages: Sequence[Stage], reactions: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+def _unsure(stages: Sequence[Stage], influences: Sequence[Array], bases: Sequence[Array]) -> list[tuple[Array, Array]]:
     """How far the error of each estimated variance moves the covariance, and what it adds by wrong weights, (k, k).
 
-    The reactions are those of the parameters to a stage's own equations, (k, own), and the stage's basis, (own, n).
+    Args:
+        influences: of each residual of a stage on the parameters, (k, n).
+        bases: of the stage's own equations, (own, n).
     """
     parts: dict[Hashable, tuple[Array, Array]] = {}
-    for stage, (reaction, basis) in zip(stages, reactions, strict=True):
-        influence = reaction @ basis
+    for stage, influence, basis in zip(stages, influences, bases, strict=True):
         unit = basis / np.linalg.norm(basis[0])
         ends = np.cumsum([0, *(data_set.size for data_set in stage.data_sets)])
         moved: dict[Hashable, tuple[Array, Array, Array]] = {}

@@ -116,7 +116,7 @@ def fit_static(data: Data, springpot: Result | None = None) -> Result:
     """
     data_sets = data.static_loops()
     held, known = _springpot(data, springpot)
-    found = _solve_loops(data, data_sets, held)
+    found = _solve(data, data_sets, BASE if held else ("elastic", "friction"), held)
     notes = [] if held else [_without_springpot(data, found.solution, data_sets)]
     return _result(data, [found], known, notes)
 
@@ -149,7 +149,7 @@ def fit_two_step(data: Data) -> TwoStep:
     springpot, passes = dict[str, float](), list[Mapping[str, float]]()
     asked, answered = list[Array](), list[Array]()
     for _ in range(_MOST_PASSES):
-        static = _solve_loops(data, loops, springpot)
+        static = _solve(data, loops, BASE if springpot else ("elastic", "friction"), springpot)
         found = static.solution.model.values
         dynamic = _solve(data, [sweep], BASE, {name: found[name] for name in STATIC})
         model = dynamic.solution.model
@@ -200,7 +200,7 @@ def _without_springpot(data: Data, solution: Solution, loops: Sequence[LoopData]
     except FitError:  # no sweep, or none that goes with the loops: a typical rubber tells as much as can be told
         ratio, alpha = _TYPICAL_SPRINGPOT
         held = {"m": ratio * found["mu"], "alpha": alpha}
-        better = _solve_loops(data, loops, held).solution.model.values
+        better = _solve(data, loops, BASE, held).solution.model.values
         source = f"with the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
     changes = ", ".join(f"{name} by {100 * (better[name] / found[name] - 1):+.1f} %" for name in STATIC)
     return (
@@ -208,15 +208,6 @@ def _without_springpot(data: Data, solution: Solution, loops: Sequence[LoopData]
         f"went into the others; {source} they change: {changes}. bushfit run alternates the two fits, and "
         "bushfit fit takes all parameters together"
     )
-
-
-def _solve_loops(data: Data, loops: Sequence[LoopData], springpot: Mapping[str, float]) -> Estimate:
-    """Loops alone, the springpot held or left out. Their gain scales what they tell, and is no way to meet them better:
-    it counts in the errors alone."""
-    known = [replace(loop, gain_error=0.0) for loop in loops]
-    found = _solve(data, known, BASE if springpot else ("elastic", "friction"), springpot)
-    pairs = zip(parted(found.weighed)[0], loops, strict=True)
-    return replace(found, weighed=tuple(replace(each, gain_error=loop.gain_error) for each, loop in pairs))
 
 
 def _solve(
