@@ -31,8 +31,6 @@ def scattering_alone(evidence: Evidence) -> Evidence:
     data_sets = tuple(
         replace(each, noise=replace(each.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), residuals="complex")
         if isinstance(each, SweepData)
-        else replace(each, gain_error=0.0)
-        if isinstance(each, LoopData)
         else each
         for each in evidence.data_sets
     )
