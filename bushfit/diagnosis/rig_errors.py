@@ -13,7 +13,7 @@ from bushfit.diagnosis.currency import Block, Node
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted
+from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted, with_gains
 from bushfit.fitting.rig_class import ASSUMED, of_class
 from bushfit.fitting.solve import jacobian, residual
 
@@ -32,7 +32,7 @@ def scattering_alone(evidence: Evidence) -> Evidence:
         replace(each, noise=replace(each.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), residuals="complex")
         if isinstance(each, SweepData)
         else each
-        for each in evidence.data_sets
+        for each in with_gains(evidence.data_sets, weigh=False)
     )
     solution, names = evidence.solution, evidence.solution.coordinates.names
     rows = jacobian(solution.model, data_sets, names)

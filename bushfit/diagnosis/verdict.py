@@ -12,7 +12,7 @@ from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.described import describe
 from bushfit.diagnosis.document import Description, Verdict
-from bushfit.diagnosis.evidence import Evidence, result_of
+from bushfit.diagnosis.evidence import Evidence, fit, result_of
 from bushfit.diagnosis.explanations import FaultyPlace
 from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.hypotheses import Hypothesis
@@ -23,6 +23,7 @@ from bushfit.diagnosis.words import Composition, Finding
 from bushfit.effects import effect_named
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import parted, with_gains
 from bushfit.units import number
 
 #: What is said of what was weighed and is not told, and where there is no gap.
@@ -89,12 +90,12 @@ class Told:
         words = f"these tests agree if {claim.words(self.data)}{beside}"
         found = self._finished("named", words, self.base, names, next_test=advice)
         warning = f"fitted to the tests as they are, which only agree if {claim.words(self.data)}: {advice}"
-        after = best.weighed.state.evidence
+        after = self._fitted(best.weighed.state.evidence)
         return replace(
             found,
             after=after,
             remainder=locate(after),
-            holdout=hold_out(self.base, after, self.search.asked.bounds),
+            holdout=hold_out(found.before, after, self.search.asked.bounds),
             result=replace(found.result, warnings=(*found.result.warnings, warning)),
         )
 
@@ -129,7 +130,11 @@ class Told:
         lead = f"; no more than leads: {_all(finding.leads)}" if finding.leads else ""
         spot = self.first.best if self.first and finding.verdict == "unexplained" else None
         rig = self.data.campaign.rig
-        if not spot and asked.most and (found := describe(self.base, rig, asked.start, asked.held, asked.bounds)):
+        if (
+            not spot
+            and asked.most
+            and (found := describe(self._fitted(self.base), rig, asked.start, asked.held, asked.bounds))
+        ):
             words = f"a real gap stays that no known effect closes: {found.words}{lead}"
             names = [Named(UNNAMED, found.evidence)]
             held = found.correction.held
@@ -170,8 +175,8 @@ class Told:
     def _evidence(self) -> str:
         """Why effects were named."""
         assert self.first
-        after = self.first.best.weighed.state.evidence
-        gain = self.base.chi_square - after.chi_square
+        after = self._fitted(self.first.best.weighed.state.evidence)
+        gain = self._fitted(self.base).chi_square - after.chi_square
         beside = " with what was named beside it" if len(self.first.best.effects) > 1 else ""
         return f"takes {gain:.0f} off chi-square{beside}; {self._probability(self.first)}"
 
@@ -192,7 +197,7 @@ class Told:
         description: Description | None = None,
         held: HoldOut | None = None,
     ) -> Diagnosis:
-        base, bounds = self.base, self.search.asked.bounds
+        base, after, bounds = self._fitted(self.base), self._fitted(after), self.search.asked.bounds
         spots = list(places.places) if places else []
         if not next_test and names:
             next_test = effect_named(names[0].name).confirmed_by
@@ -216,10 +221,24 @@ class Told:
             self.odds,
         )
 
+    def _fitted(self, evidence: Evidence) -> Evidence:
+        """The same model as a fit has it, in which a loop's gain weighs only where its class is stated."""
+        loops = parted(evidence.data_sets)[0]
+        if self.data.campaign.rig.stated[0] is not None or not any(loop.gain_weighs for loop in loops):
+            return evidence
+        if evidence not in self._refitted:
+            asked, data_sets = self.search.asked, with_gains(evidence.data_sets, weigh=False)
+            self._refitted[evidence] = fit(evidence.model, data_sets, asked.held, asked.bounds)
+        return self._refitted[evidence]
+
+    @cached_property
+    def _refitted(self) -> dict[Evidence, Evidence]:
+        return {}
+
     @cached_property
     def candidates(self) -> list[Judged]:
         """Every effect of the library beside the model as it came, and every mistake in the record weighed: its
-        score, its refit and its probability."""
+        score, its refit and its probability; by score."""
         chance = self.hypotheses[0].log_posterior
         weight = {id(each): float(np.exp(each.log_posterior - chance)) for each in self.hypotheses}
         whole = sum(weight.values())
@@ -240,7 +259,7 @@ class Told:
             found.append(
                 self._judged(each.name, each.proposal.score, each.proposal.visible, alone.get(each.name), share)
             )
-        return found
+        return sorted(found, key=lambda judged: -judged.score)
 
     def _judged(self, name: str, score: float, visible: bool, alone: Hypothesis | None, share: float) -> Judged:
         if alone is None:

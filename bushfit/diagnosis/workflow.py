@@ -18,7 +18,7 @@ from bushfit.diagnosis.words import judged
 from bushfit.effects import effect_named, qualified
 from bushfit.effects.mistakes import candidate_named, mistake_named
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import parted
+from bushfit.fitting.data_sets import parted, with_gains
 from bushfit.fitting.robust import estimate, outliers_at, told
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -104,7 +104,8 @@ class _Begun(NamedTuple):
 
 
 def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
-    """Fit the model as it came, with the effects that the user adopts."""
+    """Fit the model as it came, with the effects that the user adopts; the rig's errors are part of every explanation,
+    so a loop's gain weighs, whether its class is stated or assumed."""
     hint = "add measured tests to the campaign"
     data_sets = data.some([*data.loops, *data.sweeps], "there is nothing to diagnose", hint)
     held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
@@ -122,6 +123,6 @@ def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
         names = [name for name in model.parameters if name not in held]
         robust = estimate(model, data_sets, names, data.bounds, robust=True)
         outliers, data_sets = robust.outliers, robust.data_sets
-    data_sets = [data_set.standing() for data_set in data_sets]
+    data_sets = [data_set.standing() for data_set in with_gains(data_sets, weigh=True)]
     descent = fit_from(model, data_sets, held, data.bounds).finished(EVALUATIONS)
     return _Begun(Evidence(descent.solution, tuple(data_sets)), start, held, outliers)

@@ -90,11 +90,11 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
 
 
 def _of_gains(stage: Stage, influence: Array) -> Array:
-    """What errors of the loops' gains add to the covariance, (k, k), by the influence of each residual, (k, n)."""
+    """What errors of gains that do not weigh add to the covariance, (k, k), by the influence of residuals, (k, n)."""
     ends = np.cumsum([0, *(data_set.size for data_set in stage.data_sets)])
     added = np.zeros((len(influence), len(influence)))
     for data_set, first, last in zip(stage.data_sets, ends[:-1], ends[1:], strict=True):
-        if isinstance(data_set, LoopData):
+        if isinstance(data_set, LoopData) and not data_set.gain_weighs:
             moved = data_set.gain_error * (influence[:, first:last] @ data_set.unit_gain)
             added += np.outer(moved, moved)
     return added

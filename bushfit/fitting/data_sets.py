@@ -48,7 +48,15 @@ def with_gain_errors(loops: Sequence[LoopData], stated: RigSettings) -> list[Loo
         repeats, all that tells of the bushing, just as unsure.
     """
     errors = of_class(stated)[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
-    return [replace(loop, gain_error=error) for loop, error in zip(loops, errors.tolist(), strict=True)]
+    weighs = stated.stated[0] is not None
+    return [
+        replace(loop, gain_error=each, gain_weighs=weighs) for loop, each in zip(loops, errors.tolist(), strict=True)
+    ]
+
+
+def with_gains(data_sets: Iterable[DataSet], *, weigh: bool) -> list[DataSet]:
+    """The same tests with the errors of the loops' gains part of their noise, or not."""
+    return [replace(each, gain_weighs=weigh) if isinstance(each, LoopData) else each for each in data_sets]
 
 
 def repeats_of(loops: Sequence[LoopData]) -> Array:

@@ -29,14 +29,16 @@ class LoopData(DataSet):
     Args:
         fundamental_only: whether all but the first harmonic of its residuals is left out, so that it counts as one
             operating point, with two residuals: of an addition without a law in time nothing else is known.
-        gain_error: standard deviation of the gain of the whole record, by the class of its rig; it counts in the errors
-            of what is fitted alone.
+        gain_error: standard deviation of the gain of the whole record, by the class of its rig.
+        gain_weighs: whether it is part of the noise, as where [rig] states the class. A gain that is only assumed
+            widens the errors of what is fitted, and bends no fit to meet the shape of a loop that a model misses.
     """
 
     drive: Drive
     under: Circumstances = UNKNOWN
     fundamental_only: bool = False
     gain_error: float = 0.0
+    gain_weighs: bool = False
     kind = "loop"
     components = ("force",)
 
@@ -160,10 +162,11 @@ class LoopData(DataSet):
                 yield Outlier(self.name, file, row + before + 1, column, off)
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        whole = influence @ self._fundamental.T if self.fundamental_only else influence
-        by_noise = [self._counted(part) for part in self.drive.row_noise.unsure(whole)]
+        own = self._less_gain(influence)
+        whole = own @ self._fundamental.T if self.fundamental_only else own
+        by_noise = [self._less_gain(self._counted(part)) for part in self.drive.row_noise.unsure(whole)]
         if not by_noise and self.test.noise is None:
-            by_noise = [np.sqrt(2.0 / self._rows) * influence]
+            by_noise = [np.sqrt(2.0 / self._rows) * self._less_gain(own)]
         return {(self.name, which): part for which, part in enumerate(by_noise)}
 
     def contrasts(self) -> Array:
@@ -177,7 +180,7 @@ class LoopData(DataSet):
     def gain_and_offset(self) -> Array:
         """What a unit of gain, and half the force range of offset, make of the whitened residuals, (2, n)."""
         offset = np.full(self.drive.force.size, self.drive.half_range)
-        return np.array([self.unit_gain, self._whitened(offset * self._per_noise)])
+        return np.array([self._less_gain(self.unit_gain), self._whitened(offset * self._per_noise)])
 
     def columns(self) -> dict[str, Any]:
         unit, factor = self.direction.display.displacement
@@ -195,11 +198,19 @@ class LoopData(DataSet):
         return np.array([np.ones_like(angle), *waves])
 
     def _whitened(self, rows: Array) -> Array:
-        """Rows in units of noise, (..., n), as independent numbers, 0 where one is told from a row left out.
+        """Rows in units of noise, (..., n), as independent numbers, 0 where one is told from a row left out."""
+        return self._less_gain(self._counted(self.drive.row_noise.whiten(rows) * self._told))
 
-        The error of the gain does not weigh them: a model that misses the shape of a loop would bend the gain.
+    def _less_gain(self, white: Array) -> Array:
+        """Whitened rows less the share of what lies along the error of the gain, which makes them white again.
+
+        Notes: the covariance is 1 + g g^T with g the error that a standard deviation of the gain makes.
         """
-        return self._counted(self.drive.row_noise.whiten(rows) * self._told)
+        if not self.gain_weighs or not self.gain_error:
+            return white
+        size = float(self.unit_gain @ self.unit_gain)
+        share = (1.0 - 1.0 / np.sqrt(1.0 + self.gain_error**2 * size)) / size
+        return white - share * (white @ self.unit_gain)[..., None] * self.unit_gain
 
     def _counted(self, white: Array) -> Array:
         """Of whitened rows, (..., n), what counts as its residuals."""

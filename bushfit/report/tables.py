@@ -237,7 +237,7 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
             "level": level_of(judged.name),
             "score": judged.score,
             "chi-square gain": judged.gain,
-            "probability": judged.probability,
+            "probability": round(judged.probability, 9),
             "parameters": "; ".join(f"{name} = {value:.6g}" for name, value in judged.parameters.items()),
             "why": judged.why,
         }

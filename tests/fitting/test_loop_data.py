@@ -93,3 +93,4 @@ def test_a_gain_error_of_the_rig_pulls_no_fit(
         asked.append(-(column @ residual) / (column @ column))
     print("mean gain asked for, less 1:", np.mean(asked))
     assert abs(np.mean(asked)) < 1e-3
+    assert np.linalg.norm(column) == pytest.approx(1.0 / 5e-3, rel=0.15)  # no loop tells a gain better than its rig
