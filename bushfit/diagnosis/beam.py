@@ -21,6 +21,7 @@ from bushfit.diagnosis.hypotheses import Asked, Hypothesis, State, Tests, Weighe
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.refit import refitted, within_reach
+from bushfit.effects import effect_named
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
@@ -205,7 +206,8 @@ class Search:
             return
         data_sets, (held, bounds) = state.evidence.data_sets, (self.asked.held, self.asked.bounds)
         for name in state.effects[:-1]:
-            if state.key - {name} in self._seen:
+            needed = any(effect_named(other).after == name for other in state.effects)
+            if needed or state.key - {name} in self._seen:
                 continue
             with suppress(FitError, ModelError):  # no response without it
                 model = state.evidence.model.without(name)

@@ -235,7 +235,7 @@ def test_a_small_score_card(bushfit: Run, tmp_path: Path) -> None:
     assert len(document["outcomes"]) >= 5
     assert {"card", "confusion", "seed"} <= document.keys()
     assert "score card:" in run.stderr
-    assert "false alarm on clean campaigns" in run.stderr
+    assert "false alarm on clean" in run.stderr  # and the rest of the name where the table breaks it
     assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == {"outcomes.jsonl", "scorecard.json"}
     lines = (tmp_path / "x" / "outcomes.jsonl").read_bytes().splitlines(keepends=True)
     (tmp_path / "x" / "outcomes.jsonl").write_bytes(b"".join(lines[:-1]) + lines[-1][:30])

@@ -98,8 +98,12 @@ CUTS = (*SHOW_MASS, no_sweeps, one_loop, one_frequency)
 @pytest.mark.parametrize("effects", [{}, pytest.param(INERTIA, marks=pytest.mark.slow)], ids=["clean", "mass"])
 @pytest.mark.parametrize("part", CUTS)
 def test_with_less_no_bolder_name(measured: Measured, part: Callable[..., Campaign], effects: Effects) -> None:
-    shown = "named inertia" if effects and part in SHOW_MASS else "consistent "
-    assert said(asked(part(measured(effects, SHARED)))) == shown
+    found = asked(part(measured(effects, SHARED)))
+    if effects and part in SHOW_MASS:  # with less, what has a mass as its limit is as likely
+        assert said(found) == "named inertia" or found.verdict == "ambiguous"
+        assert "inertia" in {*found.odds.labels}
+    else:
+        assert said(found) == "consistent "
 
 
 def held(campaign: Campaign, **settings: ParameterSetting) -> Campaign:

@@ -77,4 +77,5 @@ def test_95_percent_intervals_cover_with_errors_of_levels(
         inside.append([low <= truth[name] <= high for name, (low, high) in zip(FIVE, limits, strict=True)])
     share, chance = np.mean(inside), 1.96 * np.std(np.mean(inside, axis=1)) / np.sqrt(seeds)
     print(f"{directions}, {error} a level, {seeds} seeds: {share:.3f} +- {chance:.3f} of the intervals hold the truth")
-    assert 0.93 - chance <= share <= 0.97 + chance
+    assert 0.93 - chance <= share
+    assert share <= 0.97 + chance or not error  # the class that is assumed is then larger than the rig's errors
