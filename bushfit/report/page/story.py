@@ -84,9 +84,14 @@ def _of_tables(result: Result, tables: Tables) -> Iterator[Iterator[str]]:
     for name, place in places_of(result, tables).items():
         (amplitude, stiffness, _), ((_, length), _, (_, unit)) = columns_of(place), place.display
         headers = "frequency [Hz]", amplitude, stiffness
-        if name in tables and len(table := complete(tables[name], *headers)):
+        if name not in tables:
+            continue
+        table = complete(tables[name], *headers)
+        table = table[numbers(table, stiffness)[0] != 0.0]  # which only a hand puts there
+        if len(table):
             others = (f"{stiffness}, {IF_RIGS}", f"measured {stiffness}")
             rigs, measured = (numbers(table, each)[0] / unit if each in table else None for each in others)
+            measured = None if measured is None else np.where(measured == 0.0, np.nan, measured)
             yield of_points(result, place, numbers(table, *headers) / [[1.0], [length], [unit]], rigs, measured, None)
 
 
