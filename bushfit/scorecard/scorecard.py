@@ -25,7 +25,10 @@ from bushfit.effects import effect_of
 from bushfit.effects.mistakes import mistake_named
 from bushfit.errors import MeasurementError
 from bushfit.fitting.data import Data
+from bushfit.jobs.diagnose import Diagnose
+from bushfit.report.contents import Contents, Formats
 from bushfit.report.folder import write_files
+from bushfit.report.page.readback import read_results
 from bushfit.scorecard.families import RECIPES, campaign_of
 from bushfit.scorecard.hidden import Sealed
 from bushfit.scorecard.outcome import REFUSED, Outcome, Task
@@ -71,7 +74,7 @@ def _in_worker(chosen: Sequence[Task], kept: Path | None, hours: float | None) -
 
 
 def work(task: Task, kept: Path | None = None, hours: float | None = None) -> Outcome:
-    """One task: write the campaign, seal the truth apart, diagnose the files, open the truth.
+    """One task: write the campaign, seal the truth apart, diagnose the files as the command does, open the truth.
 
     Args:
         kept: folder in which both stay; where it is None, they are gone afterwards.
@@ -92,8 +95,9 @@ def _worked(task: Task, folder: Path, hours: float | None) -> Outcome:
         write_files(sealed_file.parent, {sealed_file.name: _SEALED.dump_json(sealed)}, force=True)
         started = time.process_time()
         data = Data.of(load_campaign(place / "campaign.toml"))
-        diagnosis = diagnose(data, None, Settings(without=task.without))
-        seconds = time.process_time() - started
+        found = Diagnose(Settings(without=task.without)).run(data)
+        diagnosis, seconds = found.diagnosis, time.process_time() - started
+        _through_files(found.contents, place / "results")
         truth = _SEALED.validate_json(sealed_file.read_bytes())
         outcome = _outcome(task, truth, diagnosis, seconds)
         return _settled(outcome, truth, data.campaign, simulated, diagnosis.next_test, hours) if hours else outcome
@@ -103,6 +107,12 @@ def _worked(task: Task, folder: Path, hours: float | None) -> Outcome:
         return Outcome(task, sealed, REFUSED, matters=True)
     except Exception as wrong:  # one campaign that fails is one row of the card, and is shown there
         return _failed(task, wrong)
+
+
+def _through_files(contents: Contents, folder: Path) -> None:
+    """Write the results as `bushfit diagnose` does, and read them back as `bushfit report` does."""
+    write_files(folder, Formats(pictures=False).files(contents), force=True)
+    read_results(folder)
 
 
 def _settled(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -15,6 +16,10 @@ from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import twins_of
 from bushfit.fitting.data import Data
+from bushfit.jobs.diagnose import Diagnose
+from bushfit.report.contents import Formats
+from bushfit.report.folder import write_files
+from bushfit.report.page.readback import read_results
 
 Truths = dict[str, dict[str, Any]]
 
@@ -48,7 +53,11 @@ class Found(dict[str, Diagnosis]):
         self._folder = folder
 
     def __missing__(self, case: str) -> Diagnosis:
-        self[case] = diagnose(Data.of(load_campaign(self._folder / case / "bushing.toml")))
+        found = Diagnose().run(Data.of(load_campaign(self._folder / case / "bushing.toml")))
+        self[case] = found.diagnosis
+        with TemporaryDirectory() as folder:  # what is written is read back
+            write_files(Path(folder) / "x", Formats(pictures=False).files(found.contents), force=False)
+            read_results(Path(folder) / "x")
         return self[case]
 
 
