@@ -51,6 +51,7 @@ def kept(folder: Path) -> int:
     return sum(1 for _ in folder.glob("bushings/*/row.json"))
 
 
+@pytest.mark.slow
 def test_a_lost_worker_loses_nothing(typed: Callable[..., Any], shop: Path, cluster: tuple[str, Processes]) -> None:
     """One of two workers is killed in mid-run; what comes out is what the local pool makes, byte for byte."""
     address, (_, victim, other) = cluster

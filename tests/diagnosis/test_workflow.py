@@ -110,7 +110,7 @@ def held(campaign: Campaign, **settings: ParameterSetting) -> Campaign:
     return replace(campaign, fit=FitSettings(parameters=settings))
 
 
-@pytest.mark.parametrize("value", [0.24, None], ids=["stated", "of a model"])
+@pytest.mark.parametrize("value", some((0.24, None), {0.24}), ids=["stated", "of a model"])
 def test_held_parameters_stay(measured: Measured, paper_model: Model, value: float | None) -> None:
     campaign = held(measured(INERTIA, SHARED), alpha=ParameterSetting(value=value, vary=False))
     diagnosis = asked(campaign, None if value else paper_model)

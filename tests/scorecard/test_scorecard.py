@@ -193,15 +193,19 @@ def test_the_card_counts() -> None:
     assert rows["processor time of one diagnosis, median / longest"].met is True
 
 
-def test_clean_amplitude_sweeps_are_no_cause_for_alarm(tmp_path: Path) -> None:
-    """A few of what `bushfit scorecard --family amplitude_sweeps --campaigns 500` counts."""
-    found = run(tasks(8, SEED, "amplitude_sweeps"), tmp_path, 1, lambda _: None)
+@pytest.mark.parametrize(("many", "least"), [(3, 11), pytest.param(8, 34, marks=pytest.mark.slow)])
+def test_clean_amplitude_sweeps_are_no_cause_for_alarm(tmp_path: Path, many: int, least: int) -> None:
+    """A few of what `bushfit scorecard --family amplitude_sweeps --campaigns 500` counts.
+
+    Of 40 intervals 38 are expected to hold, and fewer than 34 do by chance once in 25.
+    """
+    found = run(tasks(8, SEED, "amplitude_sweeps")[:many], tmp_path, 1, lambda _: None)
     for row in card(found, "amplitude_sweeps"):
         print(f"{row.measure}: {row.figure}, over {row.over}")
-    assert [(outcome.error, outcome.verdict) for outcome in found] == [("", "consistent")] * 8
+    assert [(outcome.error, outcome.verdict) for outcome in found] == [("", "consistent")] * many
     covered = [hit for outcome in found for hit in outcome.covered]
-    assert len(covered) == 5 * 8
-    assert sum(covered) >= 34  # 38 are expected; fewer than 34 is chance once in 25
+    assert len(covered) == 5 * many
+    assert sum(covered) >= least
 
 
 def test_confusion_is_by_truth() -> None:
