@@ -21,7 +21,6 @@ from bushfit.diagnosis.hypotheses import Asked, Hypothesis, State, Tests, Weighe
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.refit import refitted, within_reach
-from bushfit.effects import effect_named
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
@@ -206,11 +205,12 @@ class Search:
             return
         data_sets, (held, bounds) = state.evidence.data_sets, (self.asked.held, self.asked.bounds)
         for name in state.effects[:-1]:
-            needed = any(effect_named(other).after == name for other in state.effects)
-            if needed or state.key - {name} in self._seen:
+            if state.key - {name} in self._seen:
                 continue
             with suppress(FitError, ModelError):  # no response without it
                 model = state.evidence.model.without(name)
+                if not {used for branch in model.records for used in getattr(branch, "uses", ())} <= {*model.values}:
+                    continue  # another stands on it
                 evidence = fit(model, data_sets, held, {**within_reach(model, data_sets), **bounds})
                 less = state.tests.state
                 for order, other in enumerate(each for each in state.effects if each != name):
