@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 from commandline import call
 
-from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import BASE, LIBRARY
 from bushfit.effects.mistakes import MISTAKES
+from bushfit.jobs.diagnose import Diagnosed
 from bushfit.scorecard.card import card, confusion
 from bushfit.scorecard.families import DISTURBANCES, RECIPES, tasks
 from bushfit.scorecard.hidden import FIRST, hideable
@@ -102,7 +102,7 @@ def test_the_workflow_never_opens_a_sealed_truth(tmp_path: Path, monkeypatch: py
 
     opened: list[str] = []
     running = [False]
-    plain_diagnose, plain_load, plain_open = scorecard.diagnose, scorecard.load_campaign, io.open
+    plain_run, plain_load, plain_open = scorecard.Diagnose.run, scorecard.load_campaign, io.open
 
     def watched(call: Any) -> Any:
         def inner(*arguments: Any) -> Any:
@@ -119,7 +119,7 @@ def test_the_workflow_never_opens_a_sealed_truth(tmp_path: Path, monkeypatch: py
             opened.append(str(file))
         return plain_open(file, *arguments, **keywords)
 
-    monkeypatch.setattr(scorecard, "diagnose", watched(plain_diagnose))
+    monkeypatch.setattr(scorecard.Diagnose, "run", watched(plain_run))
     monkeypatch.setattr(scorecard, "load_campaign", watched(plain_load))
     monkeypatch.setattr(io, "open", spy)
     monkeypatch.setattr(builtins, "open", spy)
@@ -133,19 +133,19 @@ def test_a_diagnosis_is_the_same_without_the_sealed_folder(tmp_path: Path, monke
     """The truth put out of reach while the workflow works, and back for the judge."""
     from bushfit.scorecard import scorecard
 
-    seen: list[Diagnosis] = []
-    plain = scorecard.diagnose
+    seen: list[Diagnosed] = []
+    plain = scorecard.Diagnose.run
 
-    def blind(*arguments: Any) -> Diagnosis:
+    def blind(*arguments: Any) -> Diagnosed:
         sealed, away = tmp_path / "sealed", tmp_path.with_name("away")
         sealed.rename(away)
         seen.append(plain(*arguments))
         away.rename(sealed)
         return seen[-1]
 
-    monkeypatch.setattr(scorecard, "diagnose", blind)
+    monkeypatch.setattr(scorecard.Diagnose, "run", blind)
     outcome = scorecard.work(Task("single", 3, ("delay",)), tmp_path)
-    assert [diagnosis.verdict for diagnosis in seen] == [outcome.verdict] == ["named"]
+    assert [found.diagnosis.verdict for found in seen] == [outcome.verdict] == ["named"]
     assert outcome.named == ("delay",)
 
 
