@@ -20,6 +20,7 @@ from bushfit.diagnosis.explanations import Explanation, FaultyPlace
 from bushfit.diagnosis.hypotheses import Asked, Hypothesis, State, Tests, Weighed
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS
+from bushfit.diagnosis.propose import has_what_it_uses
 from bushfit.diagnosis.refit import refitted, within_reach
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.rig_class import ASSUMED, of_class
@@ -209,8 +210,8 @@ class Search:
                 continue
             with suppress(FitError, ModelError):  # no response without it
                 model = state.evidence.model.without(name)
-                if not {used for branch in model.records for used in getattr(branch, "uses", ())} <= {*model.values}:
-                    continue  # another stands on it
+                if not all(has_what_it_uses(effect, model) for effect in model.records):
+                    continue
                 evidence = fit(model, data_sets, held, {**within_reach(model, data_sets), **bounds})
                 less = state.tests.state
                 for order, other in enumerate(each for each in state.effects if each != name):

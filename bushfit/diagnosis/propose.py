@@ -98,6 +98,11 @@ def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
     return per_size * np.square(along), -per_size * along / lengths, seen
 
 
+def has_what_it_uses(effect: Effect, model: Model) -> bool:
+    """Whether a model has the parameters of others that an effect reads."""
+    return not (isinstance(effect, Branch) and {*effect.uses} - {*model.values})
+
+
 def missing_effects(model: Model, places: Collection[str], excluded: Collection[str] = ()) -> list[Effect]:
     """Every effect of the library that a model lacks and tests at these places could show, of twins the bushing's.
 
@@ -105,12 +110,10 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
         places: directions, or specimens by name.
         excluded: names of effects not to consider, with their twins.
     """
-    present, values = (None, *model.effects), {*model.values}
+    present = (None, *model.effects)
     told = {name for known in (*model.effects, *excluded) for name in twins_of(known)}
     there = {*told, *(effect.replaces for effect in model.records)}
-    possible = [
-        effect for effect in at_places(places).values() if not (isinstance(effect, Branch) and {*effect.uses} - values)
-    ]
+    possible = [effect for effect in at_places(places).values() if has_what_it_uses(effect, model)]
     missing = [effect for effect in possible if effect.name not in there]
     series = {name for effect in model.records for name in effect.never_with}
     series |= {effect.name for effect in missing if {*effect.never_with} & {*present}}
