@@ -12,21 +12,19 @@ from dataclasses import replace
 from math import log
 
 import numpy as np
-from scipy.special import logsumexp
 
 from bushfit.diagnosis.claims import Screen, claims
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.explanations import Explanation, FaultyPlace
 from bushfit.diagnosis.hypotheses import Asked, Hypothesis, State, Tests, Weighed
 from bushfit.diagnosis.laplace import laplace
-from bushfit.diagnosis.priors import BEAM, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS
+from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_what_it_uses
 from bushfit.diagnosis.refit import refitted, within_reach
+from bushfit.diagnosis.words import judged
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
-#: Probability of nothing from which on records are not doubted. For time: each claim is a fit.
-_SURE = 0.99
 #: Refits at most of what is probable by a linear count alone. For time.
 _SETTLED = 8
 #: Claims that are fitted, those first under which the tests could agree best; places added to a state. For time.
@@ -56,10 +54,10 @@ class Search:
         for depth in range(ROUNDS + 1):
             for weighed in beam:
                 self._note_with_each(weighed, depth)
-            if depth == ROUNDS:
+            if depth == ROUNDS or self._settled():
                 break
             fresh = [each for weighed in beam for each in self._grown(weighed, depth)]
-            if depth == 0 and self.nothing < _SURE:
+            if depth == 0:
                 fresh += self._of_records()
             for weighed in fresh:
                 self._note_state(weighed)
@@ -75,10 +73,12 @@ class Search:
     def ordered(self) -> list[Hypothesis]:
         return sorted(self.found.values(), key=lambda each: -each.log_posterior)
 
-    @property
-    def nothing(self) -> float:
-        """Probability that nothing is missing, as far as the search has come."""
-        return float(np.exp(self.root.log_posterior - logsumexp([each.log_posterior for each in self.found.values()])))
+    def _settled(self) -> bool:
+        """Whether one answer is all but sure already, with whatever may be beside it weighed, and it fits."""
+        finding = judged(self.ordered, self.asked.tolerance)
+        if finding.verdict == "consistent":
+            return finding.nothing >= NAMED and self.root.first.chance >= DOES_NOT_FIT
+        return finding.verdict == "named" and finding.told[0].best.refitted
 
     def _settle(self) -> None:
         """Refit what only a linear count promises, as long as it is among the most probable."""

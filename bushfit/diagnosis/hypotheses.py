@@ -29,6 +29,7 @@ class Asked:
         fitted: fits it to tests of which a record was put right.
         without: effects and mistakes not to consider.
         most: effects added at the most.
+        tolerance: change of |K|, relative, that counts as nothing.
         start: values read off the data, for a model that the gap has bent too far.
         held, bounds: parameters that do not move, and limits of the others inside their own.
     """
@@ -38,6 +39,7 @@ class Asked:
     fitted: Callable[[Data], Evidence]
     without: Sequence[str]
     most: int
+    tolerance: float
     start: Mapping[str, float]
     held: Sequence[str]
     bounds: Bounds

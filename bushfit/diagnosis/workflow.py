@@ -55,6 +55,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         lambda mended: _begin(mended, model, settings).evidence,
         settings.without,
         settings.max_effects,
+        settings.tolerance,
         begun.start,
         begun.held,
         data.bounds,

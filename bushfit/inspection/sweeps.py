@@ -10,6 +10,7 @@ from bushfit.effects.mistake import told
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.data_set import shown_amplitude
 from bushfit.fitting.noise import SweepNoise, sweep_noise
+from bushfit.fitting.sweep_data import SweepData
 from bushfit.inspection.outside import wrong_labels
 from bushfit.inspection.record import Looked, told_frequencies
 from bushfit.reading.measurement import Sweep, loss_factor
@@ -57,7 +58,7 @@ def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
         "noise": noise.describe(),
     }
     odd = [
-        *(sweep.source.notes if sweep.source else ()),
+        *SweepData(sweep, noise).notes,
         *wrong_labels(named, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
         *_copies(sweep, noise),
         *_untold_repeats(sweep),

@@ -179,6 +179,7 @@ class Predict:
             if result.model.bushing or isinstance(each.direction, Specimen)
         ]
         beside = known if campaign else None
+        notes = (*notes, *(f"{sweep.name}: {note}" for sweep in known for note in sweep.notes))
         predictions = [
             predict(
                 result, place, *grid_at(settings, result, place, sweeps), sweeps=beside, temperature=self.temperature

@@ -32,6 +32,7 @@ class RunDocument(TypedDict, total=False):
         joint: the joint fit; where the model to use is another.
         model: the model to use: the joint fit, or the model with what diagnose added.
         diagnosis: where model and tests disagree; where a parameter is free.
+        warnings: what a user must know of the model to use and of what it predicts.
     """
 
     static: ModelFile
@@ -39,6 +40,7 @@ class RunDocument(TypedDict, total=False):
     joint: ModelFile
     model: Required[ModelFile]
     diagnosis: DiagnosisFile
+    warnings: list[str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -76,7 +78,8 @@ class Ran:
         results |= {"joint": self.joint.result if self.added else None, "model": self.result}
         campaign = about(self.data, "run")
         documents = {name: document_of(result, campaign) for name, result in results.items() if result}
-        return {**documents, "diagnosis": self.diagnosed.document} if self.diagnosed else documents
+        diagnosis = {"diagnosis": self.diagnosed.document} if self.diagnosed else {}
+        return {**documents, **diagnosis, "warnings": self.predicted.warnings}
 
     @property
     def contents(self) -> Contents:

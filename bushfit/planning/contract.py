@@ -83,6 +83,7 @@ class Knowledge:
         specimens: bodies of the compound that can be tested in place of the bushing.
         tests: of the campaign so far.
         bounded: its b parameters at rest on a bound, off which noise takes a fit half of the times; in typical sizes.
+        warnings: of the fit that tells it.
     """
 
     model: Model
@@ -95,6 +96,7 @@ class Knowledge:
     specimens: tuple[Specimen, ...] = ()
     tests: tuple[Test, ...] = ()
     bounded: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def errors(self) -> Array:

@@ -347,6 +347,7 @@ class _Planner:
 
     def _notes(self, planned: Programme, counts: Array) -> Iterator[str]:
         """What a user must know."""
+        yield from self.known.warnings
         if self.known.bounded:
             yield (
                 f"{' and '.join(self.known.bounded)} came to rest on a bound: the errors of the others count that noise"

@@ -58,6 +58,15 @@ REPEATS_OFF = "repeats differ as a whole by an error of"
 ROWS_APART = "points that repeat each other lie up to"
 
 
+def second_off(own: Path, off: float, tilted: bool = False) -> None:
+    """The second of two repeats is off, at all frequencies or more and more along them."""
+    file = own / "data/cmp_15961/sweep_axial.csv"
+    table = pd.read_csv(file).query("repeat <= 2")
+    share = np.log(table["frequency [Hz]"] / 5.0) / np.log(31.0) if tilted else 1.0
+    table["stiffness [N/mm]"] *= 1.0 + off * share * (table["repeat"] == 2)
+    table.to_csv(file, index=False)
+
+
 @pytest.mark.parametrize(
     ("off", "tilted", "told"),
     [
@@ -71,12 +80,7 @@ ROWS_APART = "points that repeat each other lie up to"
 def test_repeats_that_disagree_do_not_excuse_themselves(
     own: Path, command: str, off: float, tilted: bool, told: list[str]
 ) -> None:
-    """The second of two repeats is off, at all frequencies or more and more along them."""
-    file = own / "data/cmp_15961/sweep_axial.csv"
-    table = pd.read_csv(file).query("repeat <= 2")
-    share = np.log(table["frequency [Hz]"] / 5.0) / np.log(31.0) if tilted else 1.0
-    table["stiffness [N/mm]"] *= 1.0 + off * share * (table["repeat"] == 2)
-    table.to_csv(file, index=False)
+    second_off(own, off, tilted)
     done = call(own, command, CAMPAIGN, "-o", "out", "--no-plots")
     assert done.returncode == 0, done.stderr
     warnings = [line for line in done.stderr.splitlines() if line.startswith("warning:")]
@@ -87,6 +91,28 @@ def test_repeats_that_disagree_do_not_excuse_themselves(
         assert done.stderr.startswith("warning:")  # before anything is fitted
     if command == "diagnose":
         assert ("consistent" in done.stderr) is not bool(told)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("predict", "{work}/model/model.json", "--campaign", CAMPAIGN),
+        ("plan", CAMPAIGN),
+        ("compare", CAMPAIGN, CAMPAIGN),
+        ("compare", CAMPAIGN, "--families", "intrinsic_time"),
+        ("inspect", "data/cmp_15961/sweep_axial.csv"),
+    ],
+    ids=["predict", "plan", "compare", "families", "inspect"],
+)
+def test_rows_that_lie_far_apart_are_told_wherever_tests_are_read(
+    own: Path, work: Path, words: tuple[str, ...]
+) -> None:
+    second_off(own, 0.13)
+    done = call(own, *(word.format(work=work) for word in words), "-o", "out", "--no-plots", "--json")
+    assert done.returncode == 0, done.stderr
+    for told in (done.stderr, done.stdout):
+        assert ROWS_APART in " ".join(told.split())
+        assert re.search(r"sweep_axial.csv: .*, rows \d+ and \d+", " ".join(told.split()))
 
 
 def test_a_loop_that_repeats_another_and_lies_far_off_is_told(own: Path) -> None:
