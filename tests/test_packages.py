@@ -58,6 +58,7 @@ def test_the_wheel_is_for_every_machine_and_holds_every_file_of_the_package(root
     assert held == files
 
 
+@pytest.mark.slow
 def test_the_wheel_works_elsewhere(root: Path, wheel: Path, tmp_path: Path) -> None:
     """Unpacked into another folder, with nothing of the repository but a campaign."""
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")

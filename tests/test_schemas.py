@@ -54,11 +54,18 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
         assert files, pattern
         found[name] += [json.loads(file.read_text(encoding="utf-8")) for file in files]
 
-    run("run", "run", "configs/cmp_15961.toml", "-o", "run")
-    run("run", "run", "data/practice/case_001/bushing.toml", "-o", "named")
+    run("run", "run", "data/practice/case_001/bushing.toml", "-o", "run")
     run("model", "fit", "configs/cmp_15961.toml", "--profile", "--loss", "soft_l1", "-o", "profile")
     run("model", "fit", "configs/epdm_70.toml", "--direction", "DMA", "-o", "specimens")
-    run("prediction", "predict", "run/model.json", "--campaign", "configs/cmp_15961.toml", "-o", "predicted")
+    run(
+        "prediction",
+        "predict",
+        "run/model.json",
+        "--campaign",
+        "data/practice/case_001/bushing.toml",
+        "-o",
+        "predicted",
+    )
     shaken = ("--mass", "1 kg", "--base-acceleration", "0.1 g", "--direction", "mount")
     run("prediction", "predict", "specimens/model.json", *shaken, "-o", "shaken")
     run(
@@ -83,7 +90,7 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
     run("inspection", "init", loop, sweep, *sizes, "-o", "begun")
     for names in ("model", "static", "dynamic", "joint", "truth"):
         read("model", f"*/{names}.json")
-    read("diagnosis", "*/diagnosis.json")
+    read("diagnosis", "**/diagnosis.json")
     read("batch", "batch/batch.json")
     read("row", "batch/bushings/*/row.json")
     read("scorecard", "card/scorecard.json")

@@ -72,21 +72,25 @@ class Ran:
         """Whether the model to use holds more than the joint fit."""
         return bool(self.diagnosed and self.diagnosed.diagnosis.added)
 
-    @cached_property
+    @property
     def document(self) -> Mapping[str, Any]:
+        return {**self._files, "warnings": self.predicted.warnings}
+
+    @cached_property
+    def _files(self) -> Mapping[str, Any]:
+        """The documents that are files of their own."""
         results = {"static": self.static and self.static.result, "dynamic": self.two_step and self.two_step.result}
         results |= {"joint": self.joint.result if self.added else None, "model": self.result}
         campaign = about(self.data, "run")
         documents = {name: document_of(result, campaign) for name, result in results.items() if result}
-        diagnosis = {"diagnosis": self.diagnosed.document} if self.diagnosed else {}
-        return {**documents, **diagnosis, "warnings": self.predicted.warnings}
+        return {**documents, "diagnosis": self.diagnosed.document} if self.diagnosed else documents
 
     @property
     def contents(self) -> Contents:
         campaign, found = self.data.campaign, self.diagnosed
         of_tests = contents_of_tests(self.data, self.result, tests_of(campaign))
         of_gap = diagnosis_contents(found.diagnosis, campaign.name) if found else Contents()
-        return (Contents(self.document) | of_tests | of_gap | self.predicted.contents).paged()
+        return (Contents(self._files) | of_tests | of_gap | self.predicted.contents).paged()
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,7 @@ def test_a_row_is_the_single_command_to_the_last_digit(typed: Callable[..., Any]
     assert tree(shop / "all/bushings/c") == single | joint
 
 
+@pytest.mark.slow
 def test_a_row_may_be_the_whole_chain(typed: Callable[..., Any], shop: Path) -> None:
     """b1 hides an inertia, b0 nothing."""
     both = ("bushings/b0/bushing.toml", "bushings/b1/bushing.toml")
@@ -299,7 +300,7 @@ def command(folder: Path, *options: str) -> list[str]:
     return [str(Path(sys.executable).with_name("bushfit")), "batch", "many.csv", "-o", str(folder), *options]
 
 
-@pytest.mark.parametrize(("kills", "many"), [(1, 20), pytest.param(3, 40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kills", "many"), [(1, 10), pytest.param(3, 40, marks=pytest.mark.slow)])
 def test_killed_at_any_moment_and_resumed_it_is_as_if_it_had_run_through(shop: Path, kills: int, many: int) -> None:
     (shop / "many.csv").write_text("campaign\n" + "".join(f"bushings/b{n % 5}/bushing.toml\n" for n in range(many)))
     whole = subprocess.run(command(Path("whole"), "-q"), cwd=shop, check=False)

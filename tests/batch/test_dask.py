@@ -73,6 +73,7 @@ def test_a_lost_worker_loses_nothing(typed: Callable[..., Any], shop: Path, clus
     assert tree(shop / "cluster") == tree(shop / "local")
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_lost_is_one_error_and_the_work_is_kept(shop: Path, cluster: tuple[str, Processes]) -> None:
     address, (scheduler, *_) = cluster
     (shop / "many.csv").write_text("campaign\n" + "".join(f"bushings/b{n % 5}/bushing.toml\n" for n in range(40)))
@@ -90,6 +91,7 @@ def test_a_scheduler_that_is_lost_is_one_error_and_the_work_is_kept(shop: Path, 
     assert kept(shop / "all") >= 5
 
 
+@pytest.mark.slow
 def test_nobody_at_the_address(typed: Callable[..., Any], shop: Path) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
