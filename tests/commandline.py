@@ -14,9 +14,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from unittest import mock
 
+import click
 import pytest
 
-from bushfit.cli import main
+from bushfit.cli import cli, main
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ class Done:
     stderr: str
 
 
-def call(folder: Path, *arguments: object) -> Done:
-    """`bushfit` with these arguments, in a folder."""
+def call(folder: Path, *arguments: object, program: click.Command = cli) -> Done:
+    """`bushfit`, or another program of its kind, with these arguments, in a folder."""
     out, err = io.StringIO(), io.StringIO()
     with (
         contextlib.chdir(folder),
@@ -39,7 +40,7 @@ def call(folder: Path, *arguments: object) -> Done:
         mock.patch.object(sys, "argv", ["bushfit", *map(str, arguments)]),
         pytest.raises(SystemExit) as left,
     ):
-        main()
+        main(program)
     return Done(int(left.value.code or 0), out.getvalue(), err.getvalue())
 
 

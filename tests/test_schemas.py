@@ -77,8 +77,6 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
     batch = ("batch", "configs/cmp_15961.toml", "data/practice/case_001/bushing.toml", "broken.toml")
     asked = ("--command", "fit", "--command", "diagnose", "--at", "axial 25 Hz 0.1 mm", "--jobs", "1")
     run("summary", *batch, *asked, "--limits", "configs/limits.toml", "-o", "batch", status=1)
-    card = ("--family", "amplitude_sweeps", "--campaigns", "5", "--jobs", "1", "--keep")
-    run("scorecard", "scorecard", *card, "-o", "card")
     run("simulation", "simulate", "run/model.json", "-o", "simulated")
     run("export", "export", "run/model.json", "--format", "nastran", "--format", "xlsx", "-o", "exported")
     loop, sweep = ("data/cmp_15961/loop_axial_1.csv", "data/cmp_15961/sweep_axial.csv")
@@ -93,10 +91,6 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
     read("diagnosis", "**/diagnosis.json")
     read("batch", "batch/batch.json")
     read("row", "batch/bushings/*/row.json")
-    read("scorecard", "card/scorecard.json")
-    read("sealed", "card/campaigns/sealed/*.json")
-    lines = (folder / "card/outcomes.jsonl").read_text(encoding="utf-8").splitlines()
-    found["outcome"] = [json.loads(line) for line in lines]
     known = {
         "model",
         "static",
@@ -105,12 +99,11 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
         "truth",
         "diagnosis",
         "row",
-        "scorecard",
         "compare",
         "batch",
         "plan",
     }
-    strange = [file for file in folder.glob("*/**/[!.]*.json") if file.stem not in known and "sealed" not in file.parts]
+    strange = [file for file in folder.glob("*/**/[!.]*.json") if file.stem not in known]
     assert [file for file in strange if "data" not in file.parts] == [], "a file that no schema describes"
     return found
 
@@ -163,7 +156,7 @@ def test_what_is_spoiled_is_refused(written: Documents, name: str) -> None:
     """Every key that has to be there taken away in turn, and every key given what is no value of it."""
     described, document = schema(name), written[name][-1]
     required = described.get("required", [])
-    assert required or name == "outcome"
+    assert required
     for key in required:
         assert complaints(name, {other: value for other, value in document.items() if other != key}), key
     for key in document:

@@ -62,7 +62,7 @@ def cli() -> None:
     """
 
 
-def main() -> None:
+def main(command: click.Command = cli) -> None:
     """Entry point: one clear error and exit status 2 for whatever the user can put right."""
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     os.environ["MPLBACKEND"] = _BACKEND
@@ -70,13 +70,13 @@ def main() -> None:
         sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # whatever the code page: programs read it
     heard, read = _Stream(sys.stderr, is_needed=False), _Stream(sys.stdout, is_needed=True)
     with contextlib.redirect_stderr(heard), contextlib.redirect_stdout(read):
-        sys.exit(_status())
+        sys.exit(_status(command))
 
 
-def _status() -> int:
-    """Exit status of the command that is typed; what went wrong is said."""
+def _status(command: click.Command) -> int:
+    """Exit status of a command as it is typed; what went wrong is said."""
     try:
-        status = cli.main(standalone_mode=False)
+        status = command.main(standalone_mode=False)
         sys.stdout.flush()
         return status or 0
     except (click.exceptions.Abort, KeyboardInterrupt):

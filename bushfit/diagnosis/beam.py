@@ -54,7 +54,7 @@ class Search:
         for depth in range(ROUNDS + 1):
             for weighed in beam:
                 self._note_with_each(weighed, depth)
-            if depth == ROUNDS or self._settled():
+            if depth == ROUNDS or self._is_sure():
                 break
             fresh = [each for weighed in beam for each in self._grown(weighed, depth)]
             if depth == 0:
@@ -73,7 +73,7 @@ class Search:
     def ordered(self) -> list[Hypothesis]:
         return sorted(self.found.values(), key=lambda each: -each.log_posterior)
 
-    def _settled(self) -> bool:
+    def _is_sure(self) -> bool:
         """Whether one answer is all but sure already, with whatever may be beside it weighed, and it fits."""
         finding = judged(self.ordered, self.asked.tolerance)
         if finding.verdict == "consistent":

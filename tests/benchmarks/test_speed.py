@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cards.hidden import hidden_campaign
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.optimize import leastsq
 
@@ -38,7 +39,6 @@ from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 from bushfit.prediction import predict
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.scorecard.hidden import hidden_campaign
 
 pytestmark = pytest.mark.slow
 

@@ -1,4 +1,4 @@
-"""`diagnose` and `scorecard` as typed: files, streams, exit statuses, one error for what is wrong."""
+"""`diagnose` as typed: files, streams, exit statuses, one error for what is wrong."""
 
 from __future__ import annotations
 
@@ -226,38 +226,6 @@ def test_statuses(bushfit: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_small_score_card(bushfit: Run, tmp_path: Path) -> None:
-    run = bushfit("scorecard", "--campaigns", "5", "--jobs", "1", "-o", str(tmp_path / "x"), "--json")
-    assert run.returncode == 0, run.stderr
-    document = json.loads(run.stdout)
-    assert document == json.loads((tmp_path / "x" / "scorecard.json").read_text())
-    assert (document["campaigns"], document["families"]) == (5, ["effects"])
-    assert len(document["outcomes"]) >= 5
-    assert {"card", "confusion", "seed"} <= document.keys()
-    assert "score card:" in run.stderr
-    assert "false alarm on clean" in run.stderr  # and the rest of the name where the table breaks it
-    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == {"outcomes.jsonl", "scorecard.json"}
-    lines = (tmp_path / "x" / "outcomes.jsonl").read_bytes().splitlines(keepends=True)
-    (tmp_path / "x" / "outcomes.jsonl").write_bytes(b"".join(lines[:-1]) + lines[-1][:30])
-    again = bushfit("scorecard", "--campaigns", "5", "--jobs", "1", "-o", str(tmp_path / "x"), "--json", "-q")
-    told = json.loads(again.stdout)
-    assert [{**one, "seconds": 0} for one in told["outcomes"]] == [
-        {**one, "seconds": 0} for one in document["outcomes"]
-    ]
-    other = bushfit("scorecard", "--campaigns", "5", "--seed", "2", "-o", str(tmp_path / "x"))
-    assert other.returncode == 2
-    assert "outcomes of another card stand there" in other.stderr
-
-
-@pytest.mark.parametrize("options", [("--campaigns", "0"), ("--seed", "-1"), ("--jobs", "0"), ("--campaigns", "few")])
-def test_wrong_usage_of_the_score_card(bushfit: Run, options: tuple[str, ...]) -> None:
-    run = bushfit("scorecard", *options)
-    assert run.returncode == 2
-    assert run.stdout == ""
-    assert options[0] in run.stderr
-
-
-@pytest.mark.slow
 def test_the_gap_in_a_picture(bushfit: Run, tmp_path: Path) -> None:
     run = bushfit("diagnose", CAMPAIGN, "-o", str(tmp_path / "x"))
     assert run.returncode == 0, run.stderr
@@ -265,9 +233,3 @@ def test_the_gap_in_a_picture(bushfit: Run, tmp_path: Path) -> None:
     picture = (tmp_path / "x" / "gap.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
     assert len(picture) > 20_000
-
-
-def test_scorecard_promises_no_folder(bushfit: Run) -> None:
-    words = " ".join(bushfit("scorecard", "--help").stdout.split())
-    assert "[nothing is written]" in words
-    assert "results/<campaign" not in words

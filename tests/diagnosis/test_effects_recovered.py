@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cards.hidden import hidden_campaign, hideable
 from rigged import BOTH, PLAN, Diagnosed, Measured, changed, in_closed_form
 from tries import some
 
@@ -16,7 +17,6 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.scorecard.hidden import hidden_campaign, hideable
 from bushfit.simulation.measured import measure
 
 #: The rig steps a compliant mount in time with many more steps than any other.

@@ -103,6 +103,19 @@ def test_what_a_file_has_no_column_for_is_stated(tmp_path: Path) -> None:
     assert sweep_from(doubled, tmp_path, at_amplitude=5e-5).amplitude_reached[0] == pytest.approx(4.9e-5)
 
 
+@pytest.mark.parametrize(
+    ("level", "reached", "factor"),
+    [("amplitude", "p-p", 0.5), ("amplitude p-p", "", 0.5), ("amplitude p-p", "p-p", 0.5), ("amplitude", "", 1.0)],
+)
+def test_amplitudes_reached_count_as_their_header_says_or_else_as_the_levels(
+    tmp_path: Path, level: str, reached: str, factor: float
+) -> None:
+    header = f"frequency [Hz],{level} [mm],amplitude reached {reached} [mm],stiffness [N/mm],loss factor [-]"
+    rows = ["5,0.1,0.099,600,0.1", "15,0.1,0.1,610,0.1", "25,0.1,0.101,620,0.1"]
+    sweep = sweep_from("\n".join([header, *rows]), tmp_path)
+    np.testing.assert_allclose(sweep.amplitude_reached, factor * np.array([9.9e-5, 1e-4, 1.01e-4]))
+
+
 DMA = Specimen("DMA", "modulus")
 #: A simulated strain sweep, in the form of a DMA's export.
 COUPON = "\n".join(

@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from cards.hidden import Sealed
+from cards.ledger import LEDGER, ledger
+from cards.outcome import Outcome, Task
 
 from bushfit.errors import OutputError
-from bushfit.scorecard.hidden import Sealed
-from bushfit.scorecard.ledger import LEDGER, ledger
-from bushfit.scorecard.outcome import Outcome, Task
 
 ASKED = {"families": ["awkward"], "campaigns": 5, "seed": 1}
 SEALED = Sealed(("delay",), {"mu": 1.1e6}, 0.05, True, 1)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cards.hidden import FIRST, hidden_campaign, hideable
+from cards.mistaken import mistaken_campaign
 
 from bushfit.effects import BASE
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.geometry import ROTATION, Direction
 from bushfit.model.model import FIVE
 from bushfit.reading.measurement import Loop
-from bushfit.scorecard.hidden import FIRST, hidden_campaign, hideable
-from bushfit.scorecard.mistaken import mistaken_campaign
 
 
 def test_the_same_seed_makes_the_same_campaign() -> None:

@@ -1,9 +1,8 @@
 """Simulated campaigns that earlier searches named wrongly, or not at all, each with the step that it taught."""
 
 import pytest
-
-from bushfit.scorecard.families import tasks
-from bushfit.scorecard.scorecard import work
+from cards.families import tasks
+from cards.scorecard import work
 
 pytestmark = pytest.mark.slow
 

@@ -6,10 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-
-from bushfit.scorecard.card import card
-from bushfit.scorecard.hidden import Sealed
-from bushfit.scorecard.outcome import Outcome, Task
+from cards.card import card
+from cards.hidden import Sealed
+from cards.outcome import Outcome, Task
 
 EVERYWHERE, EITHER = ("sleeve_compliance",), ("sleeve_compliance", "sleeve_compliance.radial")
 

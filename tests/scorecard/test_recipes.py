@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cards.awkward import AWKWARD
+from cards.families import RECIPES, campaign_of, tasks
+from cards.faults import FAULTS, band
+from cards.outcome import Task
+from cards.outside import LAWS, OUTSIDE_LAWS
+from cards.recipe import Recipe, cooked
 
 from bushfit.effects import LIBRARY
 from bushfit.effects.history import History
-from bushfit.scorecard.awkward import AWKWARD
-from bushfit.scorecard.families import RECIPES, campaign_of, tasks
-from bushfit.scorecard.faults import FAULTS, band
-from bushfit.scorecard.outcome import Task
-from bushfit.scorecard.outside import LAWS, OUTSIDE_LAWS
-from bushfit.scorecard.recipe import Recipe, cooked
 from bushfit.simulation.measured import Simulated
 
 SEED = 4

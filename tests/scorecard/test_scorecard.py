@@ -12,16 +12,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cards.card import card, confusion
+from cards.command import command
+from cards.families import DISTURBANCES, RECIPES, tasks
+from cards.hidden import FIRST, hideable
+from cards.outcome import Outcome, Task
+from cards.scorecard import run
 from commandline import call
 
 from bushfit.effects import BASE, LIBRARY
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.jobs.diagnose import Diagnosed
-from bushfit.scorecard.card import card, confusion
-from bushfit.scorecard.families import DISTURBANCES, RECIPES, tasks
-from bushfit.scorecard.hidden import FIRST, hideable
-from bushfit.scorecard.outcome import Outcome, Task
-from bushfit.scorecard.scorecard import run
 
 COUNT, SEED = 12, 5
 
@@ -98,7 +99,7 @@ def test_truths_are_sealed_apart_from_the_campaigns(outcomes: list[Outcome], fol
 
 def test_the_workflow_never_opens_a_sealed_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every file opened while a diagnosis runs, written down."""
-    from bushfit.scorecard import scorecard
+    from cards import scorecard
 
     opened: list[str] = []
     running = [False]
@@ -131,7 +132,7 @@ def test_the_workflow_never_opens_a_sealed_truth(tmp_path: Path, monkeypatch: py
 
 def test_a_diagnosis_is_the_same_without_the_sealed_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The truth put out of reach while the workflow works, and back for the judge."""
-    from bushfit.scorecard import scorecard
+    from cards import scorecard
 
     seen: list[Diagnosed] = []
     plain = scorecard.Diagnose.run
@@ -152,7 +153,7 @@ def test_a_diagnosis_is_the_same_without_the_sealed_folder(tmp_path: Path, monke
 @pytest.mark.slow
 def test_an_effect_is_plain_whether_it_was_named_or_not(tmp_path: Path) -> None:
     """What the library lacks is left unexplained: its best stand-in counts all the same."""
-    from bushfit.scorecard import scorecard
+    from cards import scorecard
 
     outcome = scorecard.work(Task("single", 3, ("delay",), without=("delay", "viscous", "maxwell")), tmp_path)
     print(f"{outcome.verdict}, gain {outcome.gain:.0f}")
@@ -195,7 +196,7 @@ def test_the_card_counts() -> None:
 
 @pytest.mark.parametrize(("many", "least"), [(1, 3), pytest.param(8, 34, marks=pytest.mark.slow)])
 def test_clean_amplitude_sweeps_are_no_cause_for_alarm(tmp_path: Path, many: int, least: int) -> None:
-    """A few of what `bushfit scorecard --family amplitude_sweeps --campaigns 500` counts.
+    """A few of what `python -m tests.scorecard --family amplitude_sweeps --campaigns 500` counts.
 
     Of 40 intervals 38 are expected to hold, and fewer than 34 do by chance once in 25.
     """
@@ -281,8 +282,8 @@ def deadly(chosen: list[Task], kept: Path | None, hours: float | None) -> list[O
 def test_a_campaign_that_kills_its_worker_fails_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jobs: str
 ) -> None:
-    monkeypatch.setattr("bushfit.scorecard.scorecard._in_worker", deadly)
-    run = call(tmp_path, "scorecard", "--campaigns", "5", "--seed", SEED, "--jobs", jobs, "--json")
+    monkeypatch.setattr("cards.scorecard._in_worker", deadly)
+    run = call(tmp_path, "--campaigns", "5", "--seed", SEED, "--jobs", jobs, "--json", program=command)
     found = json.loads(run.stdout)["outcomes"]
     failed = [one for one in found if one["verdict"] == "failed"]
     assert len(failed) == sum(one["task"]["seed"] == SEED for one in found) < len(found)

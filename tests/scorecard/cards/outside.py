@@ -16,8 +16,8 @@ from bushfit.effects.contract import Array, ForceBelow, Setting
 from bushfit.effects.history import History, reversals
 from bushfit.geometry import Direction, Place
 from bushfit.model import rig
-from bushfit.scorecard.faults import band
-from bushfit.scorecard.recipe import Around, Bench, Recipe, Rigged
+from cards.faults import band
+from cards.recipe import Around, Bench, Recipe, Rigged
 
 #: Frequencies [Hz] at which a law is looked at, to find its largest share of |K|.
 _LOOKED_AT = (5.0, 25.0, 45.0, 65.0, 85.0, 105.0, 155.0)

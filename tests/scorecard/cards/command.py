@@ -1,32 +1,49 @@
-"""`bushfit scorecard`: the workflow judged on hidden campaigns."""
+"""`python -m tests.scorecard`: the workflow judged on hidden campaigns."""
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import click
 from rich.progress import Progress
 
 from bushfit import __version__
-from bushfit.cli.common import Options, with_options
-from bushfit.cli.options import command_called
+from bushfit.cli.common import Options
 from bushfit.cli.show import new_table
+from bushfit.report.contents import Formats
+from bushfit.report.folder import to_json
+from bushfit.validation import plain
+from cards.card import card, confusion
+from cards.document import Asked, Scorecard
+from cards.families import CARD_SEEDS, FAMILIES, tasks
+from cards.ledger import LEDGER, ledger
+from cards.outcome import Outcome, Task
+from cards.scorecard import run
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-    from bushfit.scorecard.document import Asked
-    from bushfit.scorecard.outcome import Outcome, Task
-
-
-@command_called("scorecard")
-@with_options
-def command(
-    campaigns: int, seed: int, jobs: int, family: str, session: float | None, keep: bool, options: Options
-) -> None:
+@click.command("scorecard", context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--campaigns", type=click.IntRange(5), default=300, show_default=True, help="Of each family.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of everything random.")
+@click.option("--jobs", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Cores.")
+@click.option("--family", type=click.Choice([*FAMILIES, "all"]), default="effects", show_default=True)
+@click.option(
+    "--session",
+    type=click.FloatRange(0.0, 2000.0, min_open=True),
+    metavar="HOURS",
+    help="Where effects are left open, plan tests within so many hours, simulate them and diagnose again.",
+)
+@click.option("--keep", is_flag=True, help="Keep the campaigns and the sealed truths, in -o/campaigns.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder for the results [nothing is written].")
+@click.option("-v", "--verbose", is_flag=True)
+@click.option("-q", "--quiet", is_flag=True)
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output.")
+@click.option("--force", is_flag=True, help="Replace results that stand.")
+def command(campaigns: int, seed: int, jobs: int, family: str, session: float | None, keep: bool, **given: Any) -> None:
     """Judge `diagnose` on hidden campaigns of random bushings, and print how often it is right.
 
     The time-domain rig makes the data. Families: effects (every effect alone, pairs, none, and what the library lacks
@@ -40,13 +57,7 @@ def command(
     stopped, and ends with scorecard.json. Seeds from 77000 on are kept for cards that are shown; try and tune with
     others.
     """
-    from bushfit.report.folder import to_json
-    from bushfit.scorecard.card import card, confusion
-    from bushfit.scorecard.document import Scorecard
-    from bushfit.scorecard.families import CARD_SEEDS, FAMILIES, tasks
-    from bushfit.scorecard.ledger import LEDGER, ledger
-    from bushfit.validation import plain
-
+    options = Options(formats=Formats(pictures=False), **given)
     folder = options.output
     if keep and folder is None:
         raise click.UsageError("--keep needs a folder: -o/--output")
@@ -98,8 +109,6 @@ def _made(
     session: float | None,
 ) -> list[Outcome]:
     """The outcomes of these tasks: those that stand, and the others made now and written down as they come."""
-    from bushfit.scorecard.scorecard import run
-
     left = [task for task in chosen if task not in done]
     with Progress(console=options.console, transient=True, disable=options.quiet) as progress:
         bar = progress.add_task("hidden campaigns", total=len(chosen), completed=len(chosen) - len(left))

@@ -13,8 +13,8 @@ from bushfit.effects.mistake import Mistake, other_direction
 from bushfit.effects.mistakes import MISTAKES, labelled
 from bushfit.geometry import ROTATION, Direction, Place
 from bushfit.reading.measurement import Complex, Floats, Loop, Sweep
-from bushfit.scorecard.hidden import Sealed, hidden_campaign
 from bushfit.simulation.measured import Simulated
+from cards.hidden import Sealed, hidden_campaign
 
 
 def _with_loss(stiffness: Complex, loss: Floats) -> Complex:

@@ -17,9 +17,9 @@ from bushfit.effects.contract import UNKNOWN, Array, Circumstances, ForceBelow, 
 from bushfit.effects.history import History
 from bushfit.geometry import Direction, Place
 from bushfit.model.model import Kind, Model
-from bushfit.scorecard.hidden import STEPS, Sealed, plan_of, random_bushing
 from bushfit.simulation.measured import Simulated, measure
 from bushfit.simulation.undisturbed import undisturbed
+from cards.hidden import STEPS, Sealed, plan_of, random_bushing
 
 #: Force [N] over time of a motion that the rig imposes, by the model's own force and the test.
 Around = Callable[[ForceBelow, History, Setting], Array]

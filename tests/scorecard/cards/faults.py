@@ -10,9 +10,9 @@ from bushfit.effects.contract import Array, ForceBelow, Setting
 from bushfit.effects.history import History
 from bushfit.geometry import Direction
 from bushfit.reading.measurement import Sweep
-from bushfit.scorecard.awkward import each_loop, each_sweep, wild
-from bushfit.scorecard.recipe import MIDDLE, Around, Bench, Recipe
 from bushfit.simulation.measured import Simulated
+from cards.awkward import each_loop, each_sweep, wild
+from cards.recipe import MIDDLE, Around, Bench, Recipe
 
 #: Times the largest amplitude at which a bushing is preloaded.
 _PRELOAD = 3.0

@@ -10,9 +10,9 @@ from scipy.signal import butter, lfilter
 from bushfit.campaign.schema import SimulatedSweep, SimulateSettings
 from bushfit.effects.contract import Array
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.scorecard.hidden import FORCE_NOISE, NOISE
-from bushfit.scorecard.recipe import Bench, Recipe
 from bushfit.simulation.measured import Simulated
+from cards.hidden import FORCE_NOISE, NOISE
+from cards.recipe import Bench, Recipe
 
 #: Amplitudes of a strain sweep.
 _STEPS = 12

@@ -7,9 +7,9 @@ from typing import Literal
 
 from typing_extensions import TypedDict
 
-from bushfit.scorecard.card import Row
-from bushfit.scorecard.families import Family
-from bushfit.scorecard.outcome import Outcome
+from cards.card import Row
+from cards.families import Family
+from cards.outcome import Outcome
 
 
 class Asked(TypedDict):

@@ -29,12 +29,12 @@ from bushfit.jobs.diagnose import Diagnose
 from bushfit.report.contents import Contents, Formats
 from bushfit.report.folder import write_files
 from bushfit.report.page.readback import read_results
-from bushfit.scorecard.families import RECIPES, campaign_of
-from bushfit.scorecard.hidden import Sealed
-from bushfit.scorecard.outcome import REFUSED, Outcome, Task
-from bushfit.scorecard.settled import planned_session, with_session
 from bushfit.simulation.files import to_files
 from bushfit.simulation.measured import Simulated
+from cards.families import RECIPES, campaign_of
+from cards.hidden import Sealed
+from cards.outcome import REFUSED, Outcome, Task
+from cards.settled import planned_session, with_session
 
 #: What of |K|, or of a parameter, is off where a mistake in the record matters.
 _MATTERS = 0.02

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from bushfit.errors import OutputError
 from bushfit.report import disk
-from bushfit.scorecard.outcome import Outcome, Task
+from cards.outcome import Outcome, Task
 
 #: File of the outcomes: what was asked for on the first line, then an outcome a line.
 LEDGER = "outcomes.jsonl"

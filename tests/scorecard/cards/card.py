@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import binomtest
 
-from bushfit.scorecard.families import KINDS, Family
-from bushfit.scorecard.outcome import REFUSED, Outcome
+from cards.families import KINDS, Family
+from cards.outcome import REFUSED, Outcome
 
 #: Gain in chi-square from which an effect counts as plain: ten times what chance makes.
 PLAIN = 200.0

@@ -5,7 +5,7 @@ from typing import Literal
 
 from bushfit.diagnosis.record import Settings
 from bushfit.effects import LIBRARY, twins_of
-from bushfit.scorecard.hidden import Sealed
+from cards.hidden import Sealed
 
 #: The verdict of the reader, where it does not take a file with a mistake.
 REFUSED = "refused"

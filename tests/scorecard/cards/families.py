@@ -11,14 +11,14 @@ from typing import Literal, get_args
 import numpy as np
 
 from bushfit.effects.mistakes import MISTAKES
-from bushfit.scorecard.awkward import AWKWARD, SWEPT
-from bushfit.scorecard.faults import FAULTS
-from bushfit.scorecard.hidden import FIRST, Sealed, hidden_campaign, hideable
-from bushfit.scorecard.mistaken import mistaken_campaign
-from bushfit.scorecard.outcome import Task
-from bushfit.scorecard.outside import OUTSIDE_LAWS
-from bushfit.scorecard.recipe import Recipe, cooked
 from bushfit.simulation.measured import Simulated
+from cards.awkward import AWKWARD, SWEPT
+from cards.faults import FAULTS
+from cards.hidden import FIRST, Sealed, hidden_campaign, hideable
+from cards.mistaken import mistaken_campaign
+from cards.outcome import Task
+from cards.outside import OUTSIDE_LAWS
+from cards.recipe import Recipe, cooked
 
 #: What is hidden in the campaigns of a card.
 Family = Literal["effects", "mistakes", "amplitude_sweeps", "awkward", "faults", "outside", "library"]
