@@ -42,8 +42,16 @@ def of_result(result: Result, noise: Noise | None = None, source: str = "") -> K
         "a fitted model" if fitted.names else "values given by hand, taken as right within a factor of 2.7"
     )
     strain = result.measured.strain[1] if result.measured else None
-    known = Knowledge(model, names, matrix, words, noise or Noise(), strain=strain, specimens=result.specimens)
-    return replace(known, warnings=tuple(result.warnings))
+    return Knowledge(
+        model,
+        names,
+        matrix,
+        words,
+        noise or Noise(),
+        strain=strain,
+        specimens=result.specimens,
+        warnings=tuple(result.warnings),
+    )
 
 
 def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:

@@ -36,9 +36,26 @@ def test_a_small_score_card(tmp_path: Path) -> None:
     assert "outcomes of another card stand there" in other.stderr
 
 
-@pytest.mark.parametrize("options", [("--campaigns", "0"), ("--seed", "-1"), ("--jobs", "0"), ("--campaigns", "few")])
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--campaigns", "0"),
+        ("--campaigns", "1"),
+        ("--seed", "-1"),
+        ("--jobs", "0"),
+        ("--campaigns", "few"),
+        ("--family", "fault"),
+        ("extra",),
+    ],
+)
 def test_wrong_usage_of_the_score_card(tmp_path: Path, options: tuple[str, ...]) -> None:
     run = call(tmp_path, *options, program=command)
     assert run.returncode == 2
     assert run.stdout == ""
     assert options[0] in run.stderr
+
+
+def test_the_card_promises_no_folder(tmp_path: Path) -> None:
+    words = " ".join(call(tmp_path, "--help", program=command).stdout.split())
+    assert "[nothing is written]" in words
+    assert "results/<campaign" not in words
