@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from bushfit.effects import History
-from bushfit.effects.friction import harmonic_shape, harmonic_slope, modulus, stress, stress_sensitivities
+from bushfit.effects.friction import (
+    _passed,
+    forgotten,
+    harmonic_shape,
+    harmonic_slope,
+    modulus,
+    stress,
+    stress_sensitivities,
+)
 from bushfit.effects.history import reversals
 
 VALUES = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
@@ -136,3 +144,12 @@ def test_a_motion_that_never_turns_rubs_once() -> None:
 def test_reversals_ignore_rests() -> None:
     value = np.array([0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 1.0, 1.5])
     assert np.flatnonzero(reversals(value)).tolist() == [5, 6]
+
+
+@pytest.mark.parametrize("x", [1e-3, 0.3, 1.0, 20.0])
+def test_a_cycle_lowers_a_mean_stress_as_the_walk_along_it_does(x: float) -> None:
+    begin = 2.0 * x / (math.sqrt(x * (x + 6.0) + 1.0) + x + 1.0)
+    path = _passed([-1.0, 1.0], [2.0 * x, 2.0 * x], begin)
+    end, _, kept = path[-1]
+    assert end == pytest.approx(begin, rel=1e-12)
+    assert -math.log(kept) == pytest.approx(float(forgotten(np.array(x))), rel=1e-9)

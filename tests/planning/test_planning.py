@@ -19,11 +19,12 @@ from bushfit.fitting.solve import residual, solve
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.jobs.plan import PlanTests
 from bushfit.model.model import Model
+from bushfit.model.result import Result
 from bushfit.planning.candidates import candidates, minutes
 from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, Points, Test, Wanted, motions
 from bushfit.planning.criterion import Criterion, View, distances, shown
 from bushfit.planning.guess import guess
-from bushfit.planning.knowledge import of_campaign
+from bushfit.planning.knowledge import of_campaign, of_result
 from bushfit.planning.order import Drifting, ordered
 from bushfit.planning.plan import FOUND, TOLD, plan
 from bushfit.planning.search import Budget, chosen
@@ -316,3 +317,10 @@ def test_an_amount_that_is_found_is_found_in_nine_of_ten_cases() -> None:
     drawn = np.random.default_rng(3).standard_normal(200_000)
     limit = np.quantile(np.abs(drawn), 0.95)
     assert np.mean(np.abs(drawn + FOUND) > limit) == pytest.approx(0.9, abs=0.004)
+
+
+def test_values_given_by_hand_are_taken_as_right_within_a_factor(paper_model: Model) -> None:
+    knowledge = of_result(Result(paper_model))
+    assert knowledge.names == tuple(paper_model.parameters)
+    np.testing.assert_allclose(knowledge.covariance, 0.25 * np.eye(5))
+    assert "a factor of 2.7" in knowledge.source

@@ -176,6 +176,12 @@ def test_the_rows_at_a_stated_temperature_are_taken(tmp_path: Path) -> None:
     assert set(sweep.repeat) == {1}
 
 
+def test_the_repeats_are_those_of_the_rows_that_are_taken(tmp_path: Path) -> None:
+    rows = [f"{f},0.1,{500 + f},0.1,{t},{n}" for n, t in ((1, -10), (2, 23), (3, 23)) for f in (5, 15, 25)]
+    text = "\n".join([f"{SWEEP_HEADER},Temperature [degC],repeat", *rows])
+    assert sweep_from(text, tmp_path, temperature=296.15).repeat.tolist() == [2, 2, 2, 3, 3, 3]
+
+
 @pytest.mark.parametrize(("unit", "value"), [("degC", 22.0), ("°C", 22.0), ("K", 295.15), ("degF", 71.6), ("C", 22.0)])
 def test_the_temperature_of_a_file_is_its_condition(unit: str, value: float, tmp_path: Path) -> None:
     source = sweep_from(at_temperatures(value, value, unit=unit), tmp_path).source
