@@ -103,10 +103,17 @@ def without_pictures(shared: Shared, folder: Path, command: str) -> Done:
     return shared.call(folder, *words, *["--no-plots"] * (draws and command not in DRAWING))
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if shown_commands(page)])
-@pytest.mark.parametrize("run", [without_pictures, pytest.param(as_typed, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("run", "page"),
+    [
+        pytest.param(run, page, marks=[] if (run, page) == (without_pictures, "README.md") else pytest.mark.slow)
+        for run in (without_pictures, as_typed)
+        for page in PAGES
+        if shown_commands(page)
+    ],
+)
 def test_every_command_of_a_page_runs_and_says_what_is_shown(
-    page: str, run: Callable[[Shared, Path, str], Done], shared: Shared, tmp_path: Path
+    run: Callable[[Shared, Path, str], Done], page: str, shared: Shared, tmp_path: Path
 ) -> None:
     """In order, in a folder that holds the data and campaigns and nothing that another page has made."""
     for name in ("data", "configs"):

@@ -77,6 +77,7 @@ def test_a_row_may_be_the_whole_chain(typed: Callable[..., Any], shop: Path) -> 
     assert tree(shop / "few/bushings/b1").keys() == named
 
 
+@pytest.mark.slow
 def test_a_row_is_the_single_command_in_whatever_surroundings(
     typed: Callable[..., Any], root: Path, tmp_path: Path
 ) -> None:
@@ -245,6 +246,7 @@ def test_another_form_replaces_the_table_and_does_again_only_what_has_tables_of_
     assert json.loads(typed(*tables, "--table-format", "decimal-comma").stdout)["kept"] == 2
 
 
+@pytest.mark.slow
 def test_results_of_rows_that_are_gone_do_not_stay_unsaid(typed: Callable[..., Any], shop: Path) -> None:
     assert typed("batch", PATTERN, "-o", "all", "-q").returncode == 0
     (shop / "all/bushings/notes").mkdir()
@@ -297,7 +299,15 @@ def test_a_failed_row_is_tried_again_and_its_old_results_do_not_stay(typed: Call
 
 
 def command(folder: Path, *options: str) -> list[str]:
-    return [str(Path(sys.executable).with_name("bushfit")), "batch", "many.csv", "-o", str(folder), *options]
+    return [
+        str(Path(sys.executable).with_name("bushfit")),
+        "batch",
+        "many.csv",
+        "-o",
+        str(folder),
+        "--no-plots",
+        *options,
+    ]
 
 
 @pytest.mark.parametrize(("kills", "many"), [(1, 10), pytest.param(3, 40, marks=pytest.mark.slow)])
@@ -397,6 +407,7 @@ def test_a_report_that_cannot_be_written_is_refused_before_the_work(
     assert (shop / "old.xml").read_text() == "old"
 
 
+@pytest.mark.slow
 def test_a_pattern_that_the_shell_has_expanded_is_the_pattern(typed: Callable[..., Any], shop: Path) -> None:
     assert typed("batch", PATTERN, "-o", "quoted", "-q").returncode == 0
     expanded = sorted(str(path.relative_to(shop)) for path in shop.glob(PATTERN))

@@ -35,7 +35,9 @@ def loop_too_strong(campaign: Campaign) -> Campaign:
     return replace(campaign, loops=(first, replace(second, force=1.06 * second.force)))
 
 
-@pytest.mark.parametrize("truth", [INERTIA, SLIP, TWO], ids=lambda truth: "+".join(truth))
+@pytest.mark.parametrize(
+    "truth", [TWO, *(pytest.param(one, marks=pytest.mark.slow) for one in (INERTIA, SLIP))], ids="+".join
+)
 def test_what_is_there_is_all_but_sure(diagnosed: Diagnosed, truth: Effects) -> None:
     """A mass is no fixture resonance far above, which fits as well and says more; slip is no fault of one level."""
     diagnosis = diagnosed(truth, SHARED)
@@ -60,8 +62,8 @@ def test_a_model_that_was_found_is_then_consistent(measured: Measured, diagnosed
     ("tamper", "place"),
     [
         (level_too_stiff, "the axial level 0.2 mm"),
-        (at_75_hz, "75 Hz in radial, at every amplitude"),
-        (repeat_off, "repeat 2 of the axial level 0.2 mm"),
+        pytest.param(at_75_hz, "75 Hz in radial, at every amplitude", marks=pytest.mark.slow),
+        pytest.param(repeat_off, "repeat 2 of the axial level 0.2 mm", marks=pytest.mark.slow),
         (loop_too_strong, "the loop loop_axial_2"),
     ],
     ids=["level", "frequency", "repeat", "loop"],
@@ -105,6 +107,7 @@ def test_a_wild_row_is_a_warning(measured: Measured, effects: Effects, off: floa
     assert swept == [("sweep_axial", int(np.flatnonzero(row)[0]) + 1)]
 
 
+@pytest.mark.slow
 def test_every_candidate_is_judged(diagnosed: Diagnosed) -> None:
     """By its share in all that is probable."""
     candidates = diagnosed(INERTIA, SHARED).candidates

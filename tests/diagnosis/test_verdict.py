@@ -18,6 +18,7 @@ from bushfit.jobs.diagnose import with_plan
 from bushfit.model.file import to_document
 
 
+@pytest.mark.slow
 def test_look_alikes_are_a_set_and_none_is_added(measured: Measured) -> None:
     """A little viscosity in one direction: sets, and the test that would tell."""
     diagnosis = asked(one_direction(measured({"viscous": {"eta": 35.0}}, SHARED)))

@@ -130,6 +130,7 @@ def test_the_workflow_never_opens_a_sealed_truth(tmp_path: Path, monkeypatch: py
     assert not any("sealed" in name or "truth" in name for name in opened)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_is_the_same_without_the_sealed_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The truth put out of reach while the workflow works, and back for the judge."""
     from cards import scorecard

@@ -18,6 +18,8 @@ pytestmark = pytest.mark.skipif(
 )
 Pages = Callable[[str], Path]
 NAMES = ("cmp_15961", "mystery_mount", "measured", "two", "families", "batch")
+BOTH = [(name, width) for name in NAMES for width in (1280, 400)]
+QUICK = [("mystery_mount", 1280), ("cmp_15961", 400)]
 
 
 @pytest.fixture(scope="module")
@@ -39,8 +41,10 @@ def pages(results: Pages, request: pytest.FixtureRequest) -> Pages:
     return page
 
 
-@pytest.mark.parametrize("width", [1280, 400])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("name", "width"),
+    [pytest.param(name, width, marks=[] if (name, width) in QUICK else pytest.mark.slow) for name, width in BOTH],
+)
 def test_nothing_is_asked_for_and_all_can_read_it(tab: Tab, pages: Pages, name: str, width: int) -> None:
     """axe-core judges contrast, alternative texts, roles, tables and the rest."""
     page = pages(name)
@@ -57,7 +61,9 @@ def test_nothing_is_asked_for_and_all_can_read_it(tab: Tab, pages: Pages, name: 
     assert found["passes"] > 15
 
 
-@pytest.mark.parametrize("name", NAMES[:-1])
+@pytest.mark.parametrize(
+    "name", [NAMES[1], *(pytest.param(name, marks=pytest.mark.slow) for name in NAMES[:-1] if name != NAMES[1])]
+)
 def test_a_report_is_two_sheets_of_paper(tab: Tab, pages: Pages, name: str) -> None:
     tab.open(pages(name), 1280)
     assert tab.sheets() == 2

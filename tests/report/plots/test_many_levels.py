@@ -74,7 +74,7 @@ def loops(paper_model: Model, looped: Looped) -> Callable[..., list[LoopData]]:
     return make
 
 
-@pytest.mark.parametrize("count", [2, 40, *(pytest.param(count, marks=pytest.mark.slow) for count in (8, 300))])
+@pytest.mark.parametrize("count", [40, *(pytest.param(count, marks=pytest.mark.slow) for count in (2, 8, 300))])
 def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int) -> None:
     """A line an amplitude, named by a legend as long as that can, else by a colour bar."""
     data_sets = [swept(paper_model, amplitudes=np.geomspace(2e-5, 1e-3, count), repeats=1)]
@@ -97,6 +97,7 @@ def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int)
     assert bar or len(named(right)) == count
 
 
+@pytest.mark.slow
 def test_amplitudes_as_each_point_reached_them(paper_model: Model) -> None:
     """Nothing was held: a line for the whole test, which meets each point at the amplitude that it reached."""
     random = np.random.default_rng(1)
@@ -121,7 +122,13 @@ def test_amplitudes_as_each_point_reached_them(paper_model: Model) -> None:
 
 @pytest.mark.parametrize(
     "frequencies",
-    [(40.0,), tuple(np.geomspace(5.0, 150.0, 30)), pytest.param((10.0, 40.0, 100.0), marks=pytest.mark.slow)],
+    [
+        (40.0,),
+        *(
+            pytest.param(each, marks=pytest.mark.slow)
+            for each in (tuple(np.geomspace(5.0, 150.0, 30)), (10.0, 40.0, 100.0))
+        ),
+    ],
 )
 def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, ...]) -> None:
     """Amplitudes across, logarithmic; a line and a row of the map for each frequency that was held."""
@@ -153,7 +160,7 @@ def test_rows_of_a_map_are_the_amplitudes_as_long_as_they_fit() -> None:
     assert np.all(np.diff(many) >= 0.0)
 
 
-@pytest.mark.parametrize("count", [2, 40, *(pytest.param(count, marks=pytest.mark.slow) for count in (8, 300))])
+@pytest.mark.parametrize("count", [40, *(pytest.param(count, marks=pytest.mark.slow) for count in (2, 8, 300))])
 def test_many_loops(paper_model: Model, loops: Callable[..., list[LoopData]], count: int) -> None:
     data_sets = loops(count)
     figure = checked(loops_figure(paper_model, data_sets, "mount"))
@@ -194,7 +201,8 @@ def test_reduction_of_many_levels(levels: int, histories: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("bushings", "quantities"), [(10, 2), (40, 60), pytest.param(300, 300, marks=pytest.mark.slow)]
+    ("bushings", "quantities"),
+    [(40, 60), *(pytest.param(*size, marks=pytest.mark.slow) for size in ((10, 2), (300, 300)))],
 )
 def test_batch_of_many_quantities(bushings: int, quantities: int) -> None:
     values = np.random.default_rng(2).normal(1.0, 0.02, bushings)
