@@ -1,6 +1,6 @@
 """What is known before tests are planned: from a campaign and its diagnosis, or from a model."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -68,6 +68,7 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
         FitError: data that cannot support the fit.
         ModelError: effects that these tests could not show, or a diagnosis without rivals.
     """
+    _check_rivals(rivals or (), LIBRARY)
     found = None if rivals is None else diagnose(data)
     noise = noise_of(data)
     data = Data.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
@@ -102,7 +103,14 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
         if name not in names:
             plain = _each_added(plain, [name], held, data.bounds).get(name, plain)
     rivalling = _each_added(plain, names, held, data.bounds)
-    if unknown := [name for name in names if name not in rivalling]:
+    _check_rivals(names, rivalling)
+    every = [known(rivalling[name]) for name in names]
+    return replace(every[0], rivals=tuple(every))
+
+
+def _check_rivals(names: Iterable[str], possible: Container[str]) -> None:
+    """Refuse effects that are none, which costs no diagnosis, or that these tests could not show."""
+    if unknown := [name for name in names if name not in possible]:
         raise ModelError(
             "this is no rival in these tests",
             place="--rivals",
@@ -110,8 +118,6 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
             expected="effects of the library that the model lacks, and the tests could show",
             hint=None if unknown[0] in LIBRARY else did_you_mean(unknown[0], LIBRARY),
         )
-    every = [known(rivalling[name]) for name in names]
-    return replace(every[0], rivals=tuple(every))
 
 
 def _with_bounded(known: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[DataSet]) -> Knowledge:

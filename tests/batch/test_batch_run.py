@@ -37,7 +37,7 @@ def test_a_row_is_the_single_command_to_the_last_digit(typed: Callable[..., Any]
         'name = "two ways"\n'
         '[[bushings]]\ncampaign = "bushings/b2/bushing.toml"\nname = "c"\ncommands = ["fit", "diagnose", "predict"]\n'
     )
-    done = typed("batch", "m.toml", "-o", "all", "--tables", "-q")
+    done = typed("batch", "m.toml", "-o", "all", "--tables", "-q", "--no-plots")
     assert (done.returncode, done.stderr) == (0, "")
     b0, b1, b2 = (f"bushings/b{n}/bushing.toml" for n in range(3))
     typed("fit", b0, "-o", "one/0", "--no-plots")
@@ -310,7 +310,7 @@ def command(folder: Path, *options: str) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize(("kills", "many"), [(1, 10), pytest.param(3, 40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kills", "many"), [(1, 8), pytest.param(3, 40, marks=pytest.mark.slow)])
 def test_killed_at_any_moment_and_resumed_it_is_as_if_it_had_run_through(shop: Path, kills: int, many: int) -> None:
     (shop / "many.csv").write_text("campaign\n" + "".join(f"bushings/b{n % 5}/bushing.toml\n" for n in range(many)))
     whole = subprocess.run(command(Path("whole"), "-q"), cwd=shop, check=False)

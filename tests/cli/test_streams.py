@@ -14,7 +14,7 @@ import pytest
 from spoiled import FILES, MODEL
 
 PREDICT = ("predict", "model.json", "-o", "x", "--no-plots", "--json", "-q")
-BATCH = ("batch", "campaign.toml", "more.toml", "-o", "x", "--json", "-q")
+BATCH = ("batch", "campaign.toml", "more.toml", "-o", "x", "--jobs", "1", "--no-plots", "--json", "-q")
 BUSHFIT = (sys.executable, "-m", "bushfit")
 
 

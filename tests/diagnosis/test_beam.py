@@ -95,7 +95,9 @@ def test_errors_of_every_level_within_the_class_are_nothing(measured: Measured) 
 
 
 @pytest.mark.parametrize("off", [1.04, pytest.param(1.15, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("effects", [{}, SLIP], ids=["clean", "slip"])
+@pytest.mark.parametrize(
+    "effects", [pytest.param({}, id="clean"), pytest.param(SLIP, id="slip", marks=pytest.mark.slow)]
+)
 def test_a_wild_row_is_a_warning(measured: Measured, effects: Effects, off: float) -> None:
     """One row of 288 is left out and named by its number; it neither makes a gap nor hides one."""
     campaign = measured(effects, SHARED)

@@ -97,6 +97,7 @@ def test_a_mistake_is_named_where_no_effect_may_be(measured: Measured) -> None:
     assert [effect.label for effect in diagnosis.effects] == [AXIAL]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_told_apart_is_ambiguous(measured: Measured) -> None:
     """Loops in kgf, or sweeps multiplied by 9.81 once too often: the same ratio."""
     made = on_loops(lambda x: replace(x, force=x.force / 9.80665), 0, 1)

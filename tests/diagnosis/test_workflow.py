@@ -125,6 +125,7 @@ def test_bounds_hold(measured: Measured) -> None:
     assert diagnosis.before.model.values["alpha"] >= 0.26
 
 
+@pytest.mark.slow
 def test_inputs_are_left_alone_and_the_same_comes_twice(measured: Measured) -> None:
     campaign = measured(TWO, SHARED)
     data = Data.of(campaign)

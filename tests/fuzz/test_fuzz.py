@@ -74,7 +74,7 @@ def mutated(draw: st.DrawFn, originals: list[bytes]) -> bytes:
 
 
 @pytest.mark.hypothesis
-@each_target
+@most_targets
 def test_mutated_files(name: str) -> None:
     run = ready(name)
 

@@ -166,6 +166,7 @@ def test_cells_of_all_sheets_count_together(tmp_path: Path, monkeypatch: pytest.
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows bounds no process")
+@pytest.mark.slow
 def test_a_workbook_takes_so_much_time_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "test.xlsx").write_bytes(bombs.workbook([bombs.EMPTY * 5]))
     monkeypatch.setattr("bushfit.reading.workbook._MOST_SECONDS", 1)

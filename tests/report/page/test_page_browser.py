@@ -100,6 +100,7 @@ def test_levels_and_directions_are_switched_and_all_are_printed(tab: Tab, pages:
     assert tab.sheets() == 2, "what is switched off on the screen is on paper all the same"
 
 
+@pytest.mark.slow
 def test_a_batch_is_sorted_by_its_headings(tab: Tab, pages: Pages) -> None:
     tab.open(pages("batch"), 1280)
     column = "[...document.querySelectorAll('tbody tr')].map(r => r.cells[0].textContent)"
