@@ -137,10 +137,10 @@ def test_a_bad_row_costs_that_row(typed: Callable[..., Any], shop: Path) -> None
 
 
 def test_limits_decide_the_exit_status_and_are_named(typed: Callable[..., Any], shop: Path) -> None:
-    typed("batch", PATTERN, "-o", "all", "-q")
+    typed("batch", PATTERN, "-o", "all", "--no-plots", "-q")
     middle = sorted(float(row["mu [MPa]"]) for row in rows(shop / "all"))[2]
     (shop / "limits.toml").write_text(f'[parameters.mu]\nmax = "{1.1 * middle} MPa"\n')
-    done = typed("batch", PATTERN, "-o", "all", "--resume", "--limits", "limits.toml", "--junit", "r.xml")
+    done = typed("batch", PATTERN, "-o", "all", "--no-plots", "--resume", "--limits", "limits.toml", "--junit", "r.xml")
     assert done.returncode == 1, done.stderr
     table = rows(shop / "all")
     over = [float(row["mu [MPa]"]) > 1.1 * middle for row in table]
@@ -151,7 +151,10 @@ def test_limits_decide_the_exit_status_and_are_named(typed: Callable[..., Any], 
     assert [bool(case.result) for case in suite] == over
     (shop / "limits.toml").write_text('[parameters.mu]\nmax = "1 GPa"\n')
     assert (
-        typed("batch", PATTERN, "-o", "all", "--resume", "--limits", "limits.toml", "--junit", "r.xml").returncode == 0
+        typed(
+            "batch", PATTERN, "-o", "all", "--no-plots", "--resume", "--limits", "limits.toml", "--junit", "r.xml"
+        ).returncode
+        == 0
     )
 
 
@@ -161,7 +164,9 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
     campaign = shop / "bushings/b1/bushing.toml"
     campaign.write_text(campaign.read_text() + '\n[fit.mu]\nmax = "0.2 MPa"\n')
     (shop / "limits.toml").write_text('[parameters.mu]\nmax = "1 GPa"\n')
-    done = typed("batch", "bushings/b[013]/bushing.toml", "-o", "all", "--limits", "limits.toml", "--json")
+    done = typed(
+        "batch", "bushings/b[013]/bushing.toml", "-o", "all", "--no-plots", "--limits", "limits.toml", "--json"
+    )
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["conditional"] == ["b1"]
     assert json.loads((shop / "all/bushings/b1/model.json").read_text())["parameters"]["mu"]["at_bound"] == "max"
@@ -172,7 +177,7 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
     assert "at the max of its fit" in held["on the edge"]
     assert "warning: 1 bushing with a parameter at rest on a bound of its fit" in done.stderr
     assert "conditional pass: b1: mu = 0.2" in done.stderr
-    none = typed("batch", "bushings/b[013]/bushing.toml", "-o", "none", "--effect", "inertia", "--json")
+    none = typed("batch", "bushings/b[013]/bushing.toml", "-o", "none", "--no-plots", "--effect", "inertia", "--json")
     assert json.loads((shop / "none/bushings/b1/model.json").read_text())["parameters"]["mu"]["at_bound"] == "max"
     assert not any("inertia" in row["on a bound"] for row in rows(shop / "none")), "no mass is an answer"
     assert none.returncode == 0
@@ -201,17 +206,17 @@ def test_limits_on_what_a_row_does_not_have(typed: Callable[..., Any], shop: Pat
 
 
 def test_results_that_stand_are_refused_resumed_or_replaced(typed: Callable[..., Any], shop: Path) -> None:
-    assert typed("batch", PATTERN, "-o", "all", "-q").returncode == 0
+    assert typed("batch", PATTERN, "-o", "all", "--no-plots", "-q").returncode == 0
     before, files = stamps(shop / "all/bushings"), tree(shop / "all")
-    refused = typed("batch", PATTERN, "-o", "all")
+    refused = typed("batch", PATTERN, "-o", "all", "--no-plots")
     assert refused.returncode == 2
     assert "--resume" in refused.stderr
     assert tree(shop / "all") == files
-    again = typed("batch", PATTERN, "-o", "all", "--resume", "--json")
+    again = typed("batch", PATTERN, "-o", "all", "--no-plots", "--resume", "--json")
     assert (again.returncode, json.loads(again.stdout)["kept"]) == (0, 5)
     assert stamps(shop / "all/bushings") == before, "what is done is not done again"
     assert tree(shop / "all") == files
-    forced = typed("batch", PATTERN, "-o", "all", "--force", "--json")
+    forced = typed("batch", PATTERN, "-o", "all", "--no-plots", "--force", "--json")
     assert (forced.returncode, json.loads(forced.stdout)["kept"]) == (0, 0)
     assert not set(stamps(shop / "all/bushings").items()) & set(before.items())
     assert tree(shop / "all") == files
@@ -264,7 +269,7 @@ def test_results_of_rows_that_are_gone_do_not_stay_unsaid(typed: Callable[..., A
 
 
 def test_only_what_changed_or_is_torn_is_done_again(typed: Callable[..., Any], shop: Path) -> None:
-    typed("batch", PATTERN, "-o", "all", "-q")
+    typed("batch", PATTERN, "-o", "all", "--no-plots", "-q")
     files, before = tree(shop / "all"), stamps(shop / "all/bushings")
     place = shop / "all/bushings"
     (place / "b0/model.json").write_bytes(b"{")
@@ -273,7 +278,7 @@ def test_only_what_changed_or_is_torn_is_done_again(typed: Callable[..., Any], s
     loop.write_text(loop.read_text() + "\n")
     campaign = shop / "bushings/b3/bushing.toml"
     campaign.write_text(campaign.read_text() + "\n")
-    again = typed("batch", PATTERN, "-o", "all", "--resume", "--json", "-q")
+    again = typed("batch", PATTERN, "-o", "all", "--no-plots", "--resume", "--json", "-q")
     assert json.loads(again.stdout)["kept"] == 1
     kept = {name for name, stamp in stamps(place).items() if before.get(name) == stamp}
     assert {Path(name).parent.name for name in kept} == {"b4"}
@@ -282,19 +287,19 @@ def test_only_what_changed_or_is_torn_is_done_again(typed: Callable[..., Any], s
     old, new = (json.loads(text) for text in (files["bushings/b3/model.json"], (place / "b3/model.json").read_bytes()))
     assert old.pop("campaign") != new.pop("campaign"), "the campaign's own hash"
     assert old == new
-    other = typed("batch", PATTERN, "-o", "all", "--resume", "--json", "-q", "--effect", "inertia")
+    other = typed("batch", PATTERN, "-o", "all", "--no-plots", "--resume", "--json", "-q", "--effect", "inertia")
     assert json.loads(other.stdout)["kept"] == 0
 
 
 def test_a_failed_row_is_tried_again_and_its_old_results_do_not_stay(typed: Callable[..., Any], shop: Path) -> None:
-    typed("batch", PATTERN, "-o", "all", "-q")
+    typed("batch", PATTERN, "-o", "all", "--no-plots", "-q")
     sweep = shop / "bushings/b2/sweep_axial.csv"
     good, files = sweep.read_bytes(), tree(shop / "all")
     sweep.write_text("nonsense\n1\n")
-    assert typed("batch", PATTERN, "-o", "all", "-q", "--resume").returncode == 1
+    assert typed("batch", PATTERN, "-o", "all", "--no-plots", "-q", "--resume").returncode == 1
     assert not (shop / "all/bushings/b2/model.json").exists()
     sweep.write_bytes(good)
-    assert typed("batch", PATTERN, "-o", "all", "-q", "--resume").returncode == 0
+    assert typed("batch", PATTERN, "-o", "all", "--no-plots", "-q", "--resume").returncode == 0
     assert tree(shop / "all") == files
 
 

@@ -226,7 +226,7 @@ def test_a_time_that_does_not_go_with_the_rows_is_told_by_every_fit(
         waveform = () if said else ("--waveform", "sine")
         started = typed("init", *tests, *GEOMETRY, stated, *waveform, "-o", "campaign", "--force")
         assert started.stderr.count("as those of a sine recorded evenly") == said
-        for command in ("fit-static", "diagnose"):
+        for command in ("fit-static", "fit"):
             done = typed(command, "campaign/campaign.toml", "-o", "out", "--no-plots", "--force")
             words = "warning: loop_axial_1: 29 % of the rows lie beyond 0.9 of the amplitude, as those of a sine"
             assert done.stderr.count(words) == said

@@ -79,6 +79,7 @@ def test_what_one_place_alone_shows_is_to_be_measured_again(measured: Measured, 
     assert diagnosis.odds.labels[0] == f"fault: {place}"
 
 
+@pytest.mark.slow
 def test_a_fault_beside_an_effect_hides_neither(measured: Measured) -> None:
     diagnosis = asked(level_too_stiff(measured(INERTIA, SHARED)))
     assert "the axial level 0.2 mm" in diagnosis.summary

@@ -41,6 +41,7 @@ def test_the_files_are_whole() -> None:
             assert scatter == pytest.approx(problem.scatter, rel=1e-4), problem.name
 
 
+@pytest.mark.slow
 def test_certified_values_from_both_starts(agree: Agree) -> None:
     values, errors, default, apart = {}, {}, {}, {}
     for problem, start in STARTS:
