@@ -75,7 +75,7 @@ def correct(fitted: Evidence, bare: Evidence, plain: Ledger) -> Correction | Non
     both = Terms(fitted, "gain"), Terms(bare, "gain")
     if not both[0].sensible:
         return None
-    likeliest = replace(plain, groups=(), nodes=[plain.likeliest])
+    likeliest = replace(plain, groups=(), at=plain.likeliest)
     names = tuple(dict.fromkeys(map(str, both[0].directions)))
     shared: list[Sequence[tuple[str, ...]]] = [[names], [(name,) for name in names]]
     found, worth = _of_most_evidence(both, likeliest, shared[: len(names)])

@@ -8,8 +8,8 @@ Notes:
     -(r^T P r + ln|S| + ln|J^T S^-1 J|)/2 but for a constant (Patterson and Thompson, 1971). Amounts of variance v^2
     along columns U add, with the eigenvalues l of U^T P U and the components b of U^T P r along its eigenvectors,
     sum (v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l))/2. Sizes of the rig's errors and of amounts are summed over nodes with
-    weights of a prior. Only inner products enter; errors of the rig stay within blocks of rows, so that a node costs
-    one small triangular solution a block.
+    weights of a prior. Only inner products enter; errors of the rig stay within blocks of rows, so that what a node
+    costs is solved once for all models of the same tests.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.special import chdtrc, log_ndtr, logsumexp
 
 from bushfit.diagnosis.priors import SIZES
@@ -28,6 +27,8 @@ from bushfit.effects.contract import Array
 _ROUNDING = 1e-9
 #: Change of |K| by a unit of an amount, below which the tests do not see it.
 _UNSEEN = 1e-9
+#: Numbers that errors of the rig at all nodes together may take at once: 32 MB.
+_AT_ONCE = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,48 @@ class Block:
     columns: Array
     kinds: Array
     scatters: bool
+
+
+@dataclass(frozen=True, eq=False)
+class RigErrors:
+    """The rig's errors in some tests, which are the same whatever the model."""
+
+    blocks: Sequence[Block]
+    nodes: Sequence[Node]
+
+    @cached_property
+    def scatter(self) -> Array:
+        """Of each node, (nodes,)."""
+        return np.array([node.scatter for node in self.nodes])
+
+    @cached_property
+    def within(self) -> Array:
+        """Which nodes are within the class of the rig, (nodes,) bool."""
+        return np.array([not node.wide for node in self.nodes])
+
+    @cached_property
+    def width(self) -> int:
+        """Most errors of a block."""
+        return max((len(block.kinds) for block in self.blocks), default=0)
+
+    @cached_property
+    def roots(self) -> tuple[Array, Array]:
+        """At every node and block L^-1 D of S = 1 + D W W^T D = L L^T, (nodes, blocks, w, w), and ln|S|, (nodes,).
+
+        Notes: times the products of errors with any rows it is what is to be taken off the products of those rows.
+        """
+        inner = np.zeros((len(self.blocks), self.width, self.width))
+        kinds = np.full(inner.shape[:2], -1)
+        for number, block in enumerate(self.blocks):
+            size = len(block.kinds)
+            inner[number, :size, :size] = block.columns @ block.columns.T
+            kinds[number, :size] = block.kinds
+        scatters = np.array([block.scatters for block in self.blocks], dtype=bool)
+        share = np.where(scatters, 1.0 / self.scatter[:, None], 1.0)[..., None]
+        errors = np.array([(*node.errors, 0.0) for node in self.nodes])[:, kinds] * share
+        root = np.linalg.cholesky(np.eye(self.width) + errors[..., None] * inner * errors[..., None, :])
+        log_size = 2.0 * np.sum(np.log(np.einsum("nbii->nbi", root)), axis=(1, 2))
+        return np.linalg.inv(root) * (errors * share)[..., None, :], log_size
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,17 +148,24 @@ class Ledger:
         residual: whitened by the points' own scatter alone, (n,).
         jacobian: by the parameters and what else moves freely, (k, n).
         precision: prior precision of each of these; 0 where the prior is flat, (k,).
-        blocks: of the rig's errors.
         groups: what may be missing.
-        nodes: of the rig's errors.
+        at: numbers of the rig's nodes that count; all where it is None.
     """
 
     residual: Array
     jacobian: Array
     precision: Array
-    blocks: Sequence[Block]
-    groups: Sequence[Group]
-    nodes: Sequence[Node]
+    rig: RigErrors
+    groups: Sequence[Group] = ()
+    at: Array | None = None
+
+    @cached_property
+    def _at(self) -> Array:
+        return np.arange(len(self.rig.nodes)) if self.at is None else self.at
+
+    @cached_property
+    def _within(self) -> Array:
+        return self.rig.within[self._at]
 
     @cached_property
     def _every(self) -> Array:
@@ -126,7 +176,7 @@ class Ledger:
     def _scatters(self) -> Array:
         """Which rows scatter as sweeps' points do, (n,) bool."""
         scatters = np.zeros(self.residual.size, dtype=bool)
-        for block in self.blocks:
+        for block in self.rig.blocks:
             scatters[block.rows] |= block.scatters
         return scatters
 
@@ -150,54 +200,53 @@ class Ledger:
         every, scatters = self._every, self._scatters
         first = 1 + len(self.jacobian)
         parts = [_columns(every, scatters), _columns(every, ~scatters)]
-        wide = max((len(block.kinds) for block in self.blocks), default=0)
-        inner, along = np.zeros((len(self.blocks), wide, wide)), np.zeros((len(self.blocks), wide, len(every)))
-        kinds = np.full((len(self.blocks), wide), -1)
-        for number, block in enumerate(self.blocks):
-            size = len(block.kinds)
-            inner[number, :size, :size] = block.columns @ block.columns.T
-            along[number, :size] = block.columns @ every[:, block.rows].T
-            kinds[number, :size] = block.kinds
+        along = np.zeros((len(self.rig.blocks), self.rig.width, len(every)))
+        for number, block in enumerate(self.rig.blocks):
+            along[number, : len(block.kinds)] = block.columns @ every[:, block.rows].T
         return _Products(
             tuple(part[:first] @ part.T for part in parts),
             tuple(np.einsum("cn,cn->c", part, part) for part in parts),
             [tuple(_grams(part, own) for part in parts) for _, own in self._alike],
-            inner,
             along,
-            kinds,
-            np.array([block.scatters for block in self.blocks], dtype=bool),
             int(scatters.sum()),
         )
 
     @cached_property
     def _solved(self) -> "_Solved":
-        """At every node what the tests say without a group, and along all groups."""
-        count = sum(len(group.columns) for group in self.groups)
-        base, misfit = np.empty(len(self.nodes)), np.empty(len(self.nodes))
-        size, along = np.empty((2, len(self.nodes), count))
-        grams: list[list[Array]] = [[] for _ in self._alike]
+        """At every node what the tests say without a group, and along all groups; some nodes at a time, as memory has
+        it."""
+        rows = len(self.rig.blocks) * self.rig.width * self._every.shape[0]
+        parts = np.array_split(self._at, max(1, min(len(self._at), len(self._at) * rows // _AT_ONCE)))
+        found = [self._solved_at(part) for part in parts]
+        arrays = zip(*((each.base, each.misfit, each.size, each.along) for each in found), strict=True)
+        base, misfit, size, along = map(np.concatenate, arrays)
+        grams = [np.concatenate(kind) for kind in zip(*(each.grams for each in found), strict=True)]
+        return _Solved(base, misfit, size, along, grams)
+
+    def _solved_at(self, nodes: Array) -> "_Solved":
         k, products, known = len(self.jacobian), self._products, self.precision > 0.0
         told = np.diag((products.rows[0] + products.rows[1])[1:, 1 : 1 + k]) + self.precision  # the same at every node
         scale = np.sqrt(np.maximum(told, np.finfo(float).tiny))
-        for number, node in enumerate(self.nodes):
-            left, log_size = products.beside(node)
-            share = 1.0 / node.scatter**2
-            gram = share * products.rows[0] + products.rows[1] - left[:, : 1 + k].T @ left
-            information = gram[1:, 1 : 1 + k] + np.diag(self.precision)
-            root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(k))
-            free = solve_triangular(root, gram[1:] / scale[:, None], lower=True)
-            rest = gram[0] - free[:, 0] @ free
-            log_size += 2.0 * float(np.sum(np.log(np.diag(root) * scale)))
-            log_size -= float(np.sum(np.log(self.precision[known])))
-            base[number] = node.log_weight - 0.5 * (rest[0] + log_size)
-            misfit[number], along[number] = rest[0], rest[1 + k :]
-            taken = np.concatenate((left, free))
-            square = share * products.squares[0] + products.squares[1] - np.einsum("wc,wc->c", taken, taken)
-            size[number] = np.maximum(square[1 + k :], 0.0)
-            for (_, own), parts, found in zip(self._alike, products.grams, grams, strict=True):
-                there = taken.T[own]
-                found.append(share * parts[0] + parts[1] - there @ there.swapaxes(-1, -2))
-        return _Solved(base, misfit, size, along, [np.array(each) for each in grams])
+        scatter, (roots, log_sizes) = self.rig.scatter[nodes], self.rig.roots
+        share = 1.0 / np.square(scatter)[:, None, None]
+        left = (roots[nodes] @ products.along).reshape(len(nodes), -1, len(self._every))
+        gram = share * products.rows[0] + products.rows[1] - left[..., : 1 + k].swapaxes(1, 2) @ left
+        information = gram[:, 1:, 1 : 1 + k] + np.diag(self.precision)
+        root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(k))
+        free = np.linalg.solve(root, gram[:, 1:] / scale[:, None])
+        rest = gram[:, 0] - np.einsum("nk,nkc->nc", free[..., 0], free)
+        log_size = log_sizes[nodes] + 2.0 * products.count * np.log(scatter)
+        log_size += 2.0 * np.sum(np.log(np.einsum("nkk->nk", root) * scale), axis=1)
+        log_size -= np.sum(np.log(self.precision[known]))
+        taken = np.concatenate((left, free), axis=1)
+        square = share[..., 0] * products.squares[0] + products.squares[1] - np.einsum("nwc,nwc->nc", taken, taken)
+        grams = []
+        for (_, own), parts in zip(self._alike, products.grams, strict=True):
+            there = np.moveaxis(taken[..., own], 1, -1)  # (nodes, groups, columns, taken)
+            grams.append(share[..., None] * parts[0] + parts[1] - there @ there.swapaxes(-1, -2))
+        weight = np.array([self.rig.nodes[node].log_weight for node in nodes.tolist()])
+        base = weight - 0.5 * (rest[:, 0] + log_size)
+        return _Solved(base, rest[:, 0], np.maximum(square[:, 1 + k :], 0.0), rest[:, 1 + k :], grams)
 
     @property
     def log_evidence(self) -> float:
@@ -210,23 +259,19 @@ class Ledger:
         beyond = ~self._within
         return float(logsumexp(self._solved.base[beyond])) if beyond.any() else -np.inf
 
-    def likely(self, far: float) -> list[Node]:
-        """The nodes that nothing missing, or one of the groups, brings so near the best in ln evidence."""
+    def likely(self, far: float) -> Array:
+        """Numbers of the nodes that nothing missing, or one of the groups, brings so near the best in ln evidence."""
         alone = self._solved.base
         best = np.max(np.array([alone, *(worth.by_node for worth in self.worths)]), axis=0)
         within = self._within
         kept = (alone > alone[within].max() - far) | (best > best[within].max() - far)
-        return [node for node, near in zip(self.nodes, kept.tolist(), strict=True) if near]
+        return self._at[kept]
 
     @property
-    def likeliest(self) -> Node:
-        """The node, within the class of the rig, at which one of the groups makes the tests likeliest."""
+    def likeliest(self) -> Array:
+        """Number of the node, (1,), within the class of the rig, at which a group makes the tests likeliest."""
         best = np.max(np.array([self._solved.base, *(worth.by_node for worth in self.worths)]), axis=0)
-        return self.nodes[int(np.argmax(np.where(self._within, best, -np.inf)))]
-
-    @cached_property
-    def _within(self) -> Array:
-        return np.array([not node.wide for node in self.nodes])
+        return self._at[[np.argmax(np.where(self._within, best, -np.inf))]]
 
     @property
     def chance(self) -> float:
@@ -329,31 +374,15 @@ class _Products:
         rows: of residual and derivatives with all rows, (1 + k, 1 + k + c) each.
         squares: of each row with itself.
         grams: of the columns of groups that move together, (m, g, g) each.
-        inner, along: of each block's errors with one another and with all rows, (blocks, w, w) and (blocks, w, c).
-        kinds: of the errors, -1 where a block has fewer, (blocks, w).
-        scatters: of the blocks, (blocks,) bool.
+        along: of each block's errors with all rows, (blocks, w, c).
         count: residuals that scatter.
     """
 
     rows: tuple[Array, ...]
     squares: tuple[Array, ...]
     grams: list[tuple[Array, ...]]
-    inner: Array
     along: Array
-    kinds: Array
-    scatters: Array
     count: int
-
-    def beside(self, node: Node) -> tuple[Array, float]:
-        """What errors of the rig account for, as rows whose products are to be taken off, (w, c), and ln|S|."""
-        errors = np.append(node.errors, 0.0)[self.kinds]
-        share = np.where(self.scatters, 1.0 / node.scatter, 1.0)
-        sized = errors * share[:, None]
-        inner = np.eye(errors.shape[1]) + sized[:, :, None] * self.inner * sized[:, None, :]
-        root = np.linalg.cholesky(inner)
-        left = np.linalg.inv(root) @ ((sized * share[:, None])[:, :, None] * self.along)
-        log_size = 2.0 * float(np.sum(np.log(np.einsum("bii->bi", root)))) + 2.0 * self.count * np.log(node.scatter)
-        return left.reshape(-1, self.along.shape[-1]), log_size
 
 
 @dataclass(frozen=True, eq=False)

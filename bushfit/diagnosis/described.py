@@ -13,7 +13,7 @@ from bushfit.diagnosis.evidence import Evidence, fit_from
 from bushfit.diagnosis.explanations import unnamed
 from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
 from bushfit.diagnosis.locate import locate
-from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
+from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects.unnamed import NAME
 from bushfit.errors import FitError
 from bushfit.fitting.data_sets import parted
@@ -90,8 +90,8 @@ def weighed(fitted: Evidence, rig: RigSettings) -> tuple[Evidence, Ledger]:
     at the sizes of the rig's errors that matter."""
     bare = scattering_alone(fitted)
     rows, curves = bare.solution.jacobian, [each.group for each in unnamed(bare) if each.group]
-    plain = Ledger(bare.residual, rows, np.zeros(len(rows)), blocks(bare, rig), curves, nodes(bare))
-    return bare, replace(plain, nodes=plain.likely(_NEAR))
+    plain = Ledger(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), curves)
+    return bare, replace(plain, at=plain.likely(_NEAR))
 
 
 def _refitted(evidence: Evidence, held: Sequence[str], bounds: Bounds) -> Evidence:

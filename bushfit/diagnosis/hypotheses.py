@@ -10,11 +10,11 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
-from bushfit.diagnosis.currency import Block, Ledger, Node, Worth
+from bushfit.diagnosis.currency import Ledger, RigErrors, Worth
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, FaultyPlace, MissingEffect, effects, places, unnamed
 from bushfit.diagnosis.priors import FAR
-from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
+from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.fitting.data import Data
 from bushfit.fitting.solve import Bounds
 
@@ -112,12 +112,8 @@ class Tests:
         return scattering_alone(self.base)
 
     @cached_property
-    def blocks(self) -> list[Block]:
-        return blocks(self.bare, self.rig)
-
-    @cached_property
-    def nodes(self) -> list[Node]:
-        return nodes(self.bare)
+    def errors(self) -> RigErrors:
+        return rig_errors(self.bare, self.rig)
 
     @cached_property
     def fixed(self) -> list[Explanation]:
@@ -179,7 +175,7 @@ class Weighed:
         for place, amount in zip(state.places, state.amounts, strict=True):
             free.append(place.columns)
             precision += [amount**-2] * len(place.columns)
-        return Ledger(self.bare.residual, np.concatenate(free), np.array(precision), tests.blocks, (), tests.nodes)
+        return Ledger(self.bare.residual, np.concatenate(free), np.array(precision), tests.errors)
 
     @cached_property
     def log_posterior(self) -> float:
@@ -197,7 +193,7 @@ class Weighed:
         curves = [each.group for each in every if each.group and each.kind == "unnamed"]
         likely = replace(self.first, groups=curves).likely(FAR)
         groups = [each.group for each in every if each.group]
-        return list(zip(every, replace(self.first, groups=groups, nodes=likely).worths, strict=True))
+        return list(zip(every, replace(self.first, groups=groups, at=likely).worths, strict=True))
 
     def with_(self, each: Explanation, worth: Worth, log_odds: float) -> Hypothesis:
         """This state with an explanation more, counted linearly."""

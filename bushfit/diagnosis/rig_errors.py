@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.currency import Block, Node
+from bushfit.diagnosis.currency import Block, Node, RigErrors
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
@@ -37,6 +37,11 @@ def scattering_alone(evidence: Evidence) -> Evidence:
     solution, names = evidence.solution, evidence.solution.coordinates.names
     rows = jacobian(solution.model, data_sets, names)
     return Evidence(replace(solution, residual=residual(solution.model, data_sets), jacobian=rows), data_sets)
+
+
+def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:
+    """Of the tests that a model was fitted to, whatever the model."""
+    return RigErrors(blocks(evidence, rig), nodes(evidence))
 
 
 def nodes(evidence: Evidence) -> list[Node]:

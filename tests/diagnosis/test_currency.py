@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import kstest, multivariate_normal, norm
 
-from bushfit.diagnosis.currency import Block, Group, Ledger, Node
+from bushfit.diagnosis.currency import Block, Group, Ledger, Node, RigErrors
 from bushfit.diagnosis.priors import SIZES
 from bushfit.effects.contract import Array
 
@@ -43,14 +43,14 @@ def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: 
     )
     precision = np.repeat([0.0, 0.5], [flat, known])
     jacobian = random.normal(size=(flat + known, rows))
-    return Ledger(3.0 * random.normal(size=rows), jacobian, precision, blocks, made if groups else (), NODES)
+    return Ledger(3.0 * random.normal(size=rows), jacobian, precision, RigErrors(blocks, NODES), made if groups else ())
 
 
 def covariance(of: Ledger, node: Node) -> Array:
     """Of the residuals by noise, errors of the rig and parameters that are known, in full, (n, n)."""
     variance = np.ones(of.residual.size)
     whole = np.zeros((variance.size, variance.size))
-    for block in of.blocks:
+    for block in of.rig.blocks:
         variance[block.rows] = node.scatter**2 if block.scatters else 1.0
         sized = np.array(node.errors)[block.kinds, None] * block.columns
         whole[np.ix_(block.rows, block.rows)] += sized.T @ sized
@@ -69,14 +69,14 @@ def restricted(of: Ledger, whole: Array) -> float:
 
 
 def over_nodes(of: Ledger, values: Sequence[float], *, wide: bool = False) -> float:
-    own = [node.log_weight + value for node, value in zip(of.nodes, values, strict=True) if node.wide is wide]
+    own = [node.log_weight + value for node, value in zip(of.rig.nodes, values, strict=True) if node.wide is wide]
     return float(logsumexp(own))
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_errors_of_the_rig_and_parameters_are_integrated_over(seed: int) -> None:
     of = ledger(seed)
-    plain = [restricted(of, covariance(of, node)) for node in of.nodes]
+    plain = [restricted(of, covariance(of, node)) for node in of.rig.nodes]
     assert of.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
     assert of.log_evidence_wide == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
 
@@ -95,7 +95,7 @@ def test_groups_are_worth_what_their_covariance_is(seed: int) -> None:
         )
         cases = [size * part for size in SIZES for part in parts]
         by_node = [
-            logsumexp([restricted(of, covariance(of, node) + each.T @ each) for each in cases]) for node in of.nodes
+            logsumexp([restricted(of, covariance(of, node) + each.T @ each) for each in cases]) for node in of.rig.nodes
         ]
         assert worth.log_evidence == pytest.approx(over_nodes(of, by_node) - np.log(len(cases)), abs=1e-6)
 
@@ -105,7 +105,7 @@ def test_an_amount_is_integrated_over_its_sense(sense: int) -> None:
     """Numerically, and the free parameter with it: where an effect is missing, the model stays below the tests."""
     of = ledger(4, flat=1, known=0)
     column, unit, own = of.groups[0].columns[0], 0.7, of.jacobian[0]
-    of = replace(of, nodes=NODES[:1], groups=(Group(column[None], np.array([unit]), together=False, sense=sense),))
+    of = replace(of, at=np.array([0]), groups=(Group(column[None], np.array([unit]), together=False, sense=sense),))
     noise, spreads = multivariate_normal(cov=covariance(of, NODES[0])), SIZES / unit
     low, high = {1: (0.0, 1.0), -1: (-1.0, 0.0), 0: (-1.0, 1.0)}[sense]
     x, weight = np.polynomial.legendre.leggauss(300)
@@ -122,13 +122,13 @@ def test_an_amount_is_integrated_over_its_sense(sense: int) -> None:
 def test_a_sampler_finds_the_same() -> None:
     """Mean likelihood of white noise over sizes, errors, parameters and amounts drawn as they are beforehand."""
     of, random, draws = ledger(5, flat=0, known=2, rows=8), np.random.default_rng(1), 200_000
-    of = replace(of, nodes=NODES[:2], residual=0.5 * of.residual, groups=of.groups[2:4])
+    of = replace(of, rig=replace(of.rig, nodes=NODES[:2]), residual=0.5 * of.residual, groups=of.groups[2:4])
     for group, worth in zip(of.groups, of.worths, strict=True):
         total = []
-        for node in of.nodes:
+        for node in of.rig.nodes:
             mean = (random.normal(size=(draws, 2)) / np.sqrt(of.precision)) @ of.jacobian
             sigma = np.ones(of.residual.size)
-            for block in of.blocks:
+            for block in of.rig.blocks:
                 errors = random.normal(size=(draws, len(block.kinds))) * np.array(node.errors)[block.kinds]
                 mean[:, block.rows] += errors @ block.columns
                 sigma[block.rows] = node.scatter if block.scatters else 1.0
@@ -159,9 +159,10 @@ def test_the_order_of_tests_does_not_matter(seed: int) -> None:
         of,
         residual=of.residual[order],
         jacobian=of.jacobian[:, order],
-        blocks=[replace(block, rows=place[block.rows]) for block in reversed(of.blocks)],
+        rig=RigErrors(
+            [replace(block, rows=place[block.rows]) for block in reversed(of.rig.blocks)], of.rig.nodes[::-1]
+        ),
         groups=[replace(group, columns=group.columns[:, order]) for group in of.groups],
-        nodes=of.nodes[::-1],
     )
     assert worth(turned) == pytest.approx(worth(of), rel=1e-6, abs=1e-7)
 
@@ -182,7 +183,7 @@ def test_units_do_not_matter(seed: int, factor: float) -> None:
 @given(SEEDS)
 def test_what_shares_no_error_may_as_well_be_two_blocks(seed: int) -> None:
     of = ledger(seed)
-    first, second = of.blocks[0], of.blocks[1]
+    first, second = of.rig.blocks[0], of.rig.blocks[1]
     whole = Block(
         np.concatenate((first.rows, second.rows)),
         np.block([[first.columns, np.zeros((3, 4))], [np.zeros((1, 3)), second.columns]]),
@@ -190,7 +191,8 @@ def test_what_shares_no_error_may_as_well_be_two_blocks(seed: int) -> None:
         scatters=True,
     )
     split = [first, replace(second, scatters=True)]
-    assert worth(replace(of, blocks=[whole])) == pytest.approx(worth(replace(of, blocks=split)), rel=1e-6, abs=1e-7)
+    one, other = (worth(replace(of, rig=replace(of.rig, blocks=blocks))) for blocks in ([whole], split))
+    assert one == pytest.approx(other, rel=1e-6, abs=1e-7)
 
 
 @given(SEEDS)
@@ -232,7 +234,7 @@ def test_amounts_are_those_of_a_dense_posterior(number: int) -> None:
     """By Gaussian conditioning at each node within the class and each size, mixed by their evidence."""
     of = ledger(9)
     group, log_weights, means, seconds = of.groups[number], [], [], []
-    for node in (node for node in of.nodes if not node.wide):
+    for node in (node for node in of.rig.nodes if not node.wide):
         for size in SIZES:
             whole = covariance(of, node) + size**2 * group.columns.T @ group.columns
             inverse, own = np.linalg.inv(whole), of.jacobian[of.precision == 0.0]
@@ -254,7 +256,7 @@ def test_the_chance_of_clean_tests_is_even(node: int) -> None:
     of, random = ledger(7, groups=False, rows=14), np.random.default_rng(2)
     noise = np.linalg.cholesky(covariance(of, NODES[node]))
     drawn = [noise @ random.normal(size=of.residual.size) for _ in range(200)]
-    alone = [replace(of, residual=row, nodes=(NODES[node],)).chance for row in drawn]
+    alone = [replace(of, residual=row, at=np.array([node])).chance for row in drawn]
     every = [replace(of, residual=row).chance for row in drawn]
     print(f"p {kstest(alone, 'uniform').pvalue:.3f}; below 5 %: {np.mean(np.array(every) < 0.05):.3f}")
     assert kstest(alone, "uniform").pvalue > 1e-3
@@ -264,7 +266,7 @@ def test_the_chance_of_clean_tests_is_even(node: int) -> None:
 @given(SEEDS, st.floats(0.5, 12.0))
 def test_nodes_that_nothing_more_makes_likely_are_kept(seed: int, far: float) -> None:
     of = ledger(seed)
-    exact = [restricted(of, covariance(of, node)) + node.log_weight for node in of.nodes]
-    within = max(value for value, node in zip(exact, of.nodes, strict=True) if not node.wide)
-    kept = of.likely(far)
-    assert all(node in kept for node, value in zip(of.nodes, exact, strict=True) if value > within - far + 1e-6)
+    exact = [restricted(of, covariance(of, node)) + node.log_weight for node in of.rig.nodes]
+    within = max(value for value, node in zip(exact, of.rig.nodes, strict=True) if not node.wide)
+    kept = [of.rig.nodes[number] for number in of.likely(far)]
+    assert all(node in kept for node, value in zip(of.rig.nodes, exact, strict=True) if value > within - far + 1e-6)

@@ -17,7 +17,7 @@ from bushfit.diagnosis.currency import Ledger
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
 from bushfit.diagnosis.propose import sensitivity
-from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
+from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects import BASE, LIBRARY, effect_named
 from bushfit.effects.contract import Array, Values
 from bushfit.fitting.data_sets import DataSet, parted
@@ -36,10 +36,10 @@ def best(evidence: Evidence, every: Sequence[Explanation]) -> Explanation:
     """The one that makes the tests likeliest."""
     known = [each for each in every if each.group]
     groups = [each.group for each in known if each.group]
-    rig = blocks(evidence, SHARED_RIG)
+    rig = rig_errors(evidence, SHARED_RIG)
     solution = evidence.solution
     precision = np.zeros(len(solution.jacobian))
-    worths = Ledger(solution.residual, solution.jacobian, precision, rig, groups, nodes(evidence)).worths
+    worths = Ledger(solution.residual, solution.jacobian, precision, rig, groups).worths
     return max(zip(known, worths, strict=True), key=lambda pair: pair[1].log_evidence)[0]
 
 
