@@ -10,6 +10,7 @@ import click
 
 from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.options import command_called, option_of
+from bushfit.cli.show import warn
 from bushfit.errors import ModelError, UnitError, naming
 from bushfit.units import is_number, quantity
 
@@ -31,11 +32,15 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
     Writes campaign.toml, the tables it names, and truth.json, the model behind them.
     """
+    from bushfit.effects.unnamed import NAME as UNNAMED
     from bushfit.model.file import to_document
     from bushfit.simulation.files import to_files
     from bushfit.simulation.measured import simulate
 
     truth, plan = _task(source)
+    if truth.unnamed:
+        warn(options, ["what has no name is a correction of steady states, without a law in time: it is left out here"])
+        truth = truth.without(UNNAMED)
     plan = _with_options(plan, settings)
     for text in effects:
         truth = _with_effect(truth, text)

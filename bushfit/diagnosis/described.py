@@ -16,8 +16,8 @@ from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects.unnamed import NAME
 from bushfit.errors import FitError
+from bushfit.fitting.coordinates import Bounds, jacobian, residual
 from bushfit.fitting.data_sets import parted
-from bushfit.fitting.solve import Bounds, jacobian, residual
 from bushfit.model.covariance import Z95
 from bushfit.units import number
 

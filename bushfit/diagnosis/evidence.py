@@ -10,11 +10,11 @@ from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.agreement import met_within, misfits, usable
 from bushfit.fitting.assess import Stage, apart_in_temperature, covariance, measured_range, quality
+from bushfit.fitting.coordinates import Bounds, Solution
 from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.data_sets import sources
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.procedures import cautions
-from bushfit.fitting.solve import Bounds, Solution
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 

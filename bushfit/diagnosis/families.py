@@ -13,8 +13,8 @@ from bushfit.diagnosis.holdout import HoldOut, Predicted, hold_out, parts, predi
 from bushfit.diagnosis.propose import probes
 from bushfit.effects import BASE, LIBRARY, Effect, effect_named, qualified
 from bushfit.errors import FitError, ModelError
+from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data_sets import DataSet
-from bushfit.fitting.solve import Bounds
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number

@@ -23,7 +23,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import TELLS
 from bushfit.diagnosis.terms import Measure, Terms
 from bushfit.effects.contract import Array
-from bushfit.fitting.solve import Bounds, coordinate_bounds
+from bushfit.fitting.coordinates import Bounds, coordinate_bounds
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number

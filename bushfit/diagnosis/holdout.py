@@ -21,8 +21,8 @@ from bushfit.effects import effect_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.agreement import LeaveOut, is_far
+from bushfit.fitting.coordinates import Bounds, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, SweepData, parted
-from bushfit.fitting.solve import Bounds, jacobian, residual
 from bushfit.reading.measurement import Stepped
 
 #: Share of all sweep points, those of the highest steps, that is one part.

@@ -15,8 +15,8 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, FaultyPlace, MissingEffect, effects, places, unnamed
 from bushfit.diagnosis.priors import FAR
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
+from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data import Data
-from bushfit.fitting.solve import Bounds
 
 
 @dataclass(frozen=True, eq=False)

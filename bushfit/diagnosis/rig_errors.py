@@ -13,9 +13,9 @@ from bushfit.diagnosis.currency import Block, Node, RigErrors
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
+from bushfit.fitting.coordinates import jacobian, residual
 from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted, with_gains
 from bushfit.fitting.rig_class import ASSUMED, of_class
-from bushfit.fitting.solve import jacobian, residual
 
 #: Kinds of errors, by their place in `Node.errors`.
 _RUN, _LEVEL, _WAVE, _LOOP = range(4)

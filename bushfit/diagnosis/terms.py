@@ -8,8 +8,8 @@ import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
+from bushfit.fitting.coordinates import Coordinates, jacobian, residual
 from bushfit.fitting.data_sets import DataSet
-from bushfit.fitting.solve import Coordinates, jacobian, residual
 from bushfit.geometry import STRAINING
 from bushfit.model.model import Model
 

@@ -111,7 +111,7 @@ def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
     data_sets = data.some([*data.loops, *data.sweeps], "there is nothing to diagnose", hint)
     held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
     start = data.start(data_sets, {})
-    model = model or Model.started(data.campaign.bushing, data.effects, start)
+    model = model or data.started(data.effects, data_sets, {})
     start = {name: value for name, value in start.items() if name in model.values and name not in held}
     for name in settings.adopt:
         if mistake_named(name) is None and name not in (model := model.with_twin(name)).effects:

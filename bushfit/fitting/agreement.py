@@ -10,8 +10,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.coordinates import Solution
 from bushfit.fitting.data_sets import DataSet, SweepData
-from bushfit.fitting.solve import Solution
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Usable
 from bushfit.model.sensitivity import stiffness_and_slopes

@@ -10,8 +10,8 @@ import numpy as np
 
 from bushfit.effects import temperature
 from bushfit.effects.contract import Array
+from bushfit.fitting.coordinates import Coordinates, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, repeats_of
-from bushfit.fitting.solve import Coordinates, jacobian, residual
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model

@@ -1,6 +1,7 @@
 """A campaign made ready to fit."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
@@ -11,10 +12,10 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.session import measured_session
 from bushfit.effects import with_base
 from bushfit.effects.contract import Array
-from bushfit.errors import FitError, naming
+from bushfit.errors import FitError, ModelError, naming
+from bushfit.fitting.coordinates import Bounds, residual
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data, with_level_errors
 from bushfit.fitting.rig_class import class_words
-from bushfit.fitting.solve import Bounds
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, Specimen, place_named
 from bushfit.model.model import Model
@@ -114,6 +115,17 @@ class Data:
         with naming(self.campaign.path):
             return start_values(self.campaign.bushing, data_sets, {**self.given, **held})
 
+    def started(self, effects: Sequence[str], data_sets: Sequence[DataSet], held: Mapping[str, float]) -> Model:
+        """A model to fit to some tests: with the values that the campaign gives to start from, or, where those meet the
+        tests worse, with what is read off them."""
+        fixed = {name: value for name, value in self.given.items() if not self.free((name,))}
+        models = []
+        for known in (self.given, fixed):
+            with naming(self.campaign.path):
+                values = start_values(self.campaign.bushing, data_sets, {**known, **held})
+            models.append(Model.started(self.campaign.bushing, effects, values))
+        return models[0] if fixed == self.given else min(models, key=lambda model: _misfit(model, data_sets))
+
     def free(self, names: Sequence[str]) -> tuple[str, ...]:
         """Those names that the campaign does not hold."""
         settings = self.campaign.fit.parameters
@@ -183,6 +195,14 @@ class Data:
             found=", ".join(f"{x:.4g}" for x in wanted),
             expected="some of " + ", ".join(f"{x:.4g}" for x in levels),
         )
+
+
+def _misfit(model: Model, data_sets: Sequence[DataSet]) -> float:
+    """chi-square; infinite where there is no response."""
+    with suppress(ModelError), np.errstate(all="ignore"):
+        chi_square = float(np.sum(np.square(residual(model, data_sets))))
+        return chi_square if np.isfinite(chi_square) else np.inf
+    return np.inf
 
 
 def _compound(data_sets: Sequence[_Kind]) -> Sequence[_Kind]:

@@ -1,6 +1,6 @@
 """A least-squares fit that goes step by step: several can go side by side, and one that cannot win be stopped.
 
-Diagnosis fits its candidates so. Everything else is fitted by lmfit, see `solve`, which ends at the same minimum.
+Every fit within bounds is made so; lmfit fits the paper's branches alone where no bound is met, see `solve`.
 
 Notes:
     Levenberg-Marquardt, damped as Nielsen does (Damping parameter in Marquardt's method, IMM-REP-1999-05, Lyngby
@@ -10,10 +10,6 @@ Notes:
     goes on as the last one went follows the bend which the derivatives showed over that one: geodesic acceleration
     (M. K. Transtrum, J. P. Sethna, arXiv:1201.5885, 2012), at no evaluation more. On four campaigns with gaps that no
     effect closes, it took 4 to 29 % off all evaluations of the diagnosis.
-
-    Why a second optimiser: on the 300 campaigns of the score card of seed 11, 99 % of the diagnoses take less than
-    1.4 s of processor time. With lmfit in its place they take 1.6 to 2.6 s, by its method and its starts, and 1 to 3
-    verdicts change.
 """
 
 from collections.abc import Sequence
@@ -24,8 +20,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.fitting.data_sets import DataSet
-from bushfit.fitting.solve import (
+from bushfit.fitting.coordinates import (
     Bounds,
     Coordinates,
     Solution,
@@ -35,6 +30,7 @@ from bushfit.fitting.solve import (
     residual,
     starting_point,
 )
+from bushfit.fitting.data_sets import DataSet
 from bushfit.model.model import Model
 
 #: Damping of the first step, relative to the curvature: next to none, the starts are good (usual for such methods).
@@ -54,8 +50,8 @@ _SAME_WAY = 0.8
 #: Share of a step's length that its bend may have, both in units of noise; chosen: further on the way bends otherwise,
 #: and nearly all steps fail.
 _MOST_BENT = 0.2
-#: A step that is expected to lower chi-square by less is the last: a tenth of a standard error, however large the
-#: misfit, as it is in units of noise that models are compared.
+#: A step that is expected to lower chi-square by less is the last, unless told otherwise: a tenth of a standard error,
+#: however large the misfit, as it is in units of noise that models are compared.
 _LEAST_FALL = 0.01
 #: Least squared norm of a parameter's derivatives, in units of noise, with which it moves: the shape of an effect of
 #: no amount stays.
@@ -74,6 +70,8 @@ class Descent:
         point: where the model lies, (k,).
         residual: whitened, of that model, (n,).
         jacobian: its derivatives by coordinate, (k, n).
+        tolerance: relative fall of chi-square, a step that is expected to bring less is the last; None for one that
+            models are compared by.
         damping: of the next step, relative to the curvature.
         growth: factor on the damping should that step fail.
         last: the step that led here, (k,), and the second derivative of the residuals along it, (n,); None at first.
@@ -87,6 +85,7 @@ class Descent:
     point: Array
     residual: Array
     jacobian: Array
+    tolerance: float | None = None
     evaluations: int = 1
     converged: bool = False
     damping: float = _FIRST_DAMPING
@@ -94,7 +93,14 @@ class Descent:
     last: tuple[Array, Array] | None = None
 
     @classmethod
-    def start(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds) -> "Descent":
+    def start(
+        cls,
+        model: Model,
+        data_sets: Sequence[DataSet],
+        names: Sequence[str],
+        bounds: Bounds,
+        tolerance: float | None = None,
+    ) -> "Descent":
         """A fit of the named parameters, the others held, that has not yet left the model's own values.
 
         Raises:
@@ -110,11 +116,15 @@ class Descent:
         misfit = residual(model, data_sets)  # which mostly came with the derivatives
         if not np.all(np.isfinite(misfit)) or not np.all(np.isfinite(slopes)):
             raise no_finite_response(model)
-        return cls(model, data_sets, coordinates, low, high, point, misfit, slopes)
+        return cls(model, data_sets, coordinates, low, high, point, misfit, slopes, tolerance)
 
     @property
     def chi_square(self) -> float:
         return float(self.residual @ self.residual)
+
+    @property
+    def _least_fall(self) -> float:
+        return _LEAST_FALL if self.tolerance is None else self.tolerance * self.chi_square
 
     @property
     def expected_fall(self) -> float:
@@ -133,7 +143,7 @@ class Descent:
         """The fit one evaluation on: at a lower chi-square with less damping, or where it was with more."""
         damping = self.damping
         step, expected = self._step(damping)
-        evaluations, converged = self.evaluations + 1, 0.0 <= expected < _LEAST_FALL
+        evaluations, converged = self.evaluations + 1, 0.0 <= expected < self._least_fall
         bend = self._bend(step, damping)
         # so far out between the bounds, or on a way that bends so much, that only caution leads down
         while expected < 0.0 or self._length(bend) > _MOST_BENT * self._length(step):

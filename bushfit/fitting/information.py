@@ -11,9 +11,9 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
+from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, new_loop, new_sweep, parted
 from bushfit.fitting.rig_class import ASSUMED
-from bushfit.fitting.solve import jacobian
 from bushfit.model.model import Model
 
 #: Least size of a parameter, relative to its typical value, that a relative change is counted from.

@@ -20,6 +20,7 @@ from bushfit.fitting.assess import (
     quality,
     unfitted,
 )
+from bushfit.fitting.coordinates import Bounds, Coordinates, Solution
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, sources, with_level_errors
 from bushfit.fitting.identify import left_open
@@ -27,7 +28,6 @@ from bushfit.fitting.levels import level_errors
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.rig_class import largest_error, words_of
 from bushfit.fitting.robust import Estimate, estimate, told
-from bushfit.fitting.solve import Bounds, Coordinates, Solution
 from bushfit.geometry import place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -46,10 +46,11 @@ _MOST_PASSES = 50
 _LONGEST_STRIDE = 5.0
 #: A filled natural rubber, to say what leaving the springpot out may do: m/mu [s^alpha] and alpha.
 _TYPICAL_SPRINGPOT = (0.18, 0.24)
-#: What is said of a fit that was stopped, where chi-square is flat or on a slope.
-_STOPPED = "the fit was stopped after {} evaluations of the model, where {}"
-_FLAT = "chi-square is flat: parameters that stay open could move on, for next to nothing"
-_SLOPE = "it had not come to its end: the parameters are not the best ones"
+#: What is said of a fit that was stopped.
+_STOPPED = (
+    "the fit was stopped after {} evaluations of the model, where chi-square is flat: parameters that stay open could "
+    "move on, for next to nothing"
+)
 #: What is said of levels that disagree by more than their repeats do.
 _LEVELS = "levels disagree by more than their repeats do: an error of {} of each counts as noise"
 #: What to do about a model that does not fit.
@@ -218,7 +219,7 @@ def _solve(
     model: Model | None = None,
 ) -> Estimate:
     """Fit what the campaign leaves free of a model, from its values or else from start values taken from the data."""
-    model = model or Model.started(data.campaign.bushing, effects, data.start(data_sets, held))
+    model = model or data.started(effects, data_sets, held)
     names = [name for name in data.free(tuple(model.parameters)) if name not in held]
     return estimate(model, data_sets, names, data.bounds, robust=data.robust)
 
@@ -270,7 +271,7 @@ def cautions(
     return [
         *filter(None, [covariance.restricted(names).left_open(model.values)]),
         *notes,
-        *([_STOPPED.format(solution.evaluations, _FLAT if solution.flat else _SLOPE)] if solution.stopped else []),
+        *([_STOPPED.format(solution.evaluations)] if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),
         *misfit(model, data_sets, len(names), advice),

@@ -13,8 +13,9 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.assess import linear_errors, quality
+from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, coordinate_bounds
 from bushfit.fitting.data_sets import DataSet
-from bushfit.fitting.solve import Bounds, Coordinates, Solution, coordinate_bounds, solve
+from bushfit.fitting.solve import solve
 from bushfit.model.covariance import Z95, Covariance
 
 #: Longest step of the search, in coordinates, which are of order one: one that the fit of the others follows.

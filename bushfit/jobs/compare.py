@@ -23,7 +23,6 @@ from bushfit.jobs.grid import AMPLITUDES, common_grid
 from bushfit.jobs.predict import filled
 from bushfit.model.document import BushingTable
 from bushfit.model.file import model_document, versions
-from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Source, Sweep
 from bushfit.report.artifacts import comparison_contents
@@ -229,7 +228,7 @@ class Compare:
         """
         data = Data.of(campaign)
         data_sets = [data_set.standing() for data_set in data.chosen(self.asked.directions)]
-        model = Model.started(campaign.bushing, data.effects, data.start(data_sets, {}))
+        model = data.started(data.effects, data_sets, {})
         held = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]
         families = fit_families(model, data_sets, names or known_families(), held, data.bounds)
         tested = iter(holm([family.p for family in families if family.p is not None]))

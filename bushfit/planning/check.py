@@ -16,10 +16,10 @@ from threadpoolctl import threadpool_limits
 from bushfit.campaign.schema import RigSettings, SimulateSettings
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
+from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.data import Data
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.procedures import fit_joint
-from bushfit.fitting.solve import Coordinates
 from bushfit.planning.campaign import settings_of
 from bushfit.planning.contract import Plan
 from bushfit.simulation.measured import measure

@@ -48,6 +48,12 @@ def motions(test: Test) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return test.amplitudes, test.frequencies
 
 
+#: Standard error of the relative change of a parameter of which no test tells anything: a factor of 20.
+_OPEN = 3.0
+#: Least eigenvalue of a correlation that is more than rounding.
+_ROUNDING = 1e-14
+
+
 @dataclass(frozen=True)
 class Noise:
     """How well the rig measures, standard deviations; gain and phase [rad] are those of ln K.
@@ -102,6 +108,17 @@ class Knowledge:
     def errors(self) -> Array:
         """Standard error of each parameter's relative change, (k,)."""
         return np.sqrt(np.diag(self.covariance))[: len(self.names)]
+
+    @property
+    def precision(self) -> Array:
+        """What is known as information, and each parameter beforehand within a factor of 20, (k + b, k + b).
+
+        Notes: what tests leave open has errors of a thousand times its size, which rounds all else away.
+        """
+        size = np.sqrt(np.diag(self.covariance))
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
+        scaled = vectors / size[:, None]
+        return (scaled / np.maximum(values, _ROUNDING)) @ scaled.T + np.eye(size.size) / _OPEN**2
 
 
 @dataclass(frozen=True, eq=False)

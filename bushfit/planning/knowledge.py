@@ -13,12 +13,11 @@ from bushfit.diagnosis.refit import refitted
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import LIBRARY, twins_of
 from bushfit.errors import ModelError, did_you_mean
+from bushfit.fitting.coordinates import Bounds, Coordinates
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.rig_class import of_class
-from bushfit.fitting.solve import Bounds, Coordinates
-from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.contract import Knowledge, Noise, Test
 from bushfit.planning.sensitivity import ROWS_PER_CYCLE, relative_slopes
@@ -73,7 +72,7 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
     noise = noise_of(data)
     data = Data.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
     data_sets = [*data.loops, *data.sweeps]
-    model = Model.started(data.campaign.bushing, data.effects, data.start(data_sets, {}))
+    model = data.started(data.effects, data_sets, {})
     held = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
     source = f"the tests of {data.campaign.name}"
 

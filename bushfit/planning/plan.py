@@ -14,9 +14,9 @@ from bushfit.diagnosis.priors import TELLS
 from bushfit.effects import qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
+from bushfit.fitting.coordinates import residual
 from bushfit.fitting.data_sets import new_sweep
 from bushfit.fitting.repeats import FEWEST_STEPS
-from bushfit.fitting.solve import residual
 from bushfit.geometry import Place, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
@@ -115,7 +115,7 @@ class _Planner:
 
     def _view(self, known: Knowledge, further: Array) -> View:
         told = self.grid.told(relative_slopes(known, self.grid.data_sets), further)
-        return View(told, np.linalg.inv(known.covariance), self.grid.level, len(known.bounded))
+        return View(told, known.precision, self.grid.level, len(known.bounded))
 
     @cached_property
     def slopes(self) -> Array:
@@ -300,7 +300,7 @@ class _Planner:
         own, seen = view.told.own, view.told.own[:, k, k]
         one = Told(own * counts[:, None, None], own[..., k : k + 1], seen[:, None])  # by the gain of one run
         level = np.square(view.level[:, 0])
-        root = np.linalg.cholesky(np.linalg.inv(view.together(counts).own[0]))
+        root = _root(view.together(counts).own[0])
         pull = one.beside(view.level).cross[..., 0] @ root
         return Drifting(seen, level * seen**2 / (1.0 + counts * level * seen), pull)
 
@@ -311,7 +311,7 @@ class _Planner:
         told, drifting = view.together(counts), self._drifting(counts)
         off, covariance = view.off(told)[0], np.linalg.inv(told.own[0])
         gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.slopes, off, self.slopes))
-        moved = np.linalg.cholesky(covariance) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
+        moved = _root(told.own[0]) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
         places = self.budget.place[list(runs)]
         mounted = np.diff(places, prepend=-1) != 0
         return Programme(
@@ -395,3 +395,8 @@ def _alone(information: Array) -> Array:
     values, vectors = np.linalg.eigh(information)
     least = max(_OPEN * float(values.max()), _LEAST)
     return np.linalg.norm(vectors / np.sqrt(np.maximum(values, least)), axis=1)
+
+
+def _root(information: Array) -> Array:
+    """A root of the covariance that an information leaves, R R^T, (k, k)."""
+    return np.linalg.inv(np.linalg.cholesky(information)).T

@@ -20,7 +20,7 @@ def purposes(plan: Plan) -> dict[Test, str]:
     grid = Grid(known, tuple(counts))
     slopes = relative_slopes(known, grid.data_sets)
     told = grid.told(slopes, np.empty((0, slopes.shape[-1])))
-    view = View(told, np.linalg.inv(known.covariance), grid.level, len(known.bounded))
+    view = View(told, known.precision, grid.level, len(known.bounded))
     runs = np.array(list(counts.values()))
     whole = _errors(view, runs)[: len(known.names)]
     rest = "tells the rivals apart" if plan.wanted.aim == "rivals" else "shows effects that the model lacks"

@@ -18,10 +18,10 @@ from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.propose import missing_effects, sensitivity
 from bushfit.effects import Effect
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances
+from bushfit.fitting.coordinates import Coordinates, jacobian
 from bushfit.fitting.data_sets import DataSet, new_loop, new_sweep, parted
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.noise import SweepNoise
-from bushfit.fitting.solve import Coordinates, jacobian
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.planning.contract import Knowledge, Noise, Test

@@ -28,10 +28,11 @@ from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, History
 from bushfit.effects.springpot import grunwald_letnikov_weights
+from bushfit.fitting.coordinates import Coordinates, jacobian, residual
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, SweepData, loop_data, sweep_data
 from bushfit.fitting.procedures import STATIC, fit_dynamic, fit_joint, fit_two_step
-from bushfit.fitting.solve import Coordinates, jacobian, residual, solve
+from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction
 from bushfit.jobs.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES

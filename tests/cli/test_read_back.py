@@ -207,6 +207,8 @@ def taken(tests: Path, model: Path, folder: Path, formats: Sequence[str], *, who
         well(folder, "plan", model, "--hours", "1", "-o", "planned", *plain)
         well(folder, "diagnose", tests / "campaign.toml", "--model", model, "-o", "anew", *plain)
     bushing = document["bushing"] is not None
+    if bushing:
+        well(folder, "simulate", model, "-o", "simulated", *plain)
     for form in formats if bushing else [each for each in formats if each in TABLES]:
         well(folder, "export", model, "--format", *shlex.split(form), "-o", "exported", *plain)
 

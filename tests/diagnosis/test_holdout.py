@@ -10,7 +10,7 @@ from rigged import SHARED, Fitted, Measured
 
 from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.holdout import hold_out, parts
-from bushfit.fitting.solve import residual
+from bushfit.fitting.coordinates import residual
 
 INERTIA = {"inertia": {"mass": 0.06}}
 

@@ -11,10 +11,10 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
+from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import LoopData
 from bushfit.fitting.procedures import fit_joint
-from bushfit.fitting.solve import jacobian
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result

@@ -12,10 +12,11 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE
 from bushfit.errors import FitError
+from bushfit.fitting.coordinates import Bounds, residual
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
-from bushfit.fitting.solve import Bounds, residual, solve
+from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction
 from bushfit.model.model import Model

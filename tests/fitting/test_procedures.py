@@ -291,10 +291,9 @@ def test_correlations_stay_within_one_where_nothing_is_determined(
 def test_tests_that_never_reach_eps_half_have_a_fit_that_says_so(
     rig: Callable[..., Campaign], paper_model: Model
 ) -> None:
-    """Sweeps that end at five thousandths of eps_half: chi-square is flat for decades, and a fit creeps along it."""
+    """Sweeps that end at five thousandths of eps_half: chi-square is flat for decades, and the fit ends."""
     sweep = SimulatedSweep(Direction.AXIAL, (1e-6, 2.5e-6), (5.0, 15.0, 45.0, 100.0, 155.0))
     settings = SimulateSettings(repeats=3, noise=5e-3, loops=(), sweeps=(sweep,))
-    stopped = 0
     for seed in range(6):
         result = fit_joint(Data.of(rig(paper_model, settings, seed)))
         print(result.model.values, result.warnings)
@@ -304,5 +303,4 @@ def test_tests_that_never_reach_eps_half_have_a_fit_that_says_so(
         said = " ".join(result.warnings)
         assert "sigma_fmax" in said
         assert "eps_half" in said
-        stopped += any(line.startswith("the fit was stopped after 400 evaluations") for line in result.warnings)
-    assert stopped
+        assert "was stopped" not in said

@@ -9,9 +9,10 @@ import pytest
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.errors import FitError
+from bushfit.fitting.coordinates import Coordinates, jacobian, residual
 from bushfit.fitting.data import Data
-from bushfit.fitting.procedures import fit_joint
-from bushfit.fitting.solve import Coordinates, jacobian, residual, solve
+from bushfit.fitting.procedures import cautions, fit_joint
+from bushfit.fitting.solve import solve
 from bushfit.model.model import FIVE, Model
 
 
@@ -74,6 +75,15 @@ def test_a_solver_that_runs_out_of_evaluations_says_so(measured: Data, paper_mod
     assert stopped.stopped
     with pytest.raises(FitError):
         solve(start, data_sets, names, evaluations=2)
+
+
+def test_a_fit_that_is_stopped_where_chi_square_is_flat_is_one_and_is_told(measured: Data) -> None:
+    result = fit_joint(measured)
+    data_sets, near = measured.chosen(None), result.model.with_values({"mu": 1.0001 * result.model.values["mu"]})
+    stopped = solve(near, data_sets, list(FIVE), evaluations=2)
+    assert (stopped.stopped, stopped.flat) == (True, True)
+    notes = cautions(stopped.model, stopped, data_sets, {}, result.covariance)
+    assert any(note.startswith("the fit was stopped after 2 evaluations") for note in notes)
 
 
 @pytest.mark.parametrize("many", [10, pytest.param(100, marks=pytest.mark.slow)])

@@ -13,11 +13,13 @@ from bushfit.campaign.compound import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
+from bushfit.fitting.coordinates import residual
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import SweepData, new_loop, new_sweep
-from bushfit.fitting.solve import residual, solve
+from bushfit.fitting.solve import solve
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.jobs.plan import PlanTests
+from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.candidates import candidates, minutes
@@ -324,3 +326,17 @@ def test_values_given_by_hand_are_taken_as_right_within_a_factor(paper_model: Mo
     assert knowledge.names == tuple(paper_model.parameters)
     np.testing.assert_allclose(knowledge.covariance, 0.25 * np.eye(5))
     assert "a factor of 2.7" in knowledge.source
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_tests_leave_open_a_thousand_times_over_stops_no_plan(paper_model: Model, seed: int) -> None:
+    """Three parameters that trade off all but exactly, in numbers that are rounded as files are."""
+    random, names = np.random.default_rng(seed), tuple(paper_model.parameters)
+    values = np.array([paper_model.values[name] for name in names])
+    along = np.array([130.0, 0.17, -0.07, -1900.0, -4000.0])
+    apart = random.normal(size=(5, 5)) * 3e-5
+    relative = np.outer(along, along) + apart @ apart.T
+    result = Result(paper_model, names, Covariance(names, relative * np.outer(values, values)))
+    plan = PlanTests("parameters", 1.0).run(result).plan
+    print(plan.planned.errors)
+    assert np.all(plan.planned.errors < 0.5)

@@ -11,7 +11,8 @@ from agreement import Agree, digits
 from strd import Problem, problems
 
 from bushfit.fitting.assess import Stage, covariance
-from bushfit.fitting.solve import Solution, solve
+from bushfit.fitting.coordinates import Solution
+from bushfit.fitting.solve import solve
 
 PROBLEMS = problems()
 STARTS = [(problem, start) for problem in PROBLEMS for start in (1, 2)]

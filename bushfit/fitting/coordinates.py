@@ -1,0 +1,146 @@
+"""Coordinates in which a fit moves, residuals and their derivatives there, and where a fit ended.
+
+A fit moves the logarithm of strictly positive parameters and the others in units of their typical size, so
+that every coordinate is of order one and two decades are a step like any other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.effects import Parameter
+from bushfit.effects.contract import Array
+from bushfit.errors import FitError
+from bushfit.fitting.data_sets import DataSet
+from bushfit.model.covariance import Z95
+from bushfit.model.model import Model
+from bushfit.model.result import End
+
+Bounds = Mapping[str, tuple[float | None, float | None]]
+
+#: Smallest singular value of the derivatives that counts, relative to the largest: below it is their rounding.
+_LEAST_SINGULAR_VALUE = 1e-10
+#: A parameter this close to a bound rests on it, in coordinates, which are of order one however wide the bounds.
+_AT_BOUND = 1e-3
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """The map between parameter values and the coordinates in which a fit moves."""
+
+    names: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+
+    @classmethod
+    def of(cls, model: Model, names: Sequence[str]) -> Coordinates:
+        return cls(tuple(names), tuple(model.parameters[name] for name in names))
+
+    def forward(self, name: str, value: float) -> float:
+        parameter = self.parameters[self.names.index(name)]
+        return float(np.log(value)) if parameter.log else value / parameter.typical
+
+    def point(self, values: Mapping[str, float]) -> Array:
+        """Where those values lie, (k,)."""
+        return np.array([self.forward(name, values[name]) for name in self.names])
+
+    def values(self, point: Sequence[float] | Array) -> dict[str, float]:
+        """Parameter values at a point."""
+        return {
+            name: float(np.exp(u)) if parameter.log else float(u) * parameter.typical
+            for name, parameter, u in zip(self.names, self.parameters, point, strict=True)
+        }
+
+    def slopes(self, values: Mapping[str, float]) -> Array:
+        """d value / d coordinate, (k,)."""
+        pairs = zip(self.names, self.parameters, strict=True)
+        return np.array([values[name] if parameter.log else parameter.typical for name, parameter in pairs])
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where a fit ended.
+
+    Args:
+        residual: whitened residuals, model less measured, (n,).
+        jacobian: their derivatives by coordinate, (k, n).
+        at_bound: the parameters that ended at a bound, and at which.
+        stopped: whether it was stopped before it had converged.
+    """
+
+    model: Model
+    coordinates: Coordinates
+    residual: Array
+    jacobian: Array
+    evaluations: int
+    at_bound: Mapping[str, End]
+    stopped: bool
+
+    @property
+    def chi_square(self) -> float:
+        return float(self.residual @ self.residual)
+
+    def gain(self, beside: Collection[str]) -> float:
+        """By how much one Gauss-Newton step would lower chi-square, the parameters `beside` held."""
+        free = [i for i, name in enumerate(self.coordinates.names) if name not in beside]
+        left, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
+        seen = values > _LEAST_SINGULAR_VALUE * values.max(initial=0.0)
+        return float(np.sum(np.square(left[:, seen].T @ self.residual)))
+
+    @property
+    def flat(self) -> bool:
+        """Whether the next step would lower chi-square, in units of the misfit's variance, no more than chance does."""
+        return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
+
+
+def residual(model: Model, data_sets: Sequence[DataSet]) -> Array:
+    """Whitened residuals of all data sets, (n,)."""
+    return np.concatenate([data_set.residual(model) for data_set in data_sets])
+
+
+def jacobian(model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> Array:
+    """Derivatives of `residual` by parameter coordinate, (len(names), n)."""
+    slopes = Coordinates.of(model, names).slopes(model.values)
+    by_value = np.concatenate([data_set.jacobian(model, names) for data_set in data_sets], axis=-1)
+    return by_value * slopes[:, None]
+
+
+def starting_point(
+    model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds
+) -> tuple[Coordinates, Array, Array, Array]:
+    """Coordinates of a fit, the model's own values in them, and the lower and upper bounds, (k,) each."""
+    points = sum(data_set.size for data_set in data_sets)
+    if points <= len(names):
+        raise FitError("too few points for the fit", found=f"{points} points for {len(names)} parameters")
+    coordinates = Coordinates.of(model, names)
+    least = {name: parameter.bounds[0] for name, parameter in model.parameters.items() if parameter.log}
+    lifted = {name: value or least.get(name, 0.0) for name, value in model.values.items()}
+    return coordinates, coordinates.point(lifted), *coordinate_bounds(coordinates, bounds)
+
+
+def no_finite_response(model: Model) -> FitError:
+    """The error of a fit whose model has no finite response to the tests."""
+    return FitError(
+        "the model has no finite response to these tests",
+        found=", ".join(f"{name} = {value:.4g}" for name, value in model.values.items()),
+        hint="give start values or bounds in [fit] of the campaign",
+    )
+
+
+def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
+    """Lower and upper bound of each coordinate, (k,) each."""
+    ends = []
+    for name, parameter in zip(coordinates.names, coordinates.parameters, strict=True):
+        limits = zip(parameter.bounds, bounds.get(name, (None, None)), strict=True)
+        ends.append(sorted(coordinates.forward(name, limit if own is None else own) for limit, own in limits))
+    low, high = np.array(ends).T
+    return low, high
+
+
+def at_bound(names: Sequence[str], point: Array, low: Array, high: Array) -> dict[str, End]:
+    """The parameters that rest on a bound at a point, and on which, "min" or "max"."""
+    near = _AT_BOUND * np.minimum(high - low, 1.0)
+    rooms: dict[End, Array] = {"min": point - low, "max": high - point}
+    return {name: end for end, room in rooms.items() for name, met in zip(names, room < near, strict=True) if met}
