@@ -133,6 +133,7 @@ def test_a_schema_that_is_not_there_is_told_with_the_nearest() -> None:
 
 
 @pytest.mark.parametrize("name", OUTPUTS)
+@pytest.mark.slow
 def test_what_is_written_has_the_keys_that_are_described_and_no_others(written: Documents, name: str) -> None:
     documents = written[name]
     print(name, len(documents))
@@ -141,6 +142,7 @@ def test_what_is_written_has_the_keys_that_are_described_and_no_others(written: 
         assert complaints(name, document, whole=True) == []
 
 
+@pytest.mark.slow
 def test_the_documents_are_of_every_kind(written: Documents) -> None:
     """So that keys which are there now and then have been seen."""
     assert {document["schema"] for document in written["model"]} == {"bushfit/model/1", "bushfit/model/2"}
@@ -152,6 +154,7 @@ def test_the_documents_are_of_every_kind(written: Documents) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in OUTPUTS if name != "prediction"])
+@pytest.mark.slow
 def test_what_is_spoiled_is_refused(written: Documents, name: str) -> None:
     """Every key that has to be there taken away in turn, and every key given what is no value of it."""
     described, document = schema(name), written[name][-1]
@@ -178,6 +181,7 @@ def test_what_is_spoiled_is_refused(written: Documents, name: str) -> None:
         (("provenance", "inputs", 0, "sha256"), 1),
     ],
 )
+@pytest.mark.slow
 def test_a_wrong_value_in_a_model_is_refused(written: Documents, place: tuple[Any, ...], value: object) -> None:
     document = copy.deepcopy(written["model"][0])
     table = document

@@ -134,6 +134,7 @@ def test_no_manifest(tmp_path: Path, source: str, monkeypatch: pytest.MonkeyPatc
         read_manifest(source, Settings())
 
 
+@pytest.mark.slow
 def test_a_manifest_of_many_rows_is_read_once_and_small(tmp_path: Path) -> None:
     import tracemalloc
 

@@ -142,7 +142,6 @@ def test_options_reach_the_workflow(bushfit: Run, tmp_path: Path) -> None:
         return json.loads(run.stdout)
 
     assert document("--tolerance", "50 %")["verdict"] == "consistent"
-    assert document("--max-effects", "0")["verdict"] == "unexplained"
     assert document("--adopt", "inertia")["verdict"] == "consistent"
     assert json.loads((tmp_path / "x" / "model.json").read_text())["effects"] == [*BASE, "inertia"]
 

@@ -67,7 +67,7 @@ def test_one_error_and_nothing_written(row: Spoiled, folder: Path) -> None:
     assert {path.name for path in folder.iterdir()} == before
 
 
-@pytest.mark.parametrize("row", ROWS[:: len(ROWS) // 4], ids=lambda row: row.name)
+@pytest.mark.parametrize("row", ROWS[:: len(ROWS) // 2], ids=lambda row: row.name)
 def test_the_same_of_the_installed_command(row: Spoiled, folder: Path) -> None:
     before = lay_out(folder, row)
     command = [sys.executable, "-W", "error", str(Path(sys.executable).with_name("bushfit")), *row.arguments]

@@ -56,6 +56,7 @@ def test_the_worst_comes_first_and_all_are_real(diagnosed: Diagnosed) -> None:
     assert min(excess) > 2.0
 
 
+@pytest.mark.slow
 def test_slip_shows_at_the_smallest_amplitude_and_in_odd_harmonics(diagnosed: Diagnosed) -> None:
     found = diagnosed({"interface_slip": {"force": 6.0}}, SHARED).where
     loss = one(found, "axial", "loss")

@@ -224,6 +224,7 @@ def test_a_softening_is_told_of_each_part(paper_model: Model) -> None:
     assert one.softening == pytest.approx(0.12, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_softening_in_the_virgin_cycles_of_a_programme_is_diagnosed(paper_model: Model) -> None:
     """Later parts of the record are past it, though each is a loop of its own."""
     values = {"mullins_softening.share": 0.2, "mullins_softening.cycles": 1.0}

@@ -79,8 +79,10 @@ def test_torsion_counts_in_rad(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "lead",
     [
-        "# rig 3\n\n",
-        *(pytest.param(lead, marks=pytest.mark.slow) for lead in ("", 'Operator "A"\n', "\ufeff", "Prüfstand 3\n")),
+        *(
+            pytest.param(lead, marks=pytest.mark.slow)
+            for lead in ("# rig 3\n\n", "", 'Operator "A"\n', "\ufeff", "Prüfstand 3\n")
+        ),
     ],
 )
 def test_a_large_file_reads_like_a_small_one(lead: str, tmp_path: Path) -> None:

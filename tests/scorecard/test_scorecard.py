@@ -97,6 +97,7 @@ def test_truths_are_sealed_apart_from_the_campaigns(outcomes: list[Outcome], fol
         assert "[simulate" not in text
 
 
+@pytest.mark.slow
 def test_the_workflow_never_opens_a_sealed_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every file opened while a diagnosis runs, written down."""
     from cards import scorecard

@@ -16,6 +16,9 @@ from reading_html import loads, parsed
 from bushfit.report.contents import pages_of
 from bushfit.report.page.index import index_page, read_batch
 
+#: A batch that is diagnosed and reported takes ten seconds.
+pytestmark = pytest.mark.slow
+
 
 def test_a_batch_writes_its_page_and_the_folder_gives_the_same(batch: Path) -> None:
     written = (batch / "index.html").read_bytes()

@@ -208,6 +208,7 @@ def test_a_hole_stays_white(paper_model: Model, swept: Swept) -> None:
     np.testing.assert_allclose(np.ptp(edges, axis=1), 10.0)
 
 
+@pytest.mark.slow
 def test_same_figure_same_bytes(paper_model: Model, heavier: Callable[[float], Model], campaign: list[DataSet]) -> None:
     pictures = {to_image(gap_figure(paper_model, heavier(0.1), campaign, "$ 衬套", "50 % _of_ $")) for _ in range(2)}
     assert len(pictures) == 1
