@@ -34,18 +34,6 @@ class Composition:
         claim = [str(best.claim.mistake.name)] if best.claim else []
         return frozenset((*best.effects, *spots, *(["unnamed"] if best.unnamed else []), *claim))
 
-    @property
-    def kinds(self) -> frozenset[str]:
-        """Of what parts it is made."""
-        best = self.best
-        parts = {
-            "effects": best.effects,
-            "places": best.places or best.levels,
-            "unnamed": best.unnamed,
-            "record": best.claim,
-        }
-        return frozenset(kind for kind, there in parts.items() if there)
-
 
 @dataclass(frozen=True, eq=False)
 class Finding:
@@ -90,7 +78,7 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
         return replace(found, told=(sure, *(each for each in told if each is not sure)))
     if common and all(part.startswith("place: ") for part in common):  # whatever else there is, this has to go first
         return Finding("unexplained", nothing, tuple(told[:MOST_TOLD]), _leads(compositions))
-    unnamed = sum(each.probability for each in told if "unnamed" in each.kinds)
+    unnamed = sum(each.probability for each in told if each.best.unnamed)
     if len(told) <= MOST_TOLD and unnamed < 0.5:
         return Finding("ambiguous", nothing, tuple(told))
     return Finding("described", nothing, tuple(told[:MOST_TOLD]), _leads(compositions))
@@ -102,15 +90,15 @@ def _is_nothing(each: Hypothesis, tolerance: float) -> bool:
 
 def _of_one(first: Composition, nothing: float) -> Finding:
     """The verdict where one composition is all but sure."""
-    kinds, best = first.kinds, first.best
+    best = first.best
     names = best.effects
-    if "unnamed" in kinds:
-        if names and best.last < (1.0 - MOSTLY) * best.size:
-            return Finding("partly", nothing, (first,))
+    if best.unnamed and names and best.last < (1.0 - MOSTLY) * best.size:
+        return Finding("partly", nothing, (first,))
+    if best.unnamed:
         return Finding("described", nothing, (first,), names)
-    if not names and "record" not in kinds:
+    if not names and not best.claim:
         return Finding("unexplained", nothing, (first,))
-    if "places" in kinds:
+    if best.places or best.levels:
         return Finding("partly", nothing, (first,))
     if best.chance < DOES_NOT_FIT:
         return Finding("described", nothing, (first,), names)

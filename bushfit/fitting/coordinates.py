@@ -120,15 +120,6 @@ def starting_point(
     return coordinates, coordinates.point(lifted), *coordinate_bounds(coordinates, bounds)
 
 
-def no_finite_response(model: Model) -> FitError:
-    """The error of a fit whose model has no finite response to the tests."""
-    return FitError(
-        "the model has no finite response to these tests",
-        found=", ".join(f"{name} = {value:.4g}" for name, value in model.values.items()),
-        hint="give start values or bounds in [fit] of the campaign",
-    )
-
-
 def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
     """Lower and upper bound of each coordinate, (k,) each."""
     ends = []

@@ -19,14 +19,13 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.errors import ModelError
+from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import (
     Bounds,
     Coordinates,
     Solution,
     at_bound,
     jacobian,
-    no_finite_response,
     residual,
     starting_point,
 )
@@ -115,7 +114,11 @@ class Descent:
         slopes = jacobian(model, data_sets, names)
         misfit = residual(model, data_sets)  # which mostly came with the derivatives
         if not np.all(np.isfinite(misfit)) or not np.all(np.isfinite(slopes)):
-            raise no_finite_response(model)
+            raise FitError(
+                "the model has no finite response to these tests",
+                found=", ".join(f"{name} = {value:.4g}" for name, value in model.values.items()),
+                hint="give start values or bounds in [fit] of the campaign",
+            )
         return cls(model, data_sets, coordinates, low, high, point, misfit, slopes, tolerance)
 
     @property

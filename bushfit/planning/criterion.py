@@ -101,3 +101,8 @@ def distances(told: Sequence[Told]) -> Array:
     each = [shown(one) for one in told]
     one_way = np.stack([np.insert(row, place, np.inf, axis=1) for place, row in enumerate(each)], axis=1)
     return np.minimum(one_way, np.swapaxes(one_way, 1, 2))
+
+
+def root_of(information: Array) -> Array:
+    """A root of the covariance that an information leaves, R R^T, (k, k)."""
+    return np.linalg.inv(np.linalg.cholesky(information)).T

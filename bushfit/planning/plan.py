@@ -21,7 +21,7 @@ from bushfit.geometry import Place, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
 from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible, Wanted
-from bushfit.planning.criterion import Criterion, View, distances, shown
+from bushfit.planning.criterion import Criterion, View, distances, root_of, shown
 from bushfit.planning.order import Drifting, ordered
 from bushfit.planning.search import Budget, chosen
 from bushfit.planning.sensitivity import Column, Grid, Told, relative_slopes
@@ -300,7 +300,7 @@ class _Planner:
         own, seen = view.told.own, view.told.own[:, k, k]
         one = Told(own * counts[:, None, None], own[..., k : k + 1], seen[:, None])  # by the gain of one run
         level = np.square(view.level[:, 0])
-        root = _root(view.together(counts).own[0])
+        root = root_of(view.together(counts).own[0])
         pull = one.beside(view.level).cross[..., 0] @ root
         return Drifting(seen, level * seen**2 / (1.0 + counts * level * seen), pull)
 
@@ -311,7 +311,7 @@ class _Planner:
         told, drifting = view.together(counts), self._drifting(counts)
         off, covariance = view.off(told)[0], np.linalg.inv(told.own[0])
         gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.slopes, off, self.slopes))
-        moved = _root(told.own[0]) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
+        moved = root_of(told.own[0]) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
         places = self.budget.place[list(runs)]
         mounted = np.diff(places, prepend=-1) != 0
         return Programme(
@@ -395,8 +395,3 @@ def _alone(information: Array) -> Array:
     values, vectors = np.linalg.eigh(information)
     least = max(_OPEN * float(values.max()), _LEAST)
     return np.linalg.norm(vectors / np.sqrt(np.maximum(values, least)), axis=1)
-
-
-def _root(information: Array) -> Array:
-    """A root of the covariance that an information leaves, R R^T, (k, k)."""
-    return np.linalg.inv(np.linalg.cholesky(information)).T
