@@ -88,7 +88,11 @@ def test_a_fit_that_is_stopped_where_chi_square_is_flat_is_one_and_is_told(measu
 
 @pytest.mark.parametrize("many", [10, pytest.param(100, marks=pytest.mark.slow)])
 def test_random_starts_end_at_one_minimum(measured: Data, many: int) -> None:
-    """Two decades per parameter: a tenth to ten times the answer, alpha over its own range."""
+    """Two decades per parameter: a tenth to ten times the answer, alpha over its own range.
+
+    From a start that is far too stiff a fit may lose a branch for good. It then says that the branch rests on a bound,
+    and `Data.started` takes no such start: it takes what is read off the tests where that meets them better.
+    """
     best = fit_joint(measured)
     data_sets, names, rng = measured.chosen(None), list(FIVE), np.random.default_rng(1)
     ends, costs, evaluations = [], [], []
@@ -97,13 +101,16 @@ def test_random_starts_end_at_one_minimum(measured: Data, many: int) -> None:
         start = {name: best.model.values[name] * factor[name] for name in names}
         start["alpha"] = np.clip(10.0 ** rng.uniform(-2.0, 0.0), *best.model.parameters["alpha"].bounds)
         solution = solve(best.model.with_values(start), data_sets, names)
-        ends.append([solution.model.values[name] for name in names])
-        costs.append(solution.chi_square)
         evaluations.append(solution.evaluations)
+        if not solution.at_bound:
+            ends.append([solution.model.values[name] for name in names])
+            costs.append(solution.chi_square)
     apart = np.abs(np.array(ends) / [best.model.values[name] for name in names] - 1.0).max(axis=0)
     stderr = np.array([(best.covariance.stderr(name) or 0.0) / best.model.values[name] for name in names])
     print(
-        f"{many} starts: apart by {shown(apart)}; {np.median(evaluations):.0f} evaluations, at most {max(evaluations)}"
+        f"{many} starts, {len(ends)} of them to the minimum, apart by {shown(apart)}; "
+        f"{np.median(evaluations):.0f} evaluations, at most {max(evaluations)}"
     )
+    assert len(ends) >= 0.9 * many
     assert np.ptp(costs) < 1e-3
     assert np.all(apart < 0.02 * stderr)
