@@ -1,6 +1,6 @@
 """Start values of a fit, read off the data: secant slope, loop area, slope over log f.
 
-They need only be of the right order: from starts up to ten times too small or too large, 98 of 100 fits end at one
+They need only be of the right order: from starts up to ten times too small or too large, 94 of 100 fits end at one
 minimum; the others, all far too stiff, lose a branch and say so.
 """
 
