@@ -24,7 +24,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 
 #: Tries of each property: few for a commit, many where CI looks once more (`--hypothesis-profile=full`).
-for name, tries in (("commit", 10), ("full", 100)):
+for name, tries in (("commit", 10), ("full", 50)):
     settings.register_profile(
         name, max_examples=tries, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
     )

@@ -315,7 +315,7 @@ def command(folder: Path, *options: str) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize(("kills", "many"), [(1, 8), pytest.param(3, 40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kills", "many"), [(1, 8), pytest.param(3, 20, marks=pytest.mark.slow)])
 def test_killed_at_any_moment_and_resumed_it_is_as_if_it_had_run_through(
     typed: Callable[..., Any], shop: Path, kills: int, many: int
 ) -> None:

@@ -27,7 +27,7 @@ from bushfit.geometry import Direction, stiffness_per_modulus, unit_strain
 #: A term's stiffness, complex [N/m], by frequency [Hz], amplitude [m] and the stiffness without it.
 Term = Callable[[Array, Array, Array], Array]
 #: Campaigns with terms of random phase and powers.
-RANDOM = 100
+RANDOM = 50
 
 
 def with_term(campaign: Campaign, term: Term) -> Campaign:

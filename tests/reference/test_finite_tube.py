@@ -125,7 +125,7 @@ def test_the_correction_on_kept_shapes() -> None:
 @pytest.mark.slow
 def test_the_correction_on_many_kept_shapes() -> None:
     """On a coarser mesh, which moves no error by more than 0.02 % (see `test_finer_meshes_change_nothing`)."""
-    judge(kept_shapes(12, 48), fineness=0.7)
+    judge(kept_shapes(12, 20), fineness=0.7)
 
 
 def judge(kept: list[tuple[float, float]], *, fineness: float = 1.0) -> None:
