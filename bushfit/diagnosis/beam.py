@@ -14,8 +14,8 @@ from math import log
 import numpy as np
 
 from bushfit.diagnosis.claims import Screen, claims
-from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.explanations import Explanation, FaultyPlace
+from bushfit.diagnosis.evidence import Evidence, fit, footprint
+from bushfit.diagnosis.explanations import Explanation, FaultyPlace, Meeting
 from bushfit.diagnosis.hypotheses import Asked, Hypothesis, State, Tests, Weighed
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS
@@ -31,8 +31,8 @@ _SETTLED = 8
 _CLAIMS, _PLACES = 4, 2
 #: Logarithm of odds behind its state within which an effect is refitted; for time.
 _SLIGHT = 3.0
-#: What a mistake in the record changes, relative to |K|: never so little that it counts as nothing.
-_A_RECORD = 1.0
+#: What a record says of each point.
+_SAID = ("measured", "amplitude", "frequency")
 #: Reduced chi-square beyond which a model has bent its parameters too far for a refit to start from its values.
 _BENT = 1.5
 
@@ -46,11 +46,14 @@ class Search:
         self._seen: set[frozenset[Hashable]] = set()
         tests = Tests(asked.base, asked.data.campaign.rig, log(1.0 - sum(ODDS.values())))
         self.root = self._weigh(tests.state)
-        self._odds = _odds([*self.root.effects, *tests.fixed])
+        every = [*self.root.effects, *tests.fixed]
+        self._odds, self._families = _odds(every), {(each.kind, each.family) for each in every}
 
     def run(self) -> list[Hypothesis]:
         """Every hypothesis that was weighed, the most probable first."""
         beam = [self.root]
+        for place in self.asked.met:
+            self._note_meeting(place)
         for depth in range(ROUNDS + 1):
             for weighed in beam:
                 self._note_with_each(weighed, depth)
@@ -126,6 +129,13 @@ class Search:
         size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED)))
         self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, 0.0, weighed))
 
+    def _note_meeting(self, place: Meeting) -> None:
+        """Note that points which have no weight meet at a frequency: of the tests without them nothing is missing."""
+        root, families = self.root, {family for kind, family in self._families if kind == "place"}
+        odds = log(ODDS["place"] / len({"frequency", *families})) - root.state.log_prior + place.log_odds
+        posterior = root.log_posterior + odds
+        self._note(Hypothesis((), None, (place,), "", False, posterior, place.size, place.size, root))
+
     def _note(self, hypothesis: Hypothesis) -> None:
         """Keep the better of two ways to the same; what was refitted counts before what was not."""
         before = self.found.get(hypothesis.key)
@@ -171,7 +181,7 @@ class Search:
         ]
 
     def _with_effect(self, state: State, name: str, evidence: Evidence, depth: int) -> State:
-        density, precision, size = laplace(name, evidence, state.evidence)
+        density, precision = laplace(name, evidence, state.evidence)
         return replace(
             state,
             effects=(*state.effects, name),
@@ -179,7 +189,7 @@ class Search:
             log_prior=state.log_prior + self._prior("effect", name) - log(depth + 1),
             precision={**state.precision, **precision},
             density=state.density + density,
-            size=max(state.size, size),
+            size=max(state.tests.size, footprint(state.tests.base, evidence)),
         )
 
     def _with_places(self, weighed: Weighed, depth: int) -> list[Weighed]:
@@ -227,8 +237,20 @@ class Search:
                 evidence = self.asked.fitted(claim.mended(data))
                 if [each.size for each in evidence.data_sets] == [each.size for each in base.data_sets]:
                     odds = log(ODDS["record"]) - log(len(listed))
-                    found.append(self._weigh(Tests(evidence, data.campaign.rig, odds, claim, _A_RECORD).state))
+                    found.append(
+                        self._weigh(Tests(evidence, data.campaign.rig, odds, claim, _rewritten(base, evidence)).state)
+                    )
         return found
+
+
+def _rewritten(base: Evidence, mended: Evidence) -> float:
+    """The largest change of what a record says, relative: of a stiffness, an amplitude, a frequency; a test that moves
+    to another place changes as a whole."""
+    pairs = list(zip(base.data_sets, mended.data_sets, strict=True))
+    if any(one.direction != other.direction for one, other in pairs):
+        return 1.0
+    read = [(getattr(one, what), getattr(other, what)) for one, other in pairs for what in _SAID]
+    return max(float(np.max(np.abs(after / before - 1.0))) for before, after in read)
 
 
 def _odds(every: Sequence[Explanation]) -> dict[tuple[str, str], float]:

@@ -112,7 +112,7 @@ class Group:
 
     Args:
         columns: whitened residuals of a unit of each amount, (c, n).
-        unit: share of |K| that a unit changes, (c,); all 1 where columns are given per share.
+        unit: share of |K| that a unit changes where it changes most, (c,).
         together: whether the amounts are independent of one size; else one column is chosen, each as likely.
         sense: +1 where only positive amounts make sense, of columns of which one is chosen.
     """
@@ -289,7 +289,8 @@ class Ledger:
         found: dict[int, Worth] = {}
         first = 1 + len(self.jacobian)
         for (numbers, own), gram in zip(self._alike, self._solved.grams, strict=True):
-            gains, moved = _of_all(gram, self._solved.along[:, own - first])
+            unit = np.array([self.groups[number].unit for number in numbers])
+            gains, moved = _of_all(gram, self._solved.along[:, own - first], unit)
             for place, number in enumerate(numbers):
                 found[number] = self._worth(gains[:, place, None], moved[:, place, None])
         for number, (group, own) in enumerate(zip(self.groups, self._places, strict=True)):
@@ -356,14 +357,15 @@ def _of_one(group: Group, size: Array, along: Array) -> tuple[Array, Array]:
     return gain, np.square(mean * group.unit[:, None])
 
 
-def _of_all(gram: Array, along: Array) -> tuple[Array, Array]:
-    """The same of groups whose columns move together, (nodes, groups, sizes)."""
+def _of_all(gram: Array, along: Array, unit: Array) -> tuple[Array, Array]:
+    """The same of groups whose columns move together, of the change its largest value, (nodes, groups, sizes)."""
     size, vectors = np.linalg.eigh(gram)
     along = np.einsum("nmij,nmi->nmj", vectors, along)[:, :, None]
     size, v2 = np.maximum(size, 0.0)[:, :, None], np.square(SIZES)[:, None]
     grown = 1.0 + v2 * size
     gain = 0.5 * np.sum(v2 * along**2 / grown - np.log(grown), axis=-1)
-    return gain, np.sum(np.square(v2 * along / grown), axis=-1)
+    amounts = (v2 * along / grown) @ vectors.swapaxes(-1, -2)
+    return gain, np.sum(np.square(amounts * unit[:, None]), axis=-1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.currency import Ledger, RigErrors, Worth
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import Explanation, FaultyPlace, MissingEffect, effects, places, unnamed
+from bushfit.diagnosis.explanations import Explanation, FaultyPlace, Meeting, MissingEffect, effects, places, unnamed
 from bushfit.diagnosis.priors import FAR
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.fitting.coordinates import Bounds
@@ -31,6 +31,7 @@ class Asked:
         most: effects added at the most.
         tolerance: change of |K|, relative, that counts as nothing.
         start: values read off the data, for a model that the gap has bent too far.
+        met: points without weight that meet at a frequency.
         held, bounds: parameters that do not move, and limits of the others inside their own.
     """
 
@@ -41,6 +42,7 @@ class Asked:
     most: int
     tolerance: float
     start: Mapping[str, float]
+    met: Sequence[Meeting]
     held: Sequence[str]
     bounds: Bounds
 

@@ -304,8 +304,6 @@ def _entries(data: Data, claim: Claim, evidence: str) -> list[Named]:
 
 def _place_where(base: Evidence, place: FaultyPlace, best: Hypothesis) -> Where:
     kind, component = ("loop", "force") if place.family == "loop" else ("sweep", "storage")
-    columns = place.columns
-    left = columns @ base.residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
     reading = f"{place.name} departs by {number(100 * best.size, 2)} % from what all other tests say"
     return Where(
         place.direction,
@@ -313,6 +311,6 @@ def _place_where(base: Evidence, place: FaultyPlace, best: Hypothesis) -> Where:
         place.frequency,
         place.amplitude,
         component,
-        float(np.sqrt(np.mean(left**2))),
+        place.distance(base.residual),
         reading,
     )

@@ -11,6 +11,7 @@ from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.claims import adopted
 from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit_from
+from bushfit.diagnosis.explanations import meetings
 from bushfit.diagnosis.hypotheses import Asked
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.verdict import Told
@@ -57,6 +58,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         settings.max_effects,
         settings.tolerance,
         begun.start,
+        meetings(left, data.sweeps, begun.evidence.model),
         begun.held,
         data.bounds,
     )

@@ -2,7 +2,8 @@
 
 from bushfit.diagnosis.explanations.contract import Explanation, FaultyPlace, MissingEffect
 from bushfit.diagnosis.explanations.effects import effects
+from bushfit.diagnosis.explanations.meeting import Meeting, meetings
 from bushfit.diagnosis.explanations.places import places
 from bushfit.diagnosis.explanations.unnamed import unnamed
 
-__all__ = ["Explanation", "FaultyPlace", "MissingEffect", "effects", "places", "unnamed"]
+__all__ = ["Explanation", "FaultyPlace", "Meeting", "MissingEffect", "effects", "meetings", "places", "unnamed"]

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.propose import Proposal
 from bushfit.effects.contract import Array
@@ -51,3 +53,9 @@ class FaultyPlace(Explanation):
         """Whitened residuals that a unit deviation of each kind makes, (c, n)."""
         assert self.group is not None
         return self.group.columns
+
+    def distance(self, residual: Array) -> float:
+        """How far they lie off, in units of noise: the root mean square along their columns of residuals, (n,)."""
+        columns = self.columns
+        left = columns @ residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
+        return float(np.sqrt(np.mean(left**2)))

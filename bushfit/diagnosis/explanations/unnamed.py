@@ -1,6 +1,7 @@
 """Something smooth that has no name: a Gaussian process over frequency and strain, or harmonics of the loops."""
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,13 +23,11 @@ _MOST_POINTS = 150
 def unnamed(evidence: Evidence) -> list[Explanation]:
     """Processes of one direction or of all, and the harmonics of the loops."""
     loops, sweeps = parted(evidence.data_sets)
-    found = [(f"{how} {where}", columns) for how in _LENGTHS for where, columns in _processes(evidence, sweeps, how)]
+    found = [(f"{how} {where}", group) for how in _LENGTHS for where, group in _processes(evidence, sweeps, how)]
     if loops:
-        found.append(("loops", np.concatenate([_harmonics(evidence, group) for group in alike(loops)])))
-    return [
-        Explanation("unnamed", "unnamed", name, Group(columns, np.ones(len(columns)), together=True))
-        for name, columns in found
-    ]
+        columns = np.concatenate([_harmonics(evidence, group) for group in alike(loops)])
+        found.append(("loops", Group(columns, np.ones(len(columns)), together=True)))
+    return [Explanation("unnamed", "unnamed", name, group) for name, group in found]
 
 
 def _harmonics(evidence: Evidence, loops: Sequence[LoopData]) -> Array:
@@ -39,7 +38,7 @@ def _harmonics(evidence: Evidence, loops: Sequence[LoopData]) -> Array:
     return columns
 
 
-def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Iterator[tuple[str, Array]]:
+def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Iterator[tuple[str, Group]]:
     if not sweeps:
         return
     model, lengths = evidence.model, np.array(_LENGTHS[how])
@@ -59,16 +58,14 @@ def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Ite
         )
         for sweep, a, b in zip(sweeps, ends[:-1], ends[1:], strict=True)
     ]
+    largest = [np.repeat(np.abs(features[:, a:b]).max(axis=1), 2) for a, b in pairwise(ends)]
     directions = dict.fromkeys(str(sweep.direction) for sweep in sweeps)
     for direction in directions:
-        yield (
-            direction,
-            np.concatenate(
-                [each for each, sweep in zip(own, sweeps, strict=True) if str(sweep.direction) == direction]
-            ),
-        )
+        here = [number for number, sweep in enumerate(sweeps) if str(sweep.direction) == direction]
+        columns, unit = (np.concatenate([each[number] for number in here]) for each in (own, largest))
+        yield direction, Group(columns, unit, together=True)
     if len(directions) > 1:
-        yield "all", np.sum(own, axis=0)
+        yield "all", Group(np.sum(own, axis=0), np.max(largest, axis=0), together=True)
 
 
 def _features(points: Array) -> Array:

@@ -1,0 +1,82 @@
+"""A frequency at which points of several runs lie far off: a disturbance there, and no rows that went wrong singly."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import bdtrc
+
+from bushfit.diagnosis.explanations.contract import FaultyPlace
+from bushfit.effects.contract import Array
+from bushfit.fitting.sweep_data import SweepData
+from bushfit.model.model import Model
+from bushfit.model.result import Outlier
+
+
+@dataclass(frozen=True, eq=False)
+class Meeting(FaultyPlace):
+    """Points that were left out because they lie farther off than noise explains, all at one frequency.
+
+    Args:
+        apart: how far they lie off, in units of noise, the root mean square.
+        size: the same of the farthest, relative to |K|.
+        log_odds: logarithm of how much more often than rows that go wrong singly a disturbance brings them together.
+
+    Notes:
+        Rows that go wrong singly meet at a frequency by chance: of n such rows, k lie at the frequency of one of them
+        with the binomial probability of k - 1 or more among the n - 1 others, each with one over the number of
+        frequencies.
+    """
+
+    apart: float
+    size: float
+    log_odds: float
+
+    def distance(self, residual: Array) -> float:  # noqa: ARG002
+        return self.apart
+
+
+def meetings(left: Sequence[Outlier], sweeps: Sequence[SweepData], model: Model) -> list[Meeting]:
+    """What points that were left out have in common, by frequency; a point by itself has nothing."""
+    steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
+    apart = {(outlier.test, outlier.row): outlier.distance for outlier in left}
+    found: dict[float, list[tuple[SweepData, int]]] = defaultdict(list)
+    for sweep in sweeps:
+        for point, row in enumerate((sweep.order + 1).tolist()):
+            if (sweep.name, row) in apart:
+                found[float(sweep.frequency[point])].append((sweep, point))
+    return [
+        _meeting(
+            frequency,
+            points,
+            [apart[sweep.name, int(sweep.order[point]) + 1] for sweep, point in points],
+            model,
+            -float(np.log(bdtrc(len(points) - 2, len(left) - 1, 1.0 / steps.size))),
+        )
+        for frequency, points in found.items()
+        if len(points) > 1
+    ]
+
+
+def _meeting(
+    frequency: float, points: Sequence[tuple[SweepData, int]], apart: Sequence[float], model: Model, log_odds: float
+) -> Meeting:
+    first, *others = dict.fromkeys(str(sweep.direction) for sweep, _ in points)
+    amplitudes = [float(sweep.amplitude[point]) for sweep, point in points]
+    off = max(float(np.linalg.norm(sweep.off(model)[:, point])) for sweep, point in points)
+    where = "several directions" if others else first
+    return Meeting(
+        "place",
+        "frequency",
+        f"{len(points)} points at {frequency:.4g} Hz in {where}",
+        None,
+        points[0][0].direction,
+        (frequency, frequency),
+        (min(amplitudes), max(amplitudes)),
+        float(np.sqrt(np.mean(np.square(apart)))),
+        off,
+        log_odds,
+    )
