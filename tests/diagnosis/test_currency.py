@@ -270,3 +270,16 @@ def test_nodes_that_nothing_more_makes_likely_are_kept(seed: int, far: float) ->
     within = max(value for value, node in zip(exact, of.rig.nodes, strict=True) if not node.wide)
     kept = [of.rig.nodes[number] for number in of.likely(far)]
     assert all(node in kept for node, value in zip(of.rig.nodes, exact, strict=True) if value > within - far + 1e-6)
+
+
+def test_columns_that_move_together_change_by_each_ones_own_share() -> None:
+    """The size of what they change is the root of the sum of squares of amounts times shares, as one alone tells."""
+    plain = ledger(3)
+    columns = plain.groups[0].columns
+    sizes = []
+    for unit in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (3.0, 3.0)):
+        (worth,) = replace(plain, groups=[Group(columns, np.array(unit), together=True)]).worths
+        sizes.append(worth.size)
+        assert worth.log_evidence == pytest.approx(plain.worths[0].log_evidence)
+    assert sizes[2] == pytest.approx(np.hypot(sizes[0], sizes[1]))
+    assert sizes[3] == pytest.approx(3.0 * sizes[2])
