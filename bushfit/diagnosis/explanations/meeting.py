@@ -71,7 +71,7 @@ def _meeting(
     return Meeting(
         "place",
         "frequency",
-        f"{len(points)} points at {frequency:.4g} Hz in {where}",
+        f"{frequency:.4g} Hz in {where} ({len(points)} points left out)",
         None,
         points[0][0].direction,
         (frequency, frequency),
