@@ -14,7 +14,7 @@ from math import log
 import numpy as np
 
 from bushfit.diagnosis.claims import Screen, claims
-from bushfit.diagnosis.evidence import Evidence, fit, footprint
+from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.explanations import Explanation, FaultyPlace, Meeting
 from bushfit.diagnosis.hypotheses import Asked, Hypothesis, State, Tests, Weighed
 from bushfit.diagnosis.laplace import laplace
@@ -181,7 +181,7 @@ class Search:
         ]
 
     def _with_effect(self, state: State, name: str, evidence: Evidence, depth: int) -> State:
-        density, precision = laplace(name, evidence, state.evidence)
+        density, precision, size = laplace(name, evidence, state.evidence)
         return replace(
             state,
             effects=(*state.effects, name),
@@ -189,7 +189,7 @@ class Search:
             log_prior=state.log_prior + self._prior("effect", name) - log(depth + 1),
             precision={**state.precision, **precision},
             density=state.density + density,
-            size=max(state.tests.size, footprint(state.tests.base, evidence)),
+            size=max(state.size, size),
         )
 
     def _with_places(self, weighed: Weighed, depth: int) -> list[Weighed]:

@@ -112,7 +112,7 @@ class Group:
 
     Args:
         columns: whitened residuals of a unit of each amount, (c, n).
-        unit: share of |K| that a unit changes where it changes most, (c,).
+        unit: share of |K| that a unit changes, (c,); of columns that move together complex at some points, (c, p).
         together: whether the amounts are independent of one size; else one column is chosen, each as likely.
         sense: +1 where only positive amounts make sense, of columns of which one is chosen.
     """
@@ -289,8 +289,8 @@ class Ledger:
         found: dict[int, Worth] = {}
         first = 1 + len(self.jacobian)
         for (numbers, own), gram in zip(self._alike, self._solved.grams, strict=True):
-            unit = np.array([self.groups[number].unit for number in numbers])
-            gains, moved = _of_all(gram, self._solved.along[:, own - first], unit)
+            units = [self.groups[number].unit for number in numbers]
+            gains, moved = _of_all(gram, self._solved.along[:, own - first], units)
             for place, number in enumerate(numbers):
                 found[number] = self._worth(gains[:, place, None], moved[:, place, None])
         for number, (group, own) in enumerate(zip(self.groups, self._places, strict=True)):
@@ -357,7 +357,7 @@ def _of_one(group: Group, size: Array, along: Array) -> tuple[Array, Array]:
     return gain, np.square(mean * group.unit[:, None])
 
 
-def _of_all(gram: Array, along: Array, unit: Array) -> tuple[Array, Array]:
+def _of_all(gram: Array, along: Array, units: Sequence[Array]) -> tuple[Array, Array]:
     """The same of groups whose columns move together, of the change its largest value, (nodes, groups, sizes)."""
     size, vectors = np.linalg.eigh(gram)
     along = np.einsum("nmij,nmi->nmj", vectors, along)[:, :, None]
@@ -365,7 +365,8 @@ def _of_all(gram: Array, along: Array, unit: Array) -> tuple[Array, Array]:
     grown = 1.0 + v2 * size
     gain = 0.5 * np.sum(v2 * along**2 / grown - np.log(grown), axis=-1)
     amounts = (v2 * along / grown) @ vectors.swapaxes(-1, -2)
-    return gain, np.sum(np.square(amounts * unit[:, None]), axis=-1)
+    moved = [np.square(np.abs(amounts[:, place] @ unit)).max(axis=-1) for place, unit in enumerate(units)]
+    return gain, np.stack(moved, axis=1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -133,8 +133,3 @@ def result_of(evidence: Evidence, bounds: Bounds, told: Collection[str]) -> Resu
         else usable(evidence.solution, evidence.data_sets),
         unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in told),
     )
-
-
-def footprint(before: Evidence, after: Evidence) -> float:
-    """Largest change of the model's prediction over all tests, relative to |K| or to half a loop's force range."""
-    return max(data_set.change(before.model, after.model) for data_set in before.data_sets)

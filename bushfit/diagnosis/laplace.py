@@ -14,9 +14,9 @@ from bushfit.effects import effect_named, qualified
 _FINE, _SHARPEST = 1000, 0.01
 
 
-def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dict[str, float]]:
+def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dict[str, float], float]:
     """Of an effect that was refitted: ln of the prior density of its own coordinates with the factor of Laplace's
-    method, and their precision.
+    method, their precision, and what it changes, relative to |K|.
 
     What an amount changes is log-uniform from the least size on. A shape is uniform over what the tests
     could show; at rest on an end of that it moves no further, and the fall of the likelihood away from the end tells
@@ -33,7 +33,7 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
     if effect.replaces is not None:
         count = max(len(effect.parameters) - 2, 0)
         own = {qualified(effect, parameter): 0.5 for parameter in effect.parameters}
-        return count * (0.5 * log(2.0 * np.pi) - log(3.0)), own
+        return count * (0.5 * log(2.0 * np.pi) - log(3.0)), own, size
     for parameter in effect.parameters:
         coordinate = qualified(effect, parameter)
         if coordinate not in names:
@@ -59,7 +59,7 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
             precision[coordinate] = np.inf
         else:
             precision[coordinate] = 12.0 / wide**2
-    return density + 0.5 * count * log(2.0 * np.pi), precision
+    return density + 0.5 * count * log(2.0 * np.pi), precision, size
 
 
 def _of_amount(size: float, error: float) -> float:

@@ -35,11 +35,11 @@ def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: 
     columns = 10.0 * random.normal(size=(9, rows))
     share = random.uniform(0.2, 2.0, size=9)
     made = (
-        Group(columns[:2], np.ones(2), together=True),
-        Group(columns[2:4], np.ones(2), together=True),
+        Group(columns[:2], np.eye(2), together=True),
+        Group(columns[2:4], np.eye(2), together=True),
         Group(columns[4:7], share[4:7], together=False),
         Group(columns[7:9], share[7:9], together=False, sense=1),
-        Group(columns[:3], np.ones(3), together=True),
+        Group(columns[:3], np.eye(3), together=True),
     )
     precision = np.repeat([0.0, 0.5], [flat, known])
     jacobian = random.normal(size=(flat + known, rows))
@@ -200,7 +200,8 @@ def test_what_does_nothing_leaves_the_evidence_as_it_is(seed: int) -> None:
     """Columns of nothing, or of what the parameters do too, or that the tests hardly see."""
     of = ledger(seed)
     nothing, spanned = np.zeros((2, of.residual.size)), of.jacobian[:2] + of.jacobian[1]
-    groups = [Group(each, np.ones(2), together=together) for each in (nothing, spanned) for together in (True, False)]
+    groups = [Group(each, np.eye(2), together=True) for each in (nothing, spanned)]
+    groups += [Group(each, np.ones(2), together=False) for each in (nothing, spanned)]
     groups += [replace(of.groups[3], unit=np.zeros(2)), Group(nothing, np.ones(2), together=False, sense=1)]
     for each in replace(of, groups=groups).worths:
         assert each.log_evidence == pytest.approx(of.log_evidence, abs=1e-5)
@@ -272,14 +273,16 @@ def test_nodes_that_nothing_more_makes_likely_are_kept(seed: int, far: float) ->
     assert all(node in kept for node, value in zip(of.rig.nodes, exact, strict=True) if value > within - far + 1e-6)
 
 
-def test_columns_that_move_together_change_by_each_ones_own_share() -> None:
-    """The size of what they change is the root of the sum of squares of amounts times shares, as one alone tells."""
+def test_columns_that_move_together_change_what_their_sum_does_where_it_is_largest() -> None:
+    """Of gain and phase the length; of patterns that meet at a point their sum, however small each is elsewhere."""
     plain = ledger(3)
     columns = plain.groups[0].columns
     sizes = []
-    for unit in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (3.0, 3.0)):
+    for unit in ([[1.0], [0.0]], [[0.0], [1.0]], [[1.0], [1.0j]], [[1.0, 3.0], [1.0j, 3.0j]], [[1.0, 0.0], [0.0, 1.0]]):
         (worth,) = replace(plain, groups=[Group(columns, np.array(unit), together=True)]).worths
         sizes.append(worth.size)
         assert worth.log_evidence == pytest.approx(plain.worths[0].log_evidence)
-    assert sizes[2] == pytest.approx(np.hypot(sizes[0], sizes[1]))
-    assert sizes[3] == pytest.approx(3.0 * sizes[2])
+    first, second, both, thrice, larger = sizes
+    assert both == pytest.approx(np.hypot(first, second))
+    assert thrice == pytest.approx(3.0 * both)
+    assert max(first, second) <= larger <= both

@@ -32,11 +32,21 @@ def _loop(evidence: Evidence, loop: LoopData) -> FaultyPlace:
     """A loop wrong as a whole, in gain or offset."""
     columns = [evidence.embedded(column, loop) for column in loop.gain_and_offset()]
     ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
-    return FaultyPlace("place", "loop", f"the loop {loop.name}", _group(columns), loop.direction, *ends)
+    return FaultyPlace("place", "loop", f"the loop {loop.name}", _group(columns, np.eye(2)), loop.direction, *ends)
 
 
-def _group(columns: Sequence[Array] | Array) -> Group:
-    return Group(np.array(columns), np.ones(len(columns)), together=True)
+def _group(columns: Sequence[Array] | Array, unit: Array) -> Group:
+    return Group(np.array(columns), unit, together=True)
+
+
+def _changed(columns: int, kind: str) -> Array:
+    """What a unit of gain and of phase changes, and of their slopes at both ends of a line; of a frequency those of
+    each step, (columns, points)."""
+    both = np.array([[1.0], [1.0j]])
+    if kind == "frequency":
+        return np.asarray(np.kron(np.eye(columns // 2), both))
+    ends = np.array([[1.0, 1.0], [1.0, -1.0]])
+    return np.asarray(np.kron(ends[: columns // 2], both))
 
 
 def _place(
@@ -48,7 +58,7 @@ def _place(
         np.concatenate([getattr(sweep, axis)[mine] for sweep, mine in pairs]) for axis in ("frequency", "amplitude")
     )
     ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
-    return FaultyPlace("place", kind, words, _group(columns), sweeps[0].direction, *ends)
+    return FaultyPlace("place", kind, words, _group(columns, _changed(len(columns), kind)), sweeps[0].direction, *ends)
 
 
 def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:

@@ -1,9 +1,9 @@
 """Something smooth that has no name: a Gaussian process over frequency and strain, or harmonics of the loops."""
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.evidence import Evidence
@@ -26,7 +26,7 @@ def unnamed(evidence: Evidence) -> list[Explanation]:
     found = [(f"{how} {where}", group) for how in _LENGTHS for where, group in _processes(evidence, sweeps, how)]
     if loops:
         columns = np.concatenate([_harmonics(evidence, group) for group in alike(loops)])
-        found.append(("loops", Group(columns, np.ones(len(columns)), together=True)))
+        found.append(("loops", Group(columns, np.eye(len(columns)), together=True)))
     return [Explanation("unnamed", "unnamed", name, group) for name, group in found]
 
 
@@ -58,14 +58,15 @@ def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Ite
         )
         for sweep, a, b in zip(sweeps, ends[:-1], ends[1:], strict=True)
     ]
-    largest = [np.repeat(np.abs(features[:, a:b]).max(axis=1), 2) for a, b in pairwise(ends)]
+    share = (features[:, None] * np.array([[1.0], [1.0j]])).reshape(-1, features.shape[1])
     directions = dict.fromkeys(str(sweep.direction) for sweep in sweeps)
     for direction in directions:
         here = [number for number, sweep in enumerate(sweeps) if str(sweep.direction) == direction]
-        columns, unit = (np.concatenate([each[number] for number in here]) for each in (own, largest))
-        yield direction, Group(columns, unit, together=True)
+        columns = np.concatenate([own[number] for number in here])
+        parts = [share[:, ends[number] : ends[number + 1]] for number in here]
+        yield direction, Group(columns, block_diag(*parts), together=True)
     if len(directions) > 1:
-        yield "all", Group(np.sum(own, axis=0), np.max(largest, axis=0), together=True)
+        yield "all", Group(np.sum(own, axis=0), share, together=True)
 
 
 def _features(points: Array) -> Array:

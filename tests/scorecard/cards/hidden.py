@@ -14,7 +14,7 @@ from numpy.random import Generator
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.diagnosis.evidence import fit, footprint
+from bushfit.diagnosis.evidence import fit
 from bushfit.effects import BASE, LIBRARY, Effect, effect_named, qualified
 from bushfit.effects.contract import Array
 from bushfit.fitting.data import Data
@@ -263,8 +263,8 @@ def _points(test: SimulatedSweep) -> tuple[Array, Array]:
 def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:
     """Largest misfit of a plain model fitted to what the model itself predicts, relative."""
     data_sets = _noise_free_data(model, plan)
-    before = fit(plain, data_sets, (), {})
-    return footprint(before, replace(before, solution=replace(before.solution, model=model)))
+    fitted = fit(plain, data_sets, (), {}).model
+    return max(data_set.change(fitted, model) for data_set in data_sets)
 
 
 def _noise_free_data(model: Model, plan: SimulateSettings) -> list[DataSet]:
