@@ -244,10 +244,10 @@ class Search:
 
 
 def _rewritten(base: Evidence, mended: Evidence) -> float:
-    """The largest change of what a record says, relative: of a stiffness, an amplitude, a frequency; a test that moves
-    to another place changes as a whole."""
+    """The largest change of what a record says, relative: of a stiffness, an amplitude, a frequency; other dimensions
+    of the bushing, or another place of a test, change all."""
     pairs = list(zip(base.data_sets, mended.data_sets, strict=True))
-    if any(one.direction != other.direction for one, other in pairs):
+    if base.model.bushing != mended.model.bushing or any(one.direction != other.direction for one, other in pairs):
         return 1.0
     read = [(getattr(one, what), getattr(other, what)) for one, other in pairs for what in _SAID]
     return max(float(np.max(np.abs(after / before - 1.0))) for before, after in read)
