@@ -127,7 +127,7 @@ def test_95_percent_intervals_and_bands_cover(
     assert np.all(np.abs(bands - 0.95) <= max(0.02, CHANCE))
 
 
-@pytest.mark.parametrize("seeds", [12, pytest.param(SEEDS // 2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [12, pytest.param(SEEDS, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("stated", [False, True])
 def test_95_percent_intervals_cover_where_the_gain_of_a_loop_is_off(
     rig: Rig, paper_noise: SimulateSettings, paper_model: Model, seeds: int, stated: bool
