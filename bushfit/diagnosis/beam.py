@@ -46,8 +46,7 @@ class Search:
         self._seen: set[frozenset[Hashable]] = set()
         tests = Tests(asked.base, asked.data.campaign.rig, log(1.0 - sum(ODDS.values())))
         self.root = self._weigh(tests.state)
-        every = [*self.root.effects, *tests.fixed]
-        self._odds, self._families = _odds(every), {(each.kind, each.family) for each in every}
+        self._odds = _odds([*self.root.effects, *tests.fixed])
 
     def run(self) -> list[Hypothesis]:
         """Every hypothesis that was weighed, the most probable first."""
@@ -131,9 +130,10 @@ class Search:
 
     def _note_meeting(self, place: Meeting) -> None:
         """Note that points which have no weight meet at a frequency: of the tests without them nothing is missing."""
-        root, families = self.root, {family for kind, family in self._families if kind == "place"}
-        odds = log(ODDS["place"] / len({"frequency", *families})) - root.state.log_prior + place.log_odds
-        posterior = root.log_posterior + odds
+        root = self.root
+        families = {place.family, *(each.family for each in root.state.tests.fixed if each.kind == "place")}
+        odds = log(ODDS["place"] / len(families)) - root.state.log_prior
+        posterior = root.log_posterior + odds + place.log_odds
         self._note(Hypothesis((), None, (place,), "", False, posterior, place.size, place.size, root))
 
     def _note(self, hypothesis: Hypothesis) -> None:

@@ -58,7 +58,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         settings.max_effects,
         settings.tolerance,
         begun.start,
-        meetings(left, data.sweeps, begun.evidence.model),
+        meetings(left, whole.sweeps, begun.evidence.model),
         begun.held,
         data.bounds,
     )

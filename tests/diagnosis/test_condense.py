@@ -258,3 +258,16 @@ def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_re
     assert fewer.sweeps == data.sweeps
     whole = sum(made[int(name)][1] == 1.0 and made[int(name)][2] == 0 for name in kept)
     assert fewer.loops[0].gain_error == pytest.approx(0.01 * np.sqrt(whole if kept[0] != "1" else 1))
+
+
+def test_points_left_out_meet_at_their_own_frequency_in_runs_that_are_diagnosed_in_means() -> None:
+    """Rows count in the sweep as it was read: in its means the points that were left out are no more."""
+    sweep = swept(PAPER, points=450)
+    rows = np.flatnonzero(sweep.frequency == sweep.frequency[200])
+    factor = np.ones(sweep.frequency.size)
+    factor[rows] += np.where(np.arange(rows.size) % 2, 0.2, -0.2)
+    diagnosis = diagnose(data_of(replace(sweep, stiffness=sweep.stiffness * factor)))
+    print(rows.size, diagnosis.verdict, diagnosis.summary)
+    assert rows.size > 3
+    assert diagnosis.verdict == "unexplained"
+    assert f"{sweep.frequency[200]:.4g} Hz in axial ({rows.size} points left out)" in diagnosis.summary

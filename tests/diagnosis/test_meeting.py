@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from asking import asked, names
 from rigged import SHARED, Measured, changed
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.diagnosis.explanations import Meeting, meetings
+from bushfit.diagnosis.explanations import meetings
 from bushfit.fitting.data import Data
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -41,7 +43,7 @@ def left(measured: Measured, paper_model: Model) -> tuple[Data, Model]:
 
 
 def at(data: Data, *points: tuple[int, float, int]) -> list[Outlier]:
-    """Outliers of sweeps, by number, at a frequency: the so manieth row there."""
+    """Outliers of sweeps, by number, at a frequency: and its place among the rows there."""
     found = []
     for number, frequency, which in points:
         sweep = data.sweeps[number]
@@ -56,11 +58,28 @@ def test_odds_by_hand(left: tuple[Data, Model]) -> None:
     (three,) = meetings(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 65.0, 0)), data.sweeps, model)
     assert three.log_odds == pytest.approx(2.0 * np.log(count))
     assert three.apart == pytest.approx(8.0)
-    pairs: list[Meeting] = meetings(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 45.0, 0)), data.sweeps, model)
+    pairs = meetings(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 45.0, 0)), data.sweeps, model)
     assert [pair.frequency[0] for pair in pairs] == [65.0]
     assert pairs[0].log_odds == pytest.approx(-np.log(1.0 - (1.0 - 1.0 / count) ** 2))
     assert meetings(at(data, (0, 65.0, 0), (1, 45.0, 0)), data.sweeps, model) == []
     assert meetings([], (), model) == []
+
+
+def test_odds_that_no_float_holds_are_large_ones(left: tuple[Data, Model]) -> None:
+    """Of 400 rows at one of 16 frequencies: 16 to the power of -399."""
+    _, model = left
+    count = 16 * 400
+    swept = SimpleNamespace(
+        name="swept",
+        direction="axial",
+        frequency=np.repeat(np.arange(1.0, 17.0), 400),
+        amplitude=np.ones(count),
+        order=np.arange(count),
+        off=lambda _: np.zeros((2, count)),
+    )
+    every = [Outlier("swept", None, row + 1, "stiffness", 8.0) for row in range(400)]
+    (found,) = meetings(every, [swept], model)  # type: ignore[list-item]
+    assert 700.0 < found.log_odds < 800.0
 
 
 def test_two_rows_that_went_wrong_apart_are_no_gap(measured: Measured) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import log
 
 import numpy as np
 from scipy.special import bdtrc
@@ -41,33 +42,27 @@ class Meeting(FaultyPlace):
 
 def meetings(left: Sequence[Outlier], sweeps: Sequence[SweepData], model: Model) -> list[Meeting]:
     """What points that were left out have in common, by frequency; a point by itself has nothing."""
-    steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
     apart = {(outlier.test, outlier.row): outlier.distance for outlier in left}
-    found: dict[float, list[tuple[SweepData, int]]] = defaultdict(list)
+    found: dict[float, list[_Left]] = defaultdict(list)
     for sweep in sweeps:
-        for point, row in enumerate((sweep.order + 1).tolist()):
-            if (sweep.name, row) in apart:
-                found[float(sweep.frequency[point])].append((sweep, point))
-    return [
-        _meeting(
-            frequency,
-            points,
-            [apart[sweep.name, int(sweep.order[point]) + 1] for sweep, point in points],
-            model,
-            -float(np.log(bdtrc(len(points) - 2, len(left) - 1, 1.0 / steps.size))),
-        )
-        for frequency, points in found.items()
-        if len(points) > 1
-    ]
+        for point, (frequency, row) in enumerate(zip(sweep.frequency.tolist(), sweep.order.tolist(), strict=True)):
+            there = found[frequency]
+            if (sweep.name, row + 1) in apart:
+                there.append((sweep, point, apart[sweep.name, row + 1]))
+    chance = 1.0 / max(len(found), 1)
+    return [_meeting(at, points, len(left), chance, model) for at, points in found.items() if len(points) > 1]
 
 
-def _meeting(
-    frequency: float, points: Sequence[tuple[SweepData, int]], apart: Sequence[float], model: Model, log_odds: float
-) -> Meeting:
-    first, *others = dict.fromkeys(str(sweep.direction) for sweep, _ in points)
-    amplitudes = [float(sweep.amplitude[point]) for sweep, point in points]
-    off = max(float(np.linalg.norm(sweep.off(model)[:, point])) for sweep, point in points)
+#: A point that was left out: its sweep, its number there, and how far it lies off in units of noise.
+_Left = tuple[SweepData, int, float]
+
+
+def _meeting(frequency: float, points: Sequence[_Left], left: int, chance: float, model: Model) -> Meeting:
+    """Points at a frequency, of so many that were left out, each of which might as well lie at any other."""
+    first, *others = dict.fromkeys(str(sweep.direction) for sweep, *_ in points)
     where = "several directions" if others else first
+    amplitudes = [float(sweep.amplitude[point]) for sweep, point, _ in points]
+    by_chance = max(float(bdtrc(len(points) - 2, left - 1, chance)), np.finfo(float).tiny)
     return Meeting(
         "place",
         "frequency",
@@ -76,7 +71,7 @@ def _meeting(
         points[0][0].direction,
         (frequency, frequency),
         (min(amplitudes), max(amplitudes)),
-        float(np.sqrt(np.mean(np.square(apart)))),
-        off,
-        log_odds,
+        float(np.sqrt(np.mean(np.square([apart for *_, apart in points])))),
+        max(float(np.linalg.norm(sweep.off(model)[:, point])) for sweep, point, _ in points),
+        -log(by_chance),
     )
