@@ -95,6 +95,7 @@ def test_random_starts_end_at_one_minimum(measured: Data, many: int) -> None:
     """
     best = fit_joint(measured)
     data_sets, names, rng = measured.chosen(None), list(FIVE), np.random.default_rng(1)
+    read_off = residual(measured.started(measured.effects, data_sets, {}), data_sets)
     ends, costs, evaluations = [], [], []
     for _ in range(many):
         factor = dict(zip(names, 10.0 ** rng.uniform(-1.0, 1.0, 5), strict=True))
@@ -102,7 +103,10 @@ def test_random_starts_end_at_one_minimum(measured: Data, many: int) -> None:
         start["alpha"] = np.clip(10.0 ** rng.uniform(-2.0, 0.0), *best.model.parameters["alpha"].bounds)
         solution = solve(best.model.with_values(start), data_sets, names)
         evaluations.append(solution.evaluations)
-        if not solution.at_bound:
+        if solution.at_bound:
+            tried = residual(best.model.with_values(start), data_sets)
+            assert tried @ tried > read_off @ read_off
+        else:
             ends.append([solution.model.values[name] for name in names])
             costs.append(solution.chi_square)
     apart = np.abs(np.array(ends) / [best.model.values[name] for name in names] - 1.0).max(axis=0)
