@@ -1,7 +1,7 @@
 """Workers: processes of this machine or of a Dask cluster, through one `concurrent.futures.Executor`.
 
-Rows go out in chunks, few at a time. A worker that dies costs its rows a second try, each alone; a row whose worker
-dies then, too, is given up, and the rest goes on.
+Rows go out in chunks, few at a time. A worker that dies takes the others of its pool along, so the rows that were out
+are tried again, each alone; a row whose worker dies twice then is given up, and the rest goes on.
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ _LARGEST_CHUNK = 64
 _CHUNKS_PER_WORKER = 2
 #: Pools that are tried for a chunk: the first may have lost a worker just now.
 _MOST_POOLS = 3
+#: Workers that a row alone may take down before it is given up: one may have died by chance.
+_MOST_DEATHS = 2
 #: Environment of the workers. Python puts the current folder before its own on the path of what it starts, unless told
 #: not to. Below so many bytes glibc keeps freed memory for the next row: handing it back takes a tenth of the time.
 _ENVIRONMENT = {
@@ -213,18 +215,19 @@ def _submit(pool: Pool, work: Callable[[Sequence[T]], Sequence[R]], rows: Sequen
 
 def _alone(row: T, work: Callable[[Sequence[T]], Sequence[R]], give_up: Callable[[str], R], pool: Pool) -> R:
     """The result of a row that was with a worker when it died: nothing else is out while it tries again."""
-    try:
-        return _submit(pool, work, [row]).result()[0]
-    except BatchError:
-        raise
-    except (Exception, CancelledError) as error:
-        pool.mend(error)
-        cause = error
+    for _ in range(_MOST_DEATHS):
+        try:
+            return _submit(pool, work, [row]).result()[0]
+        except BatchError:
+            raise
+        except (Exception, CancelledError) as error:
+            pool.mend(error)
+            cause = error
     try:
         _submit(pool, work, []).result()  # a worker that dies over nothing was not brought down by the row
     except (futures.BrokenExecutor, OSError, EOFError) as error:
         raise _no_worker(error) from error
-    return give_up(f"its worker process died twice, then over it alone; out of memory, most likely ({cause})")
+    return give_up(f"its worker process died twice over it alone; out of memory, most likely ({cause})")
 
 
 def _no_worker(cause: BaseException) -> BatchError:

@@ -368,7 +368,7 @@ def test_a_campaign_that_kills_its_worker_is_told_once_and_the_others_go_on(
     assert "Traceback" not in done.stderr
     assert [row["status"] for row in rows(shop / "all")] == ["done", "done", "failed", "done", "done"]
     (told,) = [line for line in done.stderr.splitlines() if line.startswith("failed: ")]
-    assert told.startswith("failed: b2: its worker process died twice, then over it alone; out of memory")
+    assert told.startswith("failed: b2: its worker process died twice over it alone; out of memory")
     assert not (shop / "all/bushings/b2").exists()
 
 
