@@ -54,23 +54,26 @@ _COUNT_SECONDS = 5.0
 
 
 class LocalPool:
-    """Worker processes of this machine."""
+    """Worker processes of this machine, which begin to get ready at once."""
 
     def __init__(self, jobs: int) -> None:
         self._jobs = jobs
         self._executor: Executor | None = None
+        # No fork of this process: it has threads. A server forks instead, with all imported already, which takes it a
+        # second or two from now on. It imports what this process does, from where it does.
+        os.environ.update(_ENVIRONMENT, PYTHONPATH=os.pathsep.join(sys.path))
+        forks = "forkserver" in multiprocessing.get_all_start_methods()
+        self._context = multiprocessing.get_context("forkserver" if forks else "spawn")
+        if forks:
+            from multiprocessing.forkserver import ensure_running
+
+            self._context.set_forkserver_preload(["bushfit.batch.work", "bushfit.jobs.fits", "lmfit", "pandas"])
+            ensure_running()
 
     def executor(self) -> Executor:
         """One that works: a new one where the last is broken."""
         if self._executor is None:
-            # No fork of this process: it has threads. A server forks instead, with all imported already.
-            # They import what this process does, from where it does.
-            os.environ.update(_ENVIRONMENT, PYTHONPATH=os.pathsep.join(sys.path))
-            kind = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-            context = multiprocessing.get_context(kind)
-            if kind == "forkserver":
-                context.set_forkserver_preload(["bushfit.batch.work", "bushfit.jobs.fits", "lmfit", "pandas"])
-            self._executor = futures.ProcessPoolExecutor(self._jobs, context, initializer=_begin_worker)
+            self._executor = futures.ProcessPoolExecutor(self._jobs, self._context, initializer=_begin_worker)
         return self._executor
 
     def workers(self) -> int:

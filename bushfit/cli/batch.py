@@ -66,10 +66,13 @@ def command(
     Writes batch.csv (a row a bushing), batch.png, batch.json, index.html (control charts, a table to sort), and
     bushings/<name>/ with model.json of each, or all that `bushfit run` writes.
     """
+    from bushfit.batch.pool import DaskPool, LocalPool
+
+    # Workers import what they need while this process does.
+    workers: Pool = DaskPool(scheduler) if scheduler else LocalPool(jobs or os.cpu_count() or 1)
     from bushfit.batch.limits import check_judged, read_limits
     from bushfit.batch.manifest import read_manifest
     from bushfit.batch.points import parse_point
-    from bushfit.batch.pool import DaskPool, LocalPool
     from bushfit.batch.run import Plan, check_free, run
     from bushfit.batch.work import Orders
 
@@ -84,7 +87,6 @@ def command(
     orders = Orders(output, tuple(dict.fromkeys(points)), formats, resume)
     plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.formats)
     check_free(plan, force=options.force)
-    workers: Pool = DaskPool(scheduler) if scheduler else LocalPool(jobs or os.cpu_count() or 1)
     with _progress(options, len(plan.rows)) as advance:
         summary = run(plan, workers, advance, lambda summary: options.tell(summary.to_document()))
     _tell(options, summary, options.folder(read.stem), plan)
