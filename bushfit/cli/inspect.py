@@ -40,7 +40,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     amplitudes, repeats; and what is odd beyond noise, in sentences with figures. Odd is an amplitude or frequency
     other than the file's name says, a gap, rows that stand still, cut-off tops, outliers, drift, cycles that still
     settle, a motion off zero, a force of the other sign; in sweeps copied rows, missing frequencies, a repeat that is
-    off, loss factors below zero. Rows count from 1 below the header.
+    off, loss factors below zero; two files that repeat each other 10 % apart. Rows count from 1 below the header.
 
     The text for the campaign goes to standard output, with full paths. If a file cannot be used, the others are told,
     nothing is written, exit status 2.
@@ -48,7 +48,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     Writes inspect.png, and inspect_2.png and so on of more than five files.
     """
     from bushfit.inspection.draft import named_apart, pasted_text
-    from bushfit.inspection.gathering import gather
+    from bushfit.inspection.gathering import gather, with_contradictions
 
     folder = options.folder(files[0].stem)
     sources, left_out = gather(files, stated)
@@ -66,7 +66,10 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
             failed.append(error)
         else:
             tell(options, seen[-1])
-    seen = named_apart(seen)
+    for alone, beside in zip(seen, together := with_contradictions(seen), strict=True):
+        for sentence in beside.looked.odd[len(alone.looked.odd) :]:
+            options.console.print(f"[yellow]odd:[/yellow] {escape(beside.label)}: {escape(sentence)}")
+    seen = named_apart(together)
     text = pasted_text(seen)
     if not options.as_json:
         click.echo(text, nl=False)

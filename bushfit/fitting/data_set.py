@@ -27,10 +27,12 @@ class DataSet(ABC):
     Args:
         kind: whether it is a loop or a sweep.
         components: what a point's residuals are of: force, or storage and loss.
+        beside: what another test says otherwise, in words; see `data_sets.told_of_others`.
     """
 
     kind: ClassVar[Kind]
     components: ClassVar[tuple[str, ...]]
+    beside: str | None
 
     @property
     def parts(self) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,6 +25,12 @@ __all__ = ["DataSet", "LoopData", "SweepData", "loop_data", "parted", "sources",
 #: Relative difference of two loops' amplitudes, or frequencies, up to which one repeats the other; chosen: rigs come
 #: back to an amplitude within it.
 _SAME_LOOP = 0.02
+#: The same of the points of sweeps, which stand at what was asked of the rig.
+_SAME_POINT = 1e-3
+#: Step in temperature up to which tests count as made at one [K].
+_SAME_KELVIN = 1.0
+
+_Kind = TypeVar("_Kind", LoopData, SweepData)
 
 
 def loop_data(
@@ -32,12 +39,7 @@ def loop_data(
     """One data set per loop; rows that are outliers carry no weight where they are to be left out."""
     drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
     found = [LoopData(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
-    stiffness = np.concatenate([np.empty(0), *(loop.measured for loop in found)])
-    for apart, one, other in unlike(stiffness, np.argmax(repeats_of(found), axis=1)) if found else ():
-        said = f"it repeats {found[one].name}, and their stiffness lies {number(100.0 * apart, 2)} % apart"
-        drive = found[other].drive
-        found[other] = replace(found[other], drive=replace(drive, notes=(*drive.notes, said)))
-    return with_gain_errors(found, stated)
+    return with_gain_errors(told_of_others(found), stated)
 
 
 def with_gain_errors(loops: Sequence[LoopData], stated: RigSettings) -> list[LoopData]:
@@ -82,7 +84,38 @@ def sweep_data(
         for rig in dict.fromkeys(rigs)
     }
     data_sets = [SweepData(sweep, noises[rig], residuals) for sweep, rig in zip(sweeps, rigs, strict=True)]
-    return [data_set.weighted(np.array(data_set.sweep.weight)) for data_set in data_sets]
+    return told_of_others([data_set.weighted(np.array(data_set.sweep.weight)) for data_set in data_sets])
+
+
+def told_of_others(found: Sequence[_Kind]) -> list[_Kind]:
+    """Loops, or sweeps, each with a sentence on the earlier one whose points it repeats and lies farthest from."""
+    if len(found) < 2:
+        return list(found)
+    owner = np.repeat(np.arange(len(found)), [one.measured.size for one in found])
+    places = [str(one.direction) for one in found]
+    same = _SAME_LOOP if isinstance(found[0], LoopData) else _SAME_POINT
+    points = (
+        np.array([places.index(place) for place in places])[owner],
+        _alike(np.log(np.concatenate([one.frequency for one in found])), same),
+        _alike(np.log(np.concatenate([one.amplitude for one in found])), same),
+        _alike(np.nan_to_num(np.hstack([one.temperature for one in found])), _SAME_KELVIN),
+    )
+    stiffness = np.concatenate([one.measured for one in found])
+    told = list(found)
+    for apart, *pair in reversed(unlike(stiffness, np.unique(points, axis=1, return_inverse=True)[1])):
+        first, later = sorted(owner[pair].tolist())
+        if first != later:  # a file that contradicts itself tells so
+            said = f"it repeats {found[first].name}, and their stiffness lies {number(100.0 * apart, 2)} % apart"
+            told[later] = replace(found[later], beside=said)
+    return told
+
+
+def _alike(values: Array, same: float) -> Array:
+    """A number for each group of values, (n,), in which no step from one to the next is larger than `same`."""
+    order = np.argsort(values)
+    groups = np.empty(values.size, dtype=np.intp)
+    groups[order] = np.cumsum(np.diff(values[order], prepend=values[order[0]]) > same)
+    return groups
 
 
 def with_level_errors(sweeps: Sequence[SweepData], error: tuple[float, float], freedom: int) -> tuple[SweepData, ...]:

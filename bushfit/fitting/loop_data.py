@@ -39,6 +39,7 @@ class LoopData(DataSet):
     fundamental_only: bool = False
     gain_error: float = 0.0
     gain_weighs: bool = False
+    beside: str | None = None
     kind = "loop"
     components = ("force",)
 
@@ -60,7 +61,12 @@ class LoopData(DataSet):
 
     @property
     def notes(self) -> Sequence[str]:
-        return self.drive.notes
+        return (*self.drive.notes, *filter(None, [self.beside]))
+
+    @property
+    def temperature(self) -> float:
+        """[K]; nan where it is not known."""
+        return self.test.temperature or np.nan
 
     @property
     def frequency(self) -> Array:

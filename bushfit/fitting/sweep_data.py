@@ -84,6 +84,7 @@ class SweepData(DataSet):
     weight: Array | None = None
     part: Array | None = None
     under: Circumstances = UNKNOWN
+    beside: str | None = None
     kind = "sweep"
     components = ("storage", "loss")
 
@@ -103,7 +104,14 @@ class SweepData(DataSet):
             * (len(rows) > _MOST_LISTED)
             for share, *_ in apart[:1]
         ]
-        return [*super().notes, *told, *(words for name, words in self.noise.beyond.items() if name == self.name)]
+        beyond = (words for name, words in self.noise.beyond.items() if name == self.name)
+        return [*super().notes, *told, *filter(None, [self.beside]), *beyond]
+
+    @property
+    def temperature(self) -> Array:
+        """Of each point [K], (n,); nan where it is not known."""
+        kelvin = np.nan if self.sweep.temperature is None else self.sweep.temperature
+        return np.broadcast_to(kelvin, self.sweep.frequency.size)[self.order]
 
     @property
     def size(self) -> int:

@@ -9,12 +9,14 @@ import numpy as np
 
 from bushfit.campaign.campaign import TEST_FILES
 from bushfit.errors import BushfitError, NoColumnError, NoTestError
+from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.geometry import Direction
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.outside import temperatures_of
 from bushfit.inspection.recognition import open_table, recognised
 from bushfit.inspection.record import Inspected
 from bushfit.reading.columns import same_text
+from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import Said, stated_above
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.workbook import sheets
@@ -86,6 +88,21 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
     by_rows = [_by_rows(source) for source in stated_of_each(sources, stated)]
     left_out += [sentence for _, others in by_rows for sentence in others]
     return [test for tests, _ in by_rows for test in tests], tuple(left_out)
+
+
+def with_contradictions(files: Sequence[Inspected]) -> list[Inspected]:
+    """Files that were inspected, each with a sentence more where another one of the same part contradicts it."""
+    beside: dict[int, str] = {}
+    for part in dict.fromkeys(seen.part for seen in files):
+        tests = [seen.measured for seen in files if seen.part == part and seen.kind != "history"]
+        loops = loop_data([test for test in tests if isinstance(test, Loop)])
+        sweeps = sweep_data([test for test in tests if isinstance(test, Sweep)])
+        beside |= {id(one.test): one.beside for one in (*loops, *sweeps) if one.beside}
+    odd = [[beside[id(seen.measured)]] if id(seen.measured) in beside else [] for seen in files]
+    return [
+        replace(seen, looked=replace(seen.looked, odd=(*seen.looked.odd, *more)))
+        for seen, more in zip(files, odd, strict=True)
+    ]
 
 
 def _by_rows(source: Source) -> tuple[list[Source], list[str]]:

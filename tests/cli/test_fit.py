@@ -115,14 +115,23 @@ def test_rows_that_lie_far_apart_are_told_wherever_tests_are_read(
         assert re.search(r"sweep_axial.csv: .*, rows \d+ and \d+", " ".join(told.split()))
 
 
-def test_a_loop_that_repeats_another_and_lies_far_off_is_told(own: Path) -> None:
-    table = pd.read_csv(own / "data/cmp_15961/loop_axial_1.csv")
-    table["force [N]"] *= 1.15
-    table.to_csv(own / "data/cmp_15961/loop_again.csv", index=False)
-    with (own / CAMPAIGN).open("a", encoding="utf-8") as file:
-        file.write('\n[[loops]]\nfile = "../data/cmp_15961/loop_again.csv"\ndirection = "axial"\n')
-    done = call(own, "fit", CAMPAIGN, "-o", "out", "--no-plots")
-    assert "loop_again: it repeats loop_axial_1, and their stiffness lies 15 % apart" in " ".join(done.stderr.split())
+@pytest.mark.parametrize(
+    ("kind", "file", "column"),
+    [("loops", "loop_axial_1", "force [N]"), ("sweeps", "sweep_axial", "stiffness [N/mm]")],
+)
+def test_a_test_that_repeats_another_and_lies_far_off_is_told(own: Path, kind: str, file: str, column: str) -> None:
+    table = pd.read_csv(own / f"data/cmp_15961/{file}.csv")
+    table[column] *= 1.15
+    table.to_csv(own / "data/cmp_15961/again.csv", index=False)
+    with (own / CAMPAIGN).open("a", encoding="utf-8") as campaign:
+        campaign.write(f'\n[[{kind}]]\nfile = "../data/cmp_15961/again.csv"\ndirection = "axial"\n')
+    for words in (
+        ("fit", CAMPAIGN),
+        ("inspect", f"data/cmp_15961/{file}.csv", "data/cmp_15961/again.csv", "--direction", "axial"),
+    ):
+        done = call(own, *words, "-o", words[0], "--no-plots")
+        told = " ".join(done.stderr.split())
+        assert re.search(rf"again(\.csv)?: it repeats {file}, and their stiffness lies 1\d % apart", told), told
 
 
 def test_the_gain_error_of_loops_is_said(own: Path) -> None:
