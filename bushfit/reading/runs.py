@@ -60,9 +60,13 @@ def runs_of(
         levels = _by_rank(frequency, amplitude, repeat)
     kept_frequency, kept_level = (float(np.mean(np.diff(values) == 0.0)) for values in (frequency, levels))
     if max(kept_frequency, kept_level) < _LEAST_HELD:
-        passes = repeat if repeat is not None else np.cumsum(np.append(False, np.diff(frequency) < 0.0)) + 1
-        if (of_passes := _of_passes(amplitude, _number(passes))) is None:
-            return Runs(None, amplitude, passes)
+        steps = np.diff(frequency)
+        turns = steps * np.sign(np.median(np.sign(steps))) < 0.0
+        if repeat is not None:
+            turns |= np.diff(repeat) != 0
+        passes = np.cumsum(np.append(False, turns))
+        if (of_passes := _of_passes(amplitude, passes)) is None:
+            return Runs(None, amplitude, passes + 1 if repeat is None else repeat)
         levels = of_passes
         kept_frequency, kept_level = 0.0, 1.0
     of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))

@@ -59,6 +59,24 @@ def test_a_frequency_sweep_that_misses_its_levels_holds_them_all_the_same() -> N
     assert (runs.repeat == 1).all()
 
 
+@given(st.permutations(["level", "repeat"]), st.booleans(), st.booleans(), st.floats(0.0, 0.1), st.integers(0, 10_000))
+def test_frequency_sweeps_as_reached_have_their_levels_and_repeats_back(
+    outer: list[str], falling: bool, numbered: bool, scatter: float, seed: int
+) -> None:
+    """Three levels in three repeats, in either order: what each run reached at one frequency it reached at no other."""
+    frequencies = np.arange(5.0, 156.0, 10.0)[:: -1 if falling else 1]
+    axes = {"level": np.array([1e-4, 2e-4, 5e-4]), "repeat": np.arange(1, 4), "frequency": frequencies}
+    names = [*outer, "frequency"]
+    grid = dict(zip(names, np.meshgrid(*(axes[name] for name in names), indexing="ij"), strict=True))
+    level, repeat, frequency = (grid[name].ravel() for name in axes)
+    reached = level * (1.0 + scatter * np.random.default_rng(seed).uniform(-1.0, 1.0, level.size))
+    runs = runs_of(frequency, reached, repeat if numbered else None)
+    assert runs.stepped == "frequency"
+    assert np.array_equal(runs.repeat, repeat)
+    assert np.unique(runs.amplitude).size == 3
+    assert np.allclose(runs.amplitude, level, rtol=scatter + 1e-12)
+
+
 def test_a_mass_on_a_mount_holds_neither_and_each_pass_is_a_run() -> None:
     frequency = np.tile(np.linspace(100.0, 300.0, 50), 2)
     amplitude = 1e-5 / (1.0 + ((frequency - 200.0) / 20.0) ** 2) * np.repeat([1.0, 3.0], 50)
