@@ -56,8 +56,8 @@ _FEWEST_ROWS = 32
 #: How far equations over a loop's motion may be from solved, relative to it: a ten-thousandth of the noise of the best
 #: rigs. Derivatives are resolved apart from that.
 _ACCURACY = 1e-8
-#: Share of a cycle by which a record may go on after its last whole one and still count as whole: rounding.
-_WHOLE = 1e-6
+#: Rows by which a record may miss its last whole cycle, or go on after it, and still count as whole.
+_WHOLE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +137,11 @@ class Drive:
         """Whether other rows of its record went before, which the rubber remembers."""
         return self.loop.part is not None and self.loop.part.first_row > 0
 
+    @property
+    def _rounding(self) -> float:
+        """Cycles by which the record may miss a whole number of them."""
+        return _WHOLE * self.cycles / self.loop.time.size
+
     @cached_property
     def _motion(self) -> History:
         cycle = np.fft.irfft(0.5 * GRID * np.append(0.0, self.coefficients[1:]), GRID)
@@ -147,7 +152,7 @@ class Drive:
 
     @cached_property
     def _settling(self) -> History:
-        count = int(np.ceil(self.cycles - _WHOLE))
+        count = int(np.ceil(self.cycles - self._rounding))
         motion = History.steady(np.tile(self._motion.value, count), self.frequency, cycles=count)
         return replace(motion, accuracy=_ACCURACY)
 
@@ -266,7 +271,7 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
     binned = drive.force.size < drive.loop.force.size
     turn = drive.phase.astype(np.intp)
     turns = np.unique(turn)
-    first, whole = int(drive.from_rest), int(drive.cycles + _WHOLE)
+    first, whole = int(drive.from_rest), int(drive.cycles + drive._rounding)
     rows = (turn >= first) & (turn < whole)
     cycles = int(np.count_nonzero((turns >= first) & (turns < whole)))
     if not cycles or np.count_nonzero(rows) < _FEWEST_ROWS * cycles:
