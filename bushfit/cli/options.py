@@ -9,6 +9,7 @@ from typing import Any, get_args
 import click
 
 from bushfit.cli import TABLES
+from bushfit.errors import MeasurementError
 from bushfit.reading.tablefile import Form
 from bushfit.report.contents import Picture
 
@@ -97,7 +98,23 @@ def option_of(key: str) -> str:
 
 
 #: Decorator of a command that takes files.
-files_argument = click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+
+
+def _tests_alone(_: click.Context, __: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Refuse a campaign or a model among test files."""
+    for file in files:
+        if file.suffix.lower() in (".toml", ".json") and file.is_file():
+            found = (
+                "a campaign, or what else TOML holds" if file.suffix.lower() == ".toml" else "a model, or other JSON"
+            )
+            hint = "bushfit diagnose looks at all tests of a campaign together; name its files, or their folder, here"
+            raise MeasurementError("a test file is needed", file=file, found=found, expected="a table", hint=hint)
+    return files
+
+
+files_argument = click.argument(
+    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path), callback=_tests_alone
+)
 
 
 def _options(table: str, without: str = "") -> Iterator[click.Option]:
