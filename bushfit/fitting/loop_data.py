@@ -20,6 +20,13 @@ from bushfit.reading.measurement import Loop
 _SMOOTH_HARMONICS = 5
 
 
+def smooth_waves(phase: Array) -> Array:
+    """1, and the cosine and sine of each harmonic that counts as smooth, at phases in cycles, (n,) -> (11, n)."""
+    angle = 2.0 * np.pi * phase
+    waves = [wave(order * angle) for order in range(1, _SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
+    return np.array([np.ones_like(angle), *waves])
+
+
 @dataclass(frozen=True, eq=False)
 class LoopData(DataSet):
     """Force over the rows of a loop; see `DataSet` for its answers.
@@ -198,10 +205,7 @@ class LoopData(DataSet):
 
     @cached_property
     def _waves(self) -> Array:
-        """1, and the cosine and sine of each harmonic that counts as smooth, (11, n)."""
-        angle = 2.0 * np.pi * self.drive.phase
-        waves = [wave(order * angle) for order in range(1, _SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
-        return np.array([np.ones_like(angle), *waves])
+        return smooth_waves(self.drive.phase)
 
     def _whitened(self, rows: Array) -> Array:
         """Rows in units of noise, (..., n), as independent numbers, 0 where one is told from a row left out."""

@@ -11,6 +11,7 @@ from bushfit.diagnosis.explanations.contract import Explanation
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import nodes_among
 from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted
+from bushfit.fitting.loop_data import smooth_waves
 
 #: Lengths in ln frequency and ln strain over which a curve changes: smooth, and rough.
 _LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
@@ -18,6 +19,8 @@ _LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
 _MOST_FEATURES, _LEAST_VARIANCE = 16, 1e-4
 #: Points at most that a process is made of.
 _MOST_POINTS = 150
+#: Phases of a cycle at which harmonics are summed up: six a wave of the fastest.
+_PHASES = 32
 
 
 def unnamed(evidence: Evidence) -> list[Explanation]:
@@ -25,8 +28,10 @@ def unnamed(evidence: Evidence) -> list[Explanation]:
     loops, sweeps = parted(evidence.data_sets)
     found = [(f"{how} {where}", group) for how in _LENGTHS for where, group in _processes(evidence, sweeps, how)]
     if loops:
-        columns = np.concatenate([_harmonics(evidence, group) for group in alike(loops)])
-        found.append(("loops", Group(columns, np.eye(len(columns)), together=True)))
+        groups = alike(loops)
+        shapes = block_diag(*[smooth_waves(np.arange(_PHASES) / _PHASES)] * len(groups))
+        columns = np.concatenate([_harmonics(evidence, group) for group in groups])
+        found.append(("loops", Group(columns, shapes, together=True)))
     return [Explanation("unnamed", "unnamed", name, group) for name, group in found]
 
 
