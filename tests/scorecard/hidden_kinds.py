@@ -30,6 +30,7 @@ from click.testing import CliRunner, Result
 from judging import Judged, acceptable
 from kinds import KINDS, SIZES
 from lab_campaign import Answer, campaign
+from observer import against_truth
 from scipy.stats import beta
 
 from bushfit.cli import cli
@@ -44,8 +45,12 @@ AIMS = {
     "visible, passed over": (0.0, 0.03),
     "clean, false alarms": (0.0, 0.01),
     "wrong name kept": (0.0, 0.015),
+    "which the tests deny": (0.0, 0.015),
     "set without the truth": (0.0, 0.015),
 }
+#: ln likelihood of the truth over what was told, from which on an observer who knows both, and takes both for equally
+#: likely beforehand, would not have told it: 97 in 100.
+DENIED = float(np.log(0.97 / 0.03))
 SETS = ("working", "held_back", "clean")
 
 
@@ -61,6 +66,7 @@ class Outcome:
         judged: None where there is none; what was visible then counts as not acceptable.
         seconds: processor time of the command.
         readable: whether `predict` reads back the model that was written.
+        against: of a wrong name, ln likelihood of the tests by the truth over that by what was told; else None.
     """
 
     seed: int
@@ -70,6 +76,7 @@ class Outcome:
     judged: Judged | None
     seconds: float
     readable: bool
+    against: float | None = None
 
 
 def _give_up(number: int, frame: FrameType | None) -> None:
@@ -105,10 +112,14 @@ def hidden(kind: str, size: float, seed: int) -> Outcome:
         diagnosis, error, seconds = diagnosed(Path(folder))
         if diagnosis is None:
             return Outcome(seed, answer, "none", error, None, seconds, readable=False)
-        readable = usable(Path(folder))
+        readable, judged, against = usable(Path(folder)), acceptable(answer, diagnosis), None
+        if judged.wrong_name:
+            silent = Path(folder) / "silent"
+            campaign(kind, size, seed, silent, silent=True)
+            against = against_truth(Path(folder), silent, Path(folder) / "out" / "model.json")
     names = [" / ".join((each["name"], *each["alternatives"])) for each in diagnosis["effects"]]
     words = "; ".join(names) or str(diagnosis["summary"])
-    return Outcome(seed, answer, diagnosis["verdict"], words, acceptable(answer, diagnosis), seconds, readable)
+    return Outcome(seed, answer, diagnosis["verdict"], words, judged, seconds, readable, against)
 
 
 def asked(chosen: str, seed: int) -> Iterator[tuple[str, float, int]]:
@@ -144,6 +155,7 @@ def rates(outcomes: Sequence[Outcome]) -> dict[str, tuple[int, int]]:
         "visible, passed over": (sum(bool(each and each.passed_over) for each in visible), len(visible)),
         "clean, false alarms": (sum(each.seen for each in clean), len(clean)),
         "wrong name kept": (sum(each.wrong_name for each in judged), len(judged)),
+        "which the tests deny": (sum(each.against is not None and each.against > DENIED for each in told), len(judged)),
         "set without the truth": (sum(each.wrong_set for each in judged), len(judged)),
     }
 
@@ -179,10 +191,11 @@ def line(outcome: Outcome) -> str:
     """One campaign in a line."""
     answer, judged = outcome.answer, outcome.judged
     marks = [name for name in ("passed_over", "wrong_name", "wrong_set") if judged and getattr(judged, name)]
+    odds = "" if outcome.against is None else f" (truth over it {outcome.against:+.1f} in ln likelihood)"
     worth = "no answer" if judged is None else "acceptable" if judged.acceptable else " ".join(marks) or "false alarm"
     size = f"{100 * answer.size:4.1f} %, left {100 * answer.left:5.1f} %, {answer.misfit:7.0f}"
     truth = f"{answer.kind or 'clean':20s} {size} {'seen' if answer.visible else '-':4s}"
-    return f"{outcome.seed:10d} {truth} {outcome.verdict:11s} {worth}: {outcome.words}"
+    return f"{outcome.seed:10d} {truth} {outcome.verdict:11s} {worth}: {outcome.words}{odds}"
 
 
 @click.command()

@@ -16,6 +16,8 @@ from visible import CYCLES, Noise, seen
 
 #: The class of the rig: gain, and phase [rad], of which each run has errors.
 CLASS = (5e-3, float(np.radians(0.25)))
+#: A rig without errors.
+_NONE = Noise(0.0, 0.0, 0.0, (0.0, 0.0), 0.0)
 #: Scatter of a loop's displacement, of its amplitude.
 _JITTER = 2e-4
 #: Levels of a sweep beside the largest, and how likely they are planned.
@@ -95,7 +97,7 @@ class Answer:
         return self.left >= 0.02 and self.misfit >= 40.0
 
 
-def campaign(kind: str, size: float, seed: int, folder: Path) -> Answer:
+def campaign(kind: str, size: float, seed: int, folder: Path, *, silent: bool = False) -> Answer:
     """Write one campaign into a folder, bushing.toml and its tables, and return the truth; the same seed, the same.
 
     Args:
@@ -103,6 +105,7 @@ def campaign(kind: str, size: float, seed: int, folder: Path) -> Answer:
         size: share of |K| that changes at most.
         seed: of everything random.
         folder: made where there is none.
+        silent: whether the rig makes no errors in it.
     """
     random = np.random.default_rng([seed, 2007])
     bushing, rubber = _specimen(random)
@@ -116,7 +119,7 @@ def campaign(kind: str, size: float, seed: int, folder: Path) -> Answer:
     if kind:
         left, misfit = seen(tests, rubber, change.record(response.stiffness), response.force, plan.noise)
         answer = Answer(kind, size, KINDS[kind].right, KINDS[kind].place, left, misfit)
-    _write(folder, tests, plan, change, response, random)
+    _write(folder, tests, replace(plan, noise=_NONE) if silent else plan, change, response, random)
     return answer
 
 
