@@ -1,8 +1,12 @@
-"""Folders compared."""
+"""Folders compared, and what tests of `batch` ask of one."""
 
 from __future__ import annotations
 
+import csv
+import sys
 from pathlib import Path
+
+PATTERN = "bushings/*/bushing.toml"
 
 
 def tree(folder: Path) -> dict[str, bytes]:
@@ -15,3 +19,20 @@ def tree(folder: Path) -> dict[str, bytes]:
 def stamps(folder: Path) -> dict[str, tuple[int, int]]:
     """What tells a file that was written again."""
     return {str(f): (f.stat().st_ino, f.stat().st_mtime_ns) for f in folder.rglob("*") if f.is_file()}
+
+
+def rows(folder: Path) -> list[dict[str, str]]:
+    with (folder / "batch.csv").open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def command(folder: Path, *options: str) -> list[str]:
+    return [
+        str(Path(sys.executable).with_name("bushfit")),
+        "batch",
+        "many.csv",
+        "-o",
+        str(folder),
+        "--no-plots",
+        *options,
+    ]

@@ -134,3 +134,7 @@ def drawn(page: str, title: str) -> dict[str, dict[str, np.ndarray]]:
 
 def change(file: Path, **keys: object) -> None:
     file.write_text(json.dumps(json.loads(file.read_text(encoding="utf-8")) | keys), encoding="utf-8")
+
+
+def page_of(folder: Path) -> str:
+    return (folder / "report.html").read_text(encoding="utf-8")
