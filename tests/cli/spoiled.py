@@ -17,11 +17,11 @@ from spoiled_rows import (
     IN_MORE,
     IN_PREDICTED,
     IN_RESONANCE,
-    USAGE,
     WHOLE_CAMPAIGNS,
     WHOLE_MODELS,
 )
 from spoiled_tables import IN_LOOP, IN_SWEEP
+from spoiled_usage import USAGE
 
 CAMPAIGN = """\
 [bushing]
