@@ -13,8 +13,8 @@ LARGEST = 4.0
 RUNS = ((0.15, 0.2), (0.5, 0.3), (1.0, 0.25), (2.0, 0.2), (4.0, 0.05))
 #: ... what all runs of a level share, and each loop by itself, ...
 LEVELS = ((0.0, 0.35), (0.4, 0.3), (1.0, 0.25), (2.5, 0.1))
-#: ... and what wanders slowly along a run.
-WANDERING = ((0.0, 0.6), (0.5, 0.25), (1.5, 0.15))
+#: ... and what wanders slowly along a run: no more than the class, which is said of what a run shares.
+WANDERING = ((0.0, 0.6), (0.5, 0.25), (1.0, 0.15))
 #: Errors of levels, in units of the class, above which they are an explanation of their own.
 WITHIN_CLASS = 1.5
 #: Harmonics of what wanders along a run; their variance falls as 1/j^2.

@@ -72,13 +72,14 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
             told.append(each)
             together += each.probability
     common = frozenset.intersection(*(each.parts for each in told))
-    sure = next((each for each in told if each.parts == common), None)
-    if sure:  # all that is probable has these parts; what else there is is not shown
+    unnamed = sum(each.probability for each in told if each.best.unnamed)
+    shown = common | {"unnamed"} if unnamed > 0.5 else common
+    sure = next((each for each in told if each.parts == shown), None)
+    if sure:  # all that is probable has these parts; what else there is is not shown, but that there is something
         found = _of_one(sure, nothing)
         return replace(found, told=(sure, *(each for each in told if each is not sure)))
     if common and all(part.startswith("place: ") for part in common):  # whatever else there is, this has to go first
         return Finding("unexplained", nothing, tuple(told[:MOST_TOLD]), _leads(compositions))
-    unnamed = sum(each.probability for each in told if each.best.unnamed)
     if len(told) <= MOST_TOLD and unnamed < 0.5:
         return Finding("ambiguous", nothing, tuple(told))
     return Finding("described", nothing, tuple(told[:MOST_TOLD]), _leads(compositions))

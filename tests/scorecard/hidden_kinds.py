@@ -66,7 +66,7 @@ class Outcome:
         judged: None where there is none; what was visible then counts as not acceptable.
         seconds: processor time of the command.
         readable: whether `predict` reads back the model that was written.
-        against: of a wrong name, ln likelihood of the tests by the truth over that by what was told; else None.
+        against: of a wrong effect, ln likelihood of the tests by the truth over that by what was told; else None.
     """
 
     seed: int
@@ -113,7 +113,8 @@ def hidden(kind: str, size: float, seed: int) -> Outcome:
         if diagnosis is None:
             return Outcome(seed, answer, "none", error, None, seconds, readable=False)
         readable, judged, against = usable(Path(folder)), acceptable(answer, diagnosis), None
-        if judged.wrong_name:
+        of_record = any(each.get("correction") for each in diagnosis["effects"])  # the model is of the tests unmended
+        if judged.wrong_name and not of_record:
             silent = Path(folder) / "silent"
             campaign(kind, size, seed, silent, silent=True)
             against = against_truth(Path(folder), silent, Path(folder) / "out" / "model.json")
