@@ -86,9 +86,9 @@ class Told:
         names = _entries(self.data, claim, evidence)
         command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(self.data))])
         advice = f"if the records of the tests bear it out, {'; '.join(claim.corrections(self.data))} (or {command})"
-        beside = f", with {_all(best.effects)} beside it" if best.effects else ""
-        words = f"these tests agree if {claim.words(self.data)}{beside}"
-        found = self._finished("named", words, self.base, names, next_test=advice)
+        beside = [*best.effects, *(place.name for place in best.places)]
+        words = f"these tests agree if {claim.words(self.data)}" + f", with {_all(beside)} beside it" * bool(beside)
+        found = self._finished(self.finding.verdict, words, self.base, names, places=best, next_test=advice)
         warning = f"fitted to the tests as they are, which only agree if {claim.words(self.data)}: {advice}"
         after = self._fitted(best.weighed.state.evidence)
         return replace(
