@@ -25,14 +25,14 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, sources, with_level_errors
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.levels import level_errors
-from bushfit.fitting.profile import profile95
+from bushfit.fitting.profile import limit95, profile95
 from bushfit.fitting.rig_class import largest_error, words_of
 from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.geometry import place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import End, Result
-from bushfit.units import number
+from bushfit.units import for_people, number
 
 STATIC = ("mu", "sigma_fmax", "eps_half")
 DYNAMIC = ("m", "alpha")
@@ -272,7 +272,7 @@ def cautions(
         *filter(None, [covariance.restricted(names).left_open(model.values)]),
         *notes,
         *([_STOPPED.format(solution.evaluations)] if solution.stopped else []),
-        *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
+        *(_at_edge(name, end, solution, data_sets, bounds) for name, end in at_bound.items()),
         *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),
         *misfit(model, data_sets, len(names), advice),
     ]
@@ -290,7 +290,14 @@ def _checked(model: Model, data_sets: Sequence[DataSet]) -> str:
     )
 
 
-def _at_edge(name: str, end: End, bounds: Bounds) -> str:
+def _at_edge(name: str, end: End, solution: Solution, data_sets: Sequence[DataSet], bounds: Bounds) -> str:
+    """What a parameter that rests on a bound means: how far from there the tests let it be."""
     if bounds.get(name, (None, None))[end == "max"] is not None:
         return f"{name} rests on the {end} given in [fit]"
-    return f"{name} ended at the edge of what is possible: the data do not determine it"
+    limit = limit95(solution, data_sets, name, bounds)
+    if limit is None:
+        return f"{name} ended at the edge of what is possible: the data do not determine it"
+    parameter = solution.model.parameters[name]
+    unit, factor = for_people(parameter.unit, 1.0, limit)
+    how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
+    return f"{name} ended at the edge of what is possible: all that the tests show of it is {how} (95 %)"

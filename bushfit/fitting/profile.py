@@ -20,6 +20,8 @@ from bushfit.model.covariance import Z95, Covariance
 
 #: Longest step of the search, in coordinates, which are of order one: one that the fit of the others follows.
 _LONGEST_STEP = 0.5
+#: Step away from a bound where a parameter does next to nothing, so that the others have nothing to follow.
+_BLIND_STEP = 4.0 * _LONGEST_STEP
 #: First step of the search over the distance at which a parabola would end: the first step then passes most ends.
 _FIRST_REACH = 1.1
 #: Steps of the search to either side at most: beyond a hundred factors e a side counts as open.
@@ -33,6 +35,9 @@ _WIDEST = 2.2
 _HELD_BY_OTHERS = 0.1
 #: Distance of such an end from the best value, in coordinates, from which on it is open: a factor e.
 _FAR = 1.0
+
+#: Standard deviations beyond which one in twenty lies on one side.
+_ONE_SIDED = 1.6448536269514722
 
 Interval = tuple[float | None, float | None]
 
@@ -130,6 +135,17 @@ def profile95(
         found[name] = low, high
         advance(name, len(names) - len(found))
     return found
+
+
+def limit95(best: Solution, data_sets: Sequence[DataSet], name: str, bounds: Bounds) -> float | None:
+    """How far a parameter that came to rest on a bound can go from there: its one-sided 95 % limit, None where the data
+    set none. A model that misses the data may miss them by as much more."""
+    i, names = best.coordinates.names.index(name), best.coordinates.names
+    start, inward = best.coordinates.point(best.model.values)[i], int(best.at_bound[name] == "min")
+    excess = max(quality(best.model, data_sets, len(names)).reduced_chi_square, 1.0)
+    profile = _Profile(name, best, data_sets, bounds, {start: best})
+    other_end = coordinate_bounds(best.coordinates, bounds)[inward][i]
+    return profile.end(start, other_end, _BLIND_STEP, _ONE_SIDED * np.sqrt(excess))
 
 
 def _allowed(best: Solution, data_sets: Sequence[DataSet], covariance: Covariance, linear: Array) -> Array:

@@ -20,6 +20,7 @@ from bushfit.campaign.schema import (
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
+from bushfit.fitting.profile import limit95
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
@@ -99,6 +100,25 @@ def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(
     print(rises)
     assert len(rises) >= (10 if largest == 1e-3 else 5)
     assert all(abs(rise - 1.0) < 0.02 for rise in rises.values())
+
+
+def test_what_rests_on_a_bound_is_told_by_how_far_from_it_the_tests_let_it_be(
+    rig: Callable[..., Campaign], paper_model: Model
+) -> None:
+    """Of rubber that is all springpot and friction the tests show how much of a spring there is at most."""
+    rubber = paper_model.with_values({"mu": 1e3, "m": 6e5, "alpha": 0.15})
+    data = Data.of(replace(rig(rubber, plan(1e-3), 0), rig=RigSettings(gain_error=0.0)))
+    best = solve(fit_joint(data).model, data.chosen(None), FIVE)
+    assert best.at_bound == {"mu": "min"}
+    limit = limit95(best, data.chosen(None), "mu", {})
+    assert limit is not None
+    held = best.model.with_values({"mu": limit})
+    rise = solve(held, data.chosen(None), FIVE[1:]).chi_square - best.chi_square
+    print(f"mu at most {limit:.3g} Pa, where chi-square has risen by {rise:.3f}")
+    assert rise == pytest.approx(1.645**2 * max(best.chi_square / (best.residual.size - 5), 1.0), rel=0.05)
+    (told,) = (line for line in fit_joint(data).warnings if line.startswith("mu ended"))
+    assert "at most" in told
+    assert "(95 %)" in told
 
 
 def test_one_loop_bounds_mu_from_above_alone(rig: Callable[..., Campaign], paper_model: Model) -> None:
