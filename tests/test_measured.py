@@ -1,4 +1,4 @@
-"""Measured rubber, as the README has it: fitted to coupons, predicted for a mount, measured on the mount."""
+"""Measured rubber, as its page has it: fitted to coupons, predicted for a mount, measured on the mount."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def compound(campaign: Campaign) -> Result:
 
 @pytest.fixture(scope="module")
 def row(root: Path) -> Callable[[str], list[str]]:
-    """The cells of a row of the README's tables, by its first."""
-    text = (root / "README.md").read_text(encoding="utf-8")
+    """The cells of a row of its tables, by its first."""
+    text = (root / "data/measured/epdm_70/README.md").read_text(encoding="utf-8")
 
     def cells(first: str) -> list[str]:
         found = re.search(rf"^\| {re.escape(first)} \|(.*)\|$", text, re.MULTILINE)
