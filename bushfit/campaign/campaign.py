@@ -16,6 +16,7 @@ from bushfit.campaign.schema import (
     CampaignFile,
     FitSettings,
     PredictSettings,
+    ReportSettings,
     RigSettings,
     SimulateSettings,
 )
@@ -63,6 +64,7 @@ class Campaign:
     rig: RigSettings = field(default_factory=RigSettings)
     compound: Compound | None = None
     sha256: str = ""
+    report: ReportSettings = field(default_factory=ReportSettings)
 
     def __repr__(self) -> str:
         kinds = {"loop": len(self.loops), "sweep": len(self.sweeps)}
@@ -119,6 +121,7 @@ def load_campaign(path: str | Path) -> Campaign:
         content.rig,
         content.compound,
         hashlib.sha256(path.read_bytes()).hexdigest(),
+        content.report,
     )
 
 

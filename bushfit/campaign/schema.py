@@ -346,6 +346,23 @@ class SimulateSettings:
 
 
 @dataclass(frozen=True)
+class ReportSettings:
+    """[report]: what stands at the head of the report, as it is to be read there.
+
+    Args:
+        customer: whose part it is.
+        part_number: of the bushing.
+        drawing: its number, with the issue.
+        compound: the rubber, by its name.
+    """
+
+    customer: Name | None = None
+    part_number: Name | None = None
+    drawing: Name | None = None
+    compound: Name | None = None
+
+
+@dataclass(frozen=True)
 class CampaignFile:
     """A whole campaign file: a bushing, or specimens of a compound, and their tests. Quantities are texts with a unit.
 
@@ -360,6 +377,7 @@ class CampaignFile:
         compound: of a bushing that was not tested yet.
         fit: how the model is fitted.
         predict: what to predict, and where.
+        report: what stands at the head of the report.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
@@ -374,3 +392,4 @@ class CampaignFile:
     fit: Annotated[FitSettings, table(_fit_table)] = field(default_factory=FitSettings)
     predict: PredictSettings = field(default_factory=PredictSettings)
     simulate: Annotated[SimulateSettings | None, _SIMULATED_PLACES] = None
+    report: ReportSettings = field(default_factory=ReportSettings)

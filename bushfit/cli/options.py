@@ -63,7 +63,7 @@ _TYPES: Mapping[str, Mapping[str, Any]] = {
     "direction": {"type": _Direction()},
     "flag": {"is_flag": True},
     "folder": {"type": _Folder(path_type=Path)},
-    "hours": {"type": _Size("time in hours such as 8", min=0.0, max=_MOST_HOURS, min_open=True)},
+    "hours": {"type": _Size("time in hours such as 8", min=0.0, max=_MOST_HOURS, min_open=True), "metavar": "HOURS"},
     "integer": {"type": int},
     "path": {"type": click.Path(path_type=Path)},
     "picture form": {"type": click.Choice(get_args(Picture))},

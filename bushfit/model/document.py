@@ -222,6 +222,7 @@ class CampaignTable:
         sha256: of the file.
         command: with all that settles the numbers, as it would be typed beside the file.
         tests: all that the campaign has.
+        report: what stands at the head of a report: customer, part_number, drawing, compound, as far as they are known.
     """
 
     name: str
@@ -229,6 +230,7 @@ class CampaignTable:
     sha256: str
     command: str
     tests: tuple[TestTable, ...] = ()
+    report: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from bushfit.caveats import of_points, warnings_of
 from bushfit.diagnosis.document import BeforeAfter, EffectEntry
 from bushfit.diagnosis.record import odds_in_words
 from bushfit.geometry import Bushing, Place, Specimen
-from bushfit.model.document import TestTable
+from bushfit.model.document import CampaignTable, TestTable
 from bushfit.model.result import Misfit, Result, Usable
 from bushfit.report.contents import Tables
 from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, tested_panels
@@ -47,7 +47,7 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
     return {
         "name": about.name if about else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
-        "facts": [*_bodies(result), *conditions(test.conditions for test in tests)],
+        "facts": [*_head(about), *_bodies(result), *conditions(test.conditions for test in tests)],
         "tests": [_tested(test, result.tests) for test in tests[:MOST]],
         "conditioned": any(test.conditions for test in tests),
         "more_tests": max(0, len(tests) - MOST),
@@ -93,6 +93,12 @@ def _of_tables(result: Result, tables: Tables) -> Iterator[Iterator[str]]:
             rigs, measured = (numbers(table, each)[0] / unit if each in table else None for each in others)
             measured = None if measured is None else np.where(measured == 0.0, np.nan, measured)
             yield of_points(result, place, numbers(table, *headers) / [[1.0], [length], [unit]], rigs, measured, None)
+
+
+def _head(about: CampaignTable | None) -> Iterator[tuple[str, str]]:
+    """Whose part it is, and which, as far as the campaign says so."""
+    for key, value in (about.report if about else {}).items():
+        yield key.replace("_", " ").capitalize(), value
 
 
 def _bodies(result: Result) -> Iterator[tuple[str, str]]:

@@ -111,7 +111,9 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
     text = (root / "configs/cmp_15961.toml").read_text(encoding="utf-8").replace("../data", str(root / "data"))
     stated = 'temperature = "22 degC"\npreload = "150 N axial"\ndate = "12 May 2025"\n'
     stated += 'operator = "night shift"\nspecimen_number = "A-7"\n'
-    (tmp_path / "c.toml").write_text(text.replace("[[sweeps]]\n", f"[[sweeps]]\n{stated}"), encoding="utf-8")
+    text = text.replace("[[sweeps]]\n", f"[[sweeps]]\n{stated}")
+    head = '[report]\ncustomer = "Vehicle works"\npart_number = "15 961"\ndrawing = "D 7, issue C"\n'
+    (tmp_path / "c.toml").write_text(f"{text}\n{head}", encoding="utf-8")
     done = call(
         tmp_path,
         "fit",
@@ -131,6 +133,8 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
     assert call(tmp_path, "report", "x", "-q").returncode == 0
     found = parsed(page_of(tmp_path / "x")).text
     for words in ("22 °C", "150 N axial", "12 May 2025", "night shift", "A-7", "Fitted, not diagnosed"):
+        assert words in found
+    for words in ("Customer", "Vehicle works", "Part number", "15 961", "Drawing", "D 7, issue C"):
         assert words in found
     assert "bushfit fit c.toml --direction axial --direction radial --effect inertia" in found
 
