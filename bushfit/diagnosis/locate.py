@@ -143,7 +143,7 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
     loops, _ = parted(evidence.data_sets)
     for data_set in loops:
         columns, amplitude = data_set.contrasts(), data_set.drive.amplitude
-        norms = np.linalg.norm(columns, axis=1)
+        norms = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
         amounts = columns @ evidence.residual[evidence.place[data_set]] / norms
         by_order = [np.hypot(each[::2], [0.0, *each[1::2]]) for each in (amounts, amounts / norms)]
         order = int(np.argmax(by_order[0]))

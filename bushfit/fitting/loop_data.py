@@ -183,8 +183,12 @@ class LoopData(DataSet):
         return {(self.name, which): part for which, part in enumerate(by_noise)}
 
     def contrasts(self) -> Array:
-        """A constant force, and the cosine and sine of each harmonic, as whitened residuals, (11, n)."""
-        return self._whitened(self._waves * (self._per_noise * self.drive.half_range))
+        """A constant force, and the cosine and sine of each harmonic, as whitened residuals, (11, n); 0 of those that
+        are left out."""
+        rows = self._whitened(self._waves * (self._per_noise * self.drive.half_range))
+        if self.fundamental_only:
+            rows[[0, *range(3, len(rows))]] = 0.0
+        return rows
 
     def smooth_misfit(self, model: Model) -> float:
         sizes = np.linalg.lstsq(self.contrasts().T, self.residual(model), rcond=None)[0]
