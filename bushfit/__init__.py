@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bushfit.version import __version__ as __version__
+
 TYPE_CHECKING = False  # as type checkers take it for true; to import typing takes as long as all the rest
 if TYPE_CHECKING:
     from typing import Any
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
         table,
     )
 
-__version__ = "0.1.0"
 __all__ = [
     "compare",
     "diagnose",

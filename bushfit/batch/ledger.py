@@ -19,13 +19,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Literal
 
-from bushfit import __version__
 from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
 from bushfit.batch.points import Point
 from bushfit.errors import OutputError
 from bushfit.report import disk
 from bushfit.report.contents import Formats
+from bushfit.version import __version__
 
 #: Layout of a record; records of another are done again.
 SCHEMA: Literal["bushfit/row/2"] = "bushfit/row/2"

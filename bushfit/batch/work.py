@@ -8,7 +8,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
-from bushfit import __version__
 from bushfit.batch import ledger
 from bushfit.batch.document import Found, Record
 from bushfit.batch.manifest import Row, Settings
@@ -26,6 +25,7 @@ from bushfit.model.result import End, Result
 from bushfit.prediction import Band, predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.contents import Formats
+from bushfit.version import __version__
 
 #: Size below which an effect is as good as none, relative to its parameter's typical size (chosen).
 _NO_EFFECT = 1e-3

@@ -12,8 +12,8 @@ from typing import Any, TextIO
 
 import click
 
-from bushfit import __version__
 from bushfit.errors import BushfitError, OutputError, printable
+from bushfit.version import __version__
 
 #: Commands, examples and options by the tables of commands.toml; no module of a command is loaded before it is needed.
 TABLES = tomllib.loads(Path(__file__).with_name("commands.toml").read_text(encoding="utf-8"))

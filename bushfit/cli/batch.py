@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from bushfit.cli.common import Options, with_options
 from bushfit.cli.options import command_called
-from bushfit.cli.show import new_table, warn
+from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import alike, for_people
 
@@ -154,7 +154,7 @@ def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
     options.say(f"{status['done']} done{kept}, {status['failed']} failed; {summary.seconds:.1f} s, {rate:.1f} a second")
     if plan.limits:
         options.say("limits: " + ", ".join(f"{count} {word}" for word, count in summary.limits.items()))
-    warn(options, summary.notes)
+    options.warn(summary.notes)
     for word, names in (
         ("failed", [f"{name}: {' '.join(error.split())}" for name, error in summary.errors]),
         ("out of limits", [f"{name}: {words}" for name, words in summary.missed]),

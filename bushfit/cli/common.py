@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 from rich.console import Console, ConsoleOptions, RenderableType
+from rich.markup import escape
 from rich.segment import Segment
 
 from bushfit.campaign.naming import folder_name
@@ -60,6 +61,13 @@ class Options:
     def say(self, text: str) -> None:
         """A line as it is, its brackets no markup."""
         self.console.print(text, markup=False)
+
+    def warn(self, lines: Iterable[str]) -> None:
+        """A line for each warning that this command has not given yet."""
+        given = click.get_current_context().meta.setdefault(__name__, set())
+        for line in (line for line in lines if line not in given):
+            given.add(line)
+            self.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
 
     def write(self, folder: Path, files: Mapping[str, bytes], document: Mapping[str, Any] | None = None) -> None:
         """Write the results, all or none, and say where; --json prints the document once they are safe on the disk.
@@ -123,7 +131,6 @@ class Task:
         `tell` is given the campaign's name; `last_line`, said below the files written, their folder.
         """
         from bushfit.campaign.campaign import load_campaign
-        from bushfit.cli.show import warn
         from bushfit.fitting.data import Data
 
         options, loaded = self.options, load_campaign(self.campaign)
@@ -132,7 +139,7 @@ class Task:
         folder = options.folder(loaded.name)
         options.require_free(folder, options.formats.names(job.kinds(loaded)))
         data = Data.of(loaded)
-        warn(options, data.notes)
+        options.warn(data.notes)
         outcome = job.run(data)
         tell(options, loaded.name, outcome)
         options.write(folder, options.formats.files(outcome.contents), outcome.document)

@@ -10,7 +10,7 @@ import click
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for
 from bushfit.cli.options import command_called, option_of
-from bushfit.cli.show import new_table, warn
+from bushfit.cli.show import new_table
 from bushfit.errors import naming, typed
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def _tell(options: Options, outcome: Compared) -> None:
         options.console.print(table)
     for line in (*outcome.judged, *(outcome.words if options.verbose or not outcome.families else ())):
         options.say(line)
-    warn(options, outcome.warnings)
+    options.warn(outcome.warnings)
 
 
 def _tell_parameters(options: Options, outcome: Compared) -> None:

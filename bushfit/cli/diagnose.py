@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from bushfit.cli.common import Options, Task, open_model, with_task
 from bushfit.cli.options import command_called
-from bushfit.cli.show import new_table, parameter_table, warn
+from bushfit.cli.show import new_table, parameter_table
 from bushfit.errors import BushfitError, naming
 from bushfit.units import alike, for_people, number, quantity
 
@@ -69,7 +69,7 @@ def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
     if diagnosis.added or options.verbose:
         title = "model with what was added" if diagnosis.added else "model as it was"
         options.console.print(parameter_table(title, diagnosis.result))
-    warn(options, outcome.document["warnings"])
+    options.warn(outcome.document["warnings"])
 
 
 def tell_verdict(options: Options, name: str, outcome: Diagnosed) -> None:

@@ -8,7 +8,6 @@ import click
 from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.grids import asked_for, positive
 from bushfit.cli.options import command_called
-from bushfit.cli.show import warn
 
 
 @command_called("export")
@@ -58,6 +57,6 @@ def command(
     for name, exported in outcome.exported.items():
         for loss in exported.losses:
             options.say(f"{name} leaves out: {loss}")
-    warn(options, outcome.predicted.warnings)
+    options.warn(outcome.predicted.warnings)
     files = {**outcome.files, **options.formats.files(outcome.contents)}
     options.write(folder, files, outcome.document)

@@ -12,7 +12,6 @@ from bushfit.cli.common import Options, with_options
 from bushfit.cli.inspect import tell_left_out
 from bushfit.cli.options import command_called, files_argument, option_of
 from bushfit.cli.raw import direction_error, options_named, with_stated
-from bushfit.cli.show import warn
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
 from bushfit.units import quantity
 
@@ -181,6 +180,6 @@ def _tell(options: Options, seen: Inspected) -> None:
     kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
     place = seen.file.parent / seen.label
     options.say(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
-    warn(options, [f"{seen.label}: {sentence}" for sentence in seen.looked.odd])
+    options.warn([f"{seen.label}: {sentence}" for sentence in seen.looked.odd])
     if seen.assumed:
         options.say(f"  {seen.assumed}")

@@ -16,7 +16,7 @@ from rich.markup import escape
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for
 from bushfit.cli.options import command_called
-from bushfit.cli.show import new_table, warn
+from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import for_people, number
 
@@ -105,7 +105,7 @@ def _tell(options: Options, outcome: Planned) -> None:
             f"{' and '.join(rivals['effects'])}: {apart} apart in expected chi-square; from "
             f"{number(rivals['enough'], 3)} on they are told apart in nine of ten cases"
         )
-    warn(options, document["warnings"])
+    options.warn(document["warnings"])
 
 
 def _tell_tests(options: Options, outcome: Planned) -> None:

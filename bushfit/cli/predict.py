@@ -10,7 +10,7 @@ import click
 from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.grids import asked_for, positive
 from bushfit.cli.options import command_called
-from bushfit.cli.show import new_table, tell_tests, warn
+from bushfit.cli.show import new_table, tell_tests
 
 if TYPE_CHECKING:
     from bushfit.jobs.predict import Predicted
@@ -99,4 +99,4 @@ def tell_predictions(options: Options, outcome: Predicted) -> None:
         for row in table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].itertuples(index=False):
             shown.add_row(*(number(value, 6) for value in row[:2]), *(alike([value], 4)[0] for value in row[2:4]))
         options.console.print(shown)
-    warn(options, outcome.warnings)
+    options.warn(outcome.warnings)

@@ -13,7 +13,7 @@ from bushfit.cli.common import Options, with_options
 from bushfit.cli.grids import parse_grid, positive
 from bushfit.cli.options import command_called, files_argument
 from bushfit.cli.raw import direction_error, options_named, with_stated
-from bushfit.cli.show import new_table, warn
+from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.report import plots
 from bushfit.report.contents import Contents, Kinds
@@ -246,7 +246,7 @@ def _tell(options: Options, reduction: Reduction) -> None:
             number(100 * max(step.force_distortion for step in steps), 2),
         )
     options.console.print(table)
-    warn(options, reduction.warnings)
+    options.warn(reduction.warnings)
     if options.verbose:
         for skip in reduction.skipped:
             options.say(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}")
@@ -284,7 +284,7 @@ def _tell_resonance(options: Options, found: Resonance) -> None:
             number(100 * float(found.relative_error[rows].max()), 2),
         )
     options.console.print(table)
-    warn(options, found.warnings)
+    options.warn(found.warnings)
 
 
 def _span(rising: Sequence[str]) -> str:

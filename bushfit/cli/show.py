@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import click
 from rich import box
 from rich.markup import escape
 from rich.table import Table
@@ -36,7 +35,7 @@ def report(options: Options, title: str, result: Result) -> None:
     from bushfit.caveats import warnings_of
 
     tell_result(options, title, result)
-    warn(options, warnings_of(result))
+    options.warn(warnings_of(result))
     tell_sources(options, result)
 
 
@@ -96,14 +95,6 @@ def tell_sources(options: Options, result: Result) -> None:
         options.say(result.model.equation())
         for source in result.inputs:
             options.say(f"input: {source.file} sha256 {source.sha256[:12]}")
-
-
-def warn(options: Options, lines: Sequence[str]) -> None:
-    """A line for each warning that this command has not given yet."""
-    given = click.get_current_context().meta.setdefault(__name__, set())
-    for line in (line for line in lines if line not in given):
-        given.add(line)
-        options.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
 
 
 def new_table(title: str, *columns: str, names: int = 1) -> Table:

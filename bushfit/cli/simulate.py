@@ -10,7 +10,6 @@ import click
 
 from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.options import command_called, option_of
-from bushfit.cli.show import warn
 from bushfit.errors import ModelError, UnitError, naming
 from bushfit.units import is_number, quantity
 
@@ -39,7 +38,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
     truth, plan = _task(source)
     if truth.unnamed:
-        warn(options, ["what has no name is a correction of steady states, without a law in time: it is left out here"])
+        options.warn(["what has no name is a correction of steady states, without a law in time: it is left out here"])
         truth = truth.without(UNNAMED)
     plan = _with_options(plan, settings)
     for text in effects:

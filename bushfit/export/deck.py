@@ -4,10 +4,10 @@ import re
 import textwrap
 from collections.abc import Iterable
 
-from bushfit import __version__
 from bushfit.export.contract import Order
 from bushfit.export.levels import Table
 from bushfit.units import number
+from bushfit.version import __version__
 
 #: Characters of a comment's line at most, its mark included: those of a card.
 _WIDTH = 80

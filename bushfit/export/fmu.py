@@ -13,12 +13,12 @@ from collections.abc import Collection, Mapping, Sequence
 from importlib.resources import files
 from xml.etree import ElementTree as ET
 
-from bushfit import __version__
 from bushfit.campaign.naming import folder_name
 from bushfit.export.compiler import SYSTEMS, libraries
 from bushfit.export.contract import Exported, Order
 from bushfit.export.in_time import FIELDS, TABLES, InTime, in_time, neutral
 from bushfit.geometry import Place, Unit
+from bushfit.version import __version__
 
 #: The sources that all FMUs share.
 _SHARED = ("fmu.c", "bushing.c", "bushing.h", "fmi2.h")

@@ -7,7 +7,6 @@ from itertools import combinations
 from string import ascii_uppercase
 from typing import Any
 
-from bushfit import __version__
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.caveats import warnings_of
@@ -30,6 +29,7 @@ from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFil
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.tables import contrast_table
 from bushfit.validation import plain
+from bushfit.version import __version__
 
 #: Results that are compared at most: the colours of a picture, and the columns of a table.
 MOST = 8

@@ -13,7 +13,6 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from bushfit import __version__
 from bushfit.effects import LIBRARY
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError, naming
@@ -24,6 +23,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Quality, Range, Result
 from bushfit.reading.files import read_utf8
 from bushfit.validation import check_tables
+from bushfit.version import __version__
 
 #: The effect that older files have in place of a factor of its own for the radial direction, and its parameter.
 _RADIAL_FACTOR = ("radial_factor", "radial_factor.excess")

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from bushfit import __version__
 from bushfit.export.contract import Exported, Order
 from bushfit.export.losses import NO_LOOPS
 from bushfit.model.result import Result
 from bushfit.reading.tablefile import to_csv, to_xlsx
 from bushfit.report.artifacts import place_names
 from bushfit.report.tables import prediction_table, wide_table
+from bushfit.version import __version__
 
 #: Tables that belong to no place; they come last.
 _OF_ALL = ("parameters", "provenance")
