@@ -21,16 +21,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from bushfit.effects.history import Array as Array
 from bushfit.effects.history import History as History
 from bushfit.geometry import Bushing, Direction, Place
-
-if TYPE_CHECKING:
-    from bushfit.effects.unnamed import Unnamed
 
 #: A number, or an array that broadcasts against operating points or samples.
 Value = Any
@@ -126,6 +123,14 @@ class Circumstances:
 UNKNOWN = Circumstances()
 
 
+class Correction(Protocol):
+    """A smooth correction of the stiffness for what has no name, as a share of it; see effects/unnamed.py."""
+
+    def at(self, setting: Setting, omega: Array, amplitude: Array) -> tuple[Array, Array, Array]:
+        """The correction, complex (..., n), standard deviations of its parts, (2, ..., n), and its share that stands,
+        (..., n), at angular frequencies [rad/s] and amplitudes [m or rad]."""
+
+
 @dataclass(frozen=True)
 class Setting:
     """The test that a response belongs to.
@@ -142,7 +147,7 @@ class Setting:
     direction: Place
     kind: Literal["sweep", "loop"]
     under: Circumstances = UNKNOWN
-    unnamed: Unnamed | None = None
+    unnamed: Correction | None = None
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from bushfit.reading.measurement import Source, Sweep
 from bushfit.report.artifacts import comparison_contents
 from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, Family, Pair
 from bushfit.report.contents import Contents, Kinds
+from bushfit.report.page import comparison_page
 from bushfit.report.tables import contrast_table
 from bushfit.validation import plain
 from bushfit.version import __version__
@@ -144,7 +145,7 @@ class Compared:
 
     @property
     def contents(self) -> Contents:
-        return comparison_contents(self.document)
+        return comparison_contents(self.document).paged(compare=comparison_page)
 
 
 def _entry(label: str, entry: Entry) -> ComparedEntry:

@@ -18,6 +18,7 @@ from bushfit.model.result import Result
 from bushfit.planning.knowledge import look_alikes
 from bushfit.report.artifacts import diagnosis_contents
 from bushfit.report.contents import Contents, Kinds
+from bushfit.report.page import report_page
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,8 +46,8 @@ class Diagnosed:
 
     @property
     def contents(self) -> Contents:
-        documents = {"diagnosis": self.document, "model": document_of(self.result, self.campaign)}
-        return (Contents(documents) | diagnosis_contents(self.diagnosis, self.campaign["name"])).paged()
+        found = Contents({"diagnosis": self.document, "model": document_of(self.result, self.campaign)})
+        return (found | diagnosis_contents(self.diagnosis, self.campaign["name"])).paged(report=report_page)
 
 
 @dataclass(frozen=True)

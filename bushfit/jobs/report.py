@@ -15,6 +15,7 @@ def report(folder: Path, base: str = "") -> Contents:
     Raises:
         ModelError: a folder of none of them, or a file in it that is not as bushfit writes it.
     """
+    from bushfit.report.page import comparison_page, report_page
     from bushfit.report.page.comparison import read_comparison
     from bushfit.report.page.index import is_batch, read_batch
     from bushfit.report.page.readback import has_model, read_results
@@ -22,6 +23,6 @@ def report(folder: Path, base: str = "") -> Contents:
     if is_batch(folder):
         return read_batch(folder, base)
     if not (folder / "compare.json").exists():
-        return read_results(folder)
-    found = read_comparison(folder)
-    return found | read_results(folder) if has_model(folder) else found
+        return read_results(folder).paged(report=report_page)
+    found = read_comparison(folder).paged(compare=comparison_page)
+    return found | read_results(folder).paged(report=report_page) if has_model(folder) else found

@@ -21,6 +21,7 @@ from bushfit.model.model import FIVE
 from bushfit.model.result import Result
 from bushfit.report.artifacts import diagnosis_contents
 from bushfit.report.contents import Contents, Kinds
+from bushfit.report.page import report_page
 
 
 class RunDocument(TypedDict, total=False):
@@ -90,7 +91,7 @@ class Ran:
         campaign, found = self.data.campaign, self.diagnosed
         of_tests = contents_of_tests(self.data, self.result, tests_of(campaign))
         of_gap = diagnosis_contents(found.diagnosis, campaign.name) if found else Contents()
-        return (Contents(self._files) | of_tests | of_gap | self.predicted.contents).paged()
+        return (Contents(self._files) | of_tests | of_gap | self.predicted.contents).paged(report=report_page)
 
 
 @dataclass(frozen=True)

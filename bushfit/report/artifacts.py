@@ -102,7 +102,7 @@ def comparison_contents(document: Mapping[str, Any]) -> Contents:
     names = ("parameters", *(["families"] if document["families"] else []), "differences")
     made = {name: partial(lambda name: SideBySide.of(document).tables()[name], name) for name in names}
     picture = {"compare": lambda: plots.comparison.comparison_figure(SideBySide.of(document))}
-    return Contents({"compare": document}, made, picture).paged("compare")
+    return Contents({"compare": document}, made, picture)
 
 
 def place_names(places: Sequence[Place]) -> list[str]:

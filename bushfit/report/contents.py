@@ -64,15 +64,9 @@ class Contents:
         """A table and a picture of one name."""
         return cls(tables={name: table}, pictures={name: picture})
 
-    def paged(self, name: Literal["report", "compare"] = "report") -> Contents:
-        """The same with a page of what it holds: the report of a result, or the page of a comparison."""
-
-        def page(documents: Documents, tables: Tables) -> str:
-            from bushfit.report.page import comparison_page, report_page
-
-            return {"report": report_page, "compare": comparison_page}[name](documents, tables)
-
-        return replace(self, pages={**self.pages, name: page})
+    def paged(self, **pages: Page) -> Contents:
+        """The same with pages of what it holds, by their names."""
+        return replace(self, pages={**self.pages, **pages})
 
     @property
     def kinds(self) -> Kinds:

@@ -18,6 +18,7 @@ from bushfit.inspection.gathering import gather
 from bushfit.jobs.compare import Compare
 from bushfit.jobs.plan import PlanTests
 from bushfit.jobs.predict import Predict
+from bushfit.jobs.report import report as reported
 from bushfit.model.file import load_result, to_document
 from bushfit.reading.loops import read_loop
 from bushfit.reading.resonance import read_resonance
@@ -26,7 +27,6 @@ from bushfit.reading.table import Table
 from bushfit.reading.words import RESONANCE_COLUMNS
 from bushfit.report.contents import pages_of
 from bushfit.report.folder import to_json
-from bushfit.report.page.readback import read_results
 
 CORPUS = Path(__file__).with_name("corpus")
 #: The files of a folder of results, by their names.
@@ -109,7 +109,7 @@ def report(folder: Path, data: bytes) -> None:
     file.write_bytes(content)
     try:
         with clear_errors():
-            pages_of(read_results(folder))
+            pages_of(reported(folder))
         if file.suffix == ".json":
             with clear_errors():
                 job = Compare()

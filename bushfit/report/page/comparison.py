@@ -38,7 +38,7 @@ _NONE = "of unknown error"
 
 
 def read_comparison(folder: Path) -> Contents:
-    """The comparison in a folder, with its page to be written.
+    """The comparison in a folder.
 
     Raises:
         ModelError: a compare.json that is not as bushfit writes it.
@@ -46,7 +46,7 @@ def read_comparison(folder: Path) -> Contents:
     file = folder / "compare.json"
     document = read_document(file)
     SideBySide.of(document, file)
-    return Contents({"compare": document}).paged("compare")
+    return Contents({"compare": document})
 
 
 def account(found: SideBySide) -> dict[str, Any]:

@@ -102,7 +102,7 @@ def has_model(folder: Path) -> bool:
 
 
 def read_results(folder: Path) -> Contents:
-    """What stands in a folder of results, with its page to be written.
+    """What stands in a folder of results.
 
     Raises:
         ModelError: no folder, none of results, or a file in it that is not as bushfit writes it.
@@ -127,7 +127,7 @@ def read_results(folder: Path) -> Contents:
     result = checked(documents, files).result
     names = (*_TABLES, *place_names([*Direction, *result.specimens]))
     tables = {name: table for name in names if (table := read_table(folder, name)) is not None}
-    return Contents(documents, {name: _given(table) for name, table in tables.items()}).paged()
+    return Contents(documents, {name: _given(table) for name, table in tables.items()})
 
 
 def canonical(table: pd.DataFrame) -> pd.DataFrame:

@@ -22,6 +22,7 @@ from bushfit.campaign.campaign import load_campaign
 from bushfit.errors import BushfitError
 from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
+from bushfit.jobs.report import report
 from bushfit.report.contents import Formats, pages_of
 from bushfit.report.page import report_page
 from bushfit.report.page.readback import canonical, read_results
@@ -50,7 +51,7 @@ def test_run_writes_a_whole_page_that_loads_nothing(results: Results, name: str)
 @pytest.mark.parametrize("name", ["cmp_15961", "mystery_mount"])
 def test_the_folder_gives_the_page_that_run_wrote(results: Results, name: str) -> None:
     folder = results(name)
-    assert pages_of(read_results(folder))["report.html"] == (folder / "report.html").read_bytes()
+    assert pages_of(report(folder))["report.html"] == (folder / "report.html").read_bytes()
 
 
 def test_diagnose_writes_it_too_and_its_folder_gives_the_same(root: Path, tmp_path: Path) -> None:
@@ -60,7 +61,7 @@ def test_diagnose_writes_it_too_and_its_folder_gives_the_same(root: Path, tmp_pa
     for file, content in files.items():
         (tmp_path / file).write_bytes(content)
     page = files["report.html"]
-    assert pages_of(read_results(tmp_path))["report.html"] == page
+    assert pages_of(report(tmp_path))["report.html"] == page
     found = parsed(page.decode())
     for words in (
         "axial: stiffness",
@@ -84,7 +85,7 @@ def test_other_forms_of_tables_are_read_back(results: Results, tmp_path: Path, f
             file.unlink()
         else:
             file.write_bytes(table.to_csv(index=False, sep=";", decimal=",").encode("utf-8-sig"))
-    assert pages_of(read_results(folder))["report.html"].decode() == page_of(folder)
+    assert pages_of(report(folder))["report.html"].decode() == page_of(folder)
 
 
 def test_what_it_says_is_what_the_documents_say(results: Results) -> None:
@@ -319,7 +320,7 @@ def test_any_cell_may_be_spoiled(thinned: Path, tmp_path_factory: Any, data: st.
     lines[row] = ",".join(f'"{cell}"' for cell in cells)
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
     try:
-        page = pages_of(read_results(folder))["report.html"].decode()
+        page = pages_of(report(folder))["report.html"].decode()
     except BushfitError:
         return
     parsed(page)

@@ -11,8 +11,8 @@ import pytest
 from commandline import call
 from reading_html import change, loads, page_of, parsed
 
+from bushfit.jobs.report import report
 from bushfit.report.contents import pages_of
-from bushfit.report.page.readback import read_results
 
 
 def test_results_of_older_versions_have_a_page(root: Path, tmp_path: Path) -> None:
@@ -21,11 +21,11 @@ def test_results_of_older_versions_have_a_page(root: Path, tmp_path: Path) -> No
     shutil.copytree(root / "data/reports/mystery_mount", folder)
     change(folder / "model.json", campaign=None)
     (folder / "gap.csv").write_text("test,kind,direction,force before [noise]\na,loop,axial,1\n")
-    text = parsed(pages_of(read_results(folder))["report.html"].decode()).text
+    text = parsed(pages_of(report(folder))["report.html"].decode()).text
     assert "Mystery mount" in text
     assert "axial: stiffness" in text
     (folder / "sweeps.csv").unlink()
-    assert "Lines" not in parsed(pages_of(read_results(folder))["report.html"].decode()).text
+    assert "Lines" not in parsed(pages_of(report(folder))["report.html"].decode()).text
 
 
 def test_a_diagnosis_of_an_older_version_has_a_page_and_is_compared(root: Path, tmp_path: Path) -> None:
