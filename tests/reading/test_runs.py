@@ -59,11 +59,15 @@ def test_a_frequency_sweep_that_misses_its_levels_holds_them_all_the_same() -> N
     assert (runs.repeat == 1).all()
 
 
-@given(st.permutations(["level", "repeat"]), st.booleans(), st.booleans(), st.floats(0.0, 0.1), st.integers(0, 10_000))
+@given(st.permutations(["level", "repeat"]), st.booleans(), st.booleans(), st.floats(0.0, 1.0), st.integers(0, 10_000))
 def test_frequency_sweeps_as_reached_have_their_levels_and_repeats_back(
-    outer: list[str], falling: bool, numbered: bool, scatter: float, seed: int
+    outer: list[str], falling: bool, numbered: bool, share: float, seed: int
 ) -> None:
-    """Three levels in three repeats, in either order: what each run reached at one frequency it reached at no other."""
+    """Three levels in three repeats, in either order: what each run reached at one frequency it reached at no other.
+
+    With numbered repeats they may miss by a tenth, without by 6 %: 1 in 100 is not told apart at 8 %.
+    """
+    scatter = share * (0.1 if numbered else 0.06)
     frequencies = np.arange(5.0, 156.0, 10.0)[:: -1 if falling else 1]
     axes = {"level": np.array([1e-4, 2e-4, 5e-4]), "repeat": np.arange(1, 4), "frequency": frequencies}
     names = [*outer, "frequency"]
