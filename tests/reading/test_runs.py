@@ -59,7 +59,7 @@ def test_a_frequency_sweep_that_misses_its_levels_holds_them_all_the_same() -> N
     assert (runs.repeat == 1).all()
 
 
-@given(st.permutations(["level", "repeat"]), st.booleans(), st.booleans(), st.floats(0.0, 1.0), st.integers(0, 10_000))
+@given(st.permutations(["level", "repeat"]), st.booleans(), st.booleans(), st.floats(0.01, 1.0), st.integers(0, 10_000))
 def test_frequency_sweeps_as_reached_have_their_levels_and_repeats_back(
     outer: list[str], falling: bool, numbered: bool, share: float, seed: int
 ) -> None:
