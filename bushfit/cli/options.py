@@ -97,21 +97,20 @@ def option_of(key: str) -> str:
     return "--" + key.replace("_", "-")
 
 
-#: Decorator of a command that takes files.
+#: What test files are not, by their endings.
+_NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
 
 
 def _tests_alone(_: click.Context, __: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
     """Refuse a campaign or a model among test files."""
     for file in files:
-        if file.suffix.lower() in (".toml", ".json") and file.is_file():
-            found = (
-                "a campaign, or what else TOML holds" if file.suffix.lower() == ".toml" else "a model, or other JSON"
-            )
+        if (found := _NO_TESTS.get(file.suffix.lower())) and file.is_file():
             hint = "bushfit diagnose looks at all tests of a campaign together; name its files, or their folder, here"
             raise MeasurementError("a test file is needed", file=file, found=found, expected="a table", hint=hint)
     return files
 
 
+#: Decorator of a command that takes files.
 files_argument = click.argument(
     "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path), callback=_tests_alone
 )

@@ -25,8 +25,6 @@ __all__ = ["DataSet", "LoopData", "SweepData", "loop_data", "parted", "sources",
 #: Relative difference of two loops' amplitudes, or frequencies, up to which one repeats the other; chosen: rigs come
 #: back to an amplitude within it.
 _SAME_LOOP = 0.02
-#: The same of the points of sweeps, which stand at what was asked of the rig.
-_SAME_POINT = 1e-3
 #: Step in temperature up to which tests count as made at one [K].
 _SAME_KELVIN = 1.0
 
@@ -39,7 +37,7 @@ def loop_data(
     """One data set per loop; rows that are outliers carry no weight where they are to be left out."""
     drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
     found = [LoopData(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
-    return with_gain_errors(told_of_others(found), stated)
+    return with_gain_errors(told_of_others(found, [_first_alike(found)]), stated)
 
 
 def with_gain_errors(loops: Sequence[LoopData], stated: RigSettings) -> list[LoopData]:
@@ -68,9 +66,14 @@ def repeats_of(loops: Sequence[LoopData]) -> Array:
     return np.all(np.abs(at[:, None] - at) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
 
 
+def _first_alike(loops: Sequence[LoopData]) -> Array:
+    """The number of the first loop that each repeats, (n,)."""
+    return np.argmax(repeats_of(loops), axis=1) if loops else np.empty(0, dtype=np.intp)
+
+
 def alike(loops: Sequence[LoopData]) -> list[list[LoopData]]:
     """Loops in groups that repeat one another; each is in one, that of the first that it repeats."""
-    first = np.argmax(repeats_of(loops), axis=1) if loops else np.empty(0, dtype=int)
+    first = _first_alike(loops)
     return [[loops[place] for place in np.flatnonzero(first == lead).tolist()] for lead in np.unique(first).tolist()]
 
 
@@ -84,37 +87,36 @@ def sweep_data(
         for rig in dict.fromkeys(rigs)
     }
     data_sets = [SweepData(sweep, noises[rig], residuals) for sweep, rig in zip(sweeps, rigs, strict=True)]
-    return told_of_others([data_set.weighted(np.array(data_set.sweep.weight)) for data_set in data_sets])
+    found = [data_set.weighted(np.array(data_set.sweep.weight)) for data_set in data_sets]
+    names = [str(one.direction) for one in found]
+    places = [np.full(one.measured.size, names.index(name)) for one, name in zip(found, names, strict=True)]
+    at = (places, [one.frequency for one in found], [one.amplitude for one in found])
+    return told_of_others(found, [np.concatenate([np.empty(0), *each]) for each in at])
 
 
-def told_of_others(found: Sequence[_Kind]) -> list[_Kind]:
-    """Loops, or sweeps, each with a sentence on the earlier one whose points it repeats and lies farthest from."""
+def told_of_others(found: Sequence[_Kind], at: Sequence[Array]) -> list[_Kind]:
+    """Loops, or sweeps, each with a sentence on the earlier one whose points it repeats and lies farthest from; points
+    repeat one another where all of `at`, (n,) each, and their temperatures are the same."""
     if len(found) < 2:
         return list(found)
     owner = np.repeat(np.arange(len(found)), [one.measured.size for one in found])
-    places = [str(one.direction) for one in found]
-    same = _SAME_LOOP if isinstance(found[0], LoopData) else _SAME_POINT
-    points = (
-        np.array([places.index(place) for place in places])[owner],
-        _alike(np.log(np.concatenate([one.frequency for one in found])), same),
-        _alike(np.log(np.concatenate([one.amplitude for one in found])), same),
-        _alike(np.nan_to_num(np.hstack([one.temperature for one in found])), _SAME_KELVIN),
-    )
+    points = np.stack([*at, _sessions(np.hstack([one.temperature for one in found]))])
     stiffness = np.concatenate([one.measured for one in found])
     told = list(found)
-    for apart, *pair in reversed(unlike(stiffness, np.unique(points, axis=1, return_inverse=True)[1])):
-        first, later = sorted(owner[pair].tolist())
+    for apart, one, other in reversed(unlike(stiffness, np.unique(points, axis=1, return_inverse=True)[1])):
+        first, later = sorted((int(owner[one]), int(owner[other])))
         if first != later:  # a file that contradicts itself tells so
             said = f"it repeats {found[first].name}, and their stiffness lies {number(100.0 * apart, 2)} % apart"
             told[later] = replace(found[later], beside=said)
     return told
 
 
-def _alike(values: Array, same: float) -> Array:
-    """A number for each group of values, (n,), in which no step from one to the next is larger than `same`."""
-    order = np.argsort(values)
-    groups = np.empty(values.size, dtype=np.intp)
-    groups[order] = np.cumsum(np.diff(values[order], prepend=values[order[0]]) > same)
+def _sessions(temperature: Array) -> Array:
+    """A number for each group of temperatures [K], (n,), that count as one; those that are not known are a group."""
+    known = np.nan_to_num(temperature)
+    order = np.argsort(known)
+    groups = np.empty(known.size, dtype=np.intp)
+    groups[order] = np.cumsum(np.diff(known[order], prepend=known[order[0]]) > _SAME_KELVIN)
     return groups
 
 

@@ -140,17 +140,21 @@ def profile95(
 def limit95(best: Solution, data_sets: Sequence[DataSet], name: str, bounds: Bounds) -> float | None:
     """How far a parameter that came to rest on a bound can go from there: its one-sided 95 % limit, None where the data
     set none. A model that misses the data may miss them by as much more."""
-    i, names = best.coordinates.names.index(name), best.coordinates.names
+    i = best.coordinates.names.index(name)
     start, inward = best.coordinates.point(best.model.values)[i], int(best.at_bound[name] == "min")
-    excess = max(quality(best.model, data_sets, len(names)).reduced_chi_square, 1.0)
     profile = _Profile(name, best, data_sets, bounds, {start: best})
     other_end = coordinate_bounds(best.coordinates, bounds)[inward][i]
-    return profile.end(start, other_end, _BLIND_STEP, _ONE_SIDED * np.sqrt(excess))
+    return profile.end(start, other_end, _BLIND_STEP, _ONE_SIDED * np.sqrt(_excess(best, data_sets)))
+
+
+def _excess(best: Solution, data_sets: Sequence[DataSet]) -> float:
+    """Reduced chi-square, 1 at the least."""
+    return max(quality(best.model, data_sets, len(best.coordinates.names)).reduced_chi_square, 1.0)
 
 
 def _allowed(best: Solution, data_sets: Sequence[DataSet], covariance: Covariance, linear: Array) -> Array:
     """Root of the rise of chi-square that each parameter's interval may reach."""
     names = best.coordinates.names
     half = covariance.half_width(np.eye(len(covariance.names)))[[covariance.names.index(name) for name in names]]
-    excess = max(quality(best.model, data_sets, len(names)).reduced_chi_square, 1.0)
-    return np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, _WIDEST * Z95 * np.sqrt(excess))
+    widest = _WIDEST * Z95 * np.sqrt(_excess(best, data_sets))
+    return np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, widest)

@@ -91,13 +91,16 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
 
 
 def with_contradictions(files: Sequence[Inspected]) -> list[Inspected]:
-    """Files that were inspected, each with a sentence more where another one of the same part contradicts it."""
+    """Files that were inspected, each with a sentence more where another one of the same part, in the same direction,
+    contradicts it."""
     beside: dict[int, str] = {}
-    for part in dict.fromkeys(seen.part for seen in files):
-        tests = [seen.measured for seen in files if seen.part == part and seen.kind != "history"]
-        loops = loop_data([test for test in tests if isinstance(test, Loop)])
-        sweeps = sweep_data([test for test in tests if isinstance(test, Sweep)])
-        beside |= {id(one.test): one.beside for one in (*loops, *sweeps) if one.beside}
+    told = [seen for seen in files if seen.direction is not None and seen.kind != "history"]
+    for part in dict.fromkeys(seen.part for seen in told):
+        tests = [seen.measured for seen in told if seen.part == part]
+        loops = [test for test in tests if isinstance(test, Loop)]
+        sweeps = [test for test in tests if isinstance(test, Sweep)]
+        data_sets = [*(loop_data(loops) if len(loops) > 1 else ()), *(sweep_data(sweeps) if len(sweeps) > 1 else ())]
+        beside |= {id(one.test): one.beside for one in data_sets if one.beside}
     odd = [[beside[id(seen.measured)]] if id(seen.measured) in beside else [] for seen in files]
     return [
         replace(seen, looked=replace(seen.looked, odd=(*seen.looked.odd, *more)))

@@ -22,7 +22,8 @@ def report(folder: Path, base: str = "") -> Contents:
 
     if is_batch(folder):
         return read_batch(folder, base)
-    if not (folder / "compare.json").exists():
-        return read_results(folder).paged(report=report_page)
-    found = read_comparison(folder).paged(compare=comparison_page)
-    return found | read_results(folder).paged(report=report_page) if has_model(folder) else found
+    compared = (folder / "compare.json").exists()
+    found = read_comparison(folder).paged(compare=comparison_page) if compared else Contents()
+    if has_model(folder) or not compared:
+        found |= read_results(folder).paged(report=report_page)
+    return found

@@ -61,7 +61,7 @@ def runs_of(
     kept_frequency, kept_level = (float(np.mean(np.diff(values) == 0.0)) for values in (frequency, levels))
     if max(kept_frequency, kept_level) < _LEAST_HELD:
         steps = np.diff(frequency)
-        turns = steps * np.sign(np.median(np.sign(steps))) < 0.0
+        turns = steps * np.median(steps) < 0.0
         if repeat is not None:
             turns |= np.diff(repeat) != 0
         passes = np.cumsum(np.append(False, turns))

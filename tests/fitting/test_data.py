@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +13,12 @@ from bushfit.campaign.campaign import load_campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting, RigSettings
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE
 from bushfit.model.result import Outlier
+from bushfit.reading.measurement import Sweep
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +34,25 @@ def test_repeats_of_a_loop_share_the_error_of_its_gain(root: Path) -> None:
     again = [replace(loop, name=f"again_{number}", displacement=1.01 * loop.displacement) for number in range(3)]
     found = Data.of(replace(campaign, loops=(loop, *again, faster))).loops
     np.testing.assert_allclose([each.gain_error for each in found], [1e-2] * 4 + [5e-3])
+
+
+def test_only_tests_of_the_same_points_contradict_one_another(measured: Data) -> None:
+    """Dense sweeps that follow one another do not, nor do tests at other temperatures; the same ones 15 % apart do."""
+    sweep, frequency = measured.sweeps[0].sweep, np.geomspace(20.0, 200.0, 4000)
+    low, high = (
+        Sweep(name, Direction.AXIAL, part, np.full(part.size, 1e-4), 1e6 * part**0.1 * (1.0 + 0.1j))
+        for name, part in (("low", frequency[:2000]), ("high", frequency[2000:]))
+    )
+    other = replace(sweep, name="other", stiffness=1.15 * sweep.stiffness)
+    warm, cold = replace(other, temperature=313.15), replace(sweep, temperature=296.15)
+    loop = measured.loops[0].test
+    hot = replace(loop, name="hot", force=1.15 * loop.force, temperature=313.15)
+    for tests in ([low, high], [cold, warm]):
+        assert [one.beside for one in sweep_data(tests)] == [None, None]
+    assert [one.beside for one in loop_data([replace(loop, temperature=296.15), hot])] == [None, None]
+    for _, one in (sweep_data([sweep, other]), loop_data([loop, replace(hot, temperature=None)])):
+        assert one.beside is not None
+        assert re.search(r"lies 1[5-7] % apart", one.beside)
 
 
 def test_axial_tests_are_used_unless_told(measured: Data) -> None:

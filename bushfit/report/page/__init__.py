@@ -9,8 +9,6 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from markupsafe import Markup
-
 from bushfit.errors import printable
 
 if TYPE_CHECKING:
@@ -49,6 +47,8 @@ def comparison_page(documents: Documents, _: Tables) -> str:
 
 def rendered(template: str, context: dict[str, Any]) -> str:
     """A template with its context; no style or script but the page's own may run, and nothing may be loaded."""
+    from markupsafe import Markup
+
     style, script = (Markup((_TEMPLATES / name).read_text(encoding="utf-8")) for name in ("style.css", "script.js"))
     allowed = (
         f"default-src 'none'; style-src {_hash(style)}; script-src {_hash(script)}; base-uri 'none'; form-action 'none'"
