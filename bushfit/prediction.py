@@ -138,7 +138,7 @@ def _predicted(
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)
     stiffness, slopes = stiffness_and_slopes(model, direction, frequency, amplitude, names, under=under)
-    open_to, beyond = _open_to(model, direction, frequency, amplitude, stiffness)
+    open_to, beyond = _open_to(result, model, direction, frequency, amplitude, stiffness)
     count, slopes = len(names), np.concatenate((slopes, open_to))
 
     def band(value: Array, slope: Array) -> Band:
@@ -160,14 +160,19 @@ def _predicted(
 
 
 def _open_to(
-    model: Model, direction: Place, frequency: Array, amplitude: Array, stiffness: Array
+    result: Result, model: Model, direction: Place, frequency: Array, amplitude: Array, stiffness: Array
 ) -> tuple[Array, Array]:
     """What a standard deviation of each part of what has no name does to the stiffness, (0 or 2, n), and the share of
-    the parameters' errors that counts beside it, (n,): among its nodes it mends what bent them."""
-    if model.unnamed is None:
-        return np.zeros((0, frequency.size)), np.ones(frequency.size)
-    share, off, stands = model.unnamed.at(model.setting(direction), 2.0 * np.pi * frequency, amplitude)
-    return np.array([[1.0], [1.0j]]) * off * stiffness / (1.0 + share), np.sqrt(1.0 - np.square(stands))
+    the parameters' errors that counts beside it, (n,): among its nodes a correction mends what bent them. A model error
+    is not mended, and counts whole."""
+    found, every = model.unnamed or result.model_error, np.ones(frequency.size)
+    if found is None:
+        return np.zeros((0, frequency.size)), every
+    share, off, stands = found.at(model.setting(direction), 2.0 * np.pi * frequency, amplitude)
+    parts = np.array([[1.0], [1.0j]])
+    if model.unnamed:
+        return parts * off * stiffness / (1.0 + share), np.sqrt(1.0 - np.square(stands))
+    return parts * np.hypot(off, [share.real, share.imag]) * stiffness, every
 
 
 def _spanned(bands: Sequence[Band]) -> Band:

@@ -24,6 +24,13 @@ NAME = "unnamed"
 #: Variance, relative to the kernel's, that keeps its matrix invertible; far below what tests show.
 _JITTER = 1e-8
 
+#: Nodes at most; chosen: all points of the paper's plan, and little time.
+_MOST_NODES = 100
+#: Patterns over the nodes at most, and the variance of one, relative to the largest, that counts; chosen for time.
+_MOST, _LEAST_VARIANCE = 30, 1e-5
+#: Digits of places that tell them apart.
+_DIGITS = 6
+
 #: Length, in ln frequency and ln strain, over which a correction fades beyond its nodes: chosen, all but gone at a
 #: fourfold frequency, because nothing was measured there.
 _FADES = 0.5
@@ -147,6 +154,13 @@ class Unnamed:
         return max(float(np.abs(values + each.of_peak(self.peak, each.nodes)).max()) for each, values in pairs)
 
     @property
+    def typical(self) -> float:
+        """Root mean square of what it may be at the nodes, as a share of the stiffness."""
+        errors = [np.square((each.in_phase_error, each.in_quadrature_error)).sum(axis=0) for each in self.patches]
+        values = [np.square((each.in_phase, each.in_quadrature)).sum(axis=0) for each in self.patches]
+        return float(np.sqrt(np.mean(np.concatenate(values) + np.concatenate(errors))))
+
+    @property
     def beyond(self) -> float:
         """Standard deviation of each part of the correction where nothing was measured."""
         return self.largest / _DEVIATIONS
@@ -204,6 +218,16 @@ def nodes_among(points: Array, most: int) -> Array:
             break
         chosen.append(int(np.argmax(distance)))
     return np.array(chosen)
+
+
+def basis(places: Array) -> tuple[Array, Array]:
+    """Some places, in units of the kernel's lengths, (p, 2), to be nodes: all or those farthest apart, their indices,
+    (m,); and what independent amounts of unit variance make of the process at all places, (p, q)."""
+    distinct = np.unique(places.round(_DIGITS), axis=0, return_index=True)[1]
+    own = distinct if distinct.size <= _MOST_NODES else distinct[nodes_among(places[distinct], _MOST_NODES)]
+    size, vectors = np.linalg.eigh(correlation(places[own]))
+    kept = (size > _LEAST_VARIANCE * size[-1]) & (np.arange(size.size) >= size.size - _MOST)  # the largest last
+    return own, kernel(places, places[own]) @ vectors[:, kept] / np.sqrt(size[kept])
 
 
 EFFECT = Layer(

@@ -10,8 +10,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.coordinates import Solution
+from bushfit.fitting.coordinates import Solution, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, SweepData
+from bushfit.fitting.joined import Joined, in_noise
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Usable
 from bushfit.model.sensitivity import stiffness_and_slopes
@@ -165,22 +166,33 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     The tests have the weights at which the solution is the least sum of squares; `left` are others.
     """
     free = [i for i, name in enumerate(solution.coordinates.names) if name not in solution.at_bound]
-    whole, begin = LeaveOut.of(solution.jacobian[free], solution.residual), 0
+    whole, begin = _left_out(solution, data_sets, free), 0
     found: dict[str, list[_Off]] = {}
     for data_set in data_sets:
         modelled, slopes = data_set.noise_free(solution.model).measured, _slopes(solution, data_set)[free]
         for run in _runs(data_set):
             points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
             step = whole.step(begin + np.flatnonzero(points))
-            if step is not None and is_far(step):
+            if step is not None and is_far(step[: len(free)]):
                 step = None
-            moved = modelled if step is None else modelled * np.exp(step @ slopes)
+            moved = modelled if step is None else modelled * np.exp(step[: len(free)] @ slopes)
             counted = run.points & (data_set.weights > 0.0 if isinstance(data_set, SweepData) else True)
             off = _off(moved[counted], data_set.measured[counted])
             found.setdefault(str(data_set.direction), []).append((off, step is not None))
         begin += data_set.size
     _add(found, solution.model, left, held_out=True)
     return tuple(_usable(place, parts) for place, parts in found.items())
+
+
+def _left_out(solution: Solution, data_sets: Sequence[DataSet], free: Sequence[int]) -> LeaveOut:
+    """The fit of the parameters of these numbers without some of its residuals in noise; amounts of an error that its
+    tests share stand behind them."""
+    if not isinstance(data_sets, Joined):
+        return LeaveOut.of(solution.jacobian[free], solution.residual)
+    own = in_noise(data_sets)
+    names = [solution.coordinates.names[i] for i in free]
+    left = np.pad(residual(solution.model, own), (0, len(data_sets.error.columns)))
+    return LeaveOut.of(data_sets.beside(jacobian(solution.model, own, names)), left)
 
 
 def met_within(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet]) -> tuple[Usable, ...]:

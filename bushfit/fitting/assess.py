@@ -10,8 +10,9 @@ import numpy as np
 
 from bushfit.effects import temperature
 from bushfit.effects.contract import Array
-from bushfit.fitting.coordinates import Coordinates, jacobian, residual
+from bushfit.fitting.coordinates import Coordinates, jacobian, residual, together
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, repeats_of
+from bushfit.fitting.joined import Joined
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -81,7 +82,8 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     by_value, reaction = answer * slopes[:, None], reaction * slopes[:, None]
     carried = reaction[:, : len(held.names)] / slopes[: len(held.names)]
     spread = [carried @ part @ carried.T for part in held.spread]
-    influences = [reaction[:, own] @ basis for own, basis in bases]
+    pairs = zip(stages, bases, strict=True)
+    influences = [together(stage.data_sets, reaction[:, own] @ basis) for stage, (own, basis) in pairs]
     matrix = by_value @ by_value.T + sum(_of_gains(*each) for each in zip(stages, influences, strict=True))
     for part, lost in _unsure(stages, influences, [basis for _, basis in bases]):
         spread.append(part)
@@ -103,7 +105,8 @@ def _of_gains(stage: Stage, influence: Array) -> Array:
 def _excess(model: Model, stage: Stage) -> list[tuple[DataSet, float]]:
     """By how much each test of a stage exceeds its noise, reduced chi-square, and as all together; else 1."""
     together = lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0
-    return [(one, max(together, lack_of_fit(model, [one], 0) or 1.0)) for one in stage.data_sets]
+    each = zip(stage.data_sets, missed(model, stage.data_sets), strict=True)
+    return [(data_set, max(together, own or 1.0)) for data_set, own in each]
 
 
 def _positive(matrix: Array, sizes: Array) -> Array:
@@ -136,7 +139,7 @@ def _unsure(stages: Sequence[Stage], influences: Sequence[Array], bases: Sequenc
     """
     parts: dict[Hashable, tuple[Array, Array]] = {}
     for stage, influence, basis in zip(stages, influences, bases, strict=True):
-        unit = basis / np.linalg.norm(basis[0])
+        unit = together(stage.data_sets, basis / np.linalg.norm(basis[0]))
         ends = np.cumsum([0, *(data_set.size for data_set in stage.data_sets)])
         moved: dict[Hashable, tuple[Array, Array, Array]] = {}
         for data_set, first, last in zip(stage.data_sets, ends[:-1], ends[1:], strict=True):
@@ -145,15 +148,22 @@ def _unsure(stages: Sequence[Stage], influences: Sequence[Array], bases: Sequenc
                 products = move @ own.T, move @ move.T, move @ unit[:, first:last].T
                 so_far = moved.get(variance, (0.0, 0.0, 0.0))
                 moved[variance] = products[0] + so_far[0], products[1] + so_far[1], products[2] + so_far[2]
+        if isinstance(stage.data_sets, Joined):
+            move = stage.data_sets.unsure(influence)
+            moved[id(stage.data_sets)] = move @ influence.T, move @ move.T, move @ unit.T
         for variance, (along, squared, absorbed) in moved.items():
             spread, lost = parts.get(variance, (0.0, 0.0))
             parts[variance] = spread + along, lost + squared - absorbed @ absorbed.T
     return list(parts.values())
 
 
-def _reduced(model: Model, data_sets: Sequence[DataSet], parameters: int) -> tuple[float, int]:
+def reduced(model: Model, data_sets: Sequence[DataSet], parameters: int) -> tuple[float, int]:
     """Reduced chi-square and its degrees of freedom."""
-    residuals = residual(model, data_sets)
+    return _over_freedom(residual(model, data_sets), data_sets, parameters)
+
+
+def _over_freedom(residuals: Array, data_sets: Sequence[DataSet], parameters: int) -> tuple[float, int]:
+    """Sum of squares of residuals, (n,), over their degrees of freedom, and these."""
     freedom = max(sum(data_set.counted for data_set in data_sets) - parameters, 1)
     return float(residuals @ residuals) / freedom, freedom
 
@@ -166,7 +176,7 @@ def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Qual
     repeats = np.count_nonzero(repeats_of(loops), axis=1)
     return Quality(
         nrmse=float(np.sqrt(np.mean(relative**2))),
-        reduced_chi_square=_reduced(model, data_sets, parameters)[0],
+        reduced_chi_square=reduced(model, data_sets, parameters)[0],
         points=sum(data_set.counted for data_set in data_sets),
         noise=float(np.sqrt(np.mean(noise**2))),
         loop_gain_error=float(np.max([loop.gain_error for loop in loops] / np.sqrt(repeats))) if loops else None,
@@ -184,21 +194,33 @@ def measured_range(model: Model, data_sets: Sequence[DataSet]) -> Range:
 
 def lack_of_fit(model: Model, data_sets: Sequence[DataSet], parameters: int) -> float | None:
     """Reduced chi-square where the model misses the data by more than their noise, else None."""
-    reduced, freedom = _reduced(model, data_sets, parameters)
-    return reduced if reduced > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
+    return _beyond_noise(*reduced(model, data_sets, parameters))
+
+
+def missed(model: Model, data_sets: Sequence[DataSet]) -> list[float | None]:
+    """The same of each test by itself, an error that all share counted."""
+    ends = np.cumsum([data_set.size for data_set in data_sets])[:-1]
+    parts = zip(np.split(residual(model, data_sets), ends), data_sets, strict=True)
+    return [_beyond_noise(*_over_freedom(part, [data_set], 0)) for part, data_set in parts]
+
+
+def _beyond_noise(chi_square: float, freedom: int) -> float | None:
+    """A reduced chi-square that noise is no explanation of, else None."""
+    return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
 
 def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: str = "") -> list[str]:
     """A sentence, with advice, where the model misses all data, or one test, by more than the noise; else none."""
     together = lack_of_fit(model, data_sets, parameters)
-    each = {one.name: missed for one in data_sets if (missed := lack_of_fit(model, [one], 0)) is not None}
+    named = zip(data_sets, missed(model, data_sets), strict=True)
+    each = {data_set.name: own for data_set, own in named if own is not None}
     if together is None and not each:
         return []
-    worst, reduced = max(each, key=lambda name: each[name], default=""), _reduced(model, data_sets, parameters)[0]
+    worst, all_tests = max(each, key=lambda name: each[name], default=""), reduced(model, data_sets, parameters)[0]
     where = f", {number(each[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
     return [
         "the model misses the data by more than their noise "
-        f"(reduced chi-square {number(reduced, 2)}{where}): intervals are invalid, though standard errors are scaled "
+        f"(reduced chi-square {number(all_tests, 2)}{where}): intervals are invalid, though standard errors are scaled "
         f"up{advice}"
     ]
 

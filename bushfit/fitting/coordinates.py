@@ -15,6 +15,7 @@ from bushfit.effects import Parameter
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.joined import Joined
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import End
@@ -97,14 +98,22 @@ class Solution:
 
 def residual(model: Model, data_sets: Sequence[DataSet]) -> Array:
     """Whitened residuals of all data sets, (n,)."""
-    return np.concatenate([data_set.residual(model) for data_set in data_sets])
+    return together(data_sets, np.concatenate([data_set.residual(model) for data_set in data_sets]))
 
 
 def jacobian(model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> Array:
     """Derivatives of `residual` by parameter coordinate, (len(names), n)."""
     slopes = Coordinates.of(model, names).slopes(model.values)
     by_value = np.concatenate([data_set.jacobian(model, names) for data_set in data_sets], axis=-1)
-    return by_value * slopes[:, None]
+    return together(data_sets, by_value * slopes[:, None])
+
+
+def together(data_sets: Sequence[DataSet], rows: Array) -> Array:
+    """Residuals of all data sets, each whitened by itself, (..., n), whitened by an error that they share as well.
+
+    Also what an estimator takes of residuals, (..., n), by what it takes of whitened ones.
+    """
+    return data_sets.error.whiten(rows) if isinstance(data_sets, Joined) else rows
 
 
 def starting_point(

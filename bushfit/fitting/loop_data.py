@@ -9,6 +9,7 @@ import numpy as np
 
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.effects.history import History
+from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.data_set import DataSet, keep, kept
 from bushfit.fitting.drive import Drive
 from bushfit.model.model import Model
@@ -39,6 +40,8 @@ class LoopData(DataSet):
         gain_error: standard deviation of the gain of the whole record, by the class of its rig.
         gain_weighs: whether it is part of the noise, as where [rig] states the class. A gain that is only assumed
             widens the errors of what is fitted, and bends no fit to meet the shape of a loop that a model misses.
+        shape_error: standard deviation of the model's error of each part of harmonic h, over half the force range and
+            1/h^2, from the second on; 0 where noise is all that is counted.
     """
 
     drive: Drive
@@ -46,6 +49,7 @@ class LoopData(DataSet):
     fundamental_only: bool = False
     gain_error: float = 0.0
     gain_weighs: bool = False
+    shape_error: float = 0.0
     beside: str | None = None
     kind = "loop"
     components = ("force",)
@@ -175,11 +179,11 @@ class LoopData(DataSet):
                 yield Outlier(self.name, file, row + before + 1, column, off)
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        own = self._less_gain(influence)
+        own = self._less_common(influence)
         whole = own @ self._fundamental.T if self.fundamental_only else own
-        by_noise = [self._less_gain(self._counted(part)) for part in self.drive.row_noise.unsure(whole)]
+        by_noise = [self._less_common(self._counted(part)) for part in self.drive.row_noise.unsure(whole)]
         if not by_noise and self.test.noise is None:
-            by_noise = [np.sqrt(2.0 / self._rows) * self._less_gain(own)]
+            by_noise = [np.sqrt(2.0 / self._rows) * self._less_common(own)]
         return {(self.name, which): part for which, part in enumerate(by_noise)}
 
     def contrasts(self) -> Array:
@@ -197,7 +201,7 @@ class LoopData(DataSet):
     def gain_and_offset(self) -> Array:
         """What a unit of gain, and half the force range of offset, make of the whitened residuals, (2, n)."""
         offset = np.full(self.drive.force.size, self.drive.half_range)
-        return np.array([self._less_gain(self.unit_gain), self._whitened(offset * self._per_noise)])
+        return np.array([self._less_common(self.unit_gain), self._whitened(offset * self._per_noise)])
 
     def columns(self) -> dict[str, Any]:
         unit, factor = self.direction.display.displacement
@@ -213,18 +217,22 @@ class LoopData(DataSet):
 
     def _whitened(self, rows: Array) -> Array:
         """Rows in units of noise, (..., n), as independent numbers, 0 where one is told from a row left out."""
-        return self._less_gain(self._counted(self.drive.row_noise.whiten(rows) * self._told))
+        return self._less_common(self._counted(self.drive.row_noise.whiten(rows) * self._told))
 
-    def _less_gain(self, white: Array) -> Array:
-        """Whitened rows less the share of what lies along the error of the gain, which makes them white again.
+    def _less_common(self, white: Array) -> Array:
+        """Whitened rows, (..., n), whitened by the errors that all of them share as well."""
+        return self._common.whiten(white) if self._common else white
 
-        Notes: the covariance is 1 + g g^T with g the error that a standard deviation of the gain makes.
-        """
-        if not self.gain_weighs or not self.gain_error:
-            return white
-        size = float(self.unit_gain @ self.unit_gain)
-        share = (1.0 - 1.0 / np.sqrt(1.0 + self.gain_error**2 * size)) / size
-        return white - share * (white @ self.unit_gain)[..., None] * self.unit_gain
+    @cached_property
+    def _common(self) -> CommonError | None:
+        """Errors of the gain, where it weighs, and of the model's shape; None without."""
+        columns = [self.gain_error * self.unit_gain] if self.gain_weighs and self.gain_error else []
+        if self.shape_error and not self.fundamental_only:
+            beyond = slice(3, len(self._waves))  # the first harmonic is part of the error of the stiffness
+            order = np.repeat(np.arange(2, _SMOOTH_HARMONICS + 1), 2)[:, None]
+            waves = self._waves[beyond] * self._per_noise * (self.shape_error * self.drive.half_range / order**2)
+            columns += list(self.drive.row_noise.whiten(waves) * self._told)
+        return CommonError(np.array(columns)) if columns else None
 
     def _counted(self, white: Array) -> Array:
         """Of whitened rows, (..., n), what counts as its residuals."""

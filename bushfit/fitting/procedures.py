@@ -24,7 +24,9 @@ from bushfit.fitting.coordinates import Bounds, Coordinates, Solution
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, sources, with_level_errors
 from bushfit.fitting.identify import left_open
+from bushfit.fitting.joined import Joined
 from bushfit.fitting.levels import level_errors
+from bushfit.fitting.model_error import told_of, with_model_error
 from bushfit.fitting.profile import limit95, profile95
 from bushfit.fitting.rig_class import largest_error, words_of
 from bushfit.fitting.robust import Estimate, estimate, told
@@ -93,13 +95,16 @@ def fit_joint(
     most = largest_error(data.campaign.rig)
     errors = level_errors(found.minimised, found.solution.residual, found.solution.jacobian, most)
     at_limit = any(error >= _AT_LIMIT * limit for error, limit in zip(errors.error, most, strict=True))
-    if errors.freedom and any(errors.error) and not at_limit:  # an error that would have to be larger is a gap
+    counts = errors.freedom and any(errors.error) and not at_limit  # an error that would have to be larger is a gap
+    found, error = with_model_error(found, data.bounds, 0.5 * errors.gain if counts else 0.0)
+    if counts and not error:
         loops, sweeps = parted(data_sets)
         data_sets = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
         found = _solve(data, data_sets, effects, {}, found.solution.model)
-    notes = [_LEVELS.format(words_of(errors.error))] if errors.matters and not at_limit else []
-    result = _result(data, [found], notes=[*notes, *unfitted(found.solution.model, left, _NEXT)], left=left)
-    result = replace(result, usable=usable(found.solution, found.minimised, left))
+    notes = [_LEVELS.format(words_of(errors.error))] if errors.matters and not at_limit and not error else []
+    notes += [*([told_of(error) + _NEXT] if error else []), *unfitted(found.solution.model, left, _NEXT)]
+    result = _result(data, [found], notes=notes, left=left)
+    result = replace(result, usable=usable(found.solution, found.minimised, left), model_error=error)
     if profile is None:
         return result
     intervals = profile95(found.solution, found.minimised, result.covariance, data.bounds, profile)
@@ -233,8 +238,8 @@ def _result(
 ) -> Result:
     """What the steps of a procedure found, the last one's model, with the uncertainty of all of them."""
     model, data_sets = steps[-1].solution.model, [data_set for step in steps for data_set in step.data_sets]
-    stages = [Stage(step.solution.coordinates.names, step.weighed) for step in steps if step.solution.coordinates.names]
-    fitted = tuple(name for stage in stages for name in stage.names)
+    stages = [Stage(_moving(step), step.weighed) for step in steps if step.solution.coordinates.names]
+    fitted = tuple(name for step in steps for name in step.solution.coordinates.names)
     cov = covariance(model, stages, held) if stages else held or Covariance()
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     of_tests = (*implausible(data.campaign.bushing, data_sets), *apart_in_temperature(model, data_sets))
@@ -253,6 +258,12 @@ def _result(
         specimens=data.campaign.specimens,
         tests=misfits(model, data_sets, left),
     )
+
+
+def _moving(step: Estimate) -> tuple[str, ...]:
+    """The parameters whose errors a fit tells; beside an error of the model, one at rest on a bound counts as held."""
+    held = step.solution.at_bound if isinstance(step.weighed, Joined) else {}
+    return tuple(name for name in step.solution.coordinates.names if name not in held)
 
 
 def cautions(

@@ -12,7 +12,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.assess import linear_errors, quality
+from bushfit.fitting.assess import linear_errors, reduced
 from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, coordinate_bounds
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import solve
@@ -149,7 +149,7 @@ def limit95(best: Solution, data_sets: Sequence[DataSet], name: str, bounds: Bou
 
 def _excess(best: Solution, data_sets: Sequence[DataSet]) -> float:
     """Reduced chi-square, 1 at the least."""
-    return max(quality(best.model, data_sets, len(best.coordinates.names)).reduced_chi_square, 1.0)
+    return max(reduced(best.model, data_sets, len(best.coordinates.names))[0], 1.0)
 
 
 def _allowed(best: Solution, data_sets: Sequence[DataSet], covariance: Covariance, linear: Array) -> Array:

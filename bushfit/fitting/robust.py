@@ -44,9 +44,9 @@ class Estimate:
     """
 
     solution: Solution
-    data_sets: tuple[DataSet, ...]
-    minimised: tuple[DataSet, ...]
-    weighed: tuple[DataSet, ...]
+    data_sets: Sequence[DataSet]
+    minimised: Sequence[DataSet]
+    weighed: Sequence[DataSet]
     outliers: tuple[Outlier, ...]
 
 

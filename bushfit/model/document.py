@@ -265,6 +265,7 @@ class ModelFile:
         specimens: other bodies of the compound.
         unresolved: effects of the model that may as well be the rig's, as the tests cannot tell.
         unnamed: data of the effect of that name: a smooth correction of the stiffness.
+        model_error: what the fit counted beside noise, as a share of the stiffness; null where noise was all.
         campaign: that the model was fitted to; null where it is known of none.
     """
 
@@ -282,4 +283,5 @@ class ModelFile:
     specimens: tuple[SpecimenTable, ...] = ()
     unresolved: tuple[str, ...] = ()
     unnamed: Unnamed | None = None
+    model_error: Unnamed | None = None
     campaign: CampaignTable | None = None

@@ -125,6 +125,7 @@ def _result(tables: ModelFile) -> Result:
         tests=fit.tests if fit else (),
         usable=fit.usable if fit else (),
         unresolved=tuple(name for name in tables.unresolved if name in model.effects),
+        model_error=tables.model_error,
     )
     with naming(place="fit, directions"):
         for name in result.measured.directions if result.measured else ():
@@ -155,6 +156,7 @@ def to_document(result: Result) -> dict[str, Any]:
         },
         "fit": _fit(result, result.quality, result.measured) if result.quality and result.measured else None,
         **({"unresolved": list(result.unresolved)} if result.unresolved else {}),
+        **({"model_error": asdict(result.model_error)} if result.model_error else {}),
         "warnings": list(result.warnings),
         "outliers": [asdict(outlier) for outlier in result.outliers],
         "provenance": {

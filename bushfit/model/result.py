@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from bushfit.effects import Level
+from bushfit.effects.unnamed import Unnamed
 from bushfit.geometry import Bushing, Place, Specimen, place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -141,6 +142,7 @@ class Result:
         profile: 95 % intervals by profile likelihood, where they were asked for; None is an open end.
         at_bound: parameters that came to rest on the least or largest value they may have, and on which.
         unresolved: effects of the model with a twin of the rig, which these tests cannot tell from it.
+        model_error: what the fit counted beside noise, as a share of the stiffness; None where noise was all.
     """
 
     model: Model
@@ -157,6 +159,7 @@ class Result:
     tests: tuple[Misfit, ...] = ()
     usable: tuple[Usable, ...] = ()
     unresolved: tuple[str, ...] = ()
+    model_error: Unnamed | None = None
 
     def __repr__(self) -> str:
         """The parameters with their standard errors, a line each, and how well the model meets its tests."""
@@ -224,4 +227,5 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
     covariance = result.covariance.restricted(there)
     told = tuple(f"{result.name}: {line}" for line in result.warnings)
     carried_there = Result(model, fitted, covariance, None, measured, told, result.inputs, specimens=result.specimens)
-    return replace(carried_there, unresolved=tuple(name for name in result.unresolved if name in kept)), said
+    unresolved = tuple(name for name in result.unresolved if name in kept)
+    return replace(carried_there, unresolved=unresolved, model_error=result.model_error), said

@@ -1,0 +1,33 @@
+"""Errors that residuals have in common, so that these are independent only when whitened together."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+
+
+@dataclass(frozen=True, eq=False)
+class CommonError:
+    """Independent amounts of an error that each move many residuals.
+
+    Args:
+        columns: residuals in units of noise that one standard deviation of each amount makes, (q, n).
+
+    Notes:
+        The covariance of the residuals is S = 1 + U^T U, U the columns. S^(-1/2) whitens them.
+    """
+
+    columns: Array
+
+    @cached_property
+    def along(self) -> tuple[Array, Array]:
+        """Orthonormal directions that the error takes, (n, q), and its standard deviation along each, (q,)."""
+        vectors, size, _ = np.linalg.svd(self.columns.T, full_matrices=False)
+        return vectors, size
+
+    def whiten(self, rows: Array) -> Array:
+        """Residuals in units of noise, (..., n), as independent numbers of unit variance."""
+        vectors, size = self.along
+        return rows - (rows @ vectors * (1.0 - 1.0 / np.hypot(1.0, size))) @ vectors.T

@@ -1,0 +1,297 @@
+"""Model error: what a fit counts beside noise where the model misses the tests by more than that.
+
+A smooth error of the model bends its parameters to the quietest test if noise is all that weighs, and their intervals
+are far too narrow. Counted as what it is, tests weigh by what they can tell, and the parameters are those of the model
+nearest to the rubber over all tests.
+
+Notes:
+    The relative error c of the complex stiffness is a Gaussian process over ln frequency and ln strain, alike in phase
+    and in quadrature, which tests share (M. C. Kennedy, A. O'Hagan, J. R. Statist. Soc. B 63 (2001) 425-464). What the
+    parameters can do is none of it: it is orthogonal to the derivatives of ln K over the places of the tests, each
+    place counted once, however quiet its test (M. Plumlee, J. Am. Stat. Assoc. 112 (2017) 1274-1285). Its size and
+    lengths are
+    those of most restricted likelihood (H. D. Patterson, R. Thompson, Biometrika 58 (1971) 545-554): with columns
+    U of the whitened residuals by its amounts, and the parameters projected out, twice the logarithm gains
+    sum(v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l)) by a size v, l the eigenvalues of U^T P U and b the components of U^T P r
+    along its eigenvectors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from scipy.special import logsumexp
+
+from bushfit.effects.contract import Array
+from bushfit.effects.unnamed import Patch, Unnamed, basis
+from bushfit.fitting.common_error import CommonError
+from bushfit.fitting.coordinates import Bounds, Solution, jacobian, residual
+from bushfit.fitting.data_sets import DataSet, LoopData
+from bushfit.fitting.joined import Joined
+from bushfit.fitting.robust import Estimate
+from bushfit.fitting.solve import solve
+from bushfit.model.sensitivity import stiffness_and_slopes
+from bushfit.units import number
+
+#: Sizes tried, relative to |K|: from what the best rigs repeat to what no one calls a fit.
+_SIZES = np.geomspace(1e-3, 0.4, 25)
+#: Lengths tried, in ln frequency and ln strain: from next points apart to several decades.
+_LENGTHS = (0.4, 0.9, 2.0, 4.5)
+#: Odds beforehand of something smooth that the model lacks, against nothing; as `diagnose` has them.
+_ODDS = 0.2
+#: Gain of the logarithm of the likelihood by an error of middling lengths, up to which no others are tried; chosen: of
+#: clean tests nine in ten stay below.
+_SHOWS = 0.5
+#: Difference of the logarithm of the likelihood from the best, beyond which an error is tried no more.
+_FAR = 12.0
+#: Singular value, relative to the largest, below which what parameters make is rounding.
+_ROUNDING = 1e-10
+#: Rounds in which error and parameters follow each other, at most, and the share of a standard error by which the
+#: parameters still move when they have settled.
+_MOST_ROUNDS, _SETTLED = 6, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """A fitted model and its tests, as far as errors beside it are concerned.
+
+    Args:
+        solution: residuals and derivatives in noise alone.
+    """
+
+    solution: Solution
+    data_sets: Sequence[DataSet]
+
+    @cached_property
+    def names(self) -> Array:
+        """Direction or specimen of each point, (p,)."""
+        return np.repeat(
+            [str(each.direction) for each in self.data_sets], [each.frequency.size for each in self.data_sets]
+        )
+
+    @cached_property
+    def directions(self) -> tuple[str, ...]:
+        """Each of these once."""
+        return tuple(dict.fromkeys(self.names.tolist()))
+
+    @cached_property
+    def points(self) -> Array:
+        """Logarithms of frequency [Hz] and equivalent strain of each point, (p, 2)."""
+        unit_strain = self.solution.model.unit_strain
+        axes = [(each.frequency, each.amplitude * unit_strain(each.direction)) for each in self.data_sets]
+        return np.log(np.concatenate(axes, axis=-1).T)
+
+    @cached_property
+    def slopes(self) -> Array:
+        """Derivatives of ln K at the points by coordinate, of the parameters that rest on no bound, complex (k, p)."""
+        model, coordinates = self.solution.model, self.solution.coordinates
+        names = [name for name in coordinates.names if name not in self.solution.at_bound]
+        found = []
+        for each in self.data_sets:
+            test = each.direction, each.frequency, each.amplitude
+            stiffness, slopes = stiffness_and_slopes(model, *test, names, each.kind, each.circumstances)
+            found.append(slopes / stiffness)
+        by_coordinate = coordinates.slopes(model.values)[[coordinates.names.index(name) for name in names]]
+        return np.concatenate(found, axis=-1) * by_coordinate[:, None]
+
+    def parts(self, data_sets: Sequence[DataSet]) -> Iterator[tuple[slice, slice, DataSet]]:
+        """Where the points and the residuals of each test stand, and the test."""
+        points, rows = 0, 0
+        for each in data_sets:
+            yield slice(points, points + each.frequency.size), slice(rows, rows + each.size), each
+            points, rows = points + each.frequency.size, rows + each.size
+
+    def seen(self, rows: Array) -> Array:
+        """Of residuals, (c, n), what a change of the tests' stiffness can make, along orthonormal directions: all of a
+        sweep, two numbers of a loop, (c, d)."""
+        pairs = zip(self.parts(self.data_sets), self._directions, strict=True)
+        return np.concatenate(
+            [rows[:, own] if along is None else rows[:, own] @ along for (_, own, _), along in pairs], 1
+        )
+
+    @cached_property
+    def _directions(self) -> list[Array | None]:
+        """Of each loop the directions of these residuals, (n, 2); None of a sweep."""
+        both = np.array([[1.0], [1.0j]])
+        return [
+            np.linalg.qr(each.moved(both, self.solution.model).T)[0] if each.kind == "loop" else None
+            for each in self.data_sets
+        ]
+
+    @cached_property
+    def left(self) -> tuple[Array, Array]:
+        """Of what the parameters make and of what the model leaves the part that is seen, (k, d) and (d,)."""
+        span, size, _ = np.linalg.svd(self.solution.jacobian.T, full_matrices=False)
+        span = span[:, size > _ROUNDING * size.max(initial=0.0)].T
+        left = self.solution.residual - (self.solution.residual @ span.T) @ span
+        return self.seen(span), self.seen(left[None])[0]
+
+
+@dataclass(frozen=True, eq=False)
+class _Prior:
+    """A smooth error of some tests, whatever model is fitted to them.
+
+    Args:
+        groups: directions and specimens that share it, by name.
+        lengths: over which it changes, in ln frequency and ln strain.
+        nodes: of each group, numbers of points, (m,).
+        shapes: the error at the points by its amounts, (q, p).
+    """
+
+    groups: tuple[tuple[str, ...], ...]
+    lengths: tuple[float, float]
+    nodes: Sequence[Array]
+    shapes: Array
+
+    @classmethod
+    def of(cls, tests: _Beside, groups: tuple[tuple[str, ...], ...], lengths: tuple[float, float]) -> _Prior:
+        """The error at the points of some tests."""
+        nodes, shapes = [], []
+        for group in groups:
+            inside = np.flatnonzero(np.isin(tests.names, group))
+            own, near = basis(tests.points[inside] / lengths)
+            here = np.zeros((near.shape[1], len(tests.points)))
+            here[:, inside] = near.T
+            nodes.append(inside[own])
+            shapes.append(here)
+        return cls(groups, lengths, nodes, np.concatenate(shapes))
+
+
+@dataclass(frozen=True, eq=False)
+class _Error:
+    """A smooth error beside a fitted model."""
+
+    beside: _Beside
+    prior: _Prior
+
+    @cached_property
+    def shapes(self) -> Array:
+        """The error at the points by a unit of each amount, in phase, then in quadrature, less what the parameters can
+        do, complex (2 q, p)."""
+        real, slopes, nodes = self.prior.shapes, self.beside.slopes, np.concatenate(self.prior.nodes)
+        left, size, right = np.linalg.svd(_in_parts(slopes[:, nodes]), full_matrices=False)
+        told = size > _SIZES[0] * np.sqrt(nodes.size)  # of the others a factor e is less than the least error
+        shapes = np.concatenate((real, 1j * real))
+        absorbed = _in_parts(shapes[:, nodes]) @ right[told].T / size[told] @ left[:, told].T
+        return shapes - absorbed @ slopes
+
+    def columns(self, data_sets: Sequence[DataSet]) -> Array:
+        """Whitened residuals of the tests, with weights of their own, by a unit of each amount, (2 q, n)."""
+        model = self.beside.solution.model
+        moved = [
+            each.moved(self.shapes[:, points] * each.noise_free(model).measured, model)
+            for points, _, each in self.beside.parts(data_sets)
+        ]
+        return np.concatenate(moved, axis=-1)
+
+    @cached_property
+    def _spectrum(self) -> tuple[Array, Array]:
+        """l and b^2 of the notes, (2 q,) each."""
+        span, left = self.beside.left
+        columns = self.beside.seen(self.columns(self.beside.data_sets))
+        taken = columns @ span.T
+        values, vectors = np.linalg.eigh(columns @ columns.T - taken @ taken.T)
+        return np.maximum(values, 0.0), np.square(vectors.T @ (columns @ left))
+
+    @cached_property
+    def _gains(self) -> Array:
+        """Of the logarithm of the restricted likelihood at each size, (sizes,)."""
+        values, along = self._spectrum
+        grown = 1.0 + np.square(_SIZES)[:, None] * values
+        return 0.5 * np.sum(np.square(_SIZES)[:, None] * along / grown - np.log(grown), axis=-1)
+
+    @property
+    def best(self) -> tuple[float, float]:
+        """The largest gain, and the size that brings it."""
+        return float(self._gains.max()), float(_SIZES[self._gains.argmax()])
+
+    @property
+    def log_evidence(self) -> float:
+        """Of the tests with it, all sizes as likely, over that without."""
+        return float(logsumexp(self._gains) - np.log(_SIZES.size))
+
+    def joined(self, data_sets: Sequence[DataSet]) -> Joined:
+        """The tests, with weights of their own, and the error that they share."""
+        told = np.square(self.best[1]) * self._spectrum[0]
+        freedom = float(np.sum(np.square(told / (1.0 + told))))
+        return Joined(tuple(data_sets), CommonError(self.best[1] * self.columns(data_sets)), max(freedom, 1.0))
+
+    def data(self, size: float) -> Unnamed:
+        """The error, of a size, as the tests leave it."""
+        columns = self.columns(self.beside.data_sets)
+        inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
+        value = (-inverse @ columns @ self.beside.solution.residual) @ self.shapes
+        root = np.linalg.cholesky(inverse).T @ self.shapes
+        errors = np.linalg.norm(root.real, axis=0), np.linalg.norm(root.imag, axis=0)
+        patches = []
+        for group, nodes in zip(self.prior.groups, self.prior.nodes, strict=True):
+            lists = (value[nodes].real, value[nodes].imag, *(error[nodes] for error in errors))
+            at = np.exp(self.beside.points[nodes].T)
+            patches.append(Patch(group, *(tuple(one.tolist()) for one in (*at, *lists))))
+        return Unnamed(size, self.prior.lengths, tuple(patches))
+
+
+def with_model_error(found: Estimate, bounds: Bounds, other: float) -> tuple[Estimate, Unnamed | None]:
+    """A fit with an error of the model beside the noise, and that error, where the tests are likelier with it; else the
+    fit as it was, and None.
+
+    `other` is by how much another explanation raises the logarithm of the likelihood of the tests.
+    """
+    names, beside = found.solution.coordinates.names, _Beside(found.solution, found.minimised)
+    if not names or not _shows(beside):
+        return found, None
+    tried = _tried(beside)
+    if float(logsumexp([each.log_evidence for each in tried])) - np.log(len(tried)) + np.log(_ODDS) < other:
+        return found, None
+    for _ in range(_MOST_ROUNDS):
+        error = max(tried, key=lambda each: each.best[0])
+        before, shaped = beside.solution, _shaped(found.minimised, error.best[1])
+        after = solve(before.model, error.joined(shaped), names, bounds, strict=False)
+        slopes = jacobian(after.model, shaped, names)
+        beside = _Beside(replace(after, residual=residual(after.model, shaped), jacobian=slopes), shaped)
+        moved = after.coordinates.point(after.model.values) - before.coordinates.point(before.model.values)
+        if float(np.linalg.norm(moved @ after.jacobian)) < _SETTLED:
+            break
+        near = (each for each in tried if each.best[0] > error.best[0] - _FAR)
+        tried = [_Error(beside, each.prior) for each in near]
+    size = error.best[1]
+    whole, minimised, weighed = (
+        error.joined(_shaped(part, size)) for part in (found.data_sets, found.minimised, found.weighed)
+    )
+    return Estimate(after, whole, minimised, weighed, found.outliers), replace(error, beside=beside).data(size)
+
+
+def _shows(beside: _Beside) -> bool:
+    """Whether tests are any likelier with an error of middling lengths that all of them share: few clean ones are."""
+    return _Error(beside, _Prior.of(beside, (beside.directions,), _LENGTHS[1:3])).best[0] > _SHOWS
+
+
+def _shaped(data_sets: Sequence[DataSet], size: float) -> list[DataSet]:
+    """The same tests, the shape of loops off by as much as their stiffness."""
+    return [replace(each, shape_error=size) if isinstance(each, LoopData) else each for each in data_sets]
+
+
+def _tried(beside: _Beside) -> list[_Error]:
+    """Errors of all tests together, and of each direction by itself, of all lengths."""
+    shared = dict.fromkeys([(beside.directions,), tuple((name,) for name in beside.directions)])
+    pairs = product(shared, product(_LENGTHS, _LENGTHS))
+    return [_Error(beside, _Prior.of(beside, groups, lengths)) for groups, lengths in pairs]
+
+
+def told_of(error: Unnamed) -> str:
+    """What is said of a model error, for people."""
+    frequency, strain = (number(np.exp(length), 2) for length in error.lengths)
+    return (
+        "the model misses the data by more than their noise: a model error of "
+        f"{number(100.0 * error.typical, 2)} % of |K|, smooth over a factor {frequency} of frequency and {strain} of "
+        "strain, counts beside it, so the parameters are those of the model nearest to the rubber over all tests"
+    )
+
+
+def _in_parts(rows: Array) -> Array:
+    """Real, then imaginary parts of complex rows, (..., p) -> (..., 2 p)."""
+    return np.concatenate((rows.real, rows.imag), axis=-1)
