@@ -14,7 +14,9 @@ from bushfit.fitting.coordinates import Bounds, Solution
 from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.data_sets import sources
 from bushfit.fitting.descent import Descent
+from bushfit.fitting.model_error import told_of, with_model_error
 from bushfit.fitting.procedures import cautions
+from bushfit.fitting.robust import Estimate
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 
@@ -109,27 +111,33 @@ def result_of(evidence: Evidence, bounds: Bounds, told: Collection[str]) -> Resu
     """The model with its uncertainty; a parameter at rest on a bound counts as held there.
 
     Of effects with a twin of the rig the level is unresolved, but of those that are `told`. Beside a correction the
-    parameters are those of the plain model, and so are their errors, by its misfit.
+    parameters are those of the plain model, and so are their errors, by its misfit; else a smooth error of the model
+    counts, as in every fit.
     """
-    model, names = evidence.model, evidence.solution.coordinates.names
-    moving = tuple(name for name in names if name not in evidence.solution.at_bound)
-    cov = covariance(model.without(UNNAMED), [Stage(moving, evidence.data_sets)])
+    corrected, tests = UNNAMED in evidence.model.effects, evidence.data_sets
+    found, error = Estimate(evidence.solution, tests, tests, tests, ()), None
+    if not corrected:
+        found, error = with_model_error(found, bounds)
+    solution, model = found.solution, found.solution.model
+    moving = tuple(name for name in solution.coordinates.names if name not in solution.at_bound)
+    cov = covariance(model.without(UNNAMED), [Stage(moving, found.weighed)])
     return Result(
         model,
         moving,
         cov,
-        quality(model, evidence.data_sets, len(moving)),
-        measured_range(model, evidence.data_sets),
+        quality(model, tests, len(moving)),
+        measured_range(model, tests),
         (
-            *([_BENT_BY_THE_GAP] if UNNAMED in model.effects else []),
-            *apart_in_temperature(model, evidence.data_sets),
-            *cautions(model, evidence.solution, evidence.data_sets, bounds, cov),
+            *([_BENT_BY_THE_GAP] if corrected else []),
+            *([told_of(error)] if error else []),
+            *apart_in_temperature(model, tests),
+            *cautions(model, solution, found.data_sets, bounds, cov),
         ),
-        sources(evidence.data_sets),
-        at_bound=evidence.solution.at_bound,
-        tests=misfits(model, evidence.data_sets),
-        usable=met_within(model, evidence.data_sets, ())  # a correction has seen every run
-        if UNNAMED in model.effects
-        else usable(evidence.solution, evidence.data_sets),
+        sources(tests),
+        at_bound=solution.at_bound,
+        tests=misfits(model, tests),
+        # a correction has seen every run
+        usable=met_within(model, tests, ()) if corrected else usable(solution, found.minimised),
+        model_error=error,
         unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in told),
     )

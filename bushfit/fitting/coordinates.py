@@ -24,6 +24,8 @@ Bounds = Mapping[str, tuple[float | None, float | None]]
 
 #: Smallest singular value of the derivatives that counts, relative to the largest: below it is their rounding.
 _LEAST_SINGULAR_VALUE = 1e-10
+#: Least and largest factor by which an accelerated pass extrapolates the last change.
+_STRIDES = (-0.5, 5.0)
 #: A parameter this close to a bound rests on it, in coordinates, which are of order one however wide the bounds.
 _AT_BOUND = 1e-3
 
@@ -53,6 +55,11 @@ class Coordinates:
             name: float(np.exp(u)) if parameter.log else float(u) * parameter.typical
             for name, parameter, u in zip(self.names, self.parameters, point, strict=True)
         }
+
+    def possible(self, point: Array) -> dict[str, float]:
+        """Parameter values at a point, or the nearest that each may have: one that is extrapolated may lie beyond."""
+        pairs = zip(self.values(point).items(), self.parameters, strict=True)
+        return {name: float(np.clip(value, *parameter.bounds)) for (name, value), parameter in pairs}
 
     def slopes(self, values: Mapping[str, float]) -> Array:
         """d value / d coordinate, (k,)."""
@@ -144,3 +151,17 @@ def at_bound(names: Sequence[str], point: Array, low: Array, high: Array) -> dic
     near = _AT_BOUND * np.minimum(high - low, 1.0)
     rooms: dict[End, Array] = {"min": point - low, "max": high - point}
     return {name: end for end, room in rooms.items() for name, met in zip(names, room < near, strict=True) if met}
+
+
+def anderson(asked: Sequence[Array], answered: Sequence[Array]) -> Array:
+    """Next point of a fixed-point iteration, from the last two of its points and images (Anderson 1965).
+
+    Plain passes gain little each where what is asked and what answers know little of each other, or swing to and fro.
+    """
+    points, images = np.array(asked[-2:]), np.array(answered[-2:])
+    if len(points) < 2:
+        return images[-1]
+    before, gap = images - points
+    change = gap - before
+    weight = np.clip(-(change @ gap) / max(change @ change, np.finfo(float).tiny), *_STRIDES)
+    return images[-1] + weight * (images[-1] - images[-2])

@@ -9,16 +9,15 @@ Notes:
     and in quadrature, which tests share (M. C. Kennedy, A. O'Hagan, J. R. Statist. Soc. B 63 (2001) 425-464). What the
     parameters can do is none of it: it is orthogonal to the derivatives of ln K over the places of the tests, each
     place counted once, however quiet its test (M. Plumlee, J. Am. Stat. Assoc. 112 (2017) 1274-1285). Its size and
-    lengths are
-    those of most restricted likelihood (H. D. Patterson, R. Thompson, Biometrika 58 (1971) 545-554): with columns
-    U of the whitened residuals by its amounts, and the parameters projected out, twice the logarithm gains
+    lengths are those of most restricted likelihood (H. D. Patterson, R. Thompson, Biometrika 58 (1971) 545-554): with
+    columns U of the whitened residuals by its amounts, and the parameters projected out, twice the logarithm gains
     sum(v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l)) by a size v, l the eigenvalues of U^T P U and b the components of U^T P r
     along its eigenvectors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -29,7 +28,7 @@ from scipy.special import logsumexp
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Patch, Unnamed, basis
 from bushfit.fitting.common_error import CommonError
-from bushfit.fitting.coordinates import Bounds, Solution, jacobian, residual
+from bushfit.fitting.coordinates import Bounds, Solution, anderson, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, LoopData
 from bushfit.fitting.joined import Joined
 from bushfit.fitting.robust import Estimate
@@ -52,7 +51,7 @@ _FAR = 12.0
 _ROUNDING = 1e-10
 #: Rounds in which error and parameters follow each other, at most, and the share of a standard error by which the
 #: parameters still move when they have settled.
-_MOST_ROUNDS, _SETTLED = 6, 0.1
+_MOST_ROUNDS, _SETTLED = 12, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +234,7 @@ class _Error:
         return Unnamed(size, self.prior.lengths, tuple(patches))
 
 
-def with_model_error(found: Estimate, bounds: Bounds, other: float) -> tuple[Estimate, Unnamed | None]:
+def with_model_error(found: Estimate, bounds: Bounds, other: float = 0.0) -> tuple[Estimate, Unnamed | None]:
     """A fit with an error of the model beside the noise, and that error, where the tests are likelier with it; else the
     fit as it was, and None.
 
@@ -247,22 +246,33 @@ def with_model_error(found: Estimate, bounds: Bounds, other: float) -> tuple[Est
     tried = _tried(beside)
     if float(logsumexp([each.log_evidence for each in tried])) - np.log(len(tried)) + np.log(_ODDS) < other:
         return found, None
+    asked, answered = list[Array](), list[Array]()
     for _ in range(_MOST_ROUNDS):
         error = max(tried, key=lambda each: each.best[0])
         before, shaped = beside.solution, _shaped(found.minimised, error.best[1])
         after = solve(before.model, error.joined(shaped), names, bounds, strict=False)
-        slopes = jacobian(after.model, shaped, names)
-        beside = _Beside(replace(after, residual=residual(after.model, shaped), jacobian=slopes), shaped)
-        moved = after.coordinates.point(after.model.values) - before.coordinates.point(before.model.values)
-        if float(np.linalg.norm(moved @ after.jacobian)) < _SETTLED:
+        asked.append(before.coordinates.point(before.model.values))
+        answered.append(after.coordinates.point(after.model.values))
+        if float(np.linalg.norm((answered[-1] - asked[-1]) @ after.jacobian)) < _SETTLED:
             break
-        near = (each for each in tried if each.best[0] > error.best[0] - _FAR)
-        tried = [_Error(beside, each.prior) for each in near]
+        beside = _at(after, after.coordinates.possible(anderson(asked, answered)), shaped)
+        tried = [_Error(beside, each.prior) for each in tried]
+        if len(asked) > 1:  # about a model that the error no longer bends
+            best = max(each.best[0] for each in tried)
+            tried = [each for each in tried if each.best[0] > best - _FAR]
+    beside = _at(after, after.model.values, shaped)
     size = error.best[1]
     whole, minimised, weighed = (
         error.joined(_shaped(part, size)) for part in (found.data_sets, found.minimised, found.weighed)
     )
     return Estimate(after, whole, minimised, weighed, found.outliers), replace(error, beside=beside).data(size)
+
+
+def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[DataSet]) -> _Beside:
+    """A fit with its parameters at other values, and the tests in noise alone."""
+    model, names = solution.model.with_values(values), solution.coordinates.names
+    left, slopes = residual(model, data_sets), jacobian(model, data_sets, names)
+    return _Beside(replace(solution, model=model, residual=left, jacobian=slopes), data_sets)
 
 
 def _shows(beside: _Beside) -> bool:

@@ -20,7 +20,7 @@ from bushfit.fitting.assess import (
     quality,
     unfitted,
 )
-from bushfit.fitting.coordinates import Bounds, Coordinates, Solution
+from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, anderson
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, sources, with_level_errors
 from bushfit.fitting.identify import left_open
@@ -44,8 +44,6 @@ _AT_LIMIT = 0.99
 #: Passes of the two-step procedure agree when no parameter moves by more than this, relative.
 _AGREED = 1e-5
 _MOST_PASSES = 50
-#: An accelerated pass extrapolates the last change by no more than this factor.
-_LONGEST_STRIDE = 5.0
 #: A filled natural rubber, to say what leaving the springpot out may do: m/mu [s^alpha] and alpha.
 _TYPICAL_SPRINGPOT = (0.18, 0.24)
 #: What is said of a fit that was stopped.
@@ -167,28 +165,15 @@ def fit_two_step(data: Data) -> TwoStep:
         if springpot:
             asked.append(coordinates.point(springpot))
             answered.append(coordinates.point(model.values))
-        springpot = {name: model.values[name] for name in DYNAMIC}
-        if len(asked) > 1:
-            next_values = coordinates.values(_anderson(asked, answered))
-            springpot = {  # an extrapolated value may lie beyond what its parameter may have
-                name: float(np.clip(value, *model.parameters[name].bounds)) for name, value in next_values.items()
-            }
+            springpot = coordinates.possible(anderson(asked, answered))
+        else:
+            springpot = {name: model.values[name] for name in DYNAMIC}
     raise FitError(
         "the static and the dynamic fit do not settle on each other",
         file=data.campaign.path,
         found=f"{_MOST_PASSES} passes",
         hint="bushfit fit takes all five parameters together",
     )
-
-
-def _anderson(asked: Sequence[Array], answered: Sequence[Array]) -> Array:
-    """Next point of a fixed-point iteration, from the last two (Anderson 1965): plain passes gain only a fifth
-    each, because a loop of one slow rate and a sweep of one amplitude know little of each other."""
-    points, images = np.array(asked[-2:]), np.array(answered[-2:])
-    before, gap = images - points
-    change = gap - before
-    weight = np.clip(-(change @ gap) / (change @ change), 0.0, _LONGEST_STRIDE)
-    return images[-1] + weight * (images[-1] - images[-2])
 
 
 def _springpot(data: Data, springpot: Result | None) -> tuple[dict[str, float], Covariance | None]:
