@@ -15,7 +15,7 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.model.result import Result
-from bushfit.prediction import predict_resonance
+from bushfit.prediction import predict, predict_resonance
 from bushfit.reading.measurement import loss_factor
 from bushfit.reading.resonance import read_resonance
 from bushfit.reading.table import Table
@@ -71,6 +71,29 @@ def test_the_mount_against_its_prediction(
     print(f"{frequency.size} points\n{stiffness}\n{losses}")
     assert row("stiffness, measured over predicted") == stiffness
     assert row("loss factor, measured less predicted") == losses
+
+
+def test_its_band_after_one_factor_and_the_second_coupon(campaign: Campaign, compound: Result, root: Path) -> None:
+    text = (root / "data/measured/epdm_70/README.md").read_text(encoding="utf-8")
+    ratio, half = [], []
+    for sweep in campaign.sweeps:
+        if str(sweep.direction) == "mount":
+            for frequency, amplitude, stiffness in zip(
+                sweep.frequency, sweep.amplitude_reached, sweep.stiffness, strict=True
+            ):
+                band = predict(compound, sweep.direction, [frequency], [amplitude]).stiffness
+                ratio.append(abs(stiffness) / band.value[0])
+                half.append((band.high - band.value)[0] / band.value[0])
+    off = np.array(ratio) / np.median(ratio) - 1.0
+    inside, width = float(np.mean(np.abs(off) <= half)), float(np.median(half)) / 1.96 / float(np.std(off))
+    print(f"after one factor {inside:.3f} of the points within the band, {width:.2f} times as wide as they scatter")
+    assert inside >= 0.9
+    assert width <= 4.0
+    assert f"{100 * inside:.0f} % of its points" in text
+    low, high = compound.interval("stiffness_factor.DMA 2") or (0.0, 0.0)
+    value = compound.model.values["stiffness_factor.DMA 2"]
+    assert f"{value:.3f} times as stiff as the first, 95 % {low:.3f} to {high:.3f}" in text
+    assert 1.02 < value < 1.06, "1.04 to 1.05 read off where both were tested"
 
 
 def test_its_resonances(campaign: Campaign, compound: Result, row: Callable[[str], list[str]], root: Path) -> None:

@@ -218,12 +218,8 @@ def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: 
         return []
     worst, all_tests = max(each, key=lambda name: each[name], default=""), reduced(model, data_sets, parameters)[0]
     where = f", {number(each[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
-    joined = isinstance(data_sets, Joined)
-    what = (
-        "something that is not smooth is missing as well"
-        if joined
-        else "the model misses the data by more than their noise"
-    )
+    beyond = "the model misses the data by more than their noise"
+    what = "something that is not smooth is missing as well" if isinstance(data_sets, Joined) else beyond
     return [
         f"{what} (reduced chi-square {number(all_tests, 2)}{where}): intervals are invalid, though standard errors are scaled "
         f"up{advice}"

@@ -75,6 +75,8 @@ _TITLE_LINE = 0.42 / CM
 _LABEL_LETTERS = 27
 #: Letters in a line of the explanation, as many as the width of a figure holds.
 _NOTE_LETTERS = 112
+#: Letters of the warnings below a picture: five lines or so, beside which the panels keep their size.
+_MOST_LETTERS = 600
 #: Fonts that help out for names beyond Latin, Greek and Cyrillic, where they are installed.
 _WIDER_FONTS = {"Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "Microsoft YaHei", "SimHei", "PingFang SC"}
 
@@ -224,6 +226,15 @@ def file_name(name: str, letters: int = _NAME_LETTERS) -> str:
     if len(name) > letters:
         name = f"{name[: letters // 2 - 1]}…{name[-letters // 2 :]}"
     return name.replace("$", r"\$")
+
+
+def few(sentences: Sequence[str]) -> str:
+    """The first of some sentences, as many as leave room for the picture, and how many more there are."""
+    ends = np.cumsum([len(sentence) for sentence in sentences])
+    kept = max(int(np.searchsorted(ends, _MOST_LETTERS)), 1)
+    more = len(sentences) - kept
+    told = [sentence[0].upper() + sentence[1:] for sentence in sentences[:kept]]
+    return ". ".join([*told, *([f"And {more} more warnings, in the model file and the report"] if more > 0 else [])])
 
 
 def explain(figure: Figure, *sentences: str) -> None:
