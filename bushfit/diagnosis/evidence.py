@@ -107,16 +107,16 @@ def fit_from(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bo
     return Descent.start(model, data_sets, [name for name in model.parameters if name not in held], bounds)
 
 
-def result_of(evidence: Evidence, bounds: Bounds, told: Collection[str]) -> Result:
+def result_of(evidence: Evidence, bounds: Bounds, told: Collection[str], *, lacking: bool = True) -> Result:
     """The model with its uncertainty; a parameter at rest on a bound counts as held there.
 
     Of effects with a twin of the rig the level is unresolved, but of those that are `told`. Beside a correction the
     parameters are those of the plain model, and so are their errors, by its misfit; else a smooth error of the model
-    counts, as in every fit.
+    counts where it is `lacking` something, as in every fit.
     """
     corrected, tests = UNNAMED in evidence.model.effects, evidence.data_sets
     found, error = Estimate(evidence.solution, tests, tests, tests, ()), None
-    if not corrected:
+    if lacking and not corrected:
         found, error = with_model_error(found, bounds)
     solution, model = found.solution, found.solution.model
     moving = tuple(name for name in solution.coordinates.names if name not in solution.at_bound)

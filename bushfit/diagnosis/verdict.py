@@ -203,6 +203,7 @@ class Told:
             next_test = effect_named(names[0].name).confirmed_by
         if spots:
             next_test = f"measure again: {spots[0].name}"
+        lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
         where = (*(_place_where(base, each, places) for each in spots if places), *locate(base))
         return Diagnosis(
             verdict,
@@ -215,7 +216,7 @@ class Told:
             tuple(self.candidates),
             base,
             after,
-            self.odds.averaged(result_of(after, bounds, {*base.model.effects} - {*self.unresolved})),
+            self.odds.averaged(result_of(after, bounds, {*base.model.effects} - {*self.unresolved}, lacking=lacking)),
             self._notes(),
             description,
             self.odds,

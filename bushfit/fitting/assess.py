@@ -221,8 +221,8 @@ def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: 
     beyond = "the model misses the data by more than their noise"
     what = "something that is not smooth is missing as well" if isinstance(data_sets, Joined) else beyond
     return [
-        f"{what} (reduced chi-square {number(all_tests, 2)}{where}): intervals are invalid, though standard errors are scaled "
-        f"up{advice}"
+        f"{what} (reduced chi-square {number(all_tests, 2)}{where}): intervals are invalid, though standard errors are "
+        f"scaled up{advice}"
     ]
 
 
