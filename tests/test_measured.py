@@ -81,9 +81,9 @@ def test_its_band_after_one_factor_and_the_second_coupon(campaign: Campaign, com
             for frequency, amplitude, stiffness in zip(
                 sweep.frequency, sweep.amplitude_reached, sweep.stiffness, strict=True
             ):
-                band = predict(compound, sweep.direction, [frequency], [amplitude]).stiffness
-                ratio.append(abs(stiffness) / band.value[0])
-                half.append((band.high - band.value)[0] / band.value[0])
+                found = predict(compound, sweep.direction, [frequency], [amplitude]).stiffness
+                ratio.append(abs(stiffness) / found.value[0])
+                half.append((found.high[0] - found.value[0]) / found.value[0])
     off = np.array(ratio) / np.median(ratio) - 1.0
     inside, width = float(np.mean(np.abs(off) <= half)), float(np.median(half)) / 1.96 / float(np.std(off))
     print(f"after one factor {inside:.3f} of the points within the band, {width:.2f} times as wide as they scatter")
@@ -91,7 +91,7 @@ def test_its_band_after_one_factor_and_the_second_coupon(campaign: Campaign, com
     assert width <= 4.0
     assert f"{100 * inside:.0f} % of its points" in text
     low, high = compound.interval("stiffness_factor.DMA 2") or (0.0, 0.0)
-    value = compound.model.values["stiffness_factor.DMA 2"]
+    value = dict(compound.model.values)["stiffness_factor.DMA 2"]
     assert f"{value:.3f} times as stiff as the first, 95 % {low:.3f} to {high:.3f}" in text
     assert 1.02 < value < 1.06, "1.04 to 1.05 read off where both were tested"
 

@@ -262,11 +262,23 @@ def apart_in_temperature(model: Model, data_sets: Sequence[DataSet]) -> list[str
 
 
 def unfitted(model: Model, data_sets: Sequence[DataSet], advice: str) -> list[str]:
-    """Sentences on tests that a model was not fitted to and misses by more than their noise."""
-    return [
-        f"{data_set.name}, {data_set.direction}, was not fitted, and the model misses it by "
-        f"{number(100 * quality(model, [data_set], 0).nrmse, 2)} % (NRMSE), "
-        f"{number(np.sqrt(misfit), 2)} times its noise{advice}"
-        for data_set in data_sets
-        if (misfit := lack_of_fit(model, [data_set], 0)) is not None
-    ]
+    """A sentence on the tests of each place that a model was not fitted to and misses by more than their noise."""
+    off: dict[str, list[tuple[float, float, str]]] = {}
+    for data_set in data_sets:
+        if (misfit := lack_of_fit(model, [data_set], 0)) is not None:
+            share = 100.0 * quality(model, [data_set], 0).nrmse
+            off.setdefault(str(data_set.direction), []).append((float(np.sqrt(misfit)), share, data_set.name))
+    return [_missed_at(place, found) + advice for place, found in off.items()]
+
+
+def _missed_at(place: str, found: Sequence[tuple[float, float, str]]) -> str:
+    """What is said of the tests of a place that are missed, each by times its noise, by per cent, and by its name."""
+    noises, share, worst = max(found)
+    times = f"{number(noises, 2)} times its noise"
+    if len(found) == 1:
+        return f"{worst}, {place}, was not fitted, and the model misses it by {number(share, 2)} % (NRMSE), {times}"
+    least, most = (number(end(share for _, share, _ in found), 2) for end in (min, max))
+    return (
+        f"{len(found)} tests, {place}, were not fitted, and the model misses them by {least} to {most} % (NRMSE), "
+        f"{worst} by {times}"
+    )
