@@ -2,19 +2,22 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import logsumexp, ndtr
 
 from bushfit.comparison import CHANCE
 from bushfit.diagnosis.evidence import Evidence, fit, fit_from
 from bushfit.diagnosis.holdout import HoldOut, Predicted, hold_out, parts, predicted_parts
+from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.propose import probes
 from bushfit.effects import BASE, LIBRARY, Effect, effect_named, qualified
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.model_error import log_likelihood, with_model_error
+from bushfit.fitting.robust import Estimate
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number
@@ -48,6 +51,8 @@ class FittedFamily:
             parts that share no point, with the 95 % interval that the noise of these tests leaves; None where nothing
             is held out.
         p: probability of so large a gain, or loss, where both are equally near the truth; None as of the gain.
+        log_evidence: of the tests under it, a smooth error of the model counted where they are likelier with it.
+        probability: of all families fitted, each as likely beforehand.
     """
 
     name: str
@@ -55,6 +60,8 @@ class FittedFamily:
     held: HoldOut
     gain: tuple[float, float, float] | None = None
     p: float | None = None
+    log_evidence: float = 0.0
+    probability: float = 1.0
 
     @property
     def words(self) -> str:
@@ -91,9 +98,9 @@ def fit_families(
     """
     first = fit(model, data_sets, held, bounds)
     own = "+".join(["paper", *(name for name in model.effects if name not in BASE)])
-    found = [FittedFamily(own, first, hold_out(first, first, bounds))]
+    found = [FittedFamily(own, first, hold_out(first, first, bounds), log_evidence=_log_evidence([first], [], bounds))]
     for name in names:
-        evidence = first
+        evidence, chain = first, [first]
         for effect in map(effect_named, name.split("+")):
             present = evidence.model.effects
             if effect.name in present or effect.replaces not in (None, *present):
@@ -101,10 +108,27 @@ def fit_families(
                 problem = has if effect.name in present else "what this effect stands in place of is not in the model"
                 raise ModelError(problem, found=effect.name, expected=f"such as {' or '.join(known_families())}")
             evidence = fitted_with(evidence, effect, held, bounds)
+            chain.append(evidence)
         told, skipped = predicted_parts(first, evidence, bounds)
         out = HoldOut.of({part: of.residuals for part, of in told.items()}, skipped)
-        found.append(FittedFamily(name, evidence, out, *_gain(told, data_sets)))
-    return found
+        worth = _log_evidence(chain, name.split("+"), bounds)
+        found.append(FittedFamily(name, evidence, out, *_gain(told, data_sets), log_evidence=worth))
+    odds = np.array([family.log_evidence for family in found])
+    shares = np.exp(odds - logsumexp(odds)).tolist()
+    return [replace(family, probability=share) for family, share in zip(found, shares, strict=True)]
+
+
+def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bounds) -> float:
+    """The logarithm of the evidence of the last of some models, each with one effect more than that before it; what
+    all families have in common counts nothing."""
+    *before, last = chain
+    tests = last.data_sets
+    found = with_model_error(Estimate(last.solution, tests, tests, tests, ()), bounds)[0]
+    priors = [
+        laplace(name, replace(last, solution=found.solution), one) for name, one in zip(names, before, strict=True)
+    ]
+    known = {name: value for _, precision, _ in priors for name, value in precision.items()}
+    return sum(density for density, *_ in priors) + log_likelihood(found, known)
 
 
 def fitted_with(evidence: Evidence, effect: Effect, held: Sequence[str], bounds: Bounds) -> Evidence:

@@ -27,6 +27,11 @@ class CommonError:
         vectors, size, _ = np.linalg.svd(self.columns.T, full_matrices=False)
         return vectors, size
 
+    @property
+    def log_size(self) -> float:
+        """ln|S|."""
+        return float(np.sum(np.log1p(np.square(self.along[1]))))
+
     def whiten(self, rows: Array) -> Array:
         """Residuals in units of noise, (..., n), as independent numbers of unit variance."""
         vectors, size = self.along

@@ -223,6 +223,11 @@ class LoopData(DataSet):
         """Whitened rows, (..., n), whitened by the errors that all of them share as well."""
         return self._common.whiten(white) if self._common else white
 
+    @property
+    def log_size(self) -> float:
+        """Logarithm of the determinant of the covariance of its whitened rows before what they share was taken out."""
+        return self._common.log_size if self._common else 0.0
+
     @cached_property
     def _common(self) -> CommonError | None:
         """Errors of the gain, where it weighs, and of the model's shape; None without."""

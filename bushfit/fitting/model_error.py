@@ -29,7 +29,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Patch, Unnamed, basis
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import Bounds, Solution, anderson, jacobian, residual
-from bushfit.fitting.data_sets import DataSet, LoopData
+from bushfit.fitting.data_sets import DataSet, LoopData, parted
 from bushfit.fitting.joined import Joined
 from bushfit.fitting.robust import Estimate
 from bushfit.fitting.solve import solve
@@ -266,6 +266,23 @@ def with_model_error(found: Estimate, bounds: Bounds, other: float = 0.0) -> tup
         error.joined(_shaped(part, size)) for part in (found.data_sets, found.minimised, found.weighed)
     )
     return Estimate(after, whole, minimised, weighed, found.outliers), replace(error, beside=beside).data(size)
+
+
+def log_likelihood(found: Estimate, known: Mapping[str, float]) -> float:
+    """The logarithm of the restricted likelihood of a fit, the parameters that rest on no bound integrated.
+
+    Args:
+        known: precision beforehand of parameters, by coordinate; of the others it is 0.
+    """
+    solution, tests = found.solution, found.minimised
+    moving = [i for i, name in enumerate(solution.coordinates.names) if name not in solution.at_bound]
+    rows = solution.jacobian[moving]
+    beforehand = [known.get(solution.coordinates.names[i], 0.0) for i in moving]
+    size = sum(loop.log_size for loop in parted(tests)[0]) + (
+        tests.error.log_size if isinstance(tests, Joined) else 0.0
+    )
+    size += float(np.linalg.slogdet(rows @ rows.T + np.diag(beforehand))[1])
+    return -0.5 * (solution.chi_square + size)
 
 
 def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[DataSet]) -> _Beside:

@@ -105,7 +105,7 @@ class Compared:
         if self.families:
             return [
                 "families are fitted to the same tests: intervals of their differences take them as independent and "
-                "are too wide as a rule; what was held out compares them"
+                "are too wide as a rule; their odds, and what was held out, compare them"
             ]
         pairs = zip(self.labels[1:], self.comparisons, strict=True)
         return [
@@ -178,6 +178,7 @@ def _family(label: str, family: FittedFamily, words: str) -> Family:
         "first_there": held.before,
         "gain": family.gain,
         "p": family.p,
+        "probability": family.probability,
         "parts": [{"part": part.part, "first": part.before, "heldout": part.after} for part in held.parts],
         "skipped": [_plain(skipped) for skipped in held.skipped],
         "words": words,

@@ -1,6 +1,6 @@
 """What compare writes as JSON, key by key. Its JSON Schema is made of these types; the type checker holds to them."""
 
-from typing import Literal
+from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -104,6 +104,8 @@ class Family(TypedDict):
         gain: by how much the mean square of what was held out is less than that of the first, low and high of its 95 %
             interval; null where nothing can be held out, and of the first.
         p: probability by chance of so large a gain or loss, over all families (Holm).
+        probability: of all families compared, by the evidence of the tests, a smooth error of the model counted where
+            they are likelier with it; none where an older file does not say.
         parts: each part that was held out.
         skipped: each that was not, and why.
         words: whether it is nearer to what was held out than the first; empty of the first.
@@ -118,6 +120,7 @@ class Family(TypedDict):
     first_there: Number | None
     gain: tuple[Number, Number, Number] | None
     p: Number | None
+    probability: NotRequired[Number]
     parts: list[HeldOutPart]
     skipped: list[Skipped]
     words: str

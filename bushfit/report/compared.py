@@ -134,21 +134,21 @@ class SideBySide:
                 "parts held out": len(family["parts"]),
                 **dict(zip((f"fall of the mean square{end}" for end in ("", ", low", ", high")), gain, strict=True)),
                 "p by Holm": family["p"],
+                "probability": family.get("probability"),
                 "words": family["words"],
             }
 
     def family_cells(self) -> Iterator[list[str]]:
         """The families in rows of cells, as `FAMILY_HEADS` names them."""
-        for row, family, entry in zip(
-            self._families(), self.document["families"] or (), self.document["compared"], strict=False
-        ):
-            parts = len(family["parts"])
+        families = self.document["families"] or ()
+        for family, entry in zip(families, self.document["compared"], strict=False):
+            parts, share = len(family["parts"]), family.get("probability")
             yield [
                 f"{family['label']}: {family['name']}",
                 str(family["parameters"]),
                 "" if entry["nrmse"] is None else f"{number(100.0 * entry['nrmse'], 2)} %",
                 number(family["reduced_chi_square"], 3),
-                number(row["BIC less the first's"], 4, "+"),
+                "" if share is None else f"{number(100.0 * share, 2)} %" if share >= _LEAST_ODDS else "< 0.1 %",
                 *("" if each is None else number(each, 3) for each in (family["heldout"], family["first_there"])),
                 f"{parts} of {parts + len(family['skipped'])}",
             ]
@@ -262,8 +262,10 @@ def _flat(pair: Pair, row: ParameterContrast) -> dict[str, Any]:
     }
 
 
+#: Odds that are told as so small that none are.
+_LEAST_ODDS = 0.001
 #: Heads of `family_cells`, and of `parameter_cells` without the labels of the two results.
-FAMILY_HEADS = ("family", "parameters", "NRMSE", "chi2", "BIC", "held out", "first there", "parts")
+FAMILY_HEADS = ("family", "parameters", "NRMSE", "chi2", "odds", "held out", "first there", "parts")
 
 
 def parameter_cells(row: ParameterContrast) -> list[str]:

@@ -41,10 +41,13 @@ def families(model: Model, truth: str, values: Mapping[str, float], seed: int = 
 def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model: Model, truth: str) -> None:
     found = families(paper_model, truth, TRUTHS[truth])
     for family in found.values():
-        print(f"{truth}: {family.name}, chi2 {family.evidence.reduced:.3f}, held out {family.held.after:.3f}")
+        shown = f"chi2 {family.evidence.reduced:.3f}, held out {family.held.after:.3f}, odds {family.probability:.3g}"
+        print(f"{truth}: {family.name}, {shown}")
     assert list(found) == ["paper", *known_families()]
     assert found[truth].evidence.reduced == pytest.approx(1.0, abs=0.05)
     assert min(found, key=lambda name: found[name].evidence.bic) == truth
+    assert sum(family.probability for family in found.values()) == pytest.approx(1.0)
+    assert found[truth].probability > 0.5
     assert found[truth].held.after == pytest.approx(1.0, abs=0.05)
     if truth != "paper":
         assert found[truth].words.endswith("better by more than chance")
