@@ -1,42 +1,32 @@
 """Model families on one campaign: the paper's and others in place of its branches, fitted and held out alike."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
 from bushfit.comparison import CHANCE
-from bushfit.diagnosis.evidence import Evidence, fit, fit_from
+from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.holdout import HoldOut, Predicted, hold_out, parts, predicted_parts
 from bushfit.diagnosis.laplace import laplace
-from bushfit.diagnosis.propose import probes
-from bushfit.effects import BASE, LIBRARY, Effect, effect_named, qualified
-from bushfit.errors import FitError, ModelError
+from bushfit.effects import BASE, LIBRARY, effect_named
+from bushfit.errors import ModelError
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.design import with_effect
 from bushfit.fitting.model_error import log_likelihood, with_model_error
 from bushfit.fitting.robust import Estimate
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number
 
-#: Factors on a shape parameter of an effect in place of a branch, besides 1, that a fit is started from; chosen: within
-#: the decade that the tests of a bushing span, and apart enough to lie in other valleys.
-_FACTORS = (0.25, 4.0)
 #: Share by which a held-out error has to differ for two families not to count as alike, sure or not; chosen: no use
 #: of a bushing's model feels less.
 _ALIKE = 0.01
 #: Standard error of a gain over that of the delta method; from 20 redraws of the noise of five pairs of families, where
 #: it was 1.3 to 2.2.
 _BEYOND_LINEAR = 1.75
-#: Evaluations of the model in the first round of all starts.
-_FIRST = 12
-#: Starts that are fitted to their end.
-_BEST = 2
-#: Evaluations of the model in one fit at most.
-_MOST = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +97,8 @@ def fit_families(
                 has = "the model has this effect already"
                 problem = has if effect.name in present else "what this effect stands in place of is not in the model"
                 raise ModelError(problem, found=effect.name, expected=f"such as {' or '.join(known_families())}")
-            evidence = fitted_with(evidence, effect, held, bounds)
+            solution = with_effect(evidence.solution, evidence.data_sets, effect, held, bounds)
+            evidence = Evidence(solution, evidence.data_sets)
             chain.append(evidence)
         told, skipped = predicted_parts(first, evidence, bounds)
         out = HoldOut.of({part: of.residuals for part, of in told.items()}, skipped)
@@ -129,43 +120,6 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
     ]
     known = {name: value for _, precision, _ in priors for name, value in precision.items()}
     return sum(density for density, *_ in priors) + log_likelihood(found, known)
-
-
-def fitted_with(evidence: Evidence, effect: Effect, held: Sequence[str], bounds: Bounds) -> Evidence:
-    """A fitted model with one effect more, or one in place of a branch: the best fit of several starts.
-
-    Raises:
-        FitError: no start has a finite response.
-    """
-    fits = []
-    for start in _starts(evidence, effect):
-        with suppress(FitError, ModelError):  # no response from this start
-            fits.append(fit_from(start, evidence.data_sets, held, bounds).finished(_FIRST))
-    if not fits:
-        raise FitError("the model has no finite response to these tests", found=effect.name)
-    best = sorted(fits, key=lambda each: each.chi_square)[:_BEST]
-    end = min((each.finished(_MOST) for each in best), key=lambda each: each.chi_square)
-    return Evidence(end.solution, evidence.data_sets)
-
-
-def _starts(evidence: Evidence, effect: Effect) -> Iterator[Model]:
-    """Models to start from: each that the fitted one suggests, and the first with each shape parameter elsewhere.
-
-    What has a neutral amount starts at a tenth of its typical one: at its neutral value a fit may not see its shape.
-    """
-    amount = effect.amount
-    little = {} if effect.replaces else {qualified(effect, amount): amount.sized(0.1)}
-    model, *others = [
-        evidence.model.with_effect(effect.name, little | start) for start in evidence.model.starts(effect)
-    ]
-    yield from (model, *others)
-    for parameter in effect.parameters:
-        if parameter.neutral is None:
-            name = qualified(effect, parameter)
-            factors = model.values[name] * np.array(_FACTORS)
-            values = probes(evidence.data_sets, model, parameter) if parameter.scale else factors
-            for value in np.clip(values, *parameter.bounds).tolist():
-                yield model.with_values({name: value})
 
 
 def _gain(

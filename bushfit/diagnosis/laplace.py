@@ -7,8 +7,8 @@ from scipy.special import logsumexp
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import LARGEST, SIZES
-from bushfit.diagnosis.propose import probes
 from bushfit.effects import effect_named, qualified
+from bushfit.fitting.design import probes
 
 #: Sizes over which the prior of an amount is averaged, and the least relative error that they resolve.
 _FINE, _SHARPEST = 1000, 0.01

@@ -13,17 +13,14 @@ from itertools import product
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence, fit_from
-from bushfit.effects import Branch, Effect, Parameter, at_places, qualified, twins_of
+from bushfit.effects import Branch, Effect, at_places, qualified, twins_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
+from bushfit.fitting.design import probes
 from bushfit.model.model import Model
 
-#: Values tried of a shape parameter (a time, a gap, a frequency), spread evenly in its logarithm.
-_PROBES = 5
-#: Least and largest order of a derivative that is tried: one far below and one far above that of filled rubber, 0.2.
-_ORDERS = (0.05, 0.9)
 #: Share of a unit sensitivity that the model's own parameters must leave for it to count as visible.
 _LEFT = 1e-4
 #: Amount at which a sensitivity is taken, relative to the typical one: small enough to be a derivative, large enough to
@@ -177,36 +174,3 @@ def sensitivity(model: Model, data_sets: Sequence[DataSet], effect: Effect) -> t
     shapes = [shape for shape, finite in zip(shapes, told[:-1], strict=True) if finite]
     rows = answers(shapes) if shapes and not told[-1] else rows[[*told[:-1], True]]
     return shapes, (rows[:-1] - rows[-1]) / _STEP
-
-
-def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:
-    """Values of a shape parameter that these tests could show, by what it is measured against."""
-    frequencies = np.concatenate([data_set.frequency for data_set in data_sets])
-    match parameter.scale:
-        case "period":
-            swept = np.concatenate([sweep.frequency for sweep in parted(data_sets)[1]] or [frequencies])
-            low, high = 0.1 / (2.0 * np.pi * swept.max()), 1.0 / (2.0 * np.pi * swept.min())
-        case "frequency":
-            low, high = 0.7 * frequencies.max(), 4.0 * frequencies.max()
-        case "displacement":
-            low, high = stroke(data_sets)
-        case "strain":
-            strains = [data_set.amplitude * model.unit_strain(data_set.direction) for data_set in data_sets]
-            low = 0.03 * np.concatenate(strains).min()
-            high = max(0.5 * model.values.get("eps_half", np.concatenate(strains).max()), low)
-        case "force":
-            along = [sweep for sweep in parted(data_sets)[1] if not sweep.direction.is_rotation]
-            high = max((float(np.max(np.abs(each.measured) * each.amplitude)) for each in along), default=1.0)
-            low, high = 0.3 * high, 0.95 * high
-        case "order":
-            low, high = _ORDERS  # steeper than the first, which without it lies between the two
-            low = min(max(low, model.values.get("alpha", low)), high)
-        case None:
-            return np.array([parameter.typical])
-    return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)
-
-
-def stroke(data_sets: Sequence[DataSet]) -> tuple[float, float]:
-    """Displacements that some test reaches and some test just misses [m]."""
-    amplitudes = np.concatenate([data_set.amplitude for data_set in data_sets])
-    return 0.8 * float(amplitudes.min()), 0.95 * float(amplitudes.max())

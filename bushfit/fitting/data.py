@@ -10,11 +10,12 @@ import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.session import measured_session
-from bushfit.effects import with_base
+from bushfit.effects import BASE, effect_named, qualified, with_base
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError, naming
 from bushfit.fitting.coordinates import Bounds, residual
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data, with_level_errors
+from bushfit.fitting.design import designed
 from bushfit.fitting.rig_class import class_words
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, Specimen, place_named
@@ -119,12 +120,20 @@ class Data:
         """A model to fit to some tests: with the values that the campaign gives to start from, or, where those meet the
         tests worse, with what is read off them."""
         fixed = {name: value for name, value in self.given.items() if not self.free((name,))}
-        models = []
+        bushing, every = self.campaign.bushing, list[tuple[Model, dict[str, float]]]()
         for known in (self.given, fixed):
             with naming(self.campaign.path):
-                values = start_values(self.campaign.bushing, data_sets, {**known, **held})
-            models.append(Model.started(self.campaign.bushing, effects, values))
-        return models[0] if fixed == self.given else min(models, key=lambda model: _misfit(model, data_sets))
+                values = start_values(bushing, data_sets, {**known, **held})
+            every.append((Model.started(bushing, effects, values), values))
+        model, values = every[0] if fixed == self.given else min(every, key=lambda pair: _misfit(pair[0], data_sets))
+        added = [name for name in effects if name not in BASE and not any(own in self.given for own in _own(name))]
+        if not added:
+            return model
+        replaced = {effect_named(name).replaces for name in added}
+        kept = [name for name in (*BASE, *effects) if name in replaced or (name in effects and name not in added)]
+        plain = Model.started(bushing, [*dict.fromkeys(kept)], values)
+        still = [name for name in (*model.parameters, *plain.parameters) if name in held or not self.free((name,))]
+        return designed(model, plain, data_sets, still, self.bounds)
 
     def free(self, names: Sequence[str]) -> tuple[str, ...]:
         """Those names that the campaign does not hold."""
@@ -195,6 +204,11 @@ class Data:
             found=", ".join(f"{x:.4g}" for x in wanted),
             expected="some of " + ", ".join(f"{x:.4g}" for x in levels),
         )
+
+
+def _own(effect: str) -> list[str]:
+    """Names of the parameters of an effect."""
+    return [qualified(effect_named(effect), each) for each in effect_named(effect).parameters]
 
 
 def _misfit(model: Model, data_sets: Sequence[DataSet]) -> float:

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.effects import with_base
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
@@ -101,7 +102,7 @@ class Fit:
         return Kinds(("model",)) + Kinds.shown(tests_of(campaign))
 
     def run(self, data: Data) -> Fitted:
-        effects = (*data.effects, *(name for name in self.effects if name not in data.campaign.fit.effects))
+        effects = with_base(dict.fromkeys((*data.campaign.fit.effects, *self.effects)))
         result = fit_joint(data, effects=effects, directions=self.directions or None, profile=self.profile)
         options = (*asked(direction=self.directions, effect=self.effects), *(["--profile"] if self.profile else []))
         return Fitted("model", tests_of(data.campaign), data, (("joint fit", result),), about(data, "fit", options))

@@ -1,0 +1,118 @@
+"""Fits of effects that are added: from a small design of their shapes, as one start may lie in another valley."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from bushfit.effects import Effect, Parameter, effect_named, qualified
+from bushfit.effects.contract import Array
+from bushfit.errors import FitError, ModelError
+from bushfit.fitting.coordinates import Bounds, Solution
+from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.fitting.descent import Descent
+from bushfit.model.model import Model
+
+#: Values tried of a shape parameter (a time, a gap, a frequency), spread evenly in its logarithm.
+_PROBES = 5
+#: Least and largest order of a derivative that is tried: one far below and one far above that of filled rubber, 0.2.
+_ORDERS = (0.05, 0.9)
+#: Factors on a shape parameter of an effect in place of a branch, besides 1, that a fit is started from; chosen: within
+#: the decade that the tests of a bushing span, and apart enough to lie in other valleys.
+_FACTORS = (0.25, 4.0)
+#: Evaluations of the model in the first round of all starts.
+_FIRST = 12
+#: Starts that are fitted to their end.
+_BEST = 2
+#: Evaluations of the model in one fit at most.
+_MOST = 200
+
+
+def designed(model: Model, plain: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Model:
+    """A model to start a fit from, effects added in turn to the best fit of those before.
+
+    Args:
+        plain: the same without the effects that are to be added, and with the branches that they replace.
+        held: parameters that do not move.
+    """
+    added = [effect for effect in model.effects if effect not in plain.effects]
+    try:
+        solution = _start(plain, data_sets, held, bounds).finished(_MOST).solution
+        for effect in map(effect_named, added):
+            solution = with_effect(solution, data_sets, effect, held, bounds)
+    except (FitError, ModelError):  # the fit from the values as they are says what is wrong
+        return model
+    return model.with_values({name: solution.model.values[name] for name in model.values})
+
+
+def with_effect(
+    solution: Solution, data_sets: Sequence[DataSet], effect: Effect, held: Sequence[str], bounds: Bounds
+) -> Solution:
+    """A fitted model with one effect more, or one in place of a branch: the best fit of several starts.
+
+    Raises:
+        FitError: no start has a finite response.
+    """
+    fits = []
+    for start in _starts(solution.model, data_sets, effect):
+        with suppress(FitError, ModelError):  # no response from this start
+            fits.append(_start(start, data_sets, held, bounds).finished(_FIRST))
+    if not fits:
+        raise FitError("the model has no finite response to these tests", found=effect.name)
+    best = sorted(fits, key=lambda each: each.chi_square)[:_BEST]
+    return min((each.finished(_MOST) for each in best), key=lambda each: each.chi_square).solution
+
+
+def _start(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
+    return Descent.start(model, data_sets, [name for name in model.parameters if name not in held], bounds)
+
+
+def _starts(fitted: Model, data_sets: Sequence[DataSet], effect: Effect) -> Iterator[Model]:
+    """Models to start from: each that the fitted one suggests, and the first with each shape parameter elsewhere.
+
+    What has a neutral amount starts at a tenth of its typical one: at its neutral value a fit may not see its shape.
+    """
+    amount = effect.amount
+    little = {} if effect.replaces else {qualified(effect, amount): amount.sized(0.1)}
+    model, *others = [fitted.with_effect(effect.name, little | start) for start in fitted.starts(effect)]
+    yield from (model, *others)
+    for parameter in effect.parameters:
+        if parameter.neutral is None:
+            name = qualified(effect, parameter)
+            factors = model.values[name] * np.array(_FACTORS)
+            values = probes(data_sets, model, parameter) if parameter.scale else factors
+            for value in np.clip(values, *parameter.bounds).tolist():
+                yield model.with_values({name: value})
+
+
+def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:
+    """Values of a shape parameter that these tests could show, by what it is measured against."""
+    frequencies = np.concatenate([data_set.frequency for data_set in data_sets])
+    match parameter.scale:
+        case "period":
+            swept = np.concatenate([sweep.frequency for sweep in parted(data_sets)[1]] or [frequencies])
+            low, high = 0.1 / (2.0 * np.pi * swept.max()), 1.0 / (2.0 * np.pi * swept.min())
+        case "frequency":
+            low, high = 0.7 * frequencies.max(), 4.0 * frequencies.max()
+        case "displacement":
+            low, high = stroke(data_sets)
+        case "strain":
+            strains = [data_set.amplitude * model.unit_strain(data_set.direction) for data_set in data_sets]
+            low = 0.03 * np.concatenate(strains).min()
+            high = max(0.5 * model.values.get("eps_half", np.concatenate(strains).max()), low)
+        case "force":
+            along = [sweep for sweep in parted(data_sets)[1] if not sweep.direction.is_rotation]
+            high = max((float(np.max(np.abs(each.measured) * each.amplitude)) for each in along), default=1.0)
+            low, high = 0.3 * high, 0.95 * high
+        case "order":
+            low, high = _ORDERS  # steeper than the first, which without it lies between the two
+            low = min(max(low, model.values.get("alpha", low)), high)
+        case None:
+            return np.array([parameter.typical])
+    return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)
+
+
+def stroke(data_sets: Sequence[DataSet]) -> tuple[float, float]:
+    """Displacements that some test reaches and some test just misses [m]."""
+    amplitudes = np.concatenate([data_set.amplitude for data_set in data_sets])
+    return 0.8 * float(amplitudes.min()), 0.95 * float(amplitudes.max())
