@@ -126,7 +126,8 @@ class Data:
                 values = start_values(bushing, data_sets, {**known, **held})
             every.append((Model.started(bushing, effects, values), values))
         model, values = every[0] if fixed == self.given else min(every, key=lambda pair: _misfit(pair[0], data_sets))
-        added = [name for name in effects if name not in BASE and not any(own in self.given for own in _own(name))]
+        added = [name for name in effects if name not in BASE and not self.given.keys() & _own(name)]
+        added = [name for name in added if effect_named(name).replaces not in effects]
         if not added:
             return model
         replaced = {effect_named(name).replaces for name in added}
@@ -206,9 +207,9 @@ class Data:
         )
 
 
-def _own(effect: str) -> list[str]:
+def _own(effect: str) -> set[str]:
     """Names of the parameters of an effect."""
-    return [qualified(effect_named(effect), each) for each in effect_named(effect).parameters]
+    return {qualified(effect_named(effect), each) for each in effect_named(effect).parameters}
 
 
 def _misfit(model: Model, data_sets: Sequence[DataSet]) -> float:

@@ -11,6 +11,7 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import Bounds, Solution
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.descent import Descent
+from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 
 #: Values tried of a shape parameter (a time, a gap, a frequency), spread evenly in its logarithm.
@@ -24,6 +25,8 @@ _FACTORS = (0.25, 4.0)
 _FIRST = 12
 #: Starts that are fitted to their end.
 _BEST = 2
+#: Fall of chi-square by which an end has to lie lower to be another: a tenth of what one standard error makes.
+_LOWER = 0.1
 #: Evaluations of the model in one fit at most.
 _MOST = 200
 
@@ -35,14 +38,17 @@ def designed(model: Model, plain: Model, data_sets: Sequence[DataSet], held: Seq
         plain: the same without the effects that are to be added, and with the branches that they replace.
         held: parameters that do not move.
     """
-    added = [effect for effect in model.effects if effect not in plain.effects]
-    try:
-        solution = _start(plain, data_sets, held, bounds).finished(_MOST).solution
-        for effect in map(effect_named, added):
+    added = [effect_named(name) for name in model.effects if name not in plain.effects]
+    ends = []
+    with suppress(FitError, ModelError):  # no response, or too few points; the fit then says what is wrong
+        ends.append(_start(model, data_sets, held, bounds).finished(_MOST).solution)
+        solution = solve(plain, data_sets, _free(plain, held), bounds, evaluations=_MOST, strict=False)
+        for effect in added:
             solution = with_effect(solution, data_sets, effect, held, bounds)
-    except (FitError, ModelError):  # the fit from the values as they are says what is wrong
+        ends.append(solution)
+    if len(ends) < 2 or ends[1].chi_square > ends[0].chi_square - _LOWER:  # alike: two of one law may change names
         return model
-    return model.with_values({name: solution.model.values[name] for name in model.values})
+    return model.with_values({name: ends[1].model.values[name] for name in model.values})
 
 
 def with_effect(
@@ -64,7 +70,11 @@ def with_effect(
 
 
 def _start(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
-    return Descent.start(model, data_sets, [name for name in model.parameters if name not in held], bounds)
+    return Descent.start(model, data_sets, _free(model, held), bounds)
+
+
+def _free(model: Model, held: Sequence[str]) -> list[str]:
+    return [name for name in model.parameters if name not in held]
 
 
 def _starts(fitted: Model, data_sets: Sequence[DataSet], effect: Effect) -> Iterator[Model]:

@@ -29,7 +29,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Patch, Unnamed, basis
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import Bounds, Solution, anderson, jacobian, residual
-from bushfit.fitting.data_sets import DataSet, LoopData, parted
+from bushfit.fitting.data_sets import DataSet, LoopData, parted, with_gains
 from bushfit.fitting.joined import Joined
 from bushfit.fitting.robust import Estimate
 from bushfit.fitting.solve import solve
@@ -240,10 +240,10 @@ def with_model_error(found: Estimate, bounds: Bounds, other: float = 0.0) -> tup
 
     `other` is by how much another explanation raises the logarithm of the likelihood of the tests.
     """
-    names, beside = found.solution.coordinates.names, _Beside(found.solution, found.minimised)
-    if not names or not _shows(beside):
+    names, values = found.solution.coordinates.names, found.solution.model.values
+    if not names or not _shows(beside := _at(found.solution, values, with_gains(found.minimised, weigh=True))):
         return found, None
-    tried = _tried(beside)
+    tried = _tried(beside)  # beside all that a rig of the class may do
     if float(logsumexp([each.log_evidence for each in tried])) - np.log(len(tried)) + np.log(_ODDS) < other:
         return found, None
     asked, answered = list[Array](), list[Array]()
@@ -262,10 +262,13 @@ def with_model_error(found: Estimate, bounds: Bounds, other: float = 0.0) -> tup
             tried = [each for each in tried if each.best[0] > best - _FAR]
     beside = _at(after, after.model.values, shaped)
     size = error.best[1]
+    data = replace(error, beside=beside).data(size)
+    if max(size, data.typical) >= _SIZES[-1]:  # that is no error of a model, but another thing than it
+        return found, None
     whole, minimised, weighed = (
         error.joined(_shaped(part, size)) for part in (found.data_sets, found.minimised, found.weighed)
     )
-    return Estimate(after, whole, minimised, weighed, found.outliers), replace(error, beside=beside).data(size)
+    return Estimate(after, whole, minimised, weighed, found.outliers), data
 
 
 def log_likelihood(found: Estimate, known: Mapping[str, float]) -> float:
