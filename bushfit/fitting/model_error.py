@@ -25,12 +25,14 @@ from itertools import product
 import numpy as np
 from scipy.special import logsumexp
 
+from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Patch, Unnamed, basis
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import Bounds, Solution, anderson, jacobian, residual
-from bushfit.fitting.data_sets import DataSet, LoopData, parted, with_gains
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted, with_gains, with_level_errors
 from bushfit.fitting.joined import Joined
+from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.robust import Estimate
 from bushfit.fitting.solve import solve
 from bushfit.model.sensitivity import stiffness_and_slopes
@@ -234,17 +236,15 @@ class _Error:
         return Unnamed(size, self.prior.lengths, tuple(patches))
 
 
-def with_model_error(found: Estimate, bounds: Bounds, other: float = 0.0) -> tuple[Estimate, Unnamed | None]:
+def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATED) -> tuple[Estimate, Unnamed | None]:
     """A fit with an error of the model beside the noise, and that error, where the tests are likelier with it; else the
-    fit as it was, and None.
-
-    `other` is by how much another explanation raises the logarithm of the likelihood of the tests.
+    fit as it was, and None. Likelier, that is, than with what a rig of the class makes.
     """
     names, values = found.solution.coordinates.names, found.solution.model.values
-    if not names or not _shows(beside := _at(found.solution, values, with_gains(found.minimised, weigh=True))):
+    if not names or not _shows(beside := _at(found.solution, values, _of_class(found.minimised, rig))):
         return found, None
-    tried = _tried(beside)  # beside all that a rig of the class may do
-    if float(logsumexp([each.log_evidence for each in tried])) - np.log(len(tried)) + np.log(_ODDS) < other:
+    tried = _tried(beside)
+    if float(logsumexp([each.log_evidence for each in tried])) - np.log(len(tried)) + np.log(_ODDS) < 0.0:
         return found, None
     asked, answered = list[Array](), list[Array]()
     for _ in range(_MOST_ROUNDS):
@@ -298,6 +298,15 @@ def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[Dat
 def _shows(beside: _Beside) -> bool:
     """Whether tests are any likelier with an error of middling lengths that all of them share: few clean ones are."""
     return _Error(beside, _Prior.of(beside, (beside.directions,), _LENGTHS[1:3])).best[0] > _SHOWS
+
+
+def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> list[DataSet]:
+    """The same tests with the errors that loops and levels have on a rig of the class, stated or assumed."""
+    weighing = with_gains(data_sets, weigh=True)
+    sweeps = parted(weighing)[1]
+    gain, phase = np.max([of_class(rig), *(sweep.noise.level for sweep in sweeps)], axis=0).tolist()
+    levelled = dict(zip(sweeps, with_level_errors(sweeps, (gain, phase), 0), strict=True))
+    return [levelled.get(each, each) if isinstance(each, SweepData) else each for each in weighing]
 
 
 def _shaped(data_sets: Sequence[DataSet], size: float) -> list[DataSet]:

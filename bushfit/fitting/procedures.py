@@ -94,7 +94,7 @@ def fit_joint(
     errors = level_errors(found.minimised, found.solution.residual, found.solution.jacobian, most)
     at_limit = any(error >= _AT_LIMIT * limit for error, limit in zip(errors.error, most, strict=True))
     counts = errors.freedom and any(errors.error) and not at_limit  # an error that would have to be larger is a gap
-    found, error = with_model_error(found, data.bounds, 0.5 * errors.gain if counts else 0.0)
+    found, error = with_model_error(found, data.bounds, data.campaign.rig)
     if counts and not error:
         loops, sweeps = parted(data_sets)
         data_sets = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
