@@ -109,19 +109,30 @@ class _Beside:
     def seen(self, rows: Array) -> Array:
         """Of residuals, (c, n), what a change of the tests' stiffness can make, along orthonormal directions: all of a
         sweep, two numbers of a loop, (c, d)."""
-        pairs = zip(self.parts(self.data_sets), self._directions, strict=True)
-        return np.concatenate(
-            [rows[:, own] if along is None else rows[:, own] @ along for (_, own, _), along in pairs], 1
-        )
+        tests = zip(self.parts(self.data_sets), self._loops, strict=True)
+        return np.concatenate([rows[:, own] @ loop[0] if loop else rows[:, own] for (_, own, _), loop in tests], 1)
+
+    def made(self, shapes: Array) -> Array:
+        """Of the residuals that relative changes of the stiffness make, complex (c, p), what is seen, (c, d)."""
+        model, found = self.solution.model, []
+        for (points, _, each), loop in zip(self.parts(self.data_sets), self._loops, strict=True):
+            change = shapes[:, points] * each.noise_free(model).measured
+            parts = np.concatenate((change.real, change.imag), axis=-1)
+            found.append(parts @ loop[1] if loop else each.moved(change, model))
+        return np.concatenate(found, axis=-1)
 
     @cached_property
-    def _directions(self) -> list[Array | None]:
-        """Of each loop the directions of these residuals, (n, 2); None of a sweep."""
-        both = np.array([[1.0], [1.0j]])
-        return [
-            np.linalg.qr(each.moved(both, self.solution.model).T)[0] if each.kind == "loop" else None
-            for each in self.data_sets
-        ]
+    def _loops(self) -> list[tuple[Array, Array] | None]:
+        """Of each loop orthonormal directions of these residuals, (n, 2), and what 1 and i of a change make along them,
+        (2, 2); None of a sweep."""
+        both, found = np.array([[1.0], [1.0j]]), list[tuple[Array, Array] | None]()
+        for each in self.data_sets:
+            if each.kind == "loop":
+                along, made = np.linalg.qr(each.moved(both, self.solution.model).T)
+                found.append((along, made.T))
+            else:
+                found.append(None)
+        return found
 
     @cached_property
     def left(self) -> tuple[Array, Array]:
@@ -193,7 +204,7 @@ class _Error:
     def _spectrum(self) -> tuple[Array, Array]:
         """l and b^2 of the notes, (2 q,) each."""
         span, left = self.beside.left
-        columns = self.beside.seen(self.columns(self.beside.data_sets))
+        columns = self.beside.made(self.shapes)
         taken = columns @ span.T
         values, vectors = np.linalg.eigh(columns @ columns.T - taken @ taken.T)
         return np.maximum(values, 0.0), np.square(vectors.T @ (columns @ left))
