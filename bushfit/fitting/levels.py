@@ -49,7 +49,7 @@ def level_errors(
         level's unit error, whitened. What the fit absorbs is projected out (Patterson and Thompson, 1971). The scoring
         is Fisher's, in the space of the levels.
     """
-    columns, which, before = _columns(data_sets)
+    columns, which, before = level_columns(data_sets)
     nothing = LevelErrors(before, 0, 0.0, matters=False)
     if not columns.size:
         return nothing
@@ -92,7 +92,7 @@ def level_errors(
     return LevelErrors((gain, phase), int(freedoms.min()) if freedoms.size else 0, fall, matters)
 
 
-def _columns(data_sets: Sequence[DataSet]) -> tuple[Array, Array, tuple[float, float]]:
+def level_columns(data_sets: Sequence[DataSet]) -> tuple[Array, Array, tuple[float, float]]:
     """Whitened unit error of each level in gain and in phase, (c, n), which of the two it is, (c,), and the error that
     is counted already."""
     ends = np.cumsum([0, *(data_set.size for data_set in data_sets)])

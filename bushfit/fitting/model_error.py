@@ -30,8 +30,9 @@ from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Patch, Unnamed, basis
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import Bounds, Solution, anderson, jacobian, residual
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted, with_gains, with_level_errors
+from bushfit.fitting.data_sets import DataSet, LoopData, parted
 from bushfit.fitting.joined import Joined
+from bushfit.fitting.levels import level_columns
 from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.robust import Estimate
 from bushfit.fitting.solve import solve
@@ -62,10 +63,12 @@ class _Beside:
 
     Args:
         solution: residuals and derivatives in noise alone.
+        errors: whitened residuals that one standard deviation of each of the rig's errors makes, (w, n).
     """
 
     solution: Solution
     data_sets: Sequence[DataSet]
+    errors: Array
 
     @cached_property
     def names(self) -> Array:
@@ -136,9 +139,17 @@ class _Beside:
 
     @cached_property
     def left(self) -> tuple[Array, Array]:
-        """Of what the parameters make and of what the model leaves the part that is seen, (k, d) and (d,)."""
-        span, size, _ = np.linalg.svd(self.solution.jacobian.T, full_matrices=False)
-        span = span[:, size > _ROUNDING * size.max(initial=0.0)].T
+        """Of what the parameters and the rig's errors make, orthonormal but for what is known of the latter, and of
+        what both leave, the part that is seen, (k, d) and (d,)."""
+        rows = np.concatenate((self.solution.jacobian, self.errors))
+        information = rows @ rows.T
+        information[np.diag_indices(len(rows))] += np.repeat(
+            (0.0, 1.0), (len(rows) - len(self.errors), len(self.errors))
+        )
+        scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
+        size, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+        known = size > _ROUNDING * size.max(initial=0.0)
+        span = (vectors[:, known] / np.sqrt(size[known])).T @ (rows / scale[:, None])
         left = self.solution.residual - (self.solution.residual @ span.T) @ span
         return self.seen(span), self.seen(left[None])[0]
 
@@ -251,8 +262,11 @@ def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATE
     """A fit with an error of the model beside the noise, and that error, where the tests are likelier with it; else the
     fit as it was, and None. Likelier, that is, than with what a rig of the class makes.
     """
-    names, values = found.solution.coordinates.names, found.solution.model.values
-    if not names or not _shows(beside := _at(found.solution, values, _of_class(found.minimised, rig))):
+    names = found.solution.coordinates.names
+    if not names:
+        return found, None
+    beside = _Beside(found.solution, found.minimised, _of_class(found.minimised, rig))
+    if not _shows(beside):
         return found, None
     tried = _tried(beside)
     if float(logsumexp([each.log_evidence for each in tried])) - np.log(len(tried)) + np.log(_ODDS) < 0.0:
@@ -303,7 +317,7 @@ def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[Dat
     """A fit with its parameters at other values, and the tests in noise alone."""
     model, names = solution.model.with_values(values), solution.coordinates.names
     left, slopes = residual(model, data_sets), jacobian(model, data_sets, names)
-    return _Beside(replace(solution, model=model, residual=left, jacobian=slopes), data_sets)
+    return _Beside(replace(solution, model=model, residual=left, jacobian=slopes), data_sets, slopes[:0])
 
 
 def _shows(beside: _Beside) -> bool:
@@ -311,13 +325,18 @@ def _shows(beside: _Beside) -> bool:
     return _Error(beside, _Prior.of(beside, (beside.directions,), _LENGTHS[1:3])).best[0] > _SHOWS
 
 
-def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> list[DataSet]:
-    """The same tests with the errors that loops and levels have on a rig of the class, stated or assumed."""
-    weighing = with_gains(data_sets, weigh=True)
-    sweeps = parted(weighing)[1]
-    gain, phase = np.max([of_class(rig), *(sweep.noise.level for sweep in sweeps)], axis=0).tolist()
-    levelled = dict(zip(sweeps, with_level_errors(sweeps, (gain, phase), 0), strict=True))
-    return [levelled.get(each, each) if isinstance(each, SweepData) else each for each in weighing]
+def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> Array:
+    """Whitened residuals that the errors of a rig of the class make beside what is counted: the gain of each loop, and
+    gain and phase of each level, (w, n)."""
+    levels, which, before = level_columns(data_sets)
+    beyond = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(before), 0.0))
+    ends, rows = np.cumsum([0, *(each.size for each in data_sets)]), [levels.T * beyond[which]] if which.size else []
+    for each, first, last in zip(data_sets, ends[:-1], ends[1:], strict=True):
+        if isinstance(each, LoopData) and not each.gain_weighs:
+            gain = np.zeros((ends[-1], 1))
+            gain[first:last, 0] = each.gain_error * each.unit_gain
+            rows.append(gain)
+    return np.concatenate(rows, axis=1).T if rows else np.empty((0, ends[-1]))
 
 
 def _shaped(data_sets: Sequence[DataSet], size: float) -> list[DataSet]:
