@@ -353,10 +353,10 @@ def _tried(beside: _Beside) -> list[_Error]:
 
 def told_of(error: Unnamed) -> str:
     """What is said of a model error, for people."""
-    frequency, strain = (number(np.exp(length), 2) for length in error.lengths)
+    frequency, strain = (number(length / np.log(10.0), 1) for length in error.lengths)
     return (
         "the model misses the data by more than their noise: a model error of "
-        f"{number(100.0 * error.typical, 2)} % of |K|, smooth over a factor {frequency} of frequency and {strain} of "
+        f"{number(100.0 * error.typical, 2)} % of |K|, smooth over {frequency} decades of frequency and {strain} of "
         "strain, counts beside it, so the parameters are those of the model nearest to the rubber over all tests"
     )
 

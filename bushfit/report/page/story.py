@@ -61,6 +61,7 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
         "interval": interval_kind(result),
         "plain": _plain(found),
         "quality": _quality(result),
+        "model_error": result.model_error is not None,
         "correlations": [
             f"{one}/{other} {size:+.2f}" for one, other, size in result.covariance.correlations() if abs(size) > _CLOSE
         ],
