@@ -77,12 +77,13 @@ class LeaveOut:
         without = np.square(self.back @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
         return without > _MOST_GROWTH * np.sum(np.square(self.back), axis=1)
 
-    def step(self, rows: Array) -> Array | None:
-        """How far the parameters move without these rows, in coordinates, (k,); None where the rest leaves one open.
+    def step(self, rows: Array, first: int | None = None) -> Array | None:
+        """How far the first parameters, or all, move without these rows, in coordinates, (k,); None where the rest
+        leaves one of these open.
 
         It is one Gauss-Newton step, which is exact where the model is linear over that step.
         """
-        return None if self.open(rows).any() else self.back @ self._moved(rows)
+        return None if self.open(rows)[:first].any() else (self.back @ self._moved(rows))[:first]
 
     def predicted(self, rows: Array, clusters: Array, *, stepped: bool = True) -> tuple[Array, Array]:
         """Residuals of these rows, (n,) each, after that step: in units of noise, and whitened by the error of the
@@ -172,10 +173,10 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
         modelled, slopes = data_set.noise_free(solution.model).measured, _slopes(solution, data_set)[free]
         for run in _runs(data_set):
             points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
-            step = whole.step(begin + np.flatnonzero(points))
-            if step is not None and is_far(step[: len(free)]):
+            step = whole.step(begin + np.flatnonzero(points), len(free))
+            if step is not None and is_far(step):
                 step = None
-            moved = modelled if step is None else modelled * np.exp(step[: len(free)] @ slopes)
+            moved = modelled if step is None else modelled * np.exp(step @ slopes)
             counted = run.points & (data_set.weights > 0.0 if isinstance(data_set, SweepData) else True)
             off = _off(moved[counted], data_set.measured[counted])
             found.setdefault(str(data_set.direction), []).append((off, step is not None))

@@ -60,7 +60,7 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
         Stacked over the stages it is M d = b, so that cov(d) = (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. Singular values
         of M below 1/_LARGEST_ERROR are lifted to it.
     """
-    held = held or Covariance()
+    held, stages = held or Covariance(), [stage for stage in stages if stage.names]
     names = (*held.names, *(name for stage in stages for name in stage.names))
     slopes = Coordinates.of(model, names).slopes(model.values)
     system, root = np.eye(len(names)), np.zeros((len(names), len(names)))
@@ -98,7 +98,7 @@ def _of_loops(stage: Stage, influence: Array) -> Array:
     for data_set, first, last in zip(stage.data_sets, ends[:-1], ends[1:], strict=True):
         if isinstance(data_set, LoopData):
             errors = [0.0 if data_set.gain_weighs else data_set.gain_error, data_set.phase_error]
-            for error, unit in zip(errors, (data_set.unit_gain, data_set.unit_phase), strict=True):
+            for error, unit in zip(errors, (data_set.gain_and_offset()[0], data_set.unit_phase), strict=True):
                 moved = error * (influence[:, first:last] @ unit)
                 added += np.outer(moved, moved)
     return added
@@ -141,21 +141,27 @@ def _unsure(stages: Sequence[Stage], influences: Sequence[Array], bases: Sequenc
     """
     parts: dict[Hashable, tuple[Array, Array]] = {}
     for stage, influence, basis in zip(stages, influences, bases, strict=True):
-        unit = together(stage.data_sets, basis / np.linalg.norm(basis[0]))
+        unit, common = together(stage.data_sets, basis / np.linalg.norm(basis[0])), np.zeros((influence.shape[1], 0))
+        taken = np.zeros(0)  # share of a square along each direction of a common error that whitening takes
+        moved: dict[Hashable, list[Array]] = {}
+        if isinstance(stage.data_sets, Joined):
+            common, size = stage.data_sets.error.along
+            taken = 1.0 - 1.0 / (1.0 + np.square(size))
+            move = stage.data_sets.unsure(influence)
+            moved[id(stage.data_sets)] = [move @ influence.T, move @ move.T, move @ unit.T, move @ common]
         ends = np.cumsum([0, *(data_set.size for data_set in stage.data_sets)])
-        moved: dict[Hashable, tuple[Array, Array, Array]] = {}
         for data_set, first, last in zip(stage.data_sets, ends[:-1], ends[1:], strict=True):
             own = influence[:, first:last]
             for variance, move in data_set.unsure(own).items():
-                products = move @ own.T, move @ move.T, move @ unit[:, first:last].T
-                so_far = moved.get(variance, (0.0, 0.0, 0.0))
-                moved[variance] = products[0] + so_far[0], products[1] + so_far[1], products[2] + so_far[2]
-        if isinstance(stage.data_sets, Joined):
-            move = stage.data_sets.unsure(influence)
-            moved[id(stage.data_sets)] = move @ influence.T, move @ move.T, move @ unit.T
-        for variance, (along, squared, absorbed) in moved.items():
+                products = [move @ own.T, move @ move.T, move @ unit[:, first:last].T, move @ common[first:last]]
+                so_far = moved.get(variance)
+                moved[variance] = (
+                    [one + other for one, other in zip(products, so_far, strict=True)] if so_far else products
+                )
+        for variance, (along, squared, absorbed, shared) in moved.items():
             spread, lost = parts.get(variance, (0.0, 0.0))
-            parts[variance] = spread + along, lost + squared - absorbed @ absorbed.T
+            wrong = squared - (shared * taken) @ shared.T - absorbed @ absorbed.T
+            parts[variance] = spread + along, lost + wrong
     return list(parts.values())
 
 

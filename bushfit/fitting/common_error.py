@@ -7,6 +7,9 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 
+#: Variance along a direction, relative to the largest, below which it is rounding.
+_ROUNDING = 1e-14
+
 
 @dataclass(frozen=True, eq=False)
 class CommonError:
@@ -24,8 +27,10 @@ class CommonError:
     @cached_property
     def along(self) -> tuple[Array, Array]:
         """Orthonormal directions that the error takes, (n, q), and its standard deviation along each, (q,)."""
-        vectors, size, _ = np.linalg.svd(self.columns.T, full_matrices=False)
-        return vectors, size
+        variance, mixed = np.linalg.eigh(self.columns @ self.columns.T)
+        kept = variance > _ROUNDING * variance.max(initial=0.0)
+        size = np.sqrt(variance[kept])
+        return self.columns.T @ (mixed[:, kept] / size), size
 
     @property
     def log_size(self) -> float:

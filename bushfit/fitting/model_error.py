@@ -29,7 +29,7 @@ from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Patch, Unnamed, basis
 from bushfit.fitting.common_error import CommonError
-from bushfit.fitting.coordinates import Bounds, Solution, anderson, jacobian, residual
+from bushfit.fitting.coordinates import Bounds, Solution, anderson, coordinate_bounds, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, LoopData, parted
 from bushfit.fitting.joined import Joined
 from bushfit.fitting.levels import level_columns
@@ -274,13 +274,16 @@ def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATE
     asked, answered = list[Array](), list[Array]()
     for _ in range(_MOST_ROUNDS):
         error = max(tried, key=lambda each: each.best[0])
+        if error.best[1] >= _SIZES[-1]:  # that is no error of a model, but another thing than it
+            return found, None
         before, shaped = beside.solution, _shaped(found.minimised, error.best[1])
         after = solve(before.model, error.joined(shaped), names, bounds, strict=False)
         asked.append(before.coordinates.point(before.model.values))
         answered.append(after.coordinates.point(after.model.values))
         if float(np.linalg.norm((answered[-1] - asked[-1]) @ after.jacobian)) < _SETTLED:
             break
-        beside = _at(after, after.coordinates.possible(anderson(asked, answered)), shaped)
+        ahead = np.clip(anderson(asked, answered), *coordinate_bounds(after.coordinates, bounds))
+        beside = _at(after, after.coordinates.possible(ahead), shaped)
         tried = [_Error(beside, each.prior) for each in tried]
         if len(asked) > 1:  # about a model that the error no longer bends
             best = max(each.best[0] for each in tried)
@@ -288,11 +291,11 @@ def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATE
     beside = _at(after, after.model.values, shaped)
     size = error.best[1]
     data = replace(error, beside=beside).data(size)
-    if max(size, data.typical) >= _SIZES[-1]:  # that is no error of a model, but another thing than it
+    if data.typical >= _SIZES[-1]:
         return found, None
-    whole, minimised, weighed = (
-        error.joined(_shaped(part, size)) for part in (found.data_sets, found.minimised, found.weighed)
-    )
+    each = found.data_sets, found.minimised, found.weighed
+    made = {id(part): error.joined(_shaped(part, size)) for part in each}  # mostly the same tests
+    whole, minimised, weighed = (made[id(part)] for part in each)
     return Estimate(after, whole, minimised, weighed, found.outliers), data
 
 
@@ -353,11 +356,17 @@ def _tried(beside: _Beside) -> list[_Error]:
 
 def told_of(error: Unnamed) -> str:
     """What is said of a model error, for people."""
-    frequency, strain = (number(length / np.log(10.0), 1) for length in error.lengths)
+    lengths = zip(error.lengths, np.ptp(np.concatenate([each.nodes for each in error.patches]), axis=0), strict=True)
+    smooth = [
+        f"{number(length / np.log(10.0), 1)} decades of {axis}"
+        for axis, (length, reach) in zip(("frequency", "strain"), lengths, strict=True)
+        if reach > 0.0
+    ]
+    over = f", smooth over {' and '.join(smooth)}," if smooth else ""
     return (
         "the model misses the data by more than their noise: a model error of "
-        f"{number(100.0 * error.typical, 2)} % of |K|, smooth over {frequency} decades of frequency and {strain} of "
-        "strain, counts beside it, so the parameters are those of the model nearest to the rubber over all tests"
+        f"{number(100.0 * error.typical, 2)} % of |K|{over} counts beside it, so the parameters are those of the model "
+        "nearest to the rubber over all tests"
     )
 
 

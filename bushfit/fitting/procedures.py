@@ -229,9 +229,9 @@ def _result(
 ) -> Result:
     """What the steps of a procedure found, the last one's model, with the uncertainty of all of them."""
     model, data_sets = steps[-1].solution.model, [data_set for step in steps for data_set in step.data_sets]
-    stages = [Stage(_moving(step), step.weighed) for step in steps if step.solution.coordinates.names]
+    stages = [Stage(_moving(step), step.weighed) for step in steps]
     fitted = tuple(name for step in steps for name in step.solution.coordinates.names)
-    cov = covariance(model, stages, held) if stages else held or Covariance()
+    cov = covariance(model, stages, held)
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     of_tests = (*implausible(data.campaign.bushing, data_sets), *apart_in_temperature(model, data_sets))
     doubts = [*of_tests, *data.assumed]

@@ -154,7 +154,7 @@ def _excess(best: Solution, data_sets: Sequence[DataSet]) -> float:
 
 def _allowed(best: Solution, data_sets: Sequence[DataSet], covariance: Covariance, linear: Array) -> Array:
     """Root of the rise of chi-square that each parameter's interval may reach."""
-    names = best.coordinates.names
-    half = covariance.half_width(np.eye(len(covariance.names)))[[covariance.names.index(name) for name in names]]
+    names = best.coordinates.names  # of what counts as held where it rests on a bound the covariance tells nothing
+    half = np.array([covariance.half(name) if name in covariance.names else 0.0 for name in names])
     widest = _WIDEST * Z95 * np.sqrt(_excess(best, data_sets))
     return np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, widest)
