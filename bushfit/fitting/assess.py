@@ -141,19 +141,19 @@ def _unsure(stages: Sequence[Stage], influences: Sequence[Array], bases: Sequenc
     """
     parts: dict[Hashable, tuple[Array, Array]] = {}
     for stage, influence, basis in zip(stages, influences, bases, strict=True):
-        unit, common = together(stage.data_sets, basis / np.linalg.norm(basis[0])), np.zeros((influence.shape[1], 0))
-        taken = np.zeros(0)  # share of a square along each direction of a common error that whitening takes
-        moved: dict[Hashable, list[Array]] = {}
+        unit, moved = together(stage.data_sets, basis / np.linalg.norm(basis[0])), dict[Hashable, list[Array]]()
+        error, taken = None, np.zeros(0)  # share of a square along each direction of the error that whitening takes
         if isinstance(stage.data_sets, Joined):
-            common, size = stage.data_sets.error.along
-            taken = 1.0 - 1.0 / (1.0 + np.square(size))
-            move = stage.data_sets.unsure(influence)
-            moved[id(stage.data_sets)] = [move @ influence.T, move @ move.T, move @ unit.T, move @ common]
+            error, move = stage.data_sets.error, stage.data_sets.unsure(influence)
+            taken = 1.0 - 1.0 / (1.0 + np.square(error.along[1]))
+            along = error.seen.of(move) @ error.along[0]
+            moved[id(stage.data_sets)] = [move @ influence.T, move @ move.T, move @ unit.T, along]
         ends = np.cumsum([0, *(data_set.size for data_set in stage.data_sets)])
-        for data_set, first, last in zip(stage.data_sets, ends[:-1], ends[1:], strict=True):
+        for i, (data_set, first, last) in enumerate(zip(stage.data_sets, ends[:-1], ends[1:], strict=True)):
             own = influence[:, first:last]
             for variance, move in data_set.unsure(own).items():
-                products = [move @ own.T, move @ move.T, move @ unit[:, first:last].T, move @ common[first:last]]
+                along = error.seen.of_part(i, move) @ error.along[0][error.seen.places[i]] if error else move[:, :0]
+                products = [move @ own.T, move @ move.T, move @ unit[:, first:last].T, along]
                 so_far = moved.get(variance)
                 moved[variance] = (
                     [one + other for one, other in zip(products, so_far, strict=True)] if so_far else products

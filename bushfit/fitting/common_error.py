@@ -1,5 +1,7 @@
 """Errors that residuals have in common, so that these are independent only when whitened together."""
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,21 +14,64 @@ _ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
+class Seen:
+    """What an error can move of residuals: all of some rows, and few directions of many others.
+
+    Args:
+        parts: rows that stand together, with orthonormal directions of them, (rows, d), or None for all.
+    """
+
+    parts: Sequence[tuple[slice, Array | None]]
+
+    def of(self, rows: Array) -> Array:
+        """Residuals, (..., n), along the directions, (..., d)."""
+        return np.concatenate([self.of_part(i, rows[..., own]) for i, (own, _) in enumerate(self.parts)], axis=-1)
+
+    def of_part(self, number: int, rows: Array) -> Array:
+        """The same of the rows of one part."""
+        along = self.parts[number][1]
+        return rows if along is None else rows @ along
+
+    def back(self, values: Array) -> Array:
+        """Residuals, (..., n), that have values along the directions, (..., d), and nothing else."""
+        found = [
+            values[..., own] if along is None else values[..., own] @ along.T
+            for own, (_, along) in zip(self.places, self.parts, strict=True)
+        ]
+        return np.concatenate(found, axis=-1)
+
+    @cached_property
+    def places(self) -> list[slice]:
+        """Where the directions of each part stand."""
+        sizes = [own.stop - own.start if along is None else along.shape[1] for own, along in self.parts]
+        ends = np.cumsum([0, *sizes]).tolist()
+        return [slice(*pair) for pair in itertools.pairwise(ends)]
+
+
+@dataclass(frozen=True, eq=False)
 class CommonError:
     """Independent amounts of an error that each move many residuals.
 
     Args:
-        columns: residuals in units of noise that one standard deviation of each amount makes, (q, n).
+        columns: what one standard deviation of each amount makes of residuals in units of noise, as they are seen,
+            (q, d).
+        seen: which of the residuals these are.
 
     Notes:
         The covariance of the residuals is S = 1 + U^T U, U the columns. S^(-1/2) whitens them.
     """
 
     columns: Array
+    seen: Seen
+
+    @classmethod
+    def of_all(cls, columns: Array) -> "CommonError":
+        """An error that moves any of the residuals, (q, n)."""
+        return cls(columns, Seen([(slice(0, columns.shape[1]), None)]))
 
     @cached_property
     def along(self) -> tuple[Array, Array]:
-        """Orthonormal directions that the error takes, (n, q), and its standard deviation along each, (q,)."""
+        """Orthonormal directions that the error takes, (d, q), and its standard deviation along each, (q,)."""
         variance, mixed = np.linalg.eigh(self.columns @ self.columns.T)
         kept = variance > _ROUNDING * variance.max(initial=0.0)
         size = np.sqrt(variance[kept])
@@ -40,4 +85,4 @@ class CommonError:
     def whiten(self, rows: Array) -> Array:
         """Residuals in units of noise, (..., n), as independent numbers of unit variance."""
         vectors, size = self.along
-        return rows - (rows @ vectors * (1.0 - 1.0 / np.hypot(1.0, size))) @ vectors.T
+        return rows - self.seen.back((self.seen.of(rows) @ vectors * (1.0 - 1.0 / np.hypot(1.0, size))) @ vectors.T)

@@ -36,13 +36,14 @@ class Joined(Sequence[DataSet]):
     def unsure(self, influence: Array) -> Array:
         """As `DataSet.unsure`, of the variance of the error, (k, n) -> (k, n)."""
         vectors, size = self.error.along
-        return (influence @ vectors * np.square(size) * np.sqrt(2.0 / self.freedom)) @ vectors.T
+        moved = self.error.seen.of(influence) @ vectors * np.square(size) * np.sqrt(2.0 / self.freedom)
+        return self.error.seen.back(moved @ vectors.T)
 
     def beside(self, jacobian: Array) -> Array:
         """Derivatives of residuals in units of noise, (k, n), with those by the amounts below, and what is known of the
         amounts beforehand as q more residuals, (k + q, n + q)."""
-        k, q = len(jacobian), len(self.error.columns)
-        return np.block([[jacobian, np.zeros((k, q))], [self.error.columns, np.eye(q)]])
+        k, columns = len(jacobian), self.error.seen.back(self.error.columns)
+        return np.block([[jacobian, np.zeros((k, len(columns)))], [columns, np.eye(len(columns))]])
 
 
 def in_noise(data_sets: Sequence[DataSet]) -> Sequence[DataSet]:

@@ -239,7 +239,7 @@ class LoopData(DataSet):
             order = np.repeat(np.arange(2, _SMOOTH_HARMONICS + 1), 2)[:, None]
             waves = self._waves[beyond] * self._per_noise * (self.shape_error * self.drive.half_range / order**2)
             columns += list(self.drive.row_noise.whiten(waves) * self._told)
-        return CommonError(np.array(columns)) if columns else None
+        return CommonError.of_all(np.array(columns)) if columns else None
 
     def _counted(self, white: Array) -> Array:
         """Of whitened rows, (..., n), what counts as its residuals."""

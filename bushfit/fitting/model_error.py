@@ -17,10 +17,10 @@ Notes:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 from scipy.special import logsumexp
@@ -28,7 +28,7 @@ from scipy.special import logsumexp
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Patch, Unnamed, basis
-from bushfit.fitting.common_error import CommonError
+from bushfit.fitting.common_error import CommonError, Seen
 from bushfit.fitting.coordinates import Bounds, Solution, anderson, coordinate_bounds, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, LoopData, parted
 from bushfit.fitting.joined import Joined
@@ -102,27 +102,27 @@ class _Beside:
         by_coordinate = coordinates.slopes(model.values)[[coordinates.names.index(name) for name in names]]
         return np.concatenate(found, axis=-1) * by_coordinate[:, None]
 
-    def parts(self, data_sets: Sequence[DataSet]) -> Iterator[tuple[slice, slice, DataSet]]:
-        """Where the points and the residuals of each test stand, and the test."""
-        points, rows = 0, 0
-        for each in data_sets:
-            yield slice(points, points + each.frequency.size), slice(rows, rows + each.size), each
-            points, rows = points + each.frequency.size, rows + each.size
-
-    def seen(self, rows: Array) -> Array:
-        """Of residuals, (c, n), what a change of the tests' stiffness can make, along orthonormal directions: all of a
-        sweep, two numbers of a loop, (c, d)."""
-        tests = zip(self.parts(self.data_sets), self._loops, strict=True)
-        return np.concatenate([rows[:, own] @ loop[0] if loop else rows[:, own] for (_, own, _), loop in tests], 1)
+    @cached_property
+    def seen(self) -> Seen:
+        """What changes of the tests' stiffness can move of the residuals: all of a sweep, two numbers of a loop."""
+        ends = np.cumsum([0, *(each.size for each in self.data_sets)]).tolist()
+        rows = [slice(*pair) for pair in pairwise(ends)]
+        return Seen([(own, None if loop is None else loop[0]) for own, loop in zip(rows, self._loops, strict=True)])
 
     def made(self, shapes: Array) -> Array:
         """Of the residuals that relative changes of the stiffness make, complex (c, p), what is seen, (c, d)."""
-        model, found = self.solution.model, []
-        for (points, _, each), loop in zip(self.parts(self.data_sets), self._loops, strict=True):
-            change = shapes[:, points] * each.noise_free(model).measured
+        found, first, changes = [], 0, shapes * self._stiffness
+        for each, loop in zip(self.data_sets, self._loops, strict=True):
+            change = changes[:, first : first + each.frequency.size]
             parts = np.concatenate((change.real, change.imag), axis=-1)
-            found.append(parts @ loop[1] if loop else each.moved(change, model))
+            found.append(each.moved(change, self.solution.model) if loop is None else parts @ loop[1])
+            first += each.frequency.size
         return np.concatenate(found, axis=-1)
+
+    @cached_property
+    def _stiffness(self) -> Array:
+        """Of the model at each point, complex, (p,)."""
+        return np.concatenate([each.noise_free(self.solution.model).measured for each in self.data_sets])
 
     @cached_property
     def _loops(self) -> list[tuple[Array, Array] | None]:
@@ -151,7 +151,7 @@ class _Beside:
         known = size > _ROUNDING * size.max(initial=0.0)
         span = (vectors[:, known] / np.sqrt(size[known])).T @ (rows / scale[:, None])
         left = self.solution.residual - (self.solution.residual @ span.T) @ span
-        return self.seen(span), self.seen(left[None])[0]
+        return self.seen.of(span), self.seen.of(left)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,15 +202,6 @@ class _Error:
         absorbed = _in_parts(shapes[:, nodes]) @ right[told].T / size[told] @ left[:, told].T
         return shapes - absorbed @ slopes
 
-    def columns(self, data_sets: Sequence[DataSet]) -> Array:
-        """Whitened residuals of the tests, with weights of their own, by a unit of each amount, (2 q, n)."""
-        model = self.beside.solution.model
-        moved = [
-            each.moved(self.shapes[:, points] * each.noise_free(model).measured, model)
-            for points, _, each in self.beside.parts(data_sets)
-        ]
-        return np.concatenate(moved, axis=-1)
-
     @cached_property
     def _spectrum(self) -> tuple[Array, Array]:
         """l and b^2 of the notes, (2 q,) each."""
@@ -241,13 +232,15 @@ class _Error:
         """The tests, with weights of their own, and the error that they share."""
         told = np.square(self.best[1]) * self._spectrum[0]
         freedom = float(np.sum(np.square(told / (1.0 + told))))
-        return Joined(tuple(data_sets), CommonError(self.best[1] * self.columns(data_sets)), max(freedom, 1.0))
+        beside = replace(self.beside, data_sets=data_sets)
+        error = CommonError(self.best[1] * beside.made(self.shapes), beside.seen)
+        return Joined(tuple(data_sets), error, max(freedom, 1.0))
 
     def data(self, size: float) -> Unnamed:
         """The error, of a size, as the tests leave it."""
-        columns = self.columns(self.beside.data_sets)
+        columns = self.beside.made(self.shapes)
         inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
-        value = (-inverse @ columns @ self.beside.solution.residual) @ self.shapes
+        value = (-inverse @ columns @ self.beside.seen.of(self.beside.solution.residual)) @ self.shapes
         root = np.linalg.cholesky(inverse).T @ self.shapes
         errors = np.linalg.norm(root.real, axis=0), np.linalg.norm(root.imag, axis=0)
         patches = []

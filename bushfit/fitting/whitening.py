@@ -137,4 +137,4 @@ def _gain_and_phase(deviation: Array) -> Array:
 
 def _flat(parts: Array) -> Array:
     """All gains, then all phases, (..., 2, n) -> (..., 2 n)."""
-    return parts.reshape(*parts.shape[:-2], -1)
+    return parts.reshape(*parts.shape[:-2], parts.shape[-2] * parts.shape[-1])

@@ -17,12 +17,16 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import SimulateSettings
+from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulateSettings
+from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.errors import FitError
+from bushfit.fitting.assess import Stage, covariance, linear_errors
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.data import Data
 from bushfit.fitting.fourier import basis
+from bushfit.fitting.model_error import told_of, with_model_error
 from bushfit.fitting.procedures import fit_joint
+from bushfit.fitting.robust import estimate
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
@@ -196,6 +200,46 @@ def test_neither_the_order_of_tests_nor_a_scale_of_force_matters(off_by_waves: t
 @given(st.integers(1, 5), st.integers(2, 9), st.integers(0, 2**31))
 def test_a_common_error_is_whitened(count: int, size: int, seed: int) -> None:
     columns = np.random.default_rng(seed).normal(size=(count, size)) * 10.0 ** np.arange(count)[:, None]
-    whitened = CommonError(columns).whiten(np.eye(size))
+    whitened = CommonError.of_all(columns).whiten(np.eye(size))
     whole = whitened @ (np.eye(size) + columns.T @ columns) @ whitened.T
     assert np.allclose(whole, np.eye(size), atol=1e-6)
+
+
+def test_intervals_beside_a_model_error_are_little_wider_than_were_its_size_known(
+    rig: Rig, paper_model: Model, shared_noise: SimulateSettings
+) -> None:
+    """What the error of its size adds is a few per cent where a dozen degrees of freedom tell it."""
+    data = Data.of(replace(spoiled(rig(paper_model, shared_noise, 3), waves(0.03, 3)), loops=()))
+    names, data_sets = list(FIVE), data.chosen(None)
+    plain = estimate(data.started(data.effects, data_sets, {}), data_sets, names, data.bounds)
+    found, error = with_model_error(plain, data.bounds)
+    assert error is not None
+    told = covariance(found.solution.model, [Stage(tuple(names), found.weighed)])
+    known = linear_errors(found.solution.jacobian) * found.solution.coordinates.slopes(found.solution.model.values)
+    ratios = [(told.stderr(name) or 0.0) / size for name, size in zip(names, known.tolist(), strict=True)]
+    print("standard errors over those of a known error: ", *(f"{ratio:.3f}" for ratio in ratios))
+    assert 0.99 < min(ratios) <= max(ratios) < 1.3
+
+
+@pytest.mark.parametrize("held", [(), ("m", "alpha", "sigma_fmax", "eps_half")], ids=["one on its bound", "no other"])
+def test_parameters_on_their_bounds_beside_a_model_error(
+    rig: Rig, paper_model: Model, shared_noise: SimulateSettings, held: tuple[str, ...]
+) -> None:
+    campaign = spoiled(rig(paper_model, shared_noise, 3), waves(0.03, 3))
+    given = {name: ParameterSetting(value=paper_model.values[name], vary=False) for name in held}
+    fit = FitSettings(parameters={**given, "mu": ParameterSetting(max=0.9 * paper_model.values["mu"])})
+    done = list[str]()
+    asked = None if held else (lambda name, _: done.append(name))
+    result = fit_joint(Data.of(replace(campaign, fit=fit)), profile=asked)
+    assert result.model_error is not None
+    assert done == ([] if held else list(FIVE))
+    assert result.at_bound == {"mu": "max"}
+    assert result.covariance.stderr("mu") is None
+    assert any("mu rests on the max given in [fit]" in line for line in result.warnings)
+
+
+def test_no_length_is_told_along_an_axis_that_the_tests_do_not_have() -> None:
+    rows = ((10.0, 10.0), (1e-3, 1e-2), (0.01, 0.02), (0.0, 0.0), (0.001, 0.001), (0.001, 0.001))
+    line = told_of(Unnamed(0.02, (0.4, 2.0), (Patch(("axial",), *rows),)))
+    assert "decades of strain" in line
+    assert "frequency" not in line
