@@ -42,7 +42,7 @@ class LoopData(DataSet):
             widens the errors of what is fitted, and bends no fit to meet the shape of a loop that a model misses.
         phase_error: standard deviation of the phase of the whole record [rad]; it widens errors and bends no fit.
         shape_error: standard deviation of the model's error of each part of harmonic h, over half the force range and
-            1/h^2, from the second on; 0 where noise is all that is counted.
+            1/h, from the second on; 0 where noise is all that is counted.
     """
 
     drive: Drive
@@ -237,7 +237,7 @@ class LoopData(DataSet):
         if self.shape_error and not self.fundamental_only:
             beyond = slice(3, len(self._waves))  # the first harmonic is part of the error of the stiffness
             order = np.repeat(np.arange(2, _SMOOTH_HARMONICS + 1), 2)[:, None]
-            waves = self._waves[beyond] * self._per_noise * (self.shape_error * self.drive.half_range / order**2)
+            waves = self._waves[beyond] * self._per_noise * (self.shape_error * self.drive.half_range / order)
             columns += list(self.drive.row_noise.whiten(waves) * self._told)
         return CommonError.of_all(np.array(columns)) if columns else None
 
