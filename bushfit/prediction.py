@@ -163,16 +163,16 @@ def _open_to(
     result: Result, model: Model, direction: Place, frequency: Array, amplitude: Array, stiffness: Array
 ) -> tuple[Array, Array]:
     """What a standard deviation of each part of what has no name does to the stiffness, (0 or 2, n), and the share of
-    the parameters' errors that counts beside it, (n,): among its nodes a correction mends what bent them. A model error
-    is not mended, and counts whole."""
-    found, every = model.unnamed or result.model_error, np.ones(frequency.size)
+    the parameters' errors that counts beside it, (n,): among its nodes, where errors are of both together, none of
+    them. A model error is told and not mended, so that it counts itself."""
+    found = model.unnamed or result.model_error
     if found is None:
-        return np.zeros((0, frequency.size)), every
+        return np.zeros((0, frequency.size)), np.ones(frequency.size)
     share, off, stands = found.at(model.setting(direction), 2.0 * np.pi * frequency, amplitude)
     parts = np.array([[1.0], [1.0j]])
     if model.unnamed:
         return parts * off * stiffness / (1.0 + share), np.sqrt(1.0 - np.square(stands))
-    return parts * np.hypot(off, [share.real, share.imag]) * stiffness, every
+    return parts * np.hypot(off, [share.real, share.imag]) * stiffness, np.sqrt(1.0 - np.square(stands))
 
 
 def _spanned(bands: Sequence[Band]) -> Band:

@@ -1,16 +1,15 @@
 """Model error: what a fit counts beside noise where the model misses the tests by more than that.
 
 A smooth error of the model bends its parameters to the quietest test if noise is all that weighs, and their intervals
-are far too narrow. Counted as what it is, tests weigh by what they can tell, and the parameters are those of the model
-nearest to the rubber over all tests.
+are far too narrow. Counted as what it is, tests weigh by what they can tell, and intervals are as wide as is true.
 
 Notes:
     The relative error c of the complex stiffness is a Gaussian process over ln frequency and ln strain, alike in phase
-    and in quadrature, which tests share (M. C. Kennedy, A. O'Hagan, J. R. Statist. Soc. B 63 (2001) 425-464). What the
-    parameters can do is none of it: it is orthogonal to the derivatives of ln K over the places of the tests, each
-    place counted once, however quiet its test (M. Plumlee, J. Am. Stat. Assoc. 112 (2017) 1274-1285). Its size and
-    lengths are those of most restricted likelihood (H. D. Patterson, R. Thompson, Biometrika 58 (1971) 545-554): with
-    columns U of the whitened residuals by its amounts, and the parameters projected out, twice the logarithm gains
+    and in quadrature, which tests share (M. C. Kennedy, A. O'Hagan, J. R. Statist. Soc. B 63 (2001) 425-464). It is
+    smooth over a decade at the most, as its prior has to say what it may not do (J. Brynjarsdottir, A. O'Hagan, Inverse
+    Problems 30 (2014) 114007): what is smoother is what the parameters are for. Its size and lengths are those of most
+    restricted likelihood (H. D. Patterson, R. Thompson, Biometrika 58 (1971) 545-554): with columns U of the whitened
+    residuals by its amounts, and the parameters projected out, twice the logarithm gains
     sum(v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l)) by a size v, l the eigenvalues of U^T P U and b the components of U^T P r
     along its eigenvectors.
 """
@@ -41,8 +40,9 @@ from bushfit.units import number
 
 #: Sizes tried, relative to |K|: from what the best rigs repeat to what no one calls a fit.
 _SIZES = np.geomspace(1e-3, 0.4, 25)
-#: Lengths tried, in ln frequency and ln strain: from next points apart to several decades.
-_LENGTHS = (0.4, 0.9, 2.0, 4.5)
+#: Lengths tried, in ln frequency and ln strain: from next points apart to a decade; the parameters are for what is
+#: smoother.
+_LENGTHS = (0.4, 0.9, 2.0)
 #: Odds beforehand of something smooth that the model lacks, against nothing; as `diagnose` has them.
 _ODDS = 0.2
 #: Gain of the logarithm of the likelihood by an error of middling lengths, up to which no others are tried; chosen: of
@@ -90,17 +90,26 @@ class _Beside:
         return np.log(np.concatenate(axes, axis=-1).T)
 
     @cached_property
+    def _moving(self) -> list[int]:
+        """Numbers of the parameters that rest on no bound."""
+        names = self.solution.coordinates.names
+        return [i for i, name in enumerate(names) if name not in self.solution.at_bound]
+
+    @property
+    def moving(self) -> Array:
+        """Derivatives of the residuals by coordinate of these, (k, n)."""
+        return self.solution.jacobian[self._moving]
+
+    @cached_property
     def slopes(self) -> Array:
         """Derivatives of ln K at the points by coordinate, of the parameters that rest on no bound, complex (k, p)."""
         model, coordinates = self.solution.model, self.solution.coordinates
-        names = [name for name in coordinates.names if name not in self.solution.at_bound]
-        found = []
+        names, found = [coordinates.names[i] for i in self._moving], []
         for each in self.data_sets:
             test = each.direction, each.frequency, each.amplitude
             stiffness, slopes = stiffness_and_slopes(model, *test, names, each.kind, each.circumstances)
             found.append(slopes / stiffness)
-        by_coordinate = coordinates.slopes(model.values)[[coordinates.names.index(name) for name in names]]
-        return np.concatenate(found, axis=-1) * by_coordinate[:, None]
+        return np.concatenate(found, axis=-1) * coordinates.slopes(model.values)[self._moving, None]
 
     @cached_property
     def seen(self) -> Seen:
@@ -193,14 +202,8 @@ class _Error:
 
     @cached_property
     def shapes(self) -> Array:
-        """The error at the points by a unit of each amount, in phase, then in quadrature, less what the parameters can
-        do, complex (2 q, p)."""
-        real, slopes, nodes = self.prior.shapes, self.beside.slopes, np.concatenate(self.prior.nodes)
-        left, size, right = np.linalg.svd(_in_parts(slopes[:, nodes]), full_matrices=False)
-        told = size > _SIZES[0] * np.sqrt(nodes.size)  # of the others a factor e is less than the least error
-        shapes = np.concatenate((real, 1j * real))
-        absorbed = _in_parts(shapes[:, nodes]) @ right[told].T / size[told] @ left[:, told].T
-        return shapes - absorbed @ slopes
+        """The error at the points by a unit of each amount, in phase, then in quadrature, complex (2 q, p)."""
+        return np.concatenate((self.prior.shapes, 1j * self.prior.shapes))
 
     @cached_property
     def _spectrum(self) -> tuple[Array, Array]:
@@ -238,11 +241,18 @@ class _Error:
 
     def data(self, size: float) -> Unnamed:
         """The error, of a size, as the tests leave it."""
-        columns = self.beside.made(self.shapes)
+        columns, rows = self.beside.made(self.shapes), self.beside.moving
         inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
         value = (-inverse @ columns @ self.beside.seen.of(self.beside.solution.residual)) @ self.shapes
-        root = np.linalg.cholesky(inverse).T @ self.shapes
-        errors = np.linalg.norm(root.real, axis=0), np.linalg.norm(root.imag, axis=0)
+        both = np.concatenate((columns, self.beside.seen.of(rows)))
+        information = both @ both.T
+        information[len(columns) :, len(columns) :] = rows @ rows.T  # loops tell more than by a change of stiffness
+        information[np.diag_indices(len(columns))] += 1.0 / size**2
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
+        known, vectors = np.linalg.eigh(information * np.outer(scale, scale))
+        root = (vectors / np.sqrt(np.maximum(known, _ROUNDING))).T * scale
+        whole = root @ np.concatenate((self.shapes, self.beside.slopes))
+        errors = np.linalg.norm(whole.real, axis=0), np.linalg.norm(whole.imag, axis=0)
         patches = []
         for group, nodes in zip(self.prior.groups, self.prior.nodes, strict=True):
             lists = (value[nodes].real, value[nodes].imag, *(error[nodes] for error in errors))
@@ -358,11 +368,5 @@ def told_of(error: Unnamed) -> str:
     over = f", smooth over {' and '.join(smooth)}," if smooth else ""
     return (
         "the model misses the data by more than their noise: a model error of "
-        f"{number(100.0 * error.typical, 2)} % of |K|{over} counts beside it, so the parameters are those of the model "
-        "nearest to the rubber over all tests"
+        f"{number(100.0 * error.typical, 2)} % of |K|{over} counts beside it, in all intervals and bands"
     )
-
-
-def _in_parts(rows: Array) -> Array:
-    """Real, then imaginary parts of complex rows, (..., p) -> (..., 2 p)."""
-    return np.concatenate((rows.real, rows.imag), axis=-1)
