@@ -72,8 +72,8 @@ def spoiled(campaign: Campaign, off: Off) -> Campaign:
 
 
 def meant(stiffness: Off) -> np.ndarray:
-    """What a stiffness still means whatever its law: ln |K| in the middle of the tests, and its slopes over ln frequency
-    and over ln amplitude."""
+    """What a stiffness means whatever its law: ln |K| in the middle of the tests, and its slopes over ln frequency and
+    ln amplitude."""
     grid = np.meshgrid(np.geomspace(5.0, 150.0, 9), np.geomspace(1e-4, 5e-4, 5))
     frequency, amplitude = (axis.ravel() for axis in grid)
     axes = [np.log(axis) - np.mean(np.log(axis)) for axis in (frequency, amplitude)]
@@ -138,8 +138,8 @@ def test_bands_hold_a_rubber_that_is_not_quite_the_model(
     each = " ".join(f"{share:.2f}" for share in np.mean(inside, axis=0))
     print(
         f"{100 * size:g} % off, {'with' if loops else 'without'} a loop: counted in {counted} of {len(shares)}; bands "
-        f"hold {bands[0]:.3f} +- {errors[0]:.3f} of |K|, {bands[1]:.3f} +- {errors[1]:.3f} of the loss factor; intervals "
-        f"of |K| in the middle and of its two slopes hold {each}"
+        f"hold {bands[0]:.3f} +- {errors[0]:.3f} of |K|, {bands[1]:.3f} +- {errors[1]:.3f} of the loss factor; "
+        f"intervals of |K| in the middle and of its two slopes hold {each}"
     )
     if size >= 0.02:
         assert counted >= 0.8 * seeds
