@@ -46,7 +46,7 @@ _LENGTHS = (0.4, 0.9, 2.0)
 #: Odds beforehand of something smooth that the model lacks, against nothing; as `diagnose` has them.
 _ODDS = 0.2
 #: Gain of the logarithm of the likelihood by an error of middling lengths, up to which no others are tried; chosen: of
-#: clean tests nine in ten stay below.
+#: clean campaigns three in four stay below.
 _SHOWS = 0.5
 #: Difference of the logarithm of the likelihood from the best, beyond which an error is tried no more.
 _FAR = 12.0
