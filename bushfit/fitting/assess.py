@@ -84,23 +84,21 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     spread = [carried @ part @ carried.T for part in held.spread]
     pairs = zip(stages, bases, strict=True)
     influences = [together(stage.data_sets, reaction[:, own] @ basis) for stage, (own, basis) in pairs]
-    matrix = by_value @ by_value.T + sum(_of_loops(*each) for each in zip(stages, influences, strict=True))
+    matrix = by_value @ by_value.T + sum(_of_gains(*each) for each in zip(stages, influences, strict=True))
     for part, lost in _unsure(stages, influences, [basis for _, basis in bases]):
         spread.append(part)
         matrix = matrix + 2.0 * _positive(lost, np.sqrt(np.diag(matrix)))
     return Covariance(names, matrix, tuple(spread))
 
 
-def _of_loops(stage: Stage, influence: Array) -> Array:
-    """What errors of loops that do not weigh add to the covariance, (k, k), by the influence of residuals, (k, n)."""
+def _of_gains(stage: Stage, influence: Array) -> Array:
+    """What errors of gains that do not weigh add to the covariance, (k, k), by the influence of residuals, (k, n)."""
     ends = np.cumsum([0, *(data_set.size for data_set in stage.data_sets)])
     added = np.zeros((len(influence), len(influence)))
     for data_set, first, last in zip(stage.data_sets, ends[:-1], ends[1:], strict=True):
-        if isinstance(data_set, LoopData):
-            errors = [0.0 if data_set.gain_weighs else data_set.gain_error, data_set.phase_error]
-            for error, unit in zip(errors, (data_set.gain_and_offset()[0], data_set.unit_phase), strict=True):
-                moved = error * (influence[:, first:last] @ unit)
-                added += np.outer(moved, moved)
+        if isinstance(data_set, LoopData) and not data_set.gain_weighs:
+            moved = data_set.gain_error * (influence[:, first:last] @ data_set.gain_and_offset()[0])
+            added += np.outer(moved, moved)
     return added
 
 

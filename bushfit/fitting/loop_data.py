@@ -40,7 +40,6 @@ class LoopData(DataSet):
         gain_error: standard deviation of the gain of the whole record, by the class of its rig.
         gain_weighs: whether it is part of the noise, as where [rig] states the class. A gain that is only assumed
             widens the errors of what is fitted, and bends no fit to meet the shape of a loop that a model misses.
-        phase_error: standard deviation of the phase of the whole record [rad]; it widens errors and bends no fit.
         shape_error: standard deviation of the model's error of each part of harmonic h, over half the force range and
             1/h, from the second on; 0 where noise is all that is counted.
     """
@@ -50,7 +49,6 @@ class LoopData(DataSet):
     fundamental_only: bool = False
     gain_error: float = 0.0
     gain_weighs: bool = False
-    phase_error: float = 0.0
     shape_error: float = 0.0
     beside: str | None = None
     kind = "loop"
@@ -263,11 +261,6 @@ class LoopData(DataSet):
         smooth = waves @ np.linalg.lstsq(waves[counted], self.drive.force[counted], rcond=None)[0]
         rows = self.drive.row_noise.whiten(smooth * self._per_noise) * self._told
         return self._counted(rows)
-
-    @property
-    def unit_phase(self) -> Array:
-        """What a unit of phase [rad] makes of the residuals, (n,): of the first harmonic, nearly all of a force."""
-        return np.array([-self.measured[0].imag, self.measured[0].real]) @ self._unit_changes
 
     @cached_property
     def _fundamental(self) -> Array:

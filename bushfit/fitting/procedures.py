@@ -97,7 +97,6 @@ def fit_joint(
     found, error = with_model_error(found, data.bounds, data.campaign.rig)
     if counts and not error:
         loops, sweeps = parted(data_sets)
-        loops = [_as_levels(loop, errors.error) for loop in loops] if errors.matters else loops
         data_sets = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
         found = _solve(data, data_sets, effects, {}, found.solution.model)
     notes = [_LEVELS.format(words_of(errors.error))] if errors.matters and not at_limit and not error else []
@@ -108,11 +107,6 @@ def fit_joint(
         return result
     intervals = profile95(found.solution, found.minimised, result.covariance, data.bounds, profile)
     return replace(result, profile=intervals)
-
-
-def _as_levels(loop: LoopData, error: tuple[float, float]) -> LoopData:
-    """A loop that is as far off as levels of sweeps are where these disagree: it is of the same rig and rubber."""
-    return replace(loop, gain_error=max(loop.gain_error, error[0]), phase_error=error[1])
 
 
 def fit_static(data: Data, springpot: Result | None = None) -> Result:

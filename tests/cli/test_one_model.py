@@ -136,8 +136,9 @@ def test_what_gives_way_in_one_direction_or_in_all_is_a_set_where_it_is_equal(
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     (leader,) = document["effects"]
-    assert [leader["name"], *leader["alternatives"]] == sets
+    named = [leader["name"], *leader["alternatives"]]  # of equals either may lead
+    assert sorted(named) == sorted(sets)
     assert document["verdict"] == ("ambiguous" if leader["alternatives"] else "named")
     assert ("sleeve_compliance" in str(model_of(tmp_path / "found")["effects"])) == (document["verdict"] == "named")
     if leader["alternatives"]:
-        assert re.search(rf"--rivals {','.join(sets)} ", document["next_test"])
+        assert re.search(rf"--rivals {','.join(named)} ", document["next_test"])
