@@ -24,20 +24,14 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut, Part
 from bushfit.diagnosis.terms import Terms
 from bushfit.effects.contract import Array
-from bushfit.effects.unnamed import Patch, Unnamed, correlation, in_lengths, kernel, nodes_among, peak_at
+from bushfit.effects.unnamed import Patch, Unnamed, basis, in_lengths, peak_at
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.data_sets import DataSet, parted
 
-#: Nodes of a patch at most; chosen: all points of the paper's plan, and little time.
-_MOST_NODES = 100
 #: Lengths tried, in ln frequency and ln motion: from next points apart to the same everywhere.
 _LENGTHS = (0.4, 0.9, 2.0, 4.5)
 #: Tilts tried, of ln frequency by ln motion: what goes by the rate of strain moves so, and a time that strain changes.
 _TILTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
-#: Patterns over the nodes at most, and the variance of one, relative to the largest, that counts; chosen for time.
-_MOST, _LEAST_VARIANCE = 30, 1e-5
-#: Digits of the logarithms of points that tell them apart.
-_DIGITS = 6
 #: Frequencies of the sweeps between which a peak is looked for, at least; chosen.
 _FEWEST = 6
 #: Peaks tried along each axis, and times that they are tried anew, closer about the best; chosen: to 1 % of the middle.
@@ -146,14 +140,11 @@ class _Process:
         terms, found = self.both[0], []
         for group in self.directions:
             inside = np.flatnonzero(np.isin(terms.directions, group))
-            distinct = inside[np.unique(terms.points[inside].round(_DIGITS), axis=0, return_index=True)[1]]
-            own = distinct[nodes_among(terms.points[distinct], _MOST_NODES)]
-            places = in_lengths(terms.points, self.lengths, self.tilt)
-            size, vectors = np.linalg.eigh(correlation(places[own]))
-            kept = (size > _LEAST_VARIANCE * size[-1]) & (np.arange(size.size) >= size.size - _MOST)  # the largest last
-            near = kernel(places[inside], places[own]) @ vectors[:, kept] / np.sqrt(size[kept])
-            peak = peak_at(self.peak, terms.points[own], terms.points[inside])
-            here = np.zeros((len(places), near.shape[1] + peak.shape[1]), dtype=complex)
+            points = terms.points[inside]
+            nodes, near = basis(in_lengths(points, self.lengths, self.tilt), points)
+            own = inside[nodes]
+            peak = peak_at(self.peak, terms.points[own], points)
+            here = np.zeros((len(terms.points), near.shape[1] + peak.shape[1]), dtype=complex)
             here[inside] = np.concatenate((near, peak), axis=1)
             found.append((own, here))
         return found

@@ -9,7 +9,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.correction import Correction, correct
 from bushfit.diagnosis.currency import Ledger
 from bushfit.diagnosis.document import Description
-from bushfit.diagnosis.evidence import Evidence, fit_from
+from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import unnamed
 from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
 from bushfit.diagnosis.locate import locate
@@ -18,6 +18,7 @@ from bushfit.effects.unnamed import NAME
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import Bounds, jacobian, residual
 from bushfit.fitting.data_sets import parted
+from bushfit.fitting.design import fit_from
 from bushfit.model.covariance import Z95
 from bushfit.units import number
 

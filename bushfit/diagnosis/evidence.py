@@ -13,7 +13,7 @@ from bushfit.fitting.assess import Stage, apart_in_temperature, covariance, meas
 from bushfit.fitting.coordinates import Bounds, Solution
 from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.data_sets import sources
-from bushfit.fitting.descent import Descent
+from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import told_of, with_model_error
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.robust import Estimate
@@ -100,11 +100,6 @@ def fit(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds:
     """
     descent = fit_from(model, data_sets, held, bounds).finished(EVALUATIONS)
     return Evidence(descent.solution, tuple(data_sets))
-
-
-def fit_from(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
-    """The same fit before its first step."""
-    return Descent.start(model, data_sets, [name for name in model.parameters if name not in held], bounds)
 
 
 def result_of(evidence: Evidence, bounds: Bounds, told: Collection[str], *, lacking: bool = True) -> Result:

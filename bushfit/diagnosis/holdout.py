@@ -169,7 +169,7 @@ class _Fitted:
     @classmethod
     def of(cls, evidence: Evidence) -> _Fitted:
         solution = evidence.solution
-        free = [i for i, name in enumerate(solution.coordinates.names) if name not in solution.at_bound]
+        free = solution.moving
         return cls(evidence, free, LeaveOut.of(solution.jacobian[free], solution.residual))
 
     def predicted(self, part: Part, bounds: Bounds) -> tuple[Array, Array] | Skipped:

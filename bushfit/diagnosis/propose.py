@@ -12,13 +12,13 @@ from itertools import product
 
 import numpy as np
 
-from bushfit.diagnosis.evidence import Evidence, fit_from
+from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects import Branch, Effect, at_places, qualified, twins_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
-from bushfit.fitting.design import probes
+from bushfit.fitting.design import fit_from, probes
 from bushfit.model.model import Model
 
 #: Share of a unit sensitivity that the model's own parameters must leave for it to count as visible.

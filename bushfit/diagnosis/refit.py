@@ -5,14 +5,14 @@ from contextlib import suppress
 
 import numpy as np
 
-from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit_from
+from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
 from bushfit.diagnosis.propose import Proposal
 from bushfit.effects import qualified
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
-from bushfit.fitting.design import probes
+from bushfit.fitting.design import fit_from, probes
 from bushfit.model.model import Model
 
 #: Chi-square beyond that of the best at which a refit is left on its way.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.claims import adopted
 from bushfit.diagnosis.condense import condensed
-from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit_from
+from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
 from bushfit.diagnosis.explanations import meetings
 from bushfit.diagnosis.hypotheses import Asked
 from bushfit.diagnosis.record import Diagnosis, Settings
@@ -20,6 +20,7 @@ from bushfit.effects import effect_named, qualified
 from bushfit.effects.mistakes import candidate_named, mistake_named
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import parted, with_gains
+from bushfit.fitting.design import fit_from
 from bushfit.fitting.robust import estimate, outliers_at, told
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier

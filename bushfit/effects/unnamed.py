@@ -220,11 +220,15 @@ def nodes_among(points: Array, most: int) -> Array:
     return np.array(chosen)
 
 
-def basis(places: Array) -> tuple[Array, Array]:
+def basis(places: Array, among: Array | None = None) -> tuple[Array, Array]:
     """Some places, in units of the kernel's lengths, (p, 2), to be nodes: all or those farthest apart, their indices,
-    (m,); and what independent amounts of unit variance make of the process at all places, (p, q)."""
-    distinct = np.unique(places.round(_DIGITS), axis=0, return_index=True)[1]
-    own = distinct if distinct.size <= _MOST_NODES else distinct[nodes_among(places[distinct], _MOST_NODES)]
+    (m,); and what independent amounts of unit variance make of the process at all places, (p, q).
+
+    `among` are the same places as they are told apart, in other units.
+    """
+    among = places if among is None else among
+    distinct = np.unique(among.round(_DIGITS), axis=0, return_index=True)[1]
+    own = distinct if distinct.size <= _MOST_NODES else distinct[nodes_among(among[distinct], _MOST_NODES)]
     size, vectors = np.linalg.eigh(correlation(places[own]))
     kept = (size > _LEAST_VARIANCE * size[-1]) & (np.arange(size.size) >= size.size - _MOST)  # the largest last
     return own, kernel(places, places[own]) @ vectors[:, kept] / np.sqrt(size[kept])

@@ -12,7 +12,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Solution, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, SweepData
-from bushfit.fitting.joined import Joined, in_noise
+from bushfit.fitting.joined import Joined
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Usable
 from bushfit.model.sensitivity import stiffness_and_slopes
@@ -166,7 +166,7 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
 
     The tests have the weights at which the solution is the least sum of squares; `left` are others.
     """
-    free = [i for i, name in enumerate(solution.coordinates.names) if name not in solution.at_bound]
+    free = solution.moving
     whole, begin = _left_out(solution, data_sets, free), 0
     found: dict[str, list[_Off]] = {}
     for data_set in data_sets:
@@ -190,7 +190,7 @@ def _left_out(solution: Solution, data_sets: Sequence[DataSet], free: Sequence[i
     tests share stand behind them."""
     if not isinstance(data_sets, Joined):
         return LeaveOut.of(solution.jacobian[free], solution.residual)
-    own = in_noise(data_sets)
+    own = data_sets.data_sets
     names = [solution.coordinates.names[i] for i in free]
     left = np.pad(residual(solution.model, own), (0, len(data_sets.error.columns)))
     return LeaveOut.of(data_sets.beside(jacobian(solution.model, own, names)), left)

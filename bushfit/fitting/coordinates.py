@@ -98,6 +98,11 @@ class Solution:
         return float(np.sum(np.square(left[:, seen].T @ self.residual)))
 
     @property
+    def moving(self) -> list[int]:
+        """Numbers of the parameters that rest on no bound."""
+        return [i for i, name in enumerate(self.coordinates.names) if name not in self.at_bound]
+
+    @property
     def flat(self) -> bool:
         """Whether the next step would lower chi-square, in units of the misfit's variance, no more than chance does."""
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)

@@ -41,7 +41,7 @@ def designed(model: Model, plain: Model, data_sets: Sequence[DataSet], held: Seq
     added = [effect_named(name) for name in model.effects if name not in plain.effects]
     ends = []
     with suppress(FitError, ModelError):  # no response, or too few points; the fit then says what is wrong
-        ends.append(_start(model, data_sets, held, bounds).finished(_MOST).solution)
+        ends.append(fit_from(model, data_sets, held, bounds).finished(_MOST).solution)
         solution = solve(plain, data_sets, _free(plain, held), bounds, evaluations=_MOST, strict=False)
         for effect in added:
             solution = with_effect(solution, data_sets, effect, held, bounds)
@@ -62,14 +62,15 @@ def with_effect(
     fits = []
     for start in _starts(solution.model, data_sets, effect):
         with suppress(FitError, ModelError):  # no response from this start
-            fits.append(_start(start, data_sets, held, bounds).finished(_FIRST))
+            fits.append(fit_from(start, data_sets, held, bounds).finished(_FIRST))
     if not fits:
         raise FitError("the model has no finite response to these tests", found=effect.name)
     best = sorted(fits, key=lambda each: each.chi_square)[:_BEST]
     return min((each.finished(_MOST) for each in best), key=lambda each: each.chi_square).solution
 
 
-def _start(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
+def fit_from(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
+    """A fit of every parameter of a model but the held ones, from its own values, before its first step."""
     return Descent.start(model, data_sets, _free(model, held), bounds)
 
 

@@ -44,8 +44,3 @@ class Joined(Sequence[DataSet]):
         amounts beforehand as q more residuals, (k + q, n + q)."""
         k, columns = len(jacobian), self.error.seen.back(self.error.columns)
         return np.block([[jacobian, np.zeros((k, len(columns)))], [columns, np.eye(len(columns))]])
-
-
-def in_noise(data_sets: Sequence[DataSet]) -> Sequence[DataSet]:
-    """The same tests, each by itself, with noise alone."""
-    return data_sets.data_sets if isinstance(data_sets, Joined) else data_sets

@@ -89,27 +89,21 @@ class _Beside:
         axes = [(each.frequency, each.amplitude * unit_strain(each.direction)) for each in self.data_sets]
         return np.log(np.concatenate(axes, axis=-1).T)
 
-    @cached_property
-    def _moving(self) -> list[int]:
-        """Numbers of the parameters that rest on no bound."""
-        names = self.solution.coordinates.names
-        return [i for i, name in enumerate(names) if name not in self.solution.at_bound]
-
     @property
     def moving(self) -> Array:
-        """Derivatives of the residuals by coordinate of these, (k, n)."""
-        return self.solution.jacobian[self._moving]
+        """Derivatives of the residuals by coordinate of the parameters that rest on no bound, (k, n)."""
+        return self.solution.jacobian[self.solution.moving]
 
     @cached_property
     def slopes(self) -> Array:
         """Derivatives of ln K at the points by coordinate, of the parameters that rest on no bound, complex (k, p)."""
         model, coordinates = self.solution.model, self.solution.coordinates
-        names, found = [coordinates.names[i] for i in self._moving], []
+        names, found = [coordinates.names[i] for i in self.solution.moving], []
         for each in self.data_sets:
             test = each.direction, each.frequency, each.amplitude
             stiffness, slopes = stiffness_and_slopes(model, *test, names, each.kind, each.circumstances)
             found.append(slopes / stiffness)
-        return np.concatenate(found, axis=-1) * coordinates.slopes(model.values)[self._moving, None]
+        return np.concatenate(found, axis=-1) * coordinates.slopes(model.values)[self.solution.moving, None]
 
     @cached_property
     def seen(self) -> Seen:
@@ -309,9 +303,8 @@ def log_likelihood(found: Estimate, known: Mapping[str, float]) -> float:
         known: precision beforehand of parameters, by coordinate; of the others it is 0.
     """
     solution, tests = found.solution, found.minimised
-    moving = [i for i, name in enumerate(solution.coordinates.names) if name not in solution.at_bound]
-    rows = solution.jacobian[moving]
-    beforehand = [known.get(solution.coordinates.names[i], 0.0) for i in moving]
+    rows = solution.jacobian[solution.moving]
+    beforehand = [known.get(solution.coordinates.names[i], 0.0) for i in solution.moving]
     size = sum(loop.log_size for loop in parted(tests)[0]) + (
         tests.error.log_size if isinstance(tests, Joined) else 0.0
     )

@@ -101,6 +101,7 @@ def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed: C
         low, value, high = (float(row[f"stiffness axial 25 Hz 0.1 mm [N/mm]{end}"]) for end in (", low", "", ", high"))
         assert low < value < high
         assert float(row["loss factor torsion 10 Hz 1 deg [-]"]) > 0
+    assert sum(bool(row["mu [MPa], std error"]) for row in table) >= 3
     summary = json.loads(done.stdout)
     assert (summary["rows"], summary["done"], summary["failed"]) == (5, 5, [])
     values = sorted(float(row["mu [MPa]"]) for row in table)

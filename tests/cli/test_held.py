@@ -77,7 +77,7 @@ def test_a_parameter_on_a_bound_shows_no_interval(bushfit: Run, work: Path, tmp_
     done = bushfit("fit", "configs/falling.toml", "-o", str(tmp_path / "x"), "--no-plots")
     assert done.returncode == 0, done.stderr
     result = load_result(tmp_path / "x" / "model.json")
-    assert result.at_bound
+    assert result.at_bound["m"] == "min"
     for name, end in result.at_bound.items():
         (row,) = [line for line in done.stderr.splitlines() if line.split()[:1] == [name]]
         assert row.split()[:3] == [name, "(at", f"{end})"]
