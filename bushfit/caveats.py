@@ -10,13 +10,15 @@ from bushfit.effects.contract import Array
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
-from bushfit.units import number, told
+from bushfit.units import CELSIUS, number, told
 
 #: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
 #: set points by less.
 MARGIN = 0.01
 #: Share by which a finite bulk modulus lowers the radial stiffness, from which that is said: that of the other errors.
 _NOTED_LOWERING = 0.01
+#: Beyond the tested temperatures by more than this [K] a prediction is an extrapolation: chambers keep to less.
+_SAME_TEMPERATURE = 2.0
 #: Relative difference of two stiffnesses that is none.
 _SAME = 1e-6
 
@@ -123,7 +125,7 @@ def of_points(
     or was measured otherwise, (n,)."""
     frequency, amplitude, stiffness = at
     yield from unfitted(result, place)
-    yield from extrapolations(result, place, frequency, amplitude)
+    yield from extrapolations(result, place, frequency, amplitude, temperature)
     known = set() if temperature is None else {"temperature"}
     effects = result.model.without(Level.INSTRUMENT).records
     yield from (effect.taken for effect in effects if effect.taken and not known & {*effect.under})
@@ -144,9 +146,14 @@ def percent_off(ratio: Array) -> str:
 
 
 def extrapolations(
-    result: Result, direction: Place, frequency: Array, amplitude: Array, what: str | None = None
+    result: Result,
+    direction: Place,
+    frequency: Array,
+    amplitude: Array,
+    temperature: float | None = None,
+    what: str | None = None,
 ) -> Iterator[str]:
-    """A warning for the frequencies and one for the strains of what is predicted where they leave what was fitted."""
+    """A warning each for frequencies, strains and the temperature [K] of a prediction that leave what was fitted."""
     if result.measured is None:
         return
     percent = 100.0 * result.model.unit_strain(direction)
@@ -154,6 +161,11 @@ def extrapolations(
         ("frequencies", "Hz", 3, frequency, result.measured.frequency),
         ("strains", "%", 2, percent * amplitude, [100.0 * end for end in result.measured.strain]),
     )
+    if temperature and (tested := result.measured.temperature):
+        asked_for, *ends = (number(kelvin - CELSIUS, 3) for kelvin in (temperature, *tested))
+        if not tested[0] - _SAME_TEMPERATURE <= temperature <= tested[1] + _SAME_TEMPERATURE:
+            there = f"predicted at {asked_for} degC, but fitted at {' to '.join(dict.fromkeys(ends))} degC only"
+            yield f"{what or direction}: {there}: extrapolated by the law of Williams, Landel and Ferry"
     for axis, unit, digits, asked, (low, high) in axes:
         if asked.min() < low * (1 - MARGIN) or asked.max() > high * (1 + MARGIN):
             here, there = (told(unit, *ends, digits=digits) for ends in ((asked.min(), asked.max()), (low, high)))

@@ -16,7 +16,7 @@ import numpy as np
 
 from bushfit.caveats import MARGIN, extrapolations, of_points, unfitted
 from bushfit.effects import Level
-from bushfit.effects.contract import Array, Circumstances
+from bushfit.effects.contract import Array, Circumstances, Setting
 from bushfit.errors import ModelError
 from bushfit.fitting.data_sets import SweepData
 from bushfit.geometry import TRANSLATION, Place
@@ -138,7 +138,7 @@ def _predicted(
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)
     stiffness, slopes = stiffness_and_slopes(model, direction, frequency, amplitude, names, under=under)
-    open_to, beyond = _open_to(result, model, direction, frequency, amplitude, stiffness)
+    open_to, beyond = _open_to(result, model, model.setting(direction, under=under), frequency, amplitude, stiffness)
     count, slopes = len(names), np.concatenate((slopes, open_to))
 
     def band(value: Array, slope: Array) -> Band:
@@ -160,7 +160,7 @@ def _predicted(
 
 
 def _open_to(
-    result: Result, model: Model, direction: Place, frequency: Array, amplitude: Array, stiffness: Array
+    result: Result, model: Model, setting: Setting, frequency: Array, amplitude: Array, stiffness: Array
 ) -> tuple[Array, Array]:
     """What a standard deviation of each part of what has no name does to the stiffness, (0 or 2, n), and the share of
     the parameters' errors that counts beside it, (n,): among its nodes, where errors are of both together, none of
@@ -168,7 +168,7 @@ def _open_to(
     found = model.unnamed or result.model_error
     if found is None:
         return np.zeros((0, frequency.size)), np.ones(frequency.size)
-    share, off, stands = found.at(model.setting(direction), 2.0 * np.pi * frequency, amplitude)
+    share, off, stands = found.at(setting, 2.0 * np.pi * frequency, amplitude)
     parts = np.array([[1.0], [1.0j]])
     if model.unnamed:
         return parts * off * stiffness / (1.0 + share), np.sqrt(1.0 - np.square(stands))
@@ -261,7 +261,10 @@ def predict_resonance(
     found, if_rigs = shaken(bushings), shaken(others[-1]) if others else None
     near = np.abs(found.transmissibility) >= min(_NEAR_PEAK, found.peak[1])
     what = f"{place}, resonance of {number(mass, 3)} kg"
-    told = [*unfitted(result, place), *extrapolations(result, place, frequency[near], found.amplitude[near], what)]
+    told = [
+        *unfitted(result, place),
+        *extrapolations(result, place, frequency[near], found.amplitude[near], temperature, what),
+    ]
     if if_rigs:
         there, largest = (number(each, 4) for each in if_rigs.peak)
         told.append(f"{what}: at {there} Hz, |T| {largest}, if {' and '.join(result.unresolved)} is the rig's")

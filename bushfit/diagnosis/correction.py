@@ -185,8 +185,9 @@ class _Process:
         for names, (nodes, each), amounts in zip(self.directions, self._patches, own, strict=True):
             smooth, peak = np.split(amounts, [each.shape[1] - strengths], axis=1)
             values = smooth @ each[nodes, : smooth.shape[1]].real.T
-            lists = (*np.exp(self.both[0].points[nodes].T), *values, *errors[:, nodes], *peak)
-            patches.append(Patch(names, *(tuple(one.tolist()) for one in lists)))
+            lists = (*np.exp(self.both[0].points[nodes].T), *values, *errors[:, nodes])
+            strength = zip(("peak_in_phase", "peak_in_quadrature"), map(tuple, peak.tolist()), strict=True)
+            patches.append(Patch(names, *(tuple(one.tolist()) for one in lists), **dict(strength)))
         size = self._with_it.worths[0].likeliest
         data = Unnamed(size, self.lengths, tuple(patches), self.tilt, self.peak)
         return Correction(data, self._held_out(size), error / gap)

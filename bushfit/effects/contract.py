@@ -158,6 +158,7 @@ class Condition:
         omega: angular frequency [rad/s].
         amplitude, strain: of the displacement [m or rad], and the equivalent strain amplitude [1].
         stiffness: complex stiffness of the bushing [N/m or N m/rad] by parameter values.
+        moduli: names of the rubber's moduli and stresses, which go up and down together with its stiffness.
     """
 
     setting: Setting
@@ -165,6 +166,7 @@ class Condition:
     amplitude: Array
     strain: Array
     stiffness: Callable[[Values], Array]
+    moduli: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,10 +269,12 @@ class Modifier(Effect):
 
     Args:
         adjust: (values, condition) -> the changed values only.
+        pace: (values, circumstances) -> how many times as fast a motion is on the rubber's own time scale; 1 without.
     """
 
     level: Level = Level.MATERIAL
     adjust: Callable[[Values, Condition], dict[str, Value]]
+    pace: Callable[[Values, Circumstances], Value] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

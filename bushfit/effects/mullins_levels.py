@@ -7,7 +7,7 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """mu, m, sigma_fmax times 1 - share erf(1 - (e0/e_max)^2), e_max the largest strain amplitude so far.
+    """All moduli and stresses times 1 - share erf(1 - (e0/e_max)^2), e_max the largest strain amplitude so far.
 
     Where it is not known what went before, no larger one did, and nothing changes.
     """
@@ -16,4 +16,4 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
         return {}
     largest = np.maximum(condition.strain, before)
     ratio = np.divide(condition.strain, largest, out=np.ones(np.shape(largest)), where=largest > 0.0)
-    return scaled_values(p, ("mu", "m", "sigma_fmax"), 1.0 - p["share"] * erf(1.0 - np.square(ratio)))
+    return scaled_values(p, condition.moduli, 1.0 - p["share"] * erf(1.0 - np.square(ratio)))

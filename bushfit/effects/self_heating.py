@@ -6,10 +6,10 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """mu, m and sigma_fmax divided by 1 + beta P, P = pi f X^2 K'' of the unheated bushing [W].
+    """All moduli and stresses divided by 1 + beta P, P = pi f X^2 K'' of the unheated bushing [W].
 
     In torsion X is the rotation [rad] and K'' the loss stiffness [N m/rad].
     """
     loss = np.imag(condition.stiffness(p))
     power = 0.5 * np.asarray(condition.omega) * np.asarray(condition.amplitude) ** 2 * loss
-    return scaled_values(p, ("mu", "m", "sigma_fmax"), 1.0 / (1.0 + p["beta"] * power))
+    return scaled_values(p, condition.moduli, 1.0 / (1.0 + p["beta"] * power))

@@ -2,20 +2,39 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Condition, Value, Values, scaled_values
+from bushfit.effects.contract import Array, Circumstances, Condition, Value, Values, scaled_values
 from bushfit.units import CELSIUS
 
 #: Temperature at which all values are unchanged [K]: that of laboratories, ISO 23529, so that a model stands by itself.
 REFERENCE = 23.0 + CELSIUS
-#: Distance from the reference up to which the law holds [K]; rubber measured from -10 to 53 degC keeps no single alpha.
-REACH = 15.0
+#: c1 and c2 [K] of a_T above the glass transition, the same for most polymers (Williams, Landel, Ferry, 1955).
+_C1, _C2 = 17.44, 51.6
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """mu, m, sigma_fmax times exp(-softening dT), m also a_T^alpha = exp(-alpha shift dT), dT from 23 degC."""
+    """mu times T/T0, all other moduli and stresses times exp(-softening dT), dT = T - T0, T0 = 23 degC."""
     temperature = condition.setting.under.temperature
     if temperature is None:
         return {}
-    above = np.asarray(temperature) - REFERENCE
-    changed = scaled_values(p, ("mu", "m", "sigma_fmax"), np.exp(-p["softening"] * above))
-    return {**changed, **scaled_values(changed, ("m",), np.exp(-p["alpha"] * p["shift"] * above))}
+    warmer, ratio = np.asarray(temperature) - REFERENCE, np.asarray(temperature) / REFERENCE
+    others = tuple(name for name in condition.moduli if name != "mu")
+    spring = scaled_values(p, ("mu",), ratio)
+    return {**spring, **scaled_values(p, others, np.exp(-p["softening"] * warmer))}
+
+
+def pace(p: Values, under: Circumstances) -> Value:
+    """The shift factor a_T: a motion at w in rubber at T is one at w a_T in rubber at 23 degC; 1 where T is unknown."""
+    return 1.0 if under.temperature is None else np.exp(log_shift(p["shift"], np.asarray(under.temperature)))
+
+
+def log_shift(shift: Value, temperature: Array) -> Array:
+    """ln a_T = -shift dT c2/(c2 + dT), shift its slope at 23 degC [1/K]: the law of Williams, Landel and Ferry.
+
+    Notes:
+        With their constants at the glass transition Tg the slope tells how far that lies below: c2 = 51.6 K + T0 - Tg
+        and shift = ln 10 * 17.44 * 51.6 K/c2^2. At c2 = T0 it is Arrhenius' law, the limit far above Tg, of all
+        smaller shifts. Below Tg the law ends; there ln a_T goes on in proportion to dT.
+    """
+    slope = np.maximum(np.asarray(shift, dtype=float), np.log(10.0) * _C1 * _C2 / REFERENCE**2)
+    c2, warmer = np.sqrt(np.log(10.0) * _C1 * _C2 / slope), temperature - REFERENCE
+    return -shift * warmer * c2 / np.maximum(c2 + warmer, _C2)

@@ -16,6 +16,7 @@ import numpy as np
 from bushfit import geometry
 from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Setting, StiffnessBelow, Values, harmonic_response
 from bushfit.effects.history import History
+from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.validation import Name, Number
 
@@ -38,23 +39,38 @@ _FADES = 0.5
 #: corrected where the tests end.
 _DEVIATIONS = 2.0
 
+#: Kelvin that count as a neper of frequency, beyond which the rubber is another one: of most, near room temperature,
+#: the time scale shifts by as much in 8 to 20 K.
+_KELVIN = 10.0
+
 Row = tuple[Number, ...]
 
 
 def kernel(one: Array, other: Array) -> Array:
-    """Matern 5/2 correlation of points in units of the kernel's lengths, (..., n, 2) and (m, 2) -> (..., n, m)."""
+    """Matern 5/2 correlation of points in units of the kernel's lengths, (..., n, d) and (m, d) -> (..., n, m)."""
     distance = np.sqrt(5.0) * np.linalg.norm(one[..., :, None, :] - other, axis=-1)
     return (1.0 + distance + np.square(distance) / 3.0) * np.exp(-distance)
 
 
 def correlation(nodes: Array) -> Array:
-    """Correlation of nodes, in units of the kernel's lengths, (m, 2) -> (m, m), invertible."""
+    """Correlation of nodes, in units of the kernel's lengths, (m, d) -> (m, m), invertible."""
     return kernel(nodes, nodes) + _JITTER * np.eye(len(nodes))
 
 
 def in_lengths(points: Array, lengths: Sequence[float], tilt: float) -> Array:
-    """ln f + tilt ln e and ln e in units of the kernel's lengths, by ln f and ln e, (..., 2)."""
-    return (points + tilt * points[..., 1:] * (1.0, 0.0)) / lengths
+    """ln f + tilt ln e, ln e and temperature in units of the kernel's lengths, by `places_of`, (..., 2 or 3)."""
+    along, across = lengths
+    moved = points + tilt * points[..., 1:2] * np.eye(points.shape[-1])[0]
+    return moved / (along, across, along)[: points.shape[-1]]
+
+
+def places_of(frequency: Array, strain: Array, temperature: Array | None = None) -> Array:
+    """Where a process of the stiffness stands: ln f [Hz], ln e, and the temperature [K] in units that change the time
+    scale as a neper of frequency does, where it is told apart; (..., 2 or 3)."""
+    axes = np.broadcast_arrays(
+        np.log(frequency), np.log(strain), *([] if temperature is None else [temperature / _KELVIN])
+    )
+    return np.stack(axes, axis=-1)
 
 
 def peak_at(peak: tuple[float, float] | None, nodes: Array, points: Array) -> Array:
@@ -82,6 +98,7 @@ class Patch:
         strain: of the nodes, equivalent, zero-to-peak, (m,).
         in_phase, in_quadrature: shares of the stiffness at the nodes, without the peak, (m,) each.
         in_phase_error, in_quadrature_error: standard deviations of the whole there, (m,) each.
+        temperature_K: of the nodes, (m,); none where it is not told apart.
         peak_in_phase, peak_in_quadrature: strength of the peak at the least and at the largest strain of the nodes, as
             shares of the stiffness, (2,) each; none without a peak.
     """
@@ -93,11 +110,12 @@ class Patch:
     in_quadrature: Row
     in_phase_error: Row
     in_quadrature_error: Row
+    temperature_K: Row = ()  # noqa: N815
     peak_in_phase: Row = ()
     peak_in_quadrature: Row = ()
 
     def __post_init__(self) -> None:
-        lists = (self.frequency_Hz, self.strain, self.in_phase, self.in_quadrature)
+        lists = (self.frequency_Hz, self.strain, self.in_phase, self.in_quadrature, self.temperature_K or self.strain)
         sizes = {len(each) for each in (*lists, self.in_phase_error, self.in_quadrature_error)}
         if len(sizes) > 1 or sizes == {0}:
             found = f"lists of {' and '.join(map(str, sorted(sizes)))} values"
@@ -109,11 +127,12 @@ class Patch:
 
     @cached_property
     def nodes(self) -> Array:
-        """Logarithms of frequency and strain of the nodes, (m, 2)."""
-        return np.log(np.stack((self.frequency_Hz, self.strain), axis=-1))
+        """Places of the nodes, (m, 2 or 3)."""
+        kelvin = np.array(self.temperature_K) if self.temperature_K else None
+        return places_of(np.array(self.frequency_Hz), np.array(self.strain), kelvin)
 
     def of_peak(self, peak: tuple[float, float] | None, points: Array) -> Array:
-        """What the peak adds at the logarithms of frequency and strain of points, complex, (..., n)."""
+        """What the peak adds at places, (..., n, 2 or 3), complex, (..., n)."""
         return peak_at(peak, self.nodes, points) @ (
             np.array(self.peak_in_phase) + 1j * np.array(self.peak_in_quadrature)
         )
@@ -125,7 +144,8 @@ class Unnamed:
 
     Args:
         size: standard deviation between nodes that lie far apart.
-        lengths: over which it changes, in ln frequency + tilt ln strain and in ln strain.
+        lengths: over which it changes, in ln frequency + tilt ln strain, and in ln strain; over temperature, as over
+            the frequency that the time scale shifts by.
         patches: by direction; what is in none has no correction, within the size of the gap.
         tilt: by how much what it shows moves along ln frequency with ln strain: 1 where it goes by the rate of strain,
             -1 where frequencies rise with strain.
@@ -172,13 +192,15 @@ class Unnamed:
         Angular frequencies are in rad/s, amplitudes in m or rad.
         """
         strain = amplitude * geometry.unit_strain(setting.bushing, setting.direction)
-        points = np.log(np.stack(np.broadcast_arrays(omega / (2.0 * np.pi), strain), axis=-1))
         patch = next((patch for patch in self.patches if str(setting.direction) in patch.directions), None)
         if patch is None:
-            nothing = np.zeros(points.shape[:-1])
+            nothing = np.zeros(np.broadcast_shapes(np.shape(omega), strain.shape))
             return nothing.astype(complex), np.full((2, *nothing.shape), self.beyond), nothing
+        warm = REFERENCE if setting.under.temperature is None else setting.under.temperature
+        kelvin = np.asarray(warm) if patch.temperature_K else None
+        points = places_of(omega / (2.0 * np.pi), strain, kelvin)
         inside = np.clip(points, patch.nodes.min(axis=0), patch.nodes.max(axis=0))
-        stays = kernel((points - inside) / _FADES, np.zeros((1, 2)))[..., 0]
+        stays = kernel((points - inside) / _FADES, np.zeros((1, points.shape[-1])))[..., 0]
         nodes = in_lengths(patch.nodes, self.lengths, self.tilt)
         near = kernel(in_lengths(inside, self.lengths, self.tilt), nodes)
         weight = near @ np.linalg.inv(correlation(nodes))

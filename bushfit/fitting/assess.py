@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bushfit.effects import temperature
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual, together
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, repeats_of
@@ -190,12 +189,14 @@ def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Qual
 
 
 def measured_range(model: Model, data_sets: Sequence[DataSet]) -> Range:
-    """Frequencies [Hz], equivalent strains and directions that the data sets reach."""
+    """Frequencies [Hz], equivalent strains, directions and temperatures [K] that the data sets reach."""
     f = np.concatenate([data_set.frequency for data_set in data_sets])
     e = np.concatenate([data_set.amplitude * model.unit_strain(data_set.direction) for data_set in data_sets])
     found = [str(data_set.direction) for data_set in data_sets]
     directions = tuple(dict.fromkeys([*(str(direction) for direction in Direction if direction in found), *found]))
-    return Range((float(f.min()), float(f.max())), (float(e.min()), float(e.max())), directions)
+    kelvin = [np.ravel(data_set.test.temperature) for data_set in data_sets if data_set.test.temperature is not None]
+    ends = [(float(each.min()), float(each.max())) for each in (f, e, *([np.concatenate(kelvin)] if kelvin else []))]
+    return Range(ends[0], ends[1], directions, *ends[2:])
 
 
 def lack_of_fit(model: Model, data_sets: Sequence[DataSet], parameters: int) -> float | None:
@@ -250,17 +251,10 @@ def apart_in_temperature(model: Model, data_sets: Sequence[DataSet]) -> list[str
     """A sentence on tests whose temperatures, where they are known, lie too far apart for one model."""
     degrees = [(data_set.name, data_set.test.temperature) for data_set in data_sets]
     known = sorted((float(np.mean(kelvin)) - CELSIUS, name) for name, kelvin in degrees if kelvin is not None)
-    if not known:
+    if not known or known[-1][0] - known[0][0] <= _ONE_TEMPERATURE or "temperature" in model.effects:
         return []
     (low, coldest), (high, warmest) = known[0], known[-1]
     tested = f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC"
-    if "temperature" in model.effects:
-        reference = temperature.REFERENCE - CELSIUS
-        beyond = max(high - reference, reference - low) > temperature.REACH
-        law = f"the effect of temperature holds within {temperature.REACH:g} K of {number(reference, 3)} degC"
-        return [f"{tested}: {law}, beyond which a rubber keeps no single alpha"] if beyond else []
-    if high - low <= _ONE_TEMPERATURE:
-        return []
     return [
         f"{tested}, {number(high - low, 3)} degC apart: this model has no effect of temperature, and another that is "
         "named may be one; fit the tests of each temperature by themselves, or with --effect temperature"

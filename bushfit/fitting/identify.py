@@ -102,10 +102,13 @@ def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], 
     each = dict(zip(names, stderr / np.abs(slopes), strict=True))
     groups = _groups(known)
     zero = [name for group in groups for name in group if _is_zero(model, name, covariance)]
-    lines = [f"{name} is no different from zero: these tests do not show {effect_of(name)}" for name in zero]
+    amounts = [name for name in names if model.parameters[name].neutral is not None]
+    shown = {effect_of(name) for name in amounts if not _is_zero(model, name, covariance)}
+    idle = {effect_of(name) for name in zero} - shown
+    unseen = {name: f": these tests do not show {effect_of(name)}" for name in zero if effect_of(name) in idle}
+    lines = [f"{name} is no different from zero{unseen.get(name, '')}" for name in zero]
     if zero:
-        idle = {effect_of(name) for name in zero}
-        rest = [name for name in names if effect_of(name) not in idle]
+        rest = [name for name in names if name not in zero and effect_of(name) not in idle]
         if not rest:
             return lines
         known = Information.of(model, data_sets, rest)

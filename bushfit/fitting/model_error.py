@@ -17,6 +17,7 @@ Notes:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise, product
@@ -25,8 +26,11 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
+from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.effects.unnamed import Patch, Unnamed, basis
+from bushfit.effects.temperature import REFERENCE
+from bushfit.effects.unnamed import Patch, Unnamed, basis, in_lengths, places_of
+from bushfit.errors import FitError
 from bushfit.fitting.common_error import CommonError, Seen
 from bushfit.fitting.coordinates import Bounds, Solution, anderson, coordinate_bounds, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, LoopData, parted
@@ -35,6 +39,8 @@ from bushfit.fitting.levels import level_columns
 from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.robust import Estimate
 from bushfit.fitting.solve import solve
+from bushfit.fitting.starts import start_values
+from bushfit.model.model import Model
 from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.units import number
 
@@ -84,10 +90,20 @@ class _Beside:
 
     @cached_property
     def points(self) -> Array:
-        """Logarithms of frequency [Hz] and equivalent strain of each point, (p, 2)."""
-        unit_strain = self.solution.model.unit_strain
-        axes = [(each.frequency, each.amplitude * unit_strain(each.direction)) for each in self.data_sets]
-        return np.log(np.concatenate(axes, axis=-1).T)
+        """Place of each point, (p, 2 or 3)."""
+        return places_of(*self.conditions)
+
+    @cached_property
+    def conditions(self) -> list[Array]:
+        """Frequency [Hz] and equivalent strain of each point, and its temperature [K] if the model knows of it."""
+        model = self.solution.model
+        strains = [each.amplitude * model.unit_strain(each.direction) for each in self.data_sets]
+        found = [np.concatenate([each.frequency for each in self.data_sets]), np.concatenate(strains)]
+        if any("temperature" in effect.under for effect in model.records):
+            known = [REFERENCE if (at := each.circumstances.temperature) is None else at for each in self.data_sets]
+            pairs = zip(known, strains, strict=True)
+            found.append(np.concatenate([np.broadcast_to(kelvin, strain.shape) for kelvin, strain in pairs]))
+        return found
 
     @property
     def moving(self) -> Array:
@@ -179,7 +195,7 @@ class _Prior:
         nodes, shapes = [], []
         for group in groups:
             inside = np.flatnonzero(np.isin(tests.names, group))
-            own, near = basis(tests.points[inside] / lengths)
+            own, near = basis(in_lengths(tests.points[inside], lengths, 0.0))
             here = np.zeros((near.shape[1], len(tests.points)))
             here[:, inside] = near.T
             nodes.append(inside[own])
@@ -250,8 +266,8 @@ class _Error:
         patches = []
         for group, nodes in zip(self.prior.groups, self.prior.nodes, strict=True):
             lists = (value[nodes].real, value[nodes].imag, *(error[nodes] for error in errors))
-            at = np.exp(self.beside.points[nodes].T)
-            patches.append(Patch(group, *(tuple(one.tolist()) for one in (*at, *lists))))
+            frequency, strain, *kelvin = (tuple(axis[nodes].tolist()) for axis in self.beside.conditions)
+            patches.append(Patch(group, frequency, strain, *(tuple(one.tolist()) for one in lists), *kelvin))
         return Unnamed(size, self.prior.lengths, tuple(patches))
 
 
@@ -274,7 +290,9 @@ def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATE
         if error.best[1] >= _SIZES[-1]:  # that is no error of a model, but another thing than it
             return found, None
         before, shaped = beside.solution, _shaped(found.minimised, error.best[1])
-        after = solve(before.model, error.joined(shaped), names, bounds, strict=False)
+        joined, starts = error.joined(shaped), [before.model] if asked else [before.model, *_alive(before, shaped)]
+        ends = [solve(start, joined, names, bounds, strict=False) for start in starts]
+        after = min(ends, key=lambda each: each.chi_square)
         asked.append(before.coordinates.point(before.model.values))
         answered.append(after.coordinates.point(after.model.values))
         if float(np.linalg.norm((answered[-1] - asked[-1]) @ after.jacobian)) < _SETTLED:
@@ -310,6 +328,20 @@ def log_likelihood(found: Estimate, known: Mapping[str, float]) -> float:
     )
     size += float(np.linalg.slogdet(rows @ rows.T + np.diag(beforehand))[1])
     return -0.5 * (solution.chi_square + size)
+
+
+def _alive(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
+    """A model to start from besides, its branches as read off the tests: a fit that noise bends may have lost one,
+    which then no step brings back; none of tests that no rubber gives."""
+    model, moved = solution.model, solution.coordinates.names
+    known = {name: value for name, value in model.values.items() if name not in moved}
+    with suppress(FitError):
+        paper = Model.started(model.bushing, BASE, start_values(model.bushing, data_sets, known))
+        values = dict(paper.values)
+        for effect in model.records:
+            values |= paper.starts(effect)[0]
+        return [model.with_values({name: values[name] for name in moved if name in values})]
+    return []
 
 
 def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[DataSet]) -> _Beside:
@@ -352,7 +384,8 @@ def _tried(beside: _Beside) -> list[_Error]:
 
 def told_of(error: Unnamed) -> str:
     """What is said of a model error, for people."""
-    lengths = zip(error.lengths, np.ptp(np.concatenate([each.nodes for each in error.patches]), axis=0), strict=True)
+    reached = np.ptp(np.concatenate([each.nodes[:, :2] for each in error.patches]), axis=0)
+    lengths = zip(error.lengths, reached, strict=True)
     smooth = [
         f"{number(length / np.log(10.0), 1)} decades of {axis}"
         for axis, (length, reach) in zip(("frequency", "strain"), lengths, strict=True)

@@ -12,8 +12,11 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
 from bushfit.jobs.about import about, asked, document_of
 from bushfit.model.result import Result
-from bushfit.report.artifacts import fit_contents
+from bushfit.report.artifacts import fit_contents, temperature_contents
 from bushfit.report.contents import Contents, Kinds
+
+#: Tables and pictures of sweeps whose temperatures are known, beside a model with an effect of temperature.
+_AT_TEMPERATURES = ("master_curve", "shift_factors")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -99,22 +102,29 @@ class Fit:
     profile: Callable[[str, int], None] | None = None
 
     def kinds(self, campaign: Campaign) -> Kinds:
-        return Kinds(("model",)) + Kinds.shown(tests_of(campaign))
+        return Kinds(("model",)) + Kinds.shown(tests_of(campaign, self._added(campaign)))
+
+    def _added(self, campaign: Campaign) -> tuple[str, ...]:
+        """The effects that [fit] of the campaign adds to the paper's, and those asked for."""
+        return tuple(dict.fromkeys((*campaign.fit.effects, *self.effects)))
 
     def run(self, data: Data) -> Fitted:
-        effects = with_base(dict.fromkeys((*data.campaign.fit.effects, *self.effects)))
-        result = fit_joint(data, effects=effects, directions=self.directions or None, profile=self.profile)
+        added = self._added(data.campaign)
+        result = fit_joint(data, effects=with_base(added), directions=self.directions or None, profile=self.profile)
         options = (*asked(direction=self.directions, effect=self.effects), *(["--profile"] if self.profile else []))
-        return Fitted("model", tests_of(data.campaign), data, (("joint fit", result),), about(data, "fit", options))
+        kinds = tests_of(data.campaign, added)
+        return Fitted("model", kinds, data, (("joint fit", result),), about(data, "fit", options))
 
 
-def tests_of(campaign: Campaign) -> tuple[str, ...]:
-    """The kinds of test that a campaign has: loops, sweeps."""
-    return tuple(kind for kind in ("loops", "sweeps") if getattr(campaign, kind))
+def tests_of(campaign: Campaign, effects: Collection[str]) -> tuple[str, ...]:
+    """The kinds of test that a campaign has: loops, sweeps; and what a model of effects makes of their temperatures."""
+    warm = "temperature" in effects and any(sweep.temperature is not None for sweep in campaign.sweeps)
+    return (*(kind for kind in ("loops", "sweeps") if getattr(campaign, kind)), *(_AT_TEMPERATURES if warm else ()))
 
 
 def contents_of_tests(data: Data, result: Result, kinds: Collection[str]) -> Contents:
     """Tables and pictures of tests of some kinds beside a model, with the outliers that its fit left out marked."""
     marked, title = data.without(result.outliers), result.model.name if result.model.bushing else data.campaign.name
     loops, sweeps = (getattr(marked, kind) if kind in kinds else () for kind in ("loops", "sweeps"))
-    return fit_contents(result, title, loops, sweeps)
+    found = fit_contents(result, title, loops, sweeps)
+    return found | temperature_contents(result, title, sweeps) if set(_AT_TEMPERATURES) <= set(kinds) else found

@@ -89,7 +89,7 @@ class Ran:
     @property
     def contents(self) -> Contents:
         campaign, found = self.data.campaign, self.diagnosed
-        of_tests = contents_of_tests(self.data, self.result, tests_of(campaign))
+        of_tests = contents_of_tests(self.data, self.result, tests_of(campaign, campaign.fit.effects))
         of_gap = diagnosis_contents(found.diagnosis, campaign.name) if found else Contents()
         return (Contents(self._files) | of_tests | of_gap | self.predicted.contents).paged(report=report_page)
 
@@ -101,7 +101,7 @@ class Run:
     def kinds(self, campaign: Campaign) -> Kinds:
         steps = (("static",) if campaign.loops else ()) + (("dynamic",) if campaign.loops and campaign.sweeps else ())
         found = Kinds((*steps, "joint")) + Diagnose().kinds(campaign)
-        return found + Kinds.shown(tests_of(campaign)) + Predict().kinds(None, campaign)
+        return found + Kinds.shown(tests_of(campaign, campaign.fit.effects)) + Predict().kinds(None, campaign)
 
     def run(self, data: Data) -> Ran:
         static = FitStatic().run(data) if data.loops else None

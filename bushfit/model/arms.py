@@ -159,7 +159,7 @@ def part_modulus(model: Model, size: str, omega: Array) -> Array:
     """mu^ [Pa] of the branches of one size at angular frequencies [rad/s], (n,)."""
     still = np.zeros_like(omega)
     own = (branch for branch in model.fading if qualified_size(branch) == size)
-    return np.asarray(sum(branch.modulus(seen_by(branch, model.values, model.values), omega, still) for branch in own))
+    return np.asarray(sum(branch.modulus(seen_by(branch, model.values), omega, still) for branch in own))
 
 
 def _basis(omega: Array, time: Array) -> Array:

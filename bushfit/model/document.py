@@ -140,6 +140,7 @@ class FitTable(Quality):
         frequency_Hz: least and largest that was tested [Hz].
         strain: least and largest equivalent strain amplitude that was tested.
         directions: of the tests that were fitted, and specimens by their names.
+        temperature_K: lowest and highest that was tested [K]; left out where no test states one.
         tests: every test, fitted or not, then each run of it.
         usable: within what the model meets the measurement, place by place.
     """
@@ -147,13 +148,14 @@ class FitTable(Quality):
     frequency_Hz: tuple[Number, Number] | None = None  # noqa: N815
     strain: tuple[Number, Number] | None = None
     directions: tuple[Name, ...] = ()
+    temperature_K: tuple[Number, Number] | None = None  # noqa: N815
     tests: tuple[Misfit, ...] = ()
     usable: tuple[Usable, ...] = ()
 
     def __post_init__(self) -> None:
         if self.strain and not self.frequency_Hz:
             raise ValueError(ModelError("a key is missing", place="frequency_Hz", expected="frequency_Hz = ..."))
-        for key in ("frequency_Hz", "strain"):
+        for key in ("frequency_Hz", "strain", "temperature_K"):
             low, high = getattr(self, key) or (1.0, 1.0)
             if not SIZES[0] <= low <= high <= SIZES[1]:
                 expected = "least and largest, above zero"
@@ -174,7 +176,7 @@ class FitTable(Quality):
         """The operating conditions; None where an older file does not say them."""
         if self.frequency_Hz is None or self.strain is None:
             return None
-        return Range(self.frequency_Hz, self.strain, self.directions)
+        return Range(self.frequency_Hz, self.strain, self.directions, self.temperature_K)
 
 
 @dataclass(frozen=True)

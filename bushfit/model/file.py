@@ -233,6 +233,7 @@ def _fit(result: Result, quality: Quality, measured: Range) -> dict[str, Any]:
         "frequency_Hz": list(measured.frequency),
         "strain": list(measured.strain),
         "directions": list(measured.directions),
+        **({"temperature_K": list(measured.temperature)} if measured.temperature else {}),
         "tests": [asdict(test) for test in result.tests],
         "usable": [asdict(place) for place in result.usable],
     }

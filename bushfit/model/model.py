@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
 from itertools import groupby
+from math import prod
 from types import MappingProxyType
 from typing import Any, Literal, cast
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from bushfit import geometry
 from bushfit.effects import BASE, Branch, Effect, Layer, Level, Parameter, Setting, effect_named, qualified, twins_of
-from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Condition, ForceBelow, StiffnessBelow, Values
+from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Condition, ForceBelow, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.effects.unnamed import Unnamed
@@ -291,9 +292,10 @@ class Model:
             if structure.modifiers:
                 omega = np.atleast_1d(displacement.omega)
                 base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
+                strain = strain.faster(self.pace(setting.under, values))
             together = displacement.periodic and structure.fading
             alone = structure.others if together else structure.branches
-            stresses = [branch.stress(seen_by(branch, values, base), strain) for branch in alone]
+            stresses = [branch.stress(seen_by(branch, base), strain) for branch in alone]
             if together:
                 stresses.append(strain.response(lambda omega: modulus(omega, base, strain)))
             return factor * sum(stresses, start=np.zeros(1))
@@ -303,9 +305,7 @@ class Model:
             count, step = strain.value.shape[-1], strain.step
             if base is values and count in known and known[count][0] is step:
                 return known[count][1]
-            moduli = (
-                branch.modulus(seen_by(branch, values, base), omega, strain.amplitude) for branch in structure.fading
-            )
+            moduli = (branch.modulus(seen_by(branch, base), omega, strain.amplitude) for branch in structure.fading)
             found = np.asarray(2.0 * sum(moduli))
             if base is values:
                 known[count] = step, found
@@ -318,19 +318,26 @@ class Model:
         return reduce(wrap, _together(layers), cast(ForceBelow, rubber))
 
     def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
-        """Complex stiffness of the rubber, with the paper's parameters as in `base`."""
-        moduli = (branch.modulus(seen_by(branch, values, base), omega, strain) for branch in self._structure.branches)
+        """Complex stiffness of the rubber, with its parameters as in `base`."""
+        omega = omega * self.pace(setting.under, values)
+        moduli = (branch.modulus(seen_by(branch, base), omega, strain) for branch in self._structure.branches)
         return np.atleast_1d(self.stiffness_per_modulus(setting.direction) * sum(moduli))
 
+    def pace(self, under: Circumstances, values: Values | None = None) -> Value:
+        """How many times as fast a motion is on the rubber's own time scale as on the clock's: the shift factor a_T."""
+        values = self.values if values is None else values
+        return prod(each.pace(seen_by(each, values), under) for each in self._structure.modifiers if each.pace)
+
     def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
-        """All values, with the paper's parameters as the modifiers leave them at an operating condition."""
+        """All values as the modifiers leave them at an operating condition."""
         if not self._structure.modifiers:
             return values
         stiffness = partial(self._branch_stiffness, setting, values, omega, strain)
-        condition, base = Condition(setting, omega, amplitude, strain, stiffness), values
+        condition = Condition(setting, omega, amplitude, strain, stiffness, self._structure.moduli)
+        base = values
         for modifier in self._structure.modifiers:
             if modifier.acts_at(setting.direction):
-                base = {**base, **modifier.adjust(seen_by(modifier, values, base), condition)}
+                base = {**base, **modifier.adjust(seen_by(modifier, base), condition)}
         return base
 
 
@@ -356,12 +363,12 @@ def _together(layers: Sequence[Layer]) -> list[list[Layer]]:
 
 def _as_one(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
     """A group of layers as the first of them, with the values that it reads."""
-    first, own = group[0], [seen_by(layer, values, values) for layer in group]
+    first, own = group[0], [seen_by(layer, values) for layer in group]
     return first, {**own[0], **({first.adds: sum(each[first.adds] for each in own)} if first.adds else {})}
 
 
-def seen_by(effect: Effect, values: Values, base: Values) -> Values:
-    """The values that an effect reads: `base` by their full names, and its own of `values` by short ones."""
+def seen_by(effect: Effect, values: Values) -> Values:
+    """The values that an effect reads: all by their full names, and its own by short ones, too."""
     if effect.name in BASE:
-        return base
-    return {**base, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}
+        return values
+    return {**values, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}

@@ -51,11 +51,13 @@ class Range:
         frequency: least and largest [Hz].
         strain: least and largest equivalent strain amplitude.
         directions: of the tests, and specimens, by name; none where an older file does not say which.
+        temperature: lowest and highest [K]; None where no test states one.
     """
 
     frequency: tuple[float, float]
     strain: tuple[float, float]
     directions: tuple[str, ...] = ()
+    temperature: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

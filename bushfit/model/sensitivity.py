@@ -69,7 +69,7 @@ def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tup
     """Add the derivatives of all branches by parameters to `total`, (len(names), n); `test` follows the values."""
 
     def response(branch: Branch, values: Values) -> Array:
-        return face(branch)[0](seen_by(branch, values, values), *test)
+        return face(branch)[0](seen_by(branch, values), *test)
 
     row = {name: i for i, name in enumerate(names)}
     for branch in model.records:
@@ -79,7 +79,7 @@ def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tup
         if not moved:
             continue
         if sensitivities := face(branch)[1]:
-            known = sensitivities(seen_by(branch, model.values, model.values), *test)
+            known = sensitivities(seen_by(branch, model.values), *test)
             slopes = {name: known[short] for short, name in own.items() if name in row}
         else:
             slopes = dict(zip(moved, differences(model, moved, partial(response, branch))[1], strict=True))

@@ -16,6 +16,7 @@ class Structure:
     Args:
         fading: the linear branches that fade with memory, whose steady answers add up harmonic by harmonic.
         others: the branches that do not.
+        moduli: names of the rubber's moduli and stresses, to which its stiffness is proportional together.
     """
 
     records: tuple[Effect, ...]
@@ -25,6 +26,7 @@ class Structure:
     layers: tuple[Layer, ...]
     fading: tuple[Branch, ...]
     others: tuple[Branch, ...]
+    moduli: tuple[str, ...]
 
     @classmethod
     @lru_cache(maxsize=256)
@@ -49,4 +51,10 @@ class Structure:
             tuple(effect for effect in records if isinstance(effect, Layer)),
             tuple(effect for effect in records if isinstance(effect, Branch) and effect.size),
             tuple(effect for effect in records if isinstance(effect, Branch) and not effect.size),
+            tuple(
+                qualified(effect, parameter)
+                for effect in records
+                for parameter in effect.parameters
+                if isinstance(effect, Branch) and parameter.unit.startswith("Pa")
+            ),
         )

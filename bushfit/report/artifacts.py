@@ -1,7 +1,7 @@
 """The tables and pictures of a result, by the names of their files without endings."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from bushfit.caveats import rig_effects, warnings_of
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import Level
 from bushfit.fitting.data_sets import LoopData, SweepData
+from bushfit.fitting.master_curve import master_curve
 from bushfit.geometry import Direction, Place
 from bushfit.model.arms import Arms
 from bushfit.model.model import Model
@@ -32,6 +33,21 @@ def fit_contents(result: Result, title: str, loops: Sequence[LoopData], sweeps: 
         table = partial(tables.sweeps_table, model, sweeps)
         found |= Contents.shown("sweeps", table, lambda: plots.fits.sweeps_figure(model, sweeps, title))
     return found
+
+
+def temperature_contents(result: Result, title: str, sweeps: Sequence[SweepData]) -> Contents:
+    """`master_curve` and `shift_factors` of sweeps at several temperatures, a table and a picture each."""
+    found = cache(partial(master_curve, result, sweeps))
+    curves = Contents.shown(
+        "master_curve",
+        lambda: tables.master_curve_table(found()),
+        lambda: plots.master_curve.master_curve_figure(result.model, found(), title),
+    )
+    return curves | Contents.shown(
+        "shift_factors",
+        lambda: tables.shift_factors_table(found()),
+        lambda: plots.master_curve.shift_factors_figure(result, found(), title),
+    )
 
 
 def prediction_contents(

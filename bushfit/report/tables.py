@@ -12,13 +12,16 @@ from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+from bushfit.fitting.master_curve import Shifted
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Display, Place
 from bushfit.model.arms import Arms
+from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.prediction import PredictedResonance, Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.reduction.resonance import Resonance
 from bushfit.reduction.result import Reduction
+from bushfit.units import CELSIUS
 
 #: Headers of what was measured and of the model beside it, in the tables of loops and sweeps.
 _MEASURED = re.compile(
@@ -225,6 +228,42 @@ def gap_table(
         return pd.DataFrame(columns | {name: shown[name] for name in shown if _MEASURED.match(name)})
 
     return pd.concat([rows(*pair) for pair in zip(data_sets, mended or data_sets, strict=True)], ignore_index=True)
+
+
+def master_curve_table(found: Sequence[Shifted]) -> pd.DataFrame:
+    """Every point of sweeps at several temperatures, as measured, and brought to 23 degC over reduced frequency."""
+
+    def rows(each: Shifted) -> pd.DataFrame:
+        sweep, place = each.sweep, each.sweep.direction
+        return pd.DataFrame(
+            {
+                "sweep": sweep.name,
+                "direction": str(place),
+                "temperature [degC]": sweep.temperature - CELSIUS,
+                "frequency [Hz]": sweep.frequency,
+                **_amplitudes(place, sweep.amplitude),
+                **_responses(place, sweep.measured),
+                "reduced frequency [Hz]": each.reduced_frequency,
+                **_responses(place, each.reduced_stiffness, "reduced "),
+            }
+        )
+
+    return pd.concat([rows(each) for each in found], ignore_index=True)
+
+
+def shift_factors_table(found: Sequence[Shifted]) -> pd.DataFrame:
+    """log10 of the shift factor of each sweep, by the fitted law and as it asks for by itself, with 95 % intervals."""
+    both = {"log10 a_T": [each.shift for each in found], "own log10 a_T": [each.own for each in found]}
+    columns: dict[str, Any] = {
+        "sweep": [each.sweep.name for each in found],
+        "direction": [str(each.sweep.direction) for each in found],
+        "temperature [degC]": [each.temperature - CELSIUS for each in found],
+    }
+    for name, pairs in both.items():
+        value, error = np.array(pairs).T / np.log(10.0)
+        ends = (("", value), (", low", value - Z95 * error), (", high", value + Z95 * error))
+        columns |= {f"{name} [-]{end}": of for end, of in ends}
+    return pd.DataFrame(columns)
 
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:

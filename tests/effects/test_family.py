@@ -80,9 +80,12 @@ def test_record_is_complete(effect: Effect) -> None:
 
 
 def test_neutral_value_gives_the_plain_model_back(effect: Effect, rng: np.random.Generator) -> None:
+    """Of the effect of temperature, but for the spring of a network, which goes with the absolute temperature."""
     plain = random_model(rng)
     neutral = plain.with_effect(effect.name, {qualified(effect, effect.amount): effect.amount.sized(0.0)})
     plain = beside(plain, effect.name)
+    if effect.name == "temperature":
+        plain = plain.with_values({"mu": plain.values["mu"] * (UNDER.temperature / 296.15)})
     frequency, amplitude = np.meshgrid([0.1, 5.0, 155.0, 900.0], [0.0, 1e-6, 2e-4, 1e-3])
     triangle = 1e-3 * np.concatenate([np.linspace(-1.0, 1.0, 300), np.linspace(1.0, -1.0, 300)[1:-1]])
     histories = [

@@ -14,6 +14,7 @@ from bushfit.effects import BASE, LIBRARY, Effect, History, qualified, sliders
 from bushfit.effects.contract import Circumstances
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.maxwell import relax
+from bushfit.effects.temperature import log_shift
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 from bushfit.units import CELSIUS
@@ -250,24 +251,36 @@ def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effe
 WARM = Circumstances(33.0 + CELSIUS, turn=0.5, strained=0.1, left=0.1, rested=0.02)
 
 
-def test_warm_rubber_is_softer_and_faster() -> None:
-    """At 33 degC with 0.3 % and 3 % a kelvin: moduli times exp(-0.03), the springpot's also times exp(-0.3 alpha)."""
-    softer, faster = np.exp(-0.03), np.exp(-0.3 * PLAIN.values["alpha"])
-    by_hand = {"mu": softer, "m": softer * faster, "sigma_fmax": softer}
-    expected = PLAIN.with_values({name: factor * PLAIN.values[name] for name, factor in by_hand.items()})
-    warm = PLAIN.with_effect("temperature", {"temperature.softening": 3e-3, "temperature.shift": 0.03})
+@pytest.mark.parametrize("shift", [0.01, 0.03, 0.13])
+def test_warm_rubber_is_softer_and_faster(shift: float) -> None:
+    """At 33 degC with 0.3 % a kelvin: moduli times exp(-0.03), the spring's times 306.15/296.15, the springpot's also
+    times a_T^alpha; and so is the second one, with its own order."""
+    c2 = min(np.sqrt(2072.1 / shift), 296.15)
+    a_t = np.exp(-shift * 10.0 * c2 / (c2 + 10.0))
+    plain = PLAIN.with_effect("second_springpot", {"second_springpot.m": 3e3, "second_springpot.alpha": 0.7})
+    faster = {"m": a_t ** PLAIN.values["alpha"], "second_springpot.m": a_t**0.7, "sigma_fmax": 1.0}
+    by_hand = {"mu": 306.15 / 296.15, **{name: np.exp(-0.03) * factor for name, factor in faster.items()}}
+    expected = plain.with_values({name: factor * plain.values[name] for name, factor in by_hand.items()})
+    warm = plain.with_effect("temperature", {"temperature.softening": 3e-3, "temperature.shift": shift})
     stiffness = warm.stiffness("axial", FREQUENCY, AMPLITUDE, under=WARM)
-    np.testing.assert_allclose(stiffness, expected.stiffness("axial", FREQUENCY, AMPLITUDE), rtol=1e-12)
-    np.testing.assert_allclose(warm.force("axial", LOOP, under=WARM), expected.force("axial", LOOP), rtol=1e-9)
-    same(warm, PLAIN, 0.0)
+    np.testing.assert_allclose(stiffness, expected.stiffness("axial", FREQUENCY, AMPLITUDE), rtol=1e-5)
+    np.testing.assert_allclose(warm.force("axial", LOOP, under=WARM), expected.force("axial", LOOP), rtol=1e-5)
+    same(warm, plain, 0.0)
 
 
-def test_a_time_shift_of_the_springpot_is_one_of_frequency() -> None:
-    """Where the springpot stands alone, 10 K at a shift of 3 % a kelvin are a frequency lower by exp(-0.3)."""
-    alone = PLAIN.with_values({"mu": 1e-3, "sigma_fmax": 1e-3})
-    warm = alone.with_effect("temperature", {"temperature.softening": 0.0, "temperature.shift": 0.03})
-    stiffness = warm.stiffness("axial", FREQUENCY, AMPLITUDE, under=WARM)
-    np.testing.assert_allclose(stiffness, alone.stiffness("axial", FREQUENCY * np.exp(-0.3), AMPLITUDE), rtol=1e-6)
+def test_the_shift_factor_is_that_of_williams_landel_and_ferry() -> None:
+    """With 17.44 and 51.6 K at a glass transition of -50 degC; of a small shift it is Arrhenius' law, and below the
+    glass transition it goes on along a line."""
+    kelvin, glass = np.array([233.15, 263.15, 296.15, 326.15, 373.15]), 223.15
+
+    def universal(at: np.ndarray) -> np.ndarray:
+        return -17.44 * np.log(10.0) * (at - glass) / (51.6 + at - glass)
+
+    slope = 17.44 * np.log(10.0) * 51.6 / (51.6 + 73.0) ** 2
+    np.testing.assert_allclose(log_shift(slope, kelvin), universal(kelvin) - universal(np.array(296.15)), rtol=1e-9)
+    np.testing.assert_allclose(log_shift(0.01, kelvin), 0.01 * 296.15**2 * (1.0 / kelvin - 1.0 / 296.15), rtol=1e-9)
+    below = log_shift(slope, np.array([203.15, 193.15, 183.15]))
+    assert np.diff(below) == pytest.approx([np.diff(below)[0]] * 2)
 
 
 def test_drift_is_in_proportion_to_the_turn() -> None:

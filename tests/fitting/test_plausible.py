@@ -10,7 +10,6 @@ import pytest
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import BASE
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint, fit_two_step
 from bushfit.geometry import Direction
@@ -87,15 +86,6 @@ def test_tests_at_other_temperatures_are_told_by_fit_and_diagnose(campaign: Camp
             assert lines[0].startswith(
                 f"{sweep.name} was tested at 60 degC and {loop.name} at 23 degC, 37 degC apart: "
             )
-
-
-@pytest.mark.parametrize(("warm", "told"), [(37.0, 0), (60.0, 1)])
-def test_the_effect_of_temperature_is_good_for_some_kelvin(campaign: Campaign, warm: float, told: int) -> None:
-    result = fit_joint(Data.of(mixed(campaign, warm)), effects=(*BASE, "temperature"))
-    lines = [line for line in result.warnings if "degC" in line]
-    print(*lines)
-    assert len(lines) == told
-    assert all("holds within 15 K of 23 degC" in line for line in lines)
 
 
 def test_a_modulus_of_no_rubber_is_told(campaign: Campaign) -> None:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         fits,
         gap,
         inspection,
+        master_curve,
         plan,
         prediction,
         reduction,

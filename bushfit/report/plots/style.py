@@ -60,7 +60,12 @@ _NAME_LETTERS = 20
 #: Right of the panel, in matplotlib's words.
 _LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "frameon": False, "handlelength": 3.2}
 #: Colours of what a figure tells apart: a scale each, so that no colour means two things. Loops stay off black.
-_SCALES = {"amplitude": ("viridis", 0.0, 0.8), "frequency": ("inferno", 0.1, 0.76), "loop": ("plasma", 0.4, 0.85)}
+_SCALES = {
+    "amplitude": ("viridis", 0.0, 0.8),
+    "frequency": ("inferno", 0.1, 0.76),
+    "loop": ("plasma", 0.4, 0.85),
+    "temperature": ("turbo", 0.05, 0.95),
+}
 #: Markers of levels, one after the other.
 _MARKERS = "os^Dv<p>"
 #: Dashes of levels, one after the other: five, so that marker and dashes together repeat after forty levels.

@@ -1,0 +1,93 @@
+"""Master curve: sweeps at several temperatures as one at 23 degC over reduced frequency, and their shift factors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.effects.contract import Array, Circumstances
+from bushfit.fitting.sweep_data import SweepData
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+
+#: Steps of a shift factor of its own at most, and the largest one [neper]: a few are enough where it is determined.
+_STEPS, _LARGEST = 10, 2.0
+#: Step of ln frequency for slopes.
+_APART = 1e-3
+#: Frequencies from which on a sweep can be shifted along them.
+_FREQUENCIES = 3
+#: The parameter that shifts the time scale.
+SHIFT = "temperature.shift"
+
+
+@dataclass(frozen=True, eq=False)
+class Shifted:
+    """A sweep beside its master curve.
+
+    Args:
+        sweep: as it was fitted.
+        temperature: mean of its points [K].
+        shift: ln a_T by the fitted law, and its standard error; nan where that is not known.
+        own: ln a_T that the sweep asks for by itself, moduli as fitted, and its standard error by what is left of it.
+        reduced_frequency: f a_T of its points [Hz], (n,).
+        reduced_stiffness: of its points, complex [SI], as they would be at 23 degC: times what the model has there,
+            at f a_T, over what it has at theirs, (n,).
+    """
+
+    sweep: SweepData
+    temperature: float
+    shift: tuple[float, float]
+    own: tuple[float, float]
+    reduced_frequency: Array
+    reduced_stiffness: Array
+
+
+def master_curve(result: Result, sweeps: Sequence[SweepData]) -> tuple[Shifted, ...]:
+    """The sweeps over frequency whose temperature is known, coldest first, by a model with an effect of temperature."""
+    known = [sweep for sweep in sweeps if sweep.circumstances.temperature is not None]
+    swept = [sweep for sweep in known if np.unique(sweep.frequency).size >= _FREQUENCIES]
+    return tuple(sorted((_shifted(result, sweep) for sweep in swept), key=lambda each: each.temperature))
+
+
+def law(result: Result, temperature: Array) -> tuple[Array, Array]:
+    """ln a_T of a fitted law at temperatures [K], and its standard errors; nan where these are not known."""
+    value, error = result.model.values[SHIFT], result.covariance.stderr(SHIFT)
+    step = _APART * (error or np.nan)
+
+    def shift(of: float) -> Array:
+        return np.log(result.model.with_values({SHIFT: of}).pace(Circumstances(temperature)))
+
+    slope = (shift(value + step) - shift(value - step)) / (2.0 * step) if error else np.full(temperature.shape, np.nan)
+    return shift(value), np.abs(slope) * (error or np.nan)
+
+
+def _shifted(result: Result, sweep: SweepData) -> Shifted:
+    model, frequency = result.model, sweep.frequency
+    pace = np.broadcast_to(model.pace(sweep.circumstances), frequency.shape)
+    at_reference = model.stiffness(sweep.direction, frequency * pace, sweep.amplitude)
+    reduced = sweep.measured * at_reference / sweep.stiffness(model)
+    temperature = float(np.mean(sweep.temperature))
+    shift, error = law(result, np.array([temperature]))
+    more, unsure = _more(model, sweep)
+    mine = float(shift[0]), float(error[0])
+    return Shifted(sweep, temperature, mine, (mine[0] + more, unsure), frequency * pace, reduced)
+
+
+def _more(model: Model, sweep: SweepData) -> tuple[float, float]:
+    """By how much more a sweep would have its time scale shifted than the model does [neper], and the standard error.
+
+    Notes: Gauss-Newton steps in the one number, all points weighing alike: what is left is mostly no noise;
+    nan where the stiffness does not change with frequency.
+    """
+    more, place, under = 0.0, sweep.direction, sweep.circumstances
+
+    def over_measured(by: float) -> Array:
+        return model.stiffness(place, sweep.frequency * np.exp(by), sweep.amplitude, under=under) / sweep.measured
+
+    for _ in range(_STEPS):
+        slope = (over_measured(more + _APART) - over_measured(more - _APART)) / (2.0 * _APART)
+        left, size = over_measured(more) - 1.0, float(np.linalg.norm(slope))
+        if not size:
+            return np.nan, np.nan
+        more -= float(np.clip(np.vdot(slope, left).real / size**2, -_LARGEST, _LARGEST))
+    return more, float(np.linalg.norm(left) / np.sqrt(max(2 * left.size - 1, 1)) / size)

@@ -1,0 +1,98 @@
+"""Sweeps at several temperatures as one curve at 23 degC, and the shift factors that make them one."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bushfit.fitting.master_curve import SHIFT, Shifted, law
+from bushfit.model.covariance import Z95
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.reading.measurement import loss_factor
+from bushfit.report.plots import style
+from bushfit.report.tables import words
+from bushfit.units import CELSIUS, for_people, number
+
+#: Points of a line.
+_FINE = 200
+#: Ratio of amplitudes that count as one level.
+_NEAR = 1.3
+#: Steps of temperature that are told apart [K].
+_SAME = 1.0
+
+
+def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> Figure:
+    """Stiffness and loss factor over reduced frequency, a row a place: at the amplitude with most temperatures."""
+    places = list(dict.fromkeys(each.sweep.direction for each in found))
+    degrees = _degrees(found)
+    figure = style.new_figure(title, style.ROW * len(places))
+    grid, levels = figure.subplots(len(places), 2, squeeze=False), []
+    for place, (stiffness, loss) in zip(places, grid, strict=True):
+        mine = [each for each in found if each.sweep.direction is place]
+        level = _level(mine)
+        levels.append(
+            f"{place} {number(level * place.display.displacement.factor, 3)} {place.display.displacement.name}"
+        )
+        unit, factor = for_people(*place.display.stiffness, max(np.abs(each.reduced_stiffness).max() for each in mine))
+        reach = np.concatenate([each.reduced_frequency for each in mine])
+        frequency = np.geomspace(reach.min(), reach.max(), _FINE)
+        line = model.stiffness(place, frequency, level)
+        for axes, part in ((stiffness, lambda k, by=factor: by * np.abs(k)), (loss, loss_factor)):
+            for each in mine:
+                look = style.styles(len(degrees), "temperature")[degrees.index(_degree(each))]
+                at = np.abs(np.log(each.sweep.amplitude / level)) < np.log(_NEAR)
+                points = each.reduced_frequency[at], part(each.reduced_stiffness[at])
+                axes.plot(*points, "o", color=look.color, **style.DOT)
+            axes.plot(frequency, part(line), color=style.INK, lw=1.1, zorder=3)
+            style.logarithmic(axes, reach)
+        style.dress(stiffness, "reduced frequency f a_T [Hz]", f"{place}\n|{words(place)[2]}| [{unit}]")
+        style.dress(loss, "reduced frequency f a_T [Hz]", "loss factor [-]")
+        style.name_levels(loss, [f"{degree:g}" for degree in degrees], "temperature", [True] * len(degrees))
+    style.explain(
+        figure,
+        f"Line: the model at 23 degC, {', '.join(levels)}. Points: measured at the temperatures beside [degC], brought",
+        "to 23 degC by the model's shift factors, and by how its moduli change.",
+    )
+    return figure
+
+
+def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -> Figure:
+    """Shift factors over temperature, by the law and as each sweep asks for, and how far these are off the law."""
+    figure = style.new_figure(title, style.ROW)
+    factors, off = figure.subplots(1, 2)
+    kelvin = np.array([each.temperature for each in found])
+    fine = np.linspace(kelvin.min(), kelvin.max(), _FINE)
+    line, error = (values / np.log(10.0) for values in law(result, fine))
+    own, unsure = np.array([each.own for each in found]).T / np.log(10.0)
+    at_law = np.array([each.shift[0] for each in found]) / np.log(10.0)
+    color = style.styles(1, "amplitude")[0].color
+    for axes, base, points in ((factors, line, own), (off, 0.0 * line, own - at_law)):
+        axes.fill_between(fine - CELSIUS, base - Z95 * error, base + Z95 * error, color="#ebebeb", lw=0)
+        axes.plot(fine - CELSIUS, base, color=style.INK, lw=1.1)
+        axes.errorbar(kelvin - CELSIUS, points, Z95 * unsure, fmt="o", color=color, lw=0.8, **style.POINT)
+    style.dress(factors, "temperature [degC]", "log10 a_T [-]")
+    style.dress(off, "temperature [degC]", "log10 a_T, own less law [-]")
+    style.explain(
+        figure,
+        f"Line: the law, with a shift of {number(result.model.values[SHIFT], 3)} 1/K at 23 degC, grey its 95 % band.",
+        "Points: what each sweep asks for by itself, bars 95 %.",
+    )
+    return figure
+
+
+def _level(found: Sequence[Shifted]) -> float:
+    """An amplitude near which most points lie [SI]."""
+    reached = np.sort(np.concatenate([each.sweep.amplitude for each in found]))
+    near = np.searchsorted(reached, _NEAR * reached) - np.arange(reached.size)
+    return float(np.median(reached[near.argmax() :][: near.max()]))
+
+
+def _degree(found: Shifted) -> float:
+    """The temperature of a sweep [degC], as it is told apart."""
+    return float(np.round((found.temperature - CELSIUS) / _SAME) * _SAME)
+
+
+def _degrees(found: Sequence[Shifted]) -> list[float]:
+    """Of all sweeps, rising, each once."""
+    return sorted({_degree(each) for each in found})

@@ -1,0 +1,113 @@
+"""Tests at several temperatures: one fit of all, its shift factors, and what it predicts between and beyond.
+
+The rig steps through time, so that the closed form of the fit made none of the data; both have the shift factors from
+one formula, which tests/effects/test_limits.py holds against the constants of Williams, Landel and Ferry. That sweeps
+which follow another law are told apart from it, a test here says.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.effects import BASE
+from bushfit.fitting.data import Data
+from bushfit.fitting.master_curve import master_curve
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Direction
+from bushfit.model.model import Model
+from bushfit.prediction import predict
+from bushfit.report.artifacts import temperature_contents
+from bushfit.simulation.measured import measure, simulate
+from bushfit.simulation.undisturbed import Undisturbed, undisturbed
+from bushfit.units import CELSIUS
+
+VALUES = {"temperature.softening": 4e-3, "temperature.shift": 0.12}
+DEGREES = (-10.0, 8.0, 23.0, 38.0, 53.0)
+FREQUENCIES = tuple(np.geomspace(1.0, 100.0, 7).tolist())
+SWEEPS = tuple(
+    SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), FREQUENCIES, temperature=CELSIUS + degrees) for degrees in DEGREES
+)
+PLAN = SimulateSettings(
+    loops=(SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2, temperature=CELSIUS + 23.0),),
+    sweeps=SWEEPS,
+    noise=3e-3,
+    force_noise=2e-3,
+    displacement_noise=1e-3,
+)
+SEEDS = 12
+
+
+@pytest.fixture(scope="module")
+def truth(paper_model: Model) -> Model:
+    return paper_model.with_effect("temperature", VALUES)
+
+
+@pytest.fixture(scope="module")
+def clean(truth: Model) -> Undisturbed:
+    return undisturbed(truth, PLAN)
+
+
+def test_all_temperatures_are_fitted_at_once(clean: Undisturbed, truth: Model) -> None:
+    """From what is read off the tests: the shift within its interval as often as it claims, and a stiffness between."""
+    off, inside, bands = [], 0, 0
+    warm = CELSIUS + 30.0
+    expected = truth.with_values(VALUES)
+    for seed in range(SEEDS):
+        data = Data.of(measure(clean, replace(PLAN, seed=seed)).campaign())
+        result = fit_joint(data, effects=(*BASE, "temperature"))
+        assert not [line for line in result.warnings if "degC" in line]
+        low, high = result.interval("temperature.shift") or (0.0, 0.0)
+        off.append(result.model.values["temperature.shift"] / VALUES["temperature.shift"] - 1.0)
+        inside += low < VALUES["temperature.shift"] < high
+        found = predict(result, Direction.AXIAL, [30.0], [2e-4], temperature=warm).stiffness
+        true = predict(replace(result, model=expected), Direction.AXIAL, [30.0], [2e-4], temperature=warm).stiffness
+        bands += bool(found.low[0] < true.value[0] < found.high[0])
+        assert found.value[0] == pytest.approx(true.value[0], rel=0.01)
+    print(f"shift off by {100 * np.std(off):.1f} %, in its interval {inside}, stiffness at 30 degC {bands} of {SEEDS}")
+    assert np.max(np.abs(off)) < 0.05
+    assert min(inside, bands) >= SEEDS - 2  # 11.4 are expected; 3 misses or more come once in 50
+
+
+def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -> None:
+    data = Data.of(measure(clean, PLAN).campaign())
+    result = fit_joint(data, effects=(*BASE, "temperature"))
+    found = master_curve(result, data.sweeps)
+    assert [round(each.temperature - CELSIUS) for each in found] == list(DEGREES)
+    off = np.array([(each.own[0] - each.shift[0]) / np.hypot(each.own[1], each.shift[1] + 1e-3) for each in found])
+    print(f"each sweep's own shift factor off the law by {np.round(off, 1)} standard errors")
+    assert np.max(np.abs(off)) < 3.5
+    for each in found:
+        line = result.model.stiffness(Direction.AXIAL, each.reduced_frequency, each.sweep.amplitude)
+        assert np.max(np.abs(each.reduced_stiffness / line - 1.0)) < 0.02
+    tables = temperature_contents(result, "bushing", data.sweeps).tables
+    factors, curve = (tables[name]() for name in ("shift_factors", "master_curve"))
+    assert len(factors) == len(DEGREES)
+    assert len(curve) == sum(each.sweep.frequency.size for each in found)
+    assert factors["log10 a_T [-]"].to_numpy() == pytest.approx([each.shift[0] / np.log(10.0) for each in found])
+
+
+def test_a_sweep_off_the_law_says_so(truth: Model) -> None:
+    """That at 8 degC as if its chamber had been 8 K warmer than it says."""
+    tested = [replace(sweep, temperature=CELSIUS + 16.0) if sweep is SWEEPS[1] else sweep for sweep in SWEEPS]
+    simulated = simulate(truth, replace(PLAN, sweeps=tuple(tested))).campaign()
+    sweeps = zip(simulated.sweeps, DEGREES, strict=True)
+    told = replace(simulated, sweeps=tuple(replace(sweep, temperature=CELSIUS + at) for sweep, at in sweeps))
+    data = Data.of(told)
+    found = master_curve(fit_joint(data, effects=(*BASE, "temperature")), data.sweeps)
+    off = np.array([(each.own[0] - each.shift[0]) / each.own[1] for each in found])
+    print(f"own less law, in standard errors, coldest first: {np.round(off, 1)}")
+    assert np.argmax(np.abs(off)) == 1
+    assert off[1] < -4.0
+
+
+def test_what_lies_beyond_the_tested_temperatures_is_told(clean: Undisturbed) -> None:
+    result = fit_joint(Data.of(measure(clean, PLAN).campaign()), effects=(*BASE, "temperature"))
+    assert result.measured is not None
+    assert result.measured.temperature == pytest.approx((CELSIUS - 10.0, CELSIUS + 53.0))
+    for degrees, told in ((53.0, 0), (80.0, 1), (-30.0, 1)):
+        found = predict(result, Direction.AXIAL, [30.0], [2e-4], temperature=CELSIUS + degrees)
+        lines = [line for line in found.warnings if "degC" in line]
+        assert len(lines) == told
+        assert all(f"predicted at {degrees:g} degC, but fitted at -10 to 53 degC only" in line for line in lines)
