@@ -18,7 +18,7 @@ MARGIN = 0.01
 #: Share by which a finite bulk modulus lowers the radial stiffness, from which that is said: that of the other errors.
 _NOTED_LOWERING = 0.01
 #: Beyond the tested temperatures by more than this [K] a prediction is an extrapolation: chambers keep to less.
-_SAME_TEMPERATURE = 2.0
+SAME_TEMPERATURE = 2.0
 #: Relative difference of two stiffnesses that is none.
 _SAME = 1e-6
 
@@ -163,7 +163,7 @@ def extrapolations(
     )
     if temperature and (tested := result.measured.temperature):
         asked_for, *ends = (number(kelvin - CELSIUS, 3) for kelvin in (temperature, *tested))
-        if not tested[0] - _SAME_TEMPERATURE <= temperature <= tested[1] + _SAME_TEMPERATURE:
+        if not tested[0] - SAME_TEMPERATURE <= temperature <= tested[1] + SAME_TEMPERATURE:
             there = f"predicted at {asked_for} degC, but fitted at {' to '.join(dict.fromkeys(ends))} degC only"
             yield f"{what or direction}: {there}: extrapolated by the law of Williams, Landel and Ferry"
     for axis, unit, digits, asked, (low, high) in axes:

@@ -5,13 +5,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
-from bushfit.caveats import warnings_of
+from bushfit.caveats import SAME_TEMPERATURE, warnings_of
 from bushfit.effects import Level
+from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
 from bushfit.fitting.data_sets import SweepData, sweep_data
@@ -43,13 +45,14 @@ _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 class Predicted:
     """The outcome of a prediction: one table a place, and a resonance, where a mass was asked for.
 
-    `measured` are the sweeps of places that the model can predict; `notes`, what else a user must know; `wide`, whether
-    the tables are written with amplitudes across, too.
+    `measured` are the sweeps of places that the model can predict, `beside` those at the temperature predicted;
+    `notes`, what else a user must know; `wide`, whether the tables are written with amplitudes across, too.
     """
 
     result: Result
     predictions: Sequence[Prediction]
     measured: Sequence[SweepData]
+    beside: Sequence[SweepData] = ()
     notes: tuple[str, ...] = ()
     resonances: Sequence[PredictedResonance] = ()
     wide: bool = False
@@ -101,7 +104,7 @@ class Predicted:
     @property
     def contents(self) -> Contents:
         places = [prediction.direction for prediction in self.predictions]
-        found = prediction_contents(self.result, self.predictions, self.measured, self.notes)
+        found = prediction_contents(self.result, self.predictions, self.beside, self.notes)
         if self.wide:
             found |= more_contents("wide", wide_table, places, self.predictions)
         found |= arms_contents(self.result.model, self.arms, places, self.result.name)
@@ -178,23 +181,30 @@ class Predict:
             for each, own in zip(sweep_data(sweeps), under[len(under) - len(sweeps) :], strict=True)
             if result.model.bushing or isinstance(each.direction, Specimen)
         ]
-        beside = known if campaign else None
+        beside = [sweep for sweep in known if self._at_temperature(result.model, sweep)]
         notes = (*notes, *(f"{sweep.name}: {note}" for sweep in known for note in sweep.notes))
+        shown, places = beside if campaign else None, self.places(result, campaign)
+        grids = [grid_at(settings, result, place, sweeps) for place in places]
         predictions = [
-            predict(
-                result, place, *grid_at(settings, result, place, sweeps), sweeps=beside, temperature=self.temperature
-            )
-            for place in self.places(result, campaign)
+            predict(result, place, *grid, sweeps=shown, temperature=self.temperature)
+            for place, grid in zip(places, grids, strict=True)
         ]
         resonances = [
             predict_resonance(
                 result, place, self.mass, self.base_acceleration, settings.frequencies, temperature=self.temperature
             )
-            for place in self.places(result, campaign)
+            for place in places
             if self.mass and self.base_acceleration
         ]
         arms = self._arms(result.model, predictions) if self.arms else ()
-        return Predicted(result, predictions, known, notes, resonances, self.wide, arms)
+        return Predicted(result, predictions, known, beside, notes, resonances, self.wide, arms)
+
+    def _at_temperature(self, model: Model, sweep: SweepData) -> bool:
+        """Whether a sweep was made at the temperature predicted, as far as model and sweep know of temperatures."""
+        tested, asked = sweep.circumstances.temperature, self.temperature or REFERENCE
+        if tested is None or not any("temperature" in effect.under for effect in model.records):
+            return True
+        return bool(abs(np.mean(tested) - asked) <= SAME_TEMPERATURE)
 
     def _arms(self, model: Model, predictions: Sequence[Prediction]) -> tuple[Arms, ...]:
         """Maxwell arms over the frequencies of all predictions."""
