@@ -1,17 +1,20 @@
 """Model families on one campaign: the paper's and others in place of its branches, fitted and held out alike."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
 from bushfit.comparison import CHANCE
 from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.holdout import HoldOut, Predicted, hold_out, parts, predicted_parts
+from bushfit.diagnosis.holdout import HoldOut, Predicted, parts, predicted_parts
 from bushfit.diagnosis.laplace import laplace
-from bushfit.effects import BASE, LIBRARY, effect_named
-from bushfit.errors import ModelError
+from bushfit.effects import BASE, effect_named
+from bushfit.errors import FitError, ModelError
+from bushfit.fitting.assess import apart_in_temperature
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.design import with_effect
@@ -21,6 +24,9 @@ from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number
 
+#: Laws of rate and of amplitude beside the paper's or in their place, of which families are made, each with each.
+_RATE = ("second_springpot", "fractional_zener", "maxwell")
+_AMPLITUDE = ("kraus", "sliders", "coupled_breakdown", "intrinsic_time")
 #: Share by which a held-out error has to differ for two families not to count as alike, sure or not; chosen: no use
 #: of a bushing's model feels less.
 _ALIKE = 0.01
@@ -68,45 +74,81 @@ class FittedFamily:
         return f"{figures}: {'better' if self.gain[0] > 0.0 else 'worse'} by more than chance"
 
 
-def known_families() -> tuple[str, ...]:
-    """Effects of the library that make a model family of their own with what they leave of the paper's branches."""
-    return tuple(name for name, effect in LIBRARY.items() if effect.replaces or effect.variant_of)
+def known_families(model: Model, data_sets: Sequence[DataSet]) -> tuple[str, ...]:
+    """Each law of rate with each law of amplitude, as far as a model can take them; with the effect of temperature
+    where the tests are apart in it and the model has none. The paper's laws with each other are the model itself."""
+    warm = ["temperature"] if apart_in_temperature(model, data_sets) else []
+    rates, amplitudes = (["", *(name for name in laws if _fits(model, name))] for laws in (_RATE, _AMPLITUDE))
+    found = [[*warm, *filter(None, pair)] for pair in product(rates, amplitudes)]
+    return tuple("+".join(names) for names in found if names and not _clash(names))
+
+
+def _clash(names: Sequence[str]) -> bool:
+    """Whether one of some effects is none beside another."""
+    return any({*effect_named(name).never_with} & {*names} for name in names)
+
+
+def _fits(model: Model, name: str) -> bool:
+    """Whether a model has not an effect yet, and what it stands in place of."""
+    return name not in model.effects and effect_named(name).replaces in (None, *model.effects)
 
 
 def fit_families(
-    model: Model, data_sets: Sequence[DataSet], names: Sequence[str], held: Sequence[str], bounds: Bounds
-) -> list[FittedFamily]:
+    model: Model,
+    data_sets: Sequence[DataSet],
+    names: Sequence[str],
+    held: Sequence[str],
+    bounds: Bounds,
+    most: int | None = None,
+) -> tuple[list[FittedFamily], dict[str, float]]:
     """The model as it comes first, and it with each of these families, fitted to the tests and held out alike.
 
     Args:
-        names: of effects, several of one family joined by +.
+        names: of effects, several of one family joined by +; all that are known where there are none.
         held, bounds: parameters that do not move, and limits inside the parameters' own.
+        most: of all, those to hold out: the first and the likeliest.
+
+    Returns:
+        These, and the probability of each family that is left.
 
     Raises:
-        FitError: data that cannot support the fit of a family.
+        FitError: data that cannot support the fit of a family that is named.
         ModelError: an unknown effect, one that the model has already, or one in place of what it has not.
     """
     first = fit(model, data_sets, held, bounds)
     own = "+".join(["paper", *(name for name in model.effects if name not in BASE)])
-    found = [FittedFamily(own, first, hold_out(first, first, bounds), log_evidence=_log_evidence([first], [], bounds))]
-    for name in names:
-        evidence, chain = first, [first]
-        for effect in map(effect_named, name.split("+")):
-            present = evidence.model.effects
-            if effect.name in present or effect.replaces not in (None, *present):
-                has = "the model has this effect already"
-                problem = has if effect.name in present else "what this effect stands in place of is not in the model"
-                raise ModelError(problem, found=effect.name, expected=f"such as {' or '.join(known_families())}")
-            solution = with_effect(evidence.solution, evidence.data_sets, effect, held, bounds)
-            evidence = Evidence(solution, evidence.data_sets)
-            chain.append(evidence)
-        told, skipped = predicted_parts(first, evidence, bounds)
+    chains = {own: [first]}
+    for name in names or known_families(model, data_sets):
+        with nullcontext() if names else suppress(FitError):
+            chains[name] = _chain(chains, first, name, held, bounds)
+    effects = {name: [] if name == own else name.split("+") for name in chains}
+    worth = {name: _log_evidence(chain, effects[name], bounds) for name, chain in chains.items()}
+    odds = np.exp(np.array([*worth.values()]) - logsumexp([*worth.values()]))
+    probability = dict(zip(worth, odds.tolist(), strict=True))
+    kept = [own, *sorted((name for name in worth if name != own), key=worth.__getitem__, reverse=True)][:most]
+    found = []
+    for name in (name for name in worth if name in kept):
+        told, skipped = predicted_parts(first, chains[name][-1], bounds)
         out = HoldOut.of({part: of.residuals for part, of in told.items()}, skipped)
-        worth = _log_evidence(chain, name.split("+"), bounds)
-        found.append(FittedFamily(name, evidence, out, *_gain(told, data_sets), log_evidence=worth))
-    odds = np.array([family.log_evidence for family in found])
-    shares = np.exp(odds - logsumexp(odds)).tolist()
-    return [replace(family, probability=share) for family, share in zip(found, shares, strict=True)]
+        gain = _gain(told, data_sets) if name != own else (None, None)
+        found.append(FittedFamily(name, chains[name][-1], out, *gain, worth[name], probability[name]))
+    return found, {name: share for name, share in probability.items() if name not in kept}
+
+
+def _chain(
+    chains: Mapping[str, list[Evidence]], first: Evidence, name: str, held: Sequence[str], bounds: Bounds
+) -> list[Evidence]:
+    """The fits of a family's effects one after the other, from the longest beginning that was fitted before."""
+    before, _, last = name.rpartition("+")
+    chain = [first] if not before else chains.get(before) or _chain(chains, first, before, held, bounds)
+    effect, present = effect_named(last), chain[-1].model.effects
+    if not _fits(chain[-1].model, last):
+        has = "the model has this effect already"
+        problem = has if last in present else "what this effect stands in place of is not in the model"
+        laws = " or ".join(name for name in (*_RATE, *_AMPLITUDE) if _fits(chain[-1].model, name))
+        raise ModelError(problem, found=last, expected=f"such as {laws}")
+    solution = with_effect(chain[-1].solution, chain[-1].data_sets, effect, held, bounds)
+    return [*chain, Evidence(solution, chain[-1].data_sets)]
 
 
 def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bounds) -> float:

@@ -7,12 +7,15 @@ from itertools import combinations
 from string import ascii_uppercase
 from typing import Any
 
+import numpy as np
+
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.caveats import warnings_of
 from bushfit.comparison import Comparison, compare, holm, with_holm
 from bushfit.diagnosis.evidence import result_of
-from bushfit.diagnosis.families import FittedFamily, fit_families, known_families
+from bushfit.diagnosis.families import FittedFamily, fit_families
+from bushfit.effects import Level
 from bushfit.errors import ModelError
 from bushfit.fitting.assess import lack_of_fit
 from bushfit.fitting.data import Data
@@ -29,6 +32,7 @@ from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFil
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.page import comparison_page
 from bushfit.report.tables import contrast_table
+from bushfit.units import number, told
 from bushfit.validation import plain
 from bushfit.version import __version__
 
@@ -38,6 +42,12 @@ MOST = 8
 _COMPOUND = Specimen("compound", "modulus")
 #: What is said of a family where the first has no gap.
 _NO_GAP = "the first family meets these tests within their noise: nothing in them asks for another"
+#: Odds from which on a family counts where it is said which to use: one in twenty.
+_LIKELY = 0.05
+#: Share of the modulus within which families say the same: what two bushings of a batch differ by.
+_AGREED = 0.05
+#: How far beyond the tested range families are followed, as a factor, and points on the way.
+_BEYOND, _POINTS = 10.0, 400
 #: A record as JSON has it.
 _plain: Callable[[Any], Any] = asdict
 
@@ -83,9 +93,10 @@ class Compared:
 
     @property
     def judged(self) -> list[str]:
-        """Of each family but the first, whether it is nearer to what was held out."""
+        """Of families, which to use; and of each but the first, whether it is nearer to what was held out."""
         pairs = list(zip(self.labels, self.families, strict=False))
-        return [f"{label}, {family.name}: {family.words}" for label, family in pairs[1:]]
+        advice = [_use(self.families, self.entries)] if self.families else []
+        return [*advice, *(f"{label}, {family.name}: {family.words}" for label, family in pairs[1:])]
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -232,7 +243,7 @@ class Compare:
         data_sets = [data_set.standing() for data_set in data.chosen(self.asked.directions)]
         model = data.started(data.effects, data_sets, {})
         held = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]
-        families = fit_families(model, data_sets, names or known_families(), held, data.bounds)
+        families, left = fit_families(model, data_sets, names, held, data.bounds, MOST)
         tested = iter(holm([family.p for family in families if family.p is not None]))
         families = [family if family.p is None else replace(family, p=next(tested)) for family in families]
         entries = [
@@ -247,7 +258,11 @@ class Compare:
         ]
         first = families[0].evidence
         no_gap = lack_of_fit(first.model, data_sets, first.parameters) is None
-        return self.run(entries, families, [_NO_GAP] if no_gap else [])
+        notes = [_NO_GAP] if no_gap else []
+        if left:
+            odds = number(100.0 * sum(left.values()), 2)
+            notes.append(f"{len(left)} more families have odds of {odds} % together: {', '.join(left)}")
+        return self.run(entries, families, notes)
 
     def _places(self, results: Sequence[Result]) -> list[list[Place]]:
         """Where to compare, each place as every result has it."""
@@ -267,6 +282,32 @@ class Compare:
         frequencies, amplitudes = common_grid(results, places, sweeps)
         asked = getattr(self.asked, AMPLITUDES[places[0].motion])
         return self.asked.frequencies or frequencies, asked or amplitudes
+
+
+def _use(families: Sequence[FittedFamily], entries: Sequence[Entry]) -> str:
+    """Which family to use, and over what range the likely ones say the same."""
+    every = list(zip(ascii_uppercase, families, entries, strict=False))
+    label, family, entry = max(every, key=lambda each: each[1].probability)
+    others = [each for each in every if each[1].probability >= _LIKELY and each[0] != label]
+    said = f"use {label}, {family.name}: odds {number(100.0 * family.probability, 2)} %"
+    if not others or entry.result.measured is None:
+        return f"{said}, no other has {100.0 * _LIKELY:g} %"
+    models = [each.result.model.without(Level.INSTRUMENT) for each in (entry, *(other[2] for other in others))]
+    ends = np.array([entry.result.measured.frequency, entry.result.measured.strain])
+    middle, reach = np.sqrt(ends.prod(axis=1)), []
+    for axis, (low, high) in enumerate(ends):
+        points = np.repeat(middle[:, None], _POINTS, axis=1)
+        at = points[axis] = np.geomspace(low / _BEYOND, high * _BEYOND, _POINTS)
+        moduli = np.abs([model.stiffness(_COMPOUND, *points) for model in models])
+        apart = at[moduli.max(axis=0) > (1.0 + _AGREED) * moduli.min(axis=0)]
+        inside = np.searchsorted(apart, middle[axis])
+        reach.append((*apart[:inside][-1:], at[0])[:1] + (*apart[inside:][:1], at[-1])[:1])
+    frequencies, strains = told("Hz", *reach[0]), told("%", *(100.0 * end for end in reach[1]))
+    names = ", ".join(other for other, *_ in others)
+    return (
+        f"{said}; {names}, of {100.0 * _LIKELY:g} % or more, have its modulus within {100.0 * _AGREED:g} % over "
+        f"{frequencies} and {strains} strain; beyond, these tests do not tell which is right"
+    )
 
 
 def _known(result: Result) -> list[str]:

@@ -144,7 +144,7 @@ class SideBySide:
         for family, entry in zip(families, self.document["compared"], strict=False):
             parts, share = len(family["parts"]), family.get("probability")
             yield [
-                f"{family['label']}: {family['name']}",
+                f"{family['label']}: {family['name'].replace('+', ' + ')}",
                 str(family["parameters"]),
                 "" if entry["nrmse"] is None else f"{number(100.0 * entry['nrmse'], 2)} %",
                 number(family["reduced_chi_square"], 3),

@@ -69,7 +69,9 @@ def account(found: SideBySide) -> dict[str, Any]:
         "sizes": [row for place in places for row in _sizes(found, place)],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*found.family_cells()],
-        "judged": len(others) if families else 0,
+        "judged": len(others) + document["words"][0].startswith("use ")
+        if families
+        else 0,  # older files give no advice
         "most": MOST,
         "cells": parameter_cells,
         "chance": chance,
