@@ -27,6 +27,8 @@ from bushfit.units import number
 #: Laws of rate and of amplitude beside the paper's or in their place, of which families are made, each with each.
 _RATE = ("second_springpot", "fractional_zener", "maxwell")
 _AMPLITUDE = ("kraus", "sliders", "coupled_breakdown", "intrinsic_time")
+#: Of all families that are known, those that are held out and shown beside the first: of these odds, and so many.
+_LIKELY, _MOST = 0.01, 5
 #: Share by which a held-out error has to differ for two families not to count as alike, sure or not; chosen: no use
 #: of a bushing's model feels less.
 _ALIKE = 0.01
@@ -99,17 +101,15 @@ def fit_families(
     names: Sequence[str],
     held: Sequence[str],
     bounds: Bounds,
-    most: int | None = None,
 ) -> tuple[list[FittedFamily], dict[str, float]]:
     """The model as it comes first, and it with each of these families, fitted to the tests and held out alike.
 
     Args:
         names: of effects, several of one family joined by +; all that are known where there are none.
         held, bounds: parameters that do not move, and limits inside the parameters' own.
-        most: of all, those to hold out: the first and the likeliest.
 
     Returns:
-        These, and the probability of each family that is left.
+        The first and those named, or else the likeliest, held out; and the probability of each family that is left.
 
     Raises:
         FitError: data that cannot support the fit of a family that is named.
@@ -125,8 +125,9 @@ def fit_families(
     worth = {name: _log_evidence(chain, effects[name], bounds) for name, chain in chains.items()}
     odds = np.exp(np.array([*worth.values()]) - logsumexp([*worth.values()]))
     probability = dict(zip(worth, odds.tolist(), strict=True))
-    kept = [own, *sorted((name for name in worth if name != own), key=worth.__getitem__, reverse=True)][:most]
-    found = []
+    others = sorted((name for name in worth if name != own), key=worth.__getitem__, reverse=True)
+    likely = [name for name in others if names or probability[name] >= _LIKELY] or others[:1]
+    kept, found = {own, *(likely if names else likely[:_MOST])}, []
     for name in (name for name in worth if name in kept):
         told, skipped = predicted_parts(first, chains[name][-1], bounds)
         out = HoldOut.of({part: of.residuals for part, of in told.items()}, skipped)

@@ -243,7 +243,7 @@ class Compare:
         data_sets = [data_set.standing() for data_set in data.chosen(self.asked.directions)]
         model = data.started(data.effects, data_sets, {})
         held = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]
-        families, left = fit_families(model, data_sets, names, held, data.bounds, MOST)
+        families, left = fit_families(model, data_sets, names, held, data.bounds)
         tested = iter(holm([family.p for family in families if family.p is not None]))
         families = [family if family.p is None else replace(family, p=next(tested)) for family in families]
         entries = [

@@ -98,9 +98,9 @@ def test_the_likeliest_of_all_families_are_held_out(paper_model: Model) -> None:
     data = Data.of(measure(in_closed_form(made, PLAN), PLAN).campaign())
     tests = [*data.loops, *data.sweeps]
     start = Model.started(paper_model.bushing, BASE, data.start(tests, {}))
-    found, left = fit_families(start, tests, (), (), {}, most=4)
+    found, left = fit_families(start, tests, (), (), {})
     print({family.name: round(family.probability, 4) for family in found}, f"others {sum(left.values()):.1e}")
-    assert len(found) == 4
+    assert 2 <= len(found) <= 6
     assert found[0].name == "paper"
     assert sum(family.probability for family in found) + sum(left.values()) == pytest.approx(1.0)
     assert max(found, key=lambda family: family.probability).name == "fractional_zener+kraus"
