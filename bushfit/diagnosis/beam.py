@@ -51,8 +51,6 @@ class Search:
     def run(self) -> list[Hypothesis]:
         """Every hypothesis that was weighed, the most probable first."""
         beam = [self.root]
-        for place in self.asked.met:
-            self._note_meeting(place)
         for depth in range(ROUNDS + 1):
             for weighed in beam:
                 self._note_with_each(weighed, depth)
@@ -128,19 +126,22 @@ class Search:
         size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED)))
         self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, 0.0, weighed))
 
-    def _note_meeting(self, place: Meeting) -> None:
-        """Note that points which have no weight meet at a frequency: of the tests without them nothing is missing."""
-        root = self.root
-        families = {place.family, *(each.family for each in root.state.tests.fixed if each.kind == "place")}
-        odds = log(ODDS["place"] / len(families)) - root.state.log_prior
-        posterior = root.log_posterior + odds + place.log_odds
-        self._note(Hypothesis((), None, (place,), "", False, posterior, place.size, place.size, root))
+    def _met(self, hypothesis: Hypothesis, place: Meeting) -> Hypothesis:
+        """The same, and that points which have no weight meet at a frequency, beside all other tests."""
+        families = {place.family, *(each.family for each in self.root.state.tests.fixed if each.kind == "place")}
+        odds = log(ODDS["place"] / len(families)) - self.root.state.log_prior
+        posterior, size = hypothesis.log_posterior + odds + place.log_odds, max(hypothesis.size, place.size)
+        if hypothesis.size <= self.asked.tolerance:  # nothing that anyone would miss
+            return Hypothesis((), None, (place,), "", False, posterior, place.size, place.size, self.root)
+        return replace(hypothesis, places=(*hypothesis.places, place), log_posterior=posterior, size=size)
 
     def _note(self, hypothesis: Hypothesis) -> None:
-        """Keep the better of two ways to the same; what was refitted counts before what was not."""
-        before = self.found.get(hypothesis.key)
-        if before is None or (hypothesis.refitted, hypothesis.log_posterior) > (before.refitted, before.log_posterior):
-            self.found[hypothesis.key] = hypothesis
+        """Keep the better of two ways to the same, by itself and beside what else is seen; what was refitted counts
+        before what was not."""
+        for each in (hypothesis, *(self._met(hypothesis, place) for place in self.asked.met)):
+            before = self.found.get(each.key)
+            if before is None or (each.refitted, each.log_posterior) > (before.refitted, before.log_posterior):
+                self.found[each.key] = each
 
     def _grown(self, weighed: Weighed, depth: int) -> list[Weighed]:
         """The state with each of its most promising effects, refitted, and places; and without an effect that may only

@@ -5,7 +5,7 @@ and a phase error. Runs that hold the same are repeats of one line. Everything i
 gain errors are real and phase errors imaginary, both relative to |K|.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from scipy.special import chdtrc, fdtrc
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.repeats import FEWEST_SOUGHT, FLOOR, LineNoise, at_nominal, free_of, told_by_line
+from bushfit.fitting.repeats import FEWEST_SOUGHT, FLOOR, LineNoise, at_nominal, disturbed, free_of, told_by_line
 from bushfit.fitting.rig_class import class_words, largest_error, of_class, words_of
 from bushfit.reading.measurement import Sweep
 
@@ -98,11 +98,18 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         are pooled within a line and over lines; lines keep a random part of their own where Bartlett's test finds them
         unequal. Where the squares of D grow along what is stepped, so does the random part.
     """
-    lines = {
-        (sweep.name, float(held)): told_by_line(sweep, log_stiffness, held)
-        for sweep, log_stiffness in [(sweep, at_nominal(sweep)) for sweep in sweeps]
-        for held in np.unique(sweep.held)
-    }
+    at_levels = [(sweep, at_nominal(sweep)) for sweep in sweeps]
+
+    def told(disturbed: Collection[float]) -> dict[LineKey, LineNoise]:
+        return {
+            (sweep.name, float(held)): told_by_line(sweep, log_stiffness, held, disturbed)
+            for sweep, log_stiffness in at_levels
+            for held in np.unique(sweep.held)
+        }
+
+    lines = told(())
+    if apart := disturbed(lines.values()):
+        lines = told(apart)
     slopes = _slopes(sweeps, lines)
     for key, line in lines.items():
         if key[0] in slopes and line.steps.size:
@@ -121,9 +128,9 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     if repeated:
         level, freedom = of_class(rig, (0.0, 0.0)), max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH)
         of_each = {key[0]: [line for own, line in lines.items() if own[0] == key[0]] for key in lines}
-        told = {name: _shared(own, rig) for name, own in of_each.items()}
+        shared_by = {name: _shared(own, rig) for name, own in of_each.items()}
         most = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states what repeats share
-        beyond = {name: _beyond(error, rig) for name, error in told.items() if np.any(error > most)}
+        beyond = {name: _beyond(error, rig) for name, error in shared_by.items() if np.any(error > most)}
         shared = _pair(_shared(repeated, rig))
         return SweepNoise(random, shared, "repeats", freedom, scatter_freedom, slopes, level, beyond=beyond)
     if all(sweep.noise is not None for sweep in sweeps):

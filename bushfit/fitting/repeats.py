@@ -4,11 +4,14 @@ A line is what was stepped through while one of frequency and amplitude was held
 i phase, so gain errors are real and phase errors imaginary, both relative to |K|.
 """
 
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
 from scipy.linalg import lapack, qr
+from scipy.special import chdtrc
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.outliers import least_absolute
@@ -28,6 +31,9 @@ _SURFACE_DEGREES = (1, 3)
 FEWEST_STEPS = 3
 #: Differences from which on outliers are sought among them: of fewer, the median tells no scale.
 FEWEST_SOUGHT = 6
+#: Probability by chance of a scatter of many lines at one step, below which something disturbs them there; small, as
+#: the scatter elsewhere is known by some points only.
+_DISTURBED = 1e-9
 #: Distance of an outlier from the other points [robust standard deviations]: noise alone reaches it once in 1e9.
 _OUTLIER = 6.0
 
@@ -43,6 +49,7 @@ class LineNoise:
         shared_freedom: degrees of freedom behind their mean; 0 without repeats.
         calmer: without repeats, the scatter less the point that adds most to it, (k - 1, 2).
         steps: of repeats, what was stepped at each deviation, (k,).
+        apart: without repeats, the square of how far the point at each step lies off, in units of the robust scatter.
     """
 
     scatter: Array
@@ -51,6 +58,7 @@ class LineNoise:
     shared_freedom: float = 0.0
     calmer: Array | None = None
     steps: Array = field(default_factory=lambda: np.empty(0))
+    apart: Mapping[float, float] = field(default_factory=dict)
 
     @property
     def variance(self) -> Array:
@@ -58,9 +66,10 @@ class LineNoise:
         return np.asarray(np.square(self.scatter).sum(axis=0) / max(self.freedom, 1))
 
 
-def told_by_line(sweep: Sweep, log_stiffness: Array, held: float) -> LineNoise:
-    """What one line of a sweep tells: by pairs of repeats, or about a smooth curve where there is no pair."""
-    chosen = sweep.held == held
+def told_by_line(sweep: Sweep, log_stiffness: Array, held: float, disturbed: Collection[float] = ()) -> LineNoise:
+    """What one line of a sweep tells, but for disturbed steps: by pairs of repeats, or about a smooth curve where there
+    is no pair."""
+    chosen = (sweep.held == held) & ~np.isin(sweep.step, [*disturbed])
     steps, column = np.unique(sweep.step[chosen], return_inverse=True)
     numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
     table = np.full((numbers.size, steps.size), np.nan + 0j)
@@ -69,7 +78,7 @@ def told_by_line(sweep: Sweep, log_stiffness: Array, held: float) -> LineNoise:
     kept = [(difference, _usual(difference, np.log(steps))) for difference in differences]
     pairs = [(difference[usual], steps[usual]) for difference, usual in kept if usual.sum() >= FEWEST_STEPS]
     if not pairs:
-        return _about_smooth_curve(np.log(steps), np.nanmean(table, axis=0))
+        return _about_smooth_curve(steps, np.nanmean(table, axis=0))
     scatter = [_parts(np.diff(difference)) / np.sqrt(2.0) for difference, _ in pairs]
     shared = [
         (_parts(difference).mean(axis=0) ** 2 - np.square(spread).mean(axis=0) / len(difference)) / 2.0
@@ -108,13 +117,13 @@ def _usual(difference: Array, log_step: Array) -> Array:
     return usual & np.all((off <= _OUTLIER * scale) | (scale == 0.0), axis=1)
 
 
-def _about_smooth_curve(log_step: Array, log_stiffness: Array) -> LineNoise:
+def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     """What a line without repeats tells: its scatter about a smooth curve; of one or two points this is assumed."""
-    degree = min(_SMOOTH_DEGREE, log_step.size - 2)
+    degree = min(_SMOOTH_DEGREE, steps.size - 2)
     if degree < 1:
         return LineNoise(np.full((1, 2), ASSUMED[0]), 1, np.empty((0, 2)))
     values = _parts(log_stiffness)
-    basis = np.polynomial.legendre.legvander(unit(log_step), degree)
+    basis = np.polynomial.legendre.legvander(unit(np.log(steps)), degree)
     residual = np.abs(values - basis @ least_absolute(basis, values, FLOOR**2))
     usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
     inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
@@ -125,7 +134,23 @@ def _about_smooth_curve(log_step: Array, log_stiffness: Array) -> LineNoise:
     falls = np.square(off).sum(axis=1) / np.maximum(free, FLOOR**2)
     worst = int(np.argmax(falls))  # the point without which the sum of squares about the curve falls most
     calmer = _freed(np.delete(basis, worst, axis=0), np.delete(values, worst, axis=0))
-    return LineNoise(scatter, len(scatter), np.empty((0, 2)), calmer=calmer)
+    squares = np.square(residual / np.maximum(MEDIAN_TO_SIGMA * usual, FLOOR)).sum(axis=1)
+    apart = dict(zip(steps.tolist(), squares.tolist(), strict=True))
+    return LineNoise(scatter, len(scatter), np.empty((0, 2)), calmer=calmer, apart=apart)
+
+
+def disturbed(lines: Iterable[LineNoise]) -> list[float]:
+    """Steps at which lines without repeats scatter far more than elsewhere, such as frequencies near that of the mains:
+    there it is no noise of the rig."""
+    points: dict[float, list[float]] = defaultdict(list)
+    for line in lines:
+        for step, square in line.apart.items():
+            points[step].append(square)
+    return [
+        step
+        for step, squares in points.items()
+        if len(squares) >= FEWEST_STEPS and chdtrc(2 * len(squares), sum(squares)) < _DISTURBED
+    ]
 
 
 def unit(values: Array) -> Array:
