@@ -20,7 +20,7 @@ from bushfit.diagnosis.hypotheses import Asked, Hypothesis, State, Tests, Weighe
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_what_it_uses
-from bushfit.diagnosis.refit import refitted, within_reach
+from bushfit.diagnosis.refit import beside, refitted, within_reach
 from bushfit.diagnosis.words import judged
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.rig_class import ASSUMED, of_class
@@ -197,12 +197,21 @@ class Search:
         state, grown = weighed.state, []
         own = [(each, worth) for each, worth in weighed.worths if isinstance(each, FaultyPlace)]
         own.sort(key=lambda pair: -(self._prior("place", pair[0].name) + pair[1].log_evidence))
-        for each, worth in own[:_PLACES]:
+        for place, shifted in own[:_PLACES]:
+            free = place.freely
+            (scattered,) = replace(weighed.first, groups=[group for group in [free.group] if group]).worths
+            both = (place, shifted), (free, scattered)
+            each, worth = max(both, key=lambda pair: pair[1].log_evidence)
             odds = self._prior("place", each.name) - log(depth + 1)
             better = weighed.with_(each, worth, odds).log_posterior > weighed.log_posterior
             if better and state.key | {each.name} not in self._seen:
+                evidence = state.evidence
+                if evidence.reduced > _BENT:  # by the place, too
+                    start = {} if state.effects else self.asked.start
+                    evidence = beside(evidence, weighed.bare, each.columns, start, self.asked.bounds)
                 more = replace(
                     state,
+                    evidence=evidence,
                     places=(*state.places, each),
                     log_prior=state.log_prior + odds,
                     amounts=(*state.amounts, worth.likeliest),

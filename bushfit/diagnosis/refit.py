@@ -2,17 +2,22 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
 from bushfit.diagnosis.propose import Proposal
 from bushfit.effects import qualified
+from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.coordinates import Bounds
+from bushfit.fitting.common_error import CommonError
+from bushfit.fitting.coordinates import Bounds, jacobian, residual
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import fit_from, probes
+from bushfit.fitting.joined import Joined
+from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 
 #: Chi-square beyond that of the best at which a refit is left on its way.
@@ -66,3 +71,17 @@ def within_reach(model: Model, data_sets: Sequence[DataSet]) -> Bounds:
     shapes = [(qualified(effect, each), each) for effect in model.records for each in effect.parameters if each.scale]
     tried = {name: probes(data_sets, model, each) for name, each in shapes}
     return {name: (float(values.min()), float(values.max())) for name, values in tried.items() if np.ptp(values) > 0.0}
+
+
+def beside(evidence: Evidence, bare: Evidence, columns: Array, start: Mapping[str, float], bounds: Bounds) -> Evidence:
+    """The fit that the tests ask for where residuals along columns, whitened by scatter alone as in `bare`, are free;
+    the best from the fit without that, and from values to start from."""
+    names, solution = evidence.solution.coordinates.names, evidence.solution
+    tests = Joined(bare.data_sets, CommonError.of_all(columns), freedom=1.0)
+    known = {name: value for name, value in start.items() if name in names}
+    starts = [evidence.model, *([evidence.model.with_values(known)] if known else [])]
+    fits = [solve(model, tests, names, bounds, strict=False) for model in starts]
+    model = min(fits, key=lambda each: each.chi_square).model
+    rows = jacobian(model, evidence.data_sets, names)
+    left = residual(model, evidence.data_sets)
+    return replace(evidence, solution=replace(solution, model=model, residual=left, jacobian=rows))

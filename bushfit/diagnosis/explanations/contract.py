@@ -1,6 +1,6 @@
 """What every explanation of a gap has: a name, a share of the odds, and columns with a prior."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,6 +53,15 @@ class FaultyPlace(Explanation):
         """Whitened residuals that a unit deviation of each kind makes, (c, n)."""
         assert self.group is not None
         return self.group.columns
+
+    @property
+    def freely(self) -> "FaultyPlace":
+        """The same with every point off by itself: what went wrong there need be no shift and no slope."""
+        size = np.abs(self.columns).max(axis=0)
+        rows = np.flatnonzero(size)
+        columns = np.zeros((rows.size, size.size))
+        columns[np.arange(rows.size), rows] = size[rows]
+        return replace(self, group=Group(columns, np.eye(rows.size), together=True))
 
     def distance(self, residual: Array) -> float:
         """How far they lie off, in units of noise: the root mean square along their columns of residuals, (n,)."""
