@@ -199,9 +199,8 @@ class Search:
         own.sort(key=lambda pair: -(self._prior("place", pair[0].name) + pair[1].log_evidence))
         for place, shifted in own[:_PLACES]:
             free = place.freely
-            (scattered,) = replace(weighed.first, groups=[group for group in [free.group] if group]).worths
-            both = (place, shifted), (free, scattered)
-            each, worth = max(both, key=lambda pair: pair[1].log_evidence)
+            (scattered,) = weighed.worths_of([free])
+            each, worth = (free, scattered) if scattered.log_evidence > shifted.log_evidence else (place, shifted)
             odds = self._prior("place", each.name) - log(depth + 1)
             better = weighed.with_(each, worth, odds).log_posterior > weighed.log_posterior
             if better and state.key | {each.name} not in self._seen:

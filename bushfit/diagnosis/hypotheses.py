@@ -15,6 +15,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, FaultyPlace, Meeting, MissingEffect, effects, places, unnamed
 from bushfit.diagnosis.priors import FAR
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
+from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data import Data
 
@@ -192,10 +193,17 @@ class Weighed:
         """Every explanation that can be counted linearly, at the sizes of the rig's errors that matter: those that
         nothing more, or something smooth, makes likely."""
         every = [each for each in (*self.effects, *self.state.tests.fixed) if each.group is not None]
-        curves = [each.group for each in every if each.group and each.kind == "unnamed"]
-        likely = replace(self.first, groups=curves).likely(FAR)
-        groups = [each.group for each in every if each.group]
-        return list(zip(every, replace(self.first, groups=groups, at=likely).worths, strict=True))
+        return list(zip(every, self.worths_of(every), strict=True))
+
+    @cached_property
+    def _likely(self) -> Array:
+        """Numbers of the nodes that nothing more, or something smooth, makes likely."""
+        curves = [each.group for each in self.state.tests.fixed if each.group and each.kind == "unnamed"]
+        return replace(self.first, groups=curves).likely(FAR)
+
+    def worths_of(self, every: Sequence[Explanation]) -> Sequence[Worth]:
+        """Of explanations that have columns."""
+        return replace(self.first, groups=[each.group for each in every if each.group], at=self._likely).worths
 
     def with_(self, each: Explanation, worth: Worth, log_odds: float) -> Hypothesis:
         """This state with an explanation more, counted linearly."""

@@ -56,7 +56,9 @@ class FaultyPlace(Explanation):
 
     @property
     def freely(self) -> "FaultyPlace":
-        """The same with every point off by itself: what went wrong there need be no shift and no slope."""
+        """The same with every point of a sweep off by itself: what went wrong need be no shift and no slope."""
+        if self.family == "loop":
+            return self
         size = np.abs(self.columns).max(axis=0)
         rows = np.flatnonzero(size)
         columns = np.zeros((rows.size, size.size))
