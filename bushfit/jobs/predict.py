@@ -13,6 +13,7 @@ from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
 from bushfit.caveats import SAME_TEMPERATURE, warnings_of
 from bushfit.effects import Level
+from bushfit.effects.contract import Circumstances
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
@@ -211,7 +212,7 @@ class Predict:
         assert self.arms
         frequencies = [prediction.frequency for prediction in predictions]
         band = float(min(map(min, frequencies))), float(max(map(max, frequencies)))
-        found = model_arms(model.without(Level.INSTRUMENT), band, self.arms)
+        found = model_arms(model.without(Level.INSTRUMENT), band, self.arms, Circumstances(self.temperature))
         if not found:
             raise ModelError(
                 "there is nothing that Maxwell arms could stand for",

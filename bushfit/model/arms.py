@@ -5,15 +5,16 @@ in series do the same within a stated error.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import itemgetter
 
 import numpy as np
 
-from bushfit.effects import Branch, qualified
-from bushfit.effects.contract import Array
+from bushfit.effects import Branch, Modifier, qualified
+from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.errors import ModelError
+from bushfit.geometry import Specimen
 from bushfit.model.model import Model, seen_by
 from bushfit.units import number
 
@@ -65,6 +66,7 @@ class Arms:
         time: tau_k [s], (k,).
         band: lowest and highest frequency [Hz] at which they are judged.
         error: largest relative error of the complex modulus there.
+        under: the rubber's temperature, where it is another than that at which a model stands by itself.
 
     Notes: with no modulus and no time below zero the arms take up energy in any motion; nothing has to be checked.
     """
@@ -75,6 +77,7 @@ class Arms:
     time: Array
     band: tuple[float, float]
     error: float
+    under: Circumstances = UNKNOWN
 
     def at(self, omega: Array) -> Array:
         """mu^ [Pa] at angular frequencies [rad/s], (n,)."""
@@ -126,7 +129,9 @@ def fitted_arms(
     )
 
 
-def model_arms(model: Model, band: tuple[float, float], accuracy: float = ACCURACY) -> tuple[Arms, ...]:
+def model_arms(
+    model: Model, band: tuple[float, float], accuracy: float = ACCURACY, under: Circumstances = UNKNOWN
+) -> tuple[Arms, ...]:
     """Arms for each part of a model that fades with memory, the springpot first, at the model's values.
 
     Effects that share a size, as the springpot and the spring in series with it, are one part. A size of 0 is none.
@@ -134,16 +139,20 @@ def model_arms(model: Model, band: tuple[float, float], accuracy: float = ACCURA
     parts: dict[str, list[str]] = {}
     for branch in model.fading:
         parts.setdefault(qualified_size(branch), []).append(branch.name)
-    return tuple(
-        fitted_arms(partial(part_modulus, model, size), band, accuracy, stands_for=" and ".join(names), size=size)
+    found = (
+        fitted_arms(
+            partial(part_modulus, model, size, under=under), band, accuracy, stands_for=" and ".join(names), size=size
+        )
         for size, names in parts.items()
         if model.values[size]
     )
+    return tuple(replace(part, under=under) for part in found)
 
 
 def listed(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
     """What each spring stands for, its modulus [Pa] and relaxation time [s]; first, without one, what is elastic."""
-    at_rest = [("elastic", model.values["mu"], np.nan)] if "mu" in model.values else []
+    values = _values(model, arms[0].under) if arms else model.values
+    at_rest = [("elastic", values["mu"], np.nan)] if "mu" in values else []
     every = ((part.stands_for, *pair) for part in arms for pair in zip(part.modulus, part.time, strict=True))
     return at_rest + [(name, float(modulus), float(time)) for name, modulus, time in every]
 
@@ -155,11 +164,19 @@ def qualified_size(branch: Branch) -> str:
     return own.get(branch.size, branch.size)
 
 
-def part_modulus(model: Model, size: str, omega: Array) -> Array:
+def part_modulus(model: Model, size: str, omega: Array, under: Circumstances = UNKNOWN) -> Array:
     """mu^ [Pa] of the branches of one size at angular frequencies [rad/s], (n,)."""
-    still = np.zeros_like(omega)
+    still, values, reduced = np.zeros_like(omega), _values(model, under), omega * model.pace(under)
     own = (branch for branch in model.fading if qualified_size(branch) == size)
-    return np.asarray(sum(branch.modulus(seen_by(branch, model.values), omega, still) for branch in own))
+    return np.asarray(sum(branch.modulus(seen_by(branch, values), reduced, still) for branch in own))
+
+
+def _values(model: Model, under: Circumstances) -> Values:
+    """The values of a model as its temperature leaves them, whatever the motion."""
+    if under.temperature is None:
+        return model.values
+    others = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.pace]
+    return model.without(*others).values_at(Specimen("compound", "modulus"), 1.0, 0.0, under)
 
 
 def _basis(omega: Array, time: Array) -> Array:

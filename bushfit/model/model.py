@@ -243,10 +243,14 @@ class Model:
             layers = tuple(layer for layer in layers if layer.corrects)
         return tuple(each for each in layers if each.acts_at(place) and (each.turns or not place.is_rotation))
 
-    def values_at(self, place: Place, frequency: float, amplitude: float) -> dict[str, float]:
+    def values_at(
+        self, place: Place, frequency: float, amplitude: float, under: Circumstances = UNKNOWN
+    ) -> dict[str, float]:
         """All values as the modifiers leave them at an operating condition [Hz, m or rad]."""
         omega, reached = 2.0 * np.pi * np.atleast_1d(frequency), np.atleast_1d(amplitude)
-        found = self._adjusted(self.setting(place), self.values, omega, reached, reached * self.unit_strain(place))
+        found = self._adjusted(
+            self.setting(place, under=under), self.values, omega, reached, reached * self.unit_strain(place)
+        )
         return {name: float(np.asarray(value).item()) for name, value in found.items()}
 
     def _stack_stiffness(self, setting: Setting, values: Values) -> Callable[[Array, Array], Array]:

@@ -12,10 +12,12 @@ import pytest
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE
+from bushfit.effects.contract import Circumstances
 from bushfit.fitting.data import Data
 from bushfit.fitting.master_curve import master_curve
 from bushfit.fitting.procedures import fit_joint
-from bushfit.geometry import Direction
+from bushfit.geometry import Direction, Specimen
+from bushfit.model.arms import listed, model_arms
 from bushfit.model.model import Model
 from bushfit.prediction import predict
 from bushfit.report.artifacts import temperature_contents
@@ -100,6 +102,20 @@ def test_a_sweep_off_the_law_says_so(truth: Model) -> None:
     print(f"own less law, in standard errors, coldest first: {np.round(off, 1)}")
     assert np.argmax(np.abs(off)) == 1
     assert off[1] < -4.0
+
+
+@pytest.mark.parametrize("degrees", [-10.0, 40.0])
+def test_arms_stand_for_the_rubber_at_a_temperature(truth: Model, degrees: float) -> None:
+    """Springs and dashpots, the spring and friction below all amplitudes are the model as cold or as warm."""
+    under, compound = Circumstances(CELSIUS + degrees), Specimen("compound", "modulus")
+    frequency = np.geomspace(1.0, 100.0, 9)
+    arms = model_arms(truth, (1.0, 100.0), 1e-3, under)
+    spring = listed(truth, arms)[0][1]
+    softer = np.exp(-VALUES["temperature.softening"] * (degrees - 23.0))
+    friction = softer * truth.values["sigma_fmax"] / (2.0 * truth.values["eps_half"])
+    found = spring + friction + sum(part.at(2.0 * np.pi * frequency) for part in arms)
+    model = truth.stiffness(compound, frequency, np.full(frequency.shape, 1e-9), under=under)
+    np.testing.assert_allclose(found, model, rtol=1e-3)
 
 
 def test_what_lies_beyond_the_tested_temperatures_is_told(clean: Undisturbed) -> None:
