@@ -253,13 +253,15 @@ def _check_loses_energy(drive: Drive) -> None:
     rows = drive.weight.sum() / drive.row_noise.rows_as_one
     chance = drive.noise * np.sqrt(2.0 / rows) / abs(drive.coefficients[1])
     if stiffness.imag < -max(_CERTAIN * chance, _NO_LOSS * abs(stiffness)):
+        late = number(-1e3 * np.angle(stiffness) / (2.0 * np.pi * drive.frequency), 2)
         raise FitError(
             "the loop gives energy, which no bushing does",
             file=drive.loop.source.file if drive.loop.source else None,
             found=f"a loss factor of {stiffness.imag / stiffness.real:.3g}: the force lags behind the displacement",
             expected="a force that runs ahead of the displacement",
             hint="are the columns of displacement and force swapped, or do the rows run backwards in time? Name the "
-            'columns in the campaign: columns = { displacement = "...", force = "..." }',
+            'columns in the campaign: columns = { displacement = "...", force = "..." }. A filter or a delay of the '
+            f"force by more than {late} ms does the same",
         )
 
 
