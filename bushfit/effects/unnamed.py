@@ -26,7 +26,7 @@ NAME = "unnamed"
 _JITTER = 1e-8
 
 #: Nodes at most; chosen: all points of the paper's plan, and little time.
-_MOST_NODES = 100
+MOST_NODES = 100
 #: Patterns over the nodes at most, and the variance of one, relative to the largest, that counts; chosen for time.
 _MOST, _LEAST_VARIANCE = 30, 1e-5
 #: Digits of places that tell them apart.
@@ -242,7 +242,7 @@ def nodes_among(points: Array, most: int) -> Array:
     return np.array(chosen)
 
 
-def basis(places: Array, among: Array | None = None) -> tuple[Array, Array]:
+def basis(places: Array, among: Array | None = None, most: int = MOST_NODES) -> tuple[Array, Array]:
     """Some places, in units of the kernel's lengths, (p, 2), to be nodes: all or those farthest apart, their indices,
     (m,); and what independent amounts of unit variance make of the process at all places, (p, q).
 
@@ -250,7 +250,7 @@ def basis(places: Array, among: Array | None = None) -> tuple[Array, Array]:
     """
     among = places if among is None else among
     distinct = np.unique(among.round(_DIGITS), axis=0, return_index=True)[1]
-    own = distinct if distinct.size <= _MOST_NODES else distinct[nodes_among(among[distinct], _MOST_NODES)]
+    own = distinct if distinct.size <= most else distinct[nodes_among(among[distinct], most)]
     size, vectors = np.linalg.eigh(correlation(places[own]))
     kept = (size > _LEAST_VARIANCE * size[-1]) & (np.arange(size.size) >= size.size - _MOST)  # the largest last
     return own, kernel(places, places[own]) @ vectors[:, kept] / np.sqrt(size[kept])

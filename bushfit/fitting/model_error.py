@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import chain, pairwise, product
 
 import numpy as np
 from scipy.special import logsumexp
@@ -29,7 +29,7 @@ from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.effects.temperature import REFERENCE
-from bushfit.effects.unnamed import Patch, Unnamed, basis, in_lengths, places_of
+from bushfit.effects.unnamed import MOST_NODES, Patch, Unnamed, basis, in_lengths, places_of
 from bushfit.errors import FitError
 from bushfit.fitting.common_error import CommonError, Seen
 from bushfit.fitting.coordinates import Bounds, Solution, anderson, coordinate_bounds, jacobian, residual
@@ -52,8 +52,8 @@ _LENGTHS = (0.4, 0.9, 2.0)
 #: Odds beforehand of something smooth that the model lacks, against nothing; as `diagnose` has them.
 _ODDS = 0.2
 #: Gain of the logarithm of the likelihood by an error of middling lengths, up to which no others are tried; chosen: of
-#: clean campaigns three in four stay below.
-_SHOWS = 0.5
+#: clean campaigns three in four stay below. And its nodes: few, as it is but looked for.
+_SHOWS, _FEW = 0.5, 16
 #: Difference of the logarithm of the likelihood from the best, beyond which an error is tried no more.
 _FAR = 12.0
 #: Singular value, relative to the largest, below which what parameters make is rounding.
@@ -61,6 +61,9 @@ _ROUNDING = 1e-10
 #: Rounds in which error and parameters follow each other, at most, and the share of a standard error by which the
 #: parameters still move when they have settled.
 _MOST_ROUNDS, _SETTLED = 12, 0.1
+
+#: Directions and specimens, by name, in groups.
+_Groups = tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,18 +187,18 @@ class _Prior:
         shapes: the error at the points by its amounts, (q, p).
     """
 
-    groups: tuple[tuple[str, ...], ...]
+    groups: _Groups
     lengths: tuple[float, float]
     nodes: Sequence[Array]
     shapes: Array
 
     @classmethod
-    def of(cls, tests: _Beside, groups: tuple[tuple[str, ...], ...], lengths: tuple[float, float]) -> _Prior:
-        """The error at the points of some tests."""
+    def of(cls, tests: _Beside, groups: _Groups, lengths: tuple[float, float], most: int = MOST_NODES) -> _Prior:
+        """The error at the points of some tests, by so many nodes at most."""
         nodes, shapes = [], []
         for group in groups:
             inside = np.flatnonzero(np.isin(tests.names, group))
-            own, near = basis(in_lengths(tests.points[inside], lengths, 0.0))
+            own, near = basis(in_lengths(tests.points[inside], lengths, 0.0), most=most)
             here = np.zeros((near.shape[1], len(tests.points)))
             here[:, inside] = near.T
             nodes.append(inside[own])
@@ -331,15 +334,13 @@ def log_likelihood(found: Estimate, known: Mapping[str, float]) -> float:
 
 
 def _alive(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
-    """A model to start from besides, its branches as read off the tests: a fit that noise bends may have lost one,
-    which then no step brings back; none of tests that no rubber gives."""
+    """A model to start from, its branches as read off the tests: a fit bent by noise may have lost one for good."""
     model, moved = solution.model, solution.coordinates.names
     known = {name: value for name, value in model.values.items() if name not in moved}
-    with suppress(FitError):
+    with suppress(FitError):  # tests that no rubber gives
         paper = Model.started(model.bushing, BASE, start_values(model.bushing, data_sets, known))
-        values = dict(paper.values)
-        for effect in model.records:
-            values |= paper.starts(effect)[0]
+        others = [paper.starts(effect)[0].items() for effect in model.records]
+        values = {**paper.values, **dict(chain.from_iterable(others))}
         return [model.with_values({name: values[name] for name in moved if name in values})]
     return []
 
@@ -353,7 +354,7 @@ def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[Dat
 
 def _shows(beside: _Beside) -> bool:
     """Whether tests are any likelier with an error of middling lengths that all of them share: few clean ones are."""
-    return _Error(beside, _Prior.of(beside, (beside.directions,), _LENGTHS[1:3])).best[0] > _SHOWS
+    return _Error(beside, _Prior.of(beside, (beside.directions,), _LENGTHS[1:3], _FEW)).best[0] > _SHOWS
 
 
 def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> Array:
