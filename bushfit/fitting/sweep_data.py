@@ -65,6 +65,12 @@ class Line:
         return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]
 
 
+#: Magnitudes per point up to which, and step from one to the next, relative, from which on they are rounded.
+_FEW_SIZES, _COARSE = 0.4, 0.01
+#: Digits of ln|K| that tell magnitudes apart.
+_DIGITS = 9
+
+
 @dataclass(frozen=True, eq=False)
 class SweepData(DataSet):
     """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor; see `DataSet`.
@@ -105,7 +111,18 @@ class SweepData(DataSet):
             for share, *_ in apart[:1]
         ]
         beyond = (words for name, words in self.noise.beyond.items() if name == self.name)
-        return [*super().notes, *told, *filter(None, [self.beside]), *beyond]
+        return [*super().notes, *told, *filter(None, [self.beside, self._rounded]), *beyond]
+
+    @property
+    def _rounded(self) -> str | None:
+        """A sentence on magnitudes that come in coarse steps: few of them at many points."""
+        sizes = np.unique(np.log(np.abs(self.measured)).round(_DIGITS))
+        points = self.measured.size
+        if not 3 <= sizes.size <= _FEW_SIZES * points or (step := float(np.median(np.diff(sizes)))) < _COARSE:
+            return None
+        many, apart = f"{sizes.size} magnitudes at {points} points", f"{number(100.0 * step, 2)} % apart"
+        file = self.source.file if self.source else self.name
+        return f"{file}: {many}, {apart}: they are rounded, and the error of it counts as noise; save more digits"
 
     @property
     def temperature(self) -> Array:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import load_campaign
+from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting, RigSettings
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
@@ -94,3 +94,14 @@ def test_points_that_are_left_out_have_no_weight(measured: Data) -> None:
     assert without.sweeps[0].counted == measured.sweeps[0].counted - 2
     assert np.count_nonzero(without.sweeps[0].weights == 0.0) == 1
     assert without.sweeps[1] is measured.sweeps[1]
+
+
+def test_magnitudes_in_coarse_steps_are_told(campaign: Campaign) -> None:
+    """In steps of 50 N/mm they are few, in steps of 0.05 N/mm they are as many as the points."""
+    sweep = campaign.sweeps[0]
+    size, turn = np.abs(sweep.stiffness), sweep.stiffness / np.abs(sweep.stiffness)
+    for step, told in ((5e4, True), (50.0, False)):
+        (data_set,) = sweep_data([replace(sweep, stiffness=np.round(size / step) * step * turn)])
+        lines = [note for note in data_set.notes if "are rounded" in note]
+        print(*lines)
+        assert bool(lines) == told
