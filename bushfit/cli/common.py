@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -218,3 +219,23 @@ def open_source(source: Path) -> Campaign | Result:
             hint="name a model file itself, or a campaign",
         )
     return open_model(file)
+
+
+@contextmanager
+def progress(options: Options, what: str) -> Iterator[Callable[[str, int], None]]:
+    """Which of some things is done, by its name, and how many are left: a bar on a terminal, a line each elsewhere."""
+    from rich.progress import Progress
+
+    console = options.console
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(what, total=None)
+
+        def advance(name: str, left: int) -> None:
+            done = bar.tasks[0].completed + 1
+            bar.update(task, completed=done, total=done + left, description=f"{what} {name}: done")
+            if not console.is_terminal:
+                options.say(f"{what} {name}: done, {left} to go")
+            elif not left:
+                bar.stop()
+
+        yield advance

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, open_source, with_options
+from bushfit.cli.common import Options, open_source, progress, with_options
 from bushfit.cli.grids import asked_for
 from bushfit.cli.options import command_called, option_of
 from bushfit.cli.show import new_table
@@ -38,8 +38,8 @@ def command(
     `bushfit fit`. Parameters stand side by side with the interval of each difference, stiffness and loss factor over
     frequency with bands; words say what differs, or how large a difference may be that is not seen.
 
-    --families fits several models to one campaign and holds out alike what tests them: a table of how well each meets
-    the tests, and which predicts better what it was not fitted to.
+    --families fits several models to one campaign and holds out alike what tests them: which to use over what range,
+    how well each meets the tests, and which predicts better what it was not fitted to.
 
     Writes compare.json, parameters.csv, differences.csv (a row a result, place, frequency and amplitude), compare.png,
     compare.html, a page to show, to print and to mail, and with --families families.csv.
@@ -66,7 +66,8 @@ def command(
         campaign = load_campaign(sources[0])
         folder = options.folder(campaign.name, "{} families")
         options.require_free(folder, options.formats.names(job.kinds(families=True)))
-        outcome = job.run_families(campaign, str(sources[0]), names)
+        with progress(options, "family") as advance:
+            outcome = job.run_families(campaign, str(sources[0]), names, advance)
     else:
         opened = [_opened(source) for source in sources]
         folder = options.folder(" and ".join(each.name for each, *_ in opened))

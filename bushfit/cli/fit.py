@@ -1,12 +1,9 @@
 """`bushfit fit-static`, `fit-dynamic` and `fit`: loops, sweeps, or both together -> parameters."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
 
-from rich.progress import Progress
-
-from bushfit.cli.common import Options, Task, open_model, with_task
+from bushfit.cli.common import Task, open_model, progress, with_task
 from bushfit.cli.options import command_called
 from bushfit.cli.show import tell_fit
 
@@ -57,23 +54,5 @@ def fit(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, ta
     """
     from bushfit.jobs.fits import Fit
 
-    with _progress(task.options) if profile else nullcontext() as advance:
+    with progress(task.options, "profile of") if profile else nullcontext() as advance:
         task.perform(Fit(directions, effects, advance), tell_fit)
-
-
-@contextmanager
-def _progress(options: Options) -> Iterator[Callable[[str, int], None]]:
-    """Which parameter's profile is done: a bar on a terminal, a line each elsewhere."""
-    console = options.console
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("profiles", total=None)
-
-        def advance(name: str, left: int) -> None:
-            done = bar.tasks[0].completed + 1
-            bar.update(task, completed=done, total=done + left, description=f"profile of {name}: done")
-            if not console.is_terminal:
-                options.say(f"profile of {name}: done, {left} to go")
-            elif not left:
-                bar.stop()
-
-        yield advance

@@ -1,6 +1,6 @@
 """Model families on one campaign: the paper's and others in place of its branches, fitted and held out alike."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from itertools import product
@@ -101,12 +101,14 @@ def fit_families(
     names: Sequence[str],
     held: Sequence[str],
     bounds: Bounds,
+    progress: Callable[[str, int], None] | None = None,
 ) -> tuple[list[FittedFamily], dict[str, float]]:
     """The model as it comes first, and it with each of these families, fitted to the tests and held out alike.
 
     Args:
         names: of effects, several of one family joined by +; all that are known where there are none.
         held, bounds: parameters that do not move, and limits inside the parameters' own.
+        progress: called with each that was fitted, and how many are left.
 
     Returns:
         The first and those named, or else the likeliest, held out; and the probability of each family that is left.
@@ -118,9 +120,12 @@ def fit_families(
     first = fit(model, data_sets, held, bounds)
     own = "+".join(["paper", *(name for name in model.effects if name not in BASE)])
     chains = {own: [first]}
-    for name in names or known_families(model, data_sets):
+    asked = names or known_families(model, data_sets)
+    for left, name in zip(reversed(range(len(asked))), asked, strict=True):
         with nullcontext() if names else suppress(FitError):
             chains[name] = _chain(chains, first, name, held, bounds)
+        if progress:
+            progress(name, left)
     effects = {name: [] if name == own else name.split("+") for name in chains}
     worth = {name: _log_evidence(chain, effects[name], bounds) for name, chain in chains.items()}
     odds = np.exp(np.array([*worth.values()]) - logsumexp([*worth.values()]))
