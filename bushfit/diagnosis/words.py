@@ -93,13 +93,13 @@ def _of_one(first: Composition, nothing: float) -> Finding:
     """The verdict where one composition is all but sure."""
     best = first.best
     names = best.effects
-    if best.unnamed and names and best.last < (1.0 - MOSTLY) * best.size:
+    if best.unnamed and names and not best.places and best.last < (1.0 - MOSTLY) * best.size:
         return Finding("partly", nothing, (first,))
     if best.unnamed:
         return Finding("described", nothing, (first,), names)
-    if not names and not best.claim:
-        return Finding("unexplained", nothing, (first,))
-    if best.places or best.levels:
+    if best.places or not (names or best.claim):  # whatever else there is, a place that is off has to go first
+        return Finding("unexplained", nothing, (first,), names)
+    if best.levels:
         return Finding("partly", nothing, (first,))
     if best.chance < DOES_NOT_FIT:
         return Finding("described", nothing, (first,), names)
