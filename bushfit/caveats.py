@@ -10,6 +10,7 @@ from bushfit.effects.contract import Array
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
+from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.units import CELSIUS, number, told
 
 #: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
@@ -17,8 +18,6 @@ from bushfit.units import CELSIUS, number, told
 MARGIN = 0.01
 #: Share by which a finite bulk modulus lowers the radial stiffness, from which that is said: that of the other errors.
 _NOTED_LOWERING = 0.01
-#: Beyond the tested temperatures by more than this [K] a prediction is an extrapolation: chambers keep to less.
-SAME_TEMPERATURE = 2.0
 #: Relative difference of two stiffnesses that is none.
 _SAME = 1e-6
 

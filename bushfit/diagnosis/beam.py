@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Hashable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from math import log
 
 import numpy as np
@@ -126,11 +127,16 @@ class Search:
         size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED)))
         self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, 0.0, weighed))
 
+    @cached_property
+    def _met_odds(self) -> float:
+        """Logarithm of the odds beforehand that points without weight meet, over nothing."""
+        families = {each.family for each in (*self.asked.met, *self.root.state.tests.fixed) if each.kind == "place"}
+        return log(ODDS["place"] / len(families)) - self.root.state.log_prior
+
     def _met(self, hypothesis: Hypothesis, place: Meeting) -> Hypothesis:
         """The same, and that points which have no weight meet at a frequency, beside all other tests."""
-        families = {place.family, *(each.family for each in self.root.state.tests.fixed if each.kind == "place")}
-        odds = log(ODDS["place"] / len(families)) - self.root.state.log_prior
-        posterior, size = hypothesis.log_posterior + odds + place.log_odds, max(hypothesis.size, place.size)
+        posterior = hypothesis.log_posterior + self._met_odds + place.log_odds
+        size = max(hypothesis.size, place.size)
         if hypothesis.size <= self.asked.tolerance:  # nothing that anyone would miss
             return Hypothesis((), None, (place,), "", False, posterior, place.size, place.size, self.root)
         return replace(hypothesis, places=(*hypothesis.places, place), log_posterior=posterior, size=size)

@@ -12,7 +12,7 @@ from bushfit.effects import qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.common_error import CommonError
-from bushfit.fitting.coordinates import Bounds, jacobian, residual
+from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import fit_from, probes
@@ -76,12 +76,10 @@ def within_reach(model: Model, data_sets: Sequence[DataSet]) -> Bounds:
 def beside(evidence: Evidence, bare: Evidence, columns: Array, start: Mapping[str, float], bounds: Bounds) -> Evidence:
     """The fit that the tests ask for where residuals along columns, whitened by scatter alone as in `bare`, are free;
     the best from the fit without that, and from values to start from."""
-    names, solution = evidence.solution.coordinates.names, evidence.solution
+    names = evidence.solution.coordinates.names
     tests = Joined(bare.data_sets, CommonError.of_all(columns), freedom=1.0)
     known = {name: value for name, value in start.items() if name in names}
     starts = [evidence.model, *([evidence.model.with_values(known)] if known else [])]
     fits = [solve(model, tests, names, bounds, strict=False) for model in starts]
     model = min(fits, key=lambda each: each.chi_square).model
-    rows = jacobian(model, evidence.data_sets, names)
-    left = residual(model, evidence.data_sets)
-    return replace(evidence, solution=replace(solution, model=model, residual=left, jacobian=rows))
+    return replace(evidence, solution=evidence.solution.at(model, evidence.data_sets))

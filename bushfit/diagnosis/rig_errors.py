@@ -13,7 +13,6 @@ from bushfit.diagnosis.currency import Block, Node, RigErrors
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
-from bushfit.fitting.coordinates import jacobian, residual
 from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted, with_gains
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
@@ -34,9 +33,7 @@ def scattering_alone(evidence: Evidence) -> Evidence:
         else each
         for each in with_gains(evidence.data_sets, weigh=False)
     )
-    solution, names = evidence.solution, evidence.solution.coordinates.names
-    rows = jacobian(solution.model, data_sets, names)
-    return Evidence(replace(solution, residual=residual(solution.model, data_sets), jacobian=rows), data_sets)
+    return Evidence(evidence.solution.at(evidence.model, data_sets), data_sets)
 
 
 def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:

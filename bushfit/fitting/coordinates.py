@@ -7,7 +7,7 @@ that every coordinate is of order one and two decades are a step like any other.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -96,6 +96,11 @@ class Solution:
         left, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
         seen = values > _LEAST_SINGULAR_VALUE * values.max(initial=0.0)
         return float(np.sum(np.square(left[:, seen].T @ self.residual)))
+
+    def at(self, model: Model, data_sets: Sequence[DataSet]) -> Solution:
+        """The same fit with its parameters at the values of a model, and with residuals of these tests."""
+        rows = jacobian(model, data_sets, self.coordinates.names)
+        return replace(self, model=model, residual=residual(model, data_sets), jacobian=rows)
 
     @property
     def moving(self) -> list[int]:

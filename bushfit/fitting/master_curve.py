@@ -9,6 +9,7 @@ from bushfit.effects.contract import Array, Circumstances
 from bushfit.fitting.sweep_data import SweepData
 from bushfit.model.model import Model
 from bushfit.model.result import Result
+from bushfit.reading.measurement import Sweep
 
 #: Steps of a shift factor of its own at most, and the largest one [neper]: a few are enough where it is determined.
 _STEPS, _LARGEST = 10, 2.0
@@ -44,9 +45,13 @@ class Shifted:
 
 def master_curve(result: Result, sweeps: Sequence[SweepData]) -> tuple[Shifted, ...]:
     """The sweeps over frequency whose temperature is known, coldest first, by a model with an effect of temperature."""
-    known = [sweep for sweep in sweeps if sweep.circumstances.temperature is not None]
-    swept = [sweep for sweep in known if np.unique(sweep.frequency).size >= _FREQUENCIES]
-    return tuple(sorted((_shifted(result, sweep) for sweep in swept), key=lambda each: each.temperature))
+    swept = (_shifted(result, sweep) for sweep in sweeps if can_shift(sweep.sweep))
+    return tuple(sorted(swept, key=lambda each: each.temperature))
+
+
+def can_shift(sweep: Sweep) -> bool:
+    """Whether a sweep is over frequency, and its temperature known."""
+    return sweep.temperature is not None and np.unique(sweep.frequency).size >= _FREQUENCIES
 
 
 def law(result: Result, temperature: Array) -> tuple[Array, Array]:

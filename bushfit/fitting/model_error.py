@@ -32,7 +32,7 @@ from bushfit.effects.temperature import REFERENCE
 from bushfit.effects.unnamed import MOST_NODES, Patch, Unnamed, basis, in_lengths, places_of
 from bushfit.errors import FitError
 from bushfit.fitting.common_error import CommonError, Seen
-from bushfit.fitting.coordinates import Bounds, Solution, anderson, coordinate_bounds, jacobian, residual
+from bushfit.fitting.coordinates import Bounds, Solution, anderson, coordinate_bounds
 from bushfit.fitting.data_sets import DataSet, LoopData, parted
 from bushfit.fitting.joined import Joined
 from bushfit.fitting.levels import level_columns
@@ -102,7 +102,7 @@ class _Beside:
         model = self.solution.model
         strains = [each.amplitude * model.unit_strain(each.direction) for each in self.data_sets]
         found = [np.concatenate([each.frequency for each in self.data_sets]), np.concatenate(strains)]
-        if any("temperature" in effect.under for effect in model.records):
+        if model.knows_temperature:
             known = [REFERENCE if (at := each.circumstances.temperature) is None else at for each in self.data_sets]
             pairs = zip(known, strains, strict=True)
             found.append(np.concatenate([np.broadcast_to(kelvin, strain.shape) for kelvin, strain in pairs]))
@@ -347,9 +347,8 @@ def _alive(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
 
 def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[DataSet]) -> _Beside:
     """A fit with its parameters at other values, and the tests in noise alone."""
-    model, names = solution.model.with_values(values), solution.coordinates.names
-    left, slopes = residual(model, data_sets), jacobian(model, data_sets, names)
-    return _Beside(replace(solution, model=model, residual=left, jacobian=slopes), data_sets, slopes[:0])
+    found = solution.at(solution.model.with_values(values), data_sets)
+    return _Beside(found, data_sets, found.jacobian[:0])
 
 
 def _shows(beside: _Beside) -> bool:

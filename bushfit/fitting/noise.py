@@ -100,9 +100,9 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     """
     at_levels = [(sweep, at_nominal(sweep)) for sweep in sweeps]
 
-    def told(disturbed: Collection[float]) -> dict[LineKey, LineNoise]:
+    def told(without: Collection[float]) -> dict[LineKey, LineNoise]:
         return {
-            (sweep.name, float(held)): told_by_line(sweep, log_stiffness, held, disturbed)
+            (sweep.name, float(held)): told_by_line(sweep, log_stiffness, held, without)
             for sweep, log_stiffness in at_levels
             for held in np.unique(sweep.held)
         }

@@ -91,7 +91,7 @@ class Compared:
         pairs = zip(others, self.comparisons, strict=True)
         return [f"{label} against {first}, {line}" for label, found in pairs for line in found.words()]
 
-    @property
+    @cached_property
     def judged(self) -> list[str]:
         """Of families, which to use; and of each but the first, whether it is nearer to what was held out."""
         pairs = list(zip(self.labels, self.families, strict=False))
@@ -302,19 +302,20 @@ def _use(families: Sequence[FittedFamily], entries: Sequence[Entry]) -> str:
         return f"{said}, no other has {100.0 * _LIKELY:g} %"
     models = [each.result.model.without(Level.INSTRUMENT) for each in (entry, *(other[2] for other in others))]
     ends = np.array([entry.result.measured.frequency, entry.result.measured.strain])
+    ends[1] /= entry.result.model.unit_strain(_COMPOUND)  # as laboratories count it
     middle, reach = np.sqrt(ends.prod(axis=1)), []
     for axis, (low, high) in enumerate(ends):
         points = np.repeat(middle[:, None], _POINTS, axis=1)
         at = points[axis] = np.geomspace(low / _BEYOND, high * _BEYOND, _POINTS)
         moduli = np.abs([model.stiffness(_COMPOUND, *points) for model in models])
         apart = at[moduli.max(axis=0) > (1.0 + _AGREED) * moduli.min(axis=0)]
-        inside = np.searchsorted(apart, middle[axis])
-        reach.append((*apart[:inside][-1:], at[0])[:1] + (*apart[inside:][:1], at[-1])[:1])
+        below, above = apart[apart < middle[axis]], apart[apart > middle[axis]]
+        reach.append((below.max(initial=at[0]), above.min(initial=at[-1])))
     frequencies, strains = told("Hz", *reach[0]), told("%", *(100.0 * end for end in reach[1]))
     names = ", ".join(other for other, *_ in others)
     return (
         f"{said}; {names}, of {100.0 * _LIKELY:g} % or more, have its modulus within {100.0 * _AGREED:g} % over "
-        f"{frequencies} and {strains} strain; beyond, these tests do not tell which is right"
+        f"{frequencies} and {strains} shear strain; beyond, these tests do not tell which is right"
     )
 
 

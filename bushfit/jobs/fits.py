@@ -9,6 +9,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.effects import with_base
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
+from bushfit.fitting.master_curve import can_shift
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
 from bushfit.jobs.about import about, asked, document_of
 from bushfit.model.result import Result
@@ -118,7 +119,7 @@ class Fit:
 
 def tests_of(campaign: Campaign, effects: Collection[str]) -> tuple[str, ...]:
     """The kinds of test that a campaign has: loops, sweeps; and what a model of effects makes of their temperatures."""
-    warm = "temperature" in effects and any(sweep.temperature is not None for sweep in campaign.sweeps)
+    warm = "temperature" in effects and any(map(can_shift, campaign.sweeps))
     return (*(kind for kind in ("loops", "sweeps") if getattr(campaign, kind)), *(_AT_TEMPERATURES if warm else ()))
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
-from bushfit.caveats import SAME_TEMPERATURE, warnings_of
+from bushfit.caveats import warnings_of
 from bushfit.effects import Level
 from bushfit.effects.contract import Circumstances
 from bushfit.effects.temperature import REFERENCE
@@ -24,6 +24,7 @@ from bushfit.model.arms import Arms, model_arms
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Result, Usable
 from bushfit.prediction import PredictedResonance, Prediction, predict, predict_resonance
+from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.report.artifacts import (
     arms_contents,
     measured_contents,
@@ -168,7 +169,7 @@ class Predict:
             ModelError: a frequency or amplitude that is not positive, a direction where there is no bushing, or a
                 temperature of which the model has no effect.
         """
-        if self.temperature is not None and not any("temperature" in effect.under for effect in result.model.records):
+        if self.temperature is not None and not result.model.knows_temperature:
             raise ModelError(
                 "the model knows no temperature",
                 found=f"{self.temperature - CELSIUS:.4g} degC asked for",
@@ -203,7 +204,7 @@ class Predict:
     def _at_temperature(self, model: Model, sweep: SweepData) -> bool:
         """Whether a sweep was made at the temperature predicted, as far as model and sweep know of temperatures."""
         tested, asked = sweep.circumstances.temperature, self.temperature or REFERENCE
-        if tested is None or not any("temperature" in effect.under for effect in model.records):
+        if tested is None or not model.knows_temperature:
             return True
         return bool(abs(np.mean(tested) - asked) <= SAME_TEMPERATURE)
 

@@ -95,6 +95,11 @@ class Model:
         return any(effect.under for effect in self.records)
 
     @property
+    def knows_temperature(self) -> bool:
+        """Whether it depends on the temperature of the rubber."""
+        return any("temperature" in effect.under for effect in self.records)
+
+    @property
     def name(self) -> str:
         """Of the bushing; "compound" where there is none."""
         return self.bushing.name if self.bushing else "compound"
@@ -296,6 +301,7 @@ class Model:
             if structure.modifiers:
                 omega = np.atleast_1d(displacement.omega)
                 base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
+            if structure.paced:
                 strain = strain.faster(self.pace(setting.under, values))
             together = displacement.periodic and structure.fading
             alone = structure.others if together else structure.branches
@@ -330,7 +336,7 @@ class Model:
     def pace(self, under: Circumstances, values: Values | None = None) -> Value:
         """How many times as fast a motion is on the rubber's own time scale as on the clock's: the shift factor a_T."""
         values = self.values if values is None else values
-        return prod(each.pace(seen_by(each, values), under) for each in self._structure.modifiers if each.pace)
+        return prod(each.pace(seen_by(each, values), under) for each in self._structure.paced if each.pace)
 
     def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
         """All values as the modifiers leave them at an operating condition."""

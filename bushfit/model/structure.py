@@ -16,6 +16,7 @@ class Structure:
     Args:
         fading: the linear branches that fade with memory, whose steady answers add up harmonic by harmonic.
         others: the branches that do not.
+        paced: the modifiers that shift the rubber's time scale.
         moduli: names of the rubber's moduli and stresses, to which its stiffness is proportional together.
     """
 
@@ -26,6 +27,7 @@ class Structure:
     layers: tuple[Layer, ...]
     fading: tuple[Branch, ...]
     others: tuple[Branch, ...]
+    paced: tuple[Modifier, ...]
     moduli: tuple[str, ...]
 
     @classmethod
@@ -51,6 +53,7 @@ class Structure:
             tuple(effect for effect in records if isinstance(effect, Layer)),
             tuple(effect for effect in records if isinstance(effect, Branch) and effect.size),
             tuple(effect for effect in records if isinstance(effect, Branch) and not effect.size),
+            tuple(effect for effect in records if isinstance(effect, Modifier) and effect.pace),
             tuple(
                 qualified(effect, parameter)
                 for effect in records

@@ -18,6 +18,8 @@ from bushfit.units import CELSIUS
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Waveform = Literal["sine", "triangle"]
+#: Temperatures as near as this [K] are the same: chosen, chambers keep to less.
+SAME_TEMPERATURE = 2.0
 #: What changes from point to point of a run.
 Stepped = Literal["frequency", "amplitude"]
 

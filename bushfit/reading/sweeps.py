@@ -14,7 +14,7 @@ from bushfit.geometry import Place, stated_strain
 from bushfit.reading.columns import Rows
 from bushfit.reading.headers import AmplitudeConvention, Column
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.measurement import Complex, Floats, Stepped, Sweep, source_of
+from bushfit.reading.measurement import SAME_TEMPERATURE, Complex, Floats, Stepped, Sweep, source_of
 from bushfit.reading.runs import runs_of
 from bushfit.reading.table import Table
 from bushfit.reading.words import OF_MOTION, SWEEP_COLUMNS
@@ -41,8 +41,6 @@ LEAST_LOSS_FACTOR = 0.005
 _THROUGHOUT = 0.95
 #: Share within which an amplitude or frequency that is stated agrees with a column for it; chosen: rigs miss by less.
 _STATED_AGREEMENT = 0.1
-#: [K] Distance from the stated temperature within which a row was tested at it; chosen: chambers keep to less.
-_SAME_TEMPERATURE = 2.0
 #: [K] Range of temperatures that one test may have; chosen: a rubber warms up by as much while it is tested.
 ONE_TEST = 5.0
 #: Share of |K| within which columns that say the same agree; chosen: some are rounded to few digits.
@@ -254,13 +252,13 @@ def _of_temperature(
             return rows, round(float(celsius.mean()), 2) + si.CELSIUS, each
         problem, expected = "this file holds tests at several temperatures", "one temperature"
     else:
-        rows = np.flatnonzero(np.abs(each - stated) <= _SAME_TEMPERATURE)
+        rows = np.flatnonzero(np.abs(each - stated) <= SAME_TEMPERATURE)
         if rows.size >= _FEWEST_SWEEP_ROWS:
             return rows, stated, each[rows]
         problem = "too few rows are near the temperature that is stated"
-        expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {_SAME_TEMPERATURE:g} K of {stated - si.CELSIUS:.4g} degC"
+        expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {SAME_TEMPERATURE:g} K of {stated - si.CELSIUS:.4g} degC"
     ordered = np.sort(celsius)
-    means = [part.mean() for part in np.split(ordered, np.flatnonzero(np.diff(ordered) > _SAME_TEMPERATURE) + 1)]
+    means = [part.mean() for part in np.split(ordered, np.flatnonzero(np.diff(ordered) > SAME_TEMPERATURE) + 1)]
     nearest = min(means, key=lambda mean: abs(mean + si.CELSIUS - (stated or 0.0)))
     raise table.error(
         problem,

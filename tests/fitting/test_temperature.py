@@ -10,13 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.schema import PredictSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE
 from bushfit.effects.contract import Circumstances
 from bushfit.fitting.data import Data
 from bushfit.fitting.master_curve import master_curve
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction, Specimen
+from bushfit.jobs.fits import Fit
+from bushfit.jobs.predict import Predict
 from bushfit.model.arms import listed, model_arms
 from bushfit.model.model import Model
 from bushfit.prediction import predict
@@ -116,6 +118,34 @@ def test_arms_stand_for_the_rubber_at_a_temperature(truth: Model, degrees: float
     found = spring + friction + sum(part.at(2.0 * np.pi * frequency) for part in arms)
     model = truth.stiffness(compound, frequency, np.full(frequency.shape, 1e-9), under=under)
     np.testing.assert_allclose(found, model, rtol=1e-3)
+
+
+def test_a_sweep_of_amplitudes_has_no_shift_factor(truth: Model) -> None:
+    """It goes into the fit, and neither its table nor its picture is promised or made."""
+    amplitudes = tuple(np.geomspace(5e-5, 1e-3, 8).tolist())
+    stepped = SimulatedSweep(Direction.AXIAL, amplitudes, (1.0, 30.0), stepped="amplitude", temperature=300.0)
+    campaign = simulate(truth, replace(PLAN, loops=(), sweeps=(stepped,))).campaign()
+    job = Fit(effects=("temperature",))
+    assert job.kinds(campaign).tables == ("sweeps",)
+    assert [*job.run(Data.of(campaign)).contents.tables] == ["sweeps"]
+    mixed = simulate(truth, replace(PLAN, loops=(), sweeps=(stepped, *SWEEPS))).campaign()
+    tables = job.run(Data.of(mixed)).contents.tables
+    assert [*tables] == [*job.kinds(mixed).tables] == ["sweeps", "master_curve", "shift_factors"]
+    assert len(tables["shift_factors"]()) == len(SWEEPS)
+
+
+def test_only_tests_of_its_temperature_stand_beside_a_prediction(clean: Undisturbed) -> None:
+    """At 38 degC one of five sweeps; all of them tell how well the model meets them."""
+    campaign = measure(clean, PLAN).campaign()
+    result = fit_joint(Data.of(campaign), effects=(*BASE, "temperature"))
+    settings = PredictSettings(directions=("axial",), frequencies=FREQUENCIES, amplitudes=(5e-4,))
+    at_38, at_30 = (Predict(settings, temperature=CELSIUS + at).run(result, campaign) for at in (38.0, 30.0))
+    assert [len(at_38.beside), len(at_38.measured), len(at_30.beside)] == [1, len(SWEEPS), 0]
+    measured, none = (found.predictions[0].measured for found in (at_38, at_30))
+    assert measured is not None
+    assert none is not None
+    np.testing.assert_allclose(np.abs(measured), at_38.predictions[0].stiffness.value, rtol=0.03)
+    assert np.isnan(none).all()
 
 
 def test_what_lies_beyond_the_tested_temperatures_is_told(clean: Undisturbed) -> None:
