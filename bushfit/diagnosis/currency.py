@@ -268,12 +268,6 @@ class Ledger:
         return self._at[kept]
 
     @property
-    def likeliest(self) -> Array:
-        """Number of the node, (1,), within the class of the rig, at which a group makes the tests likeliest."""
-        best = np.max(np.array([self._solved.base, *(worth.by_node for worth in self.worths)]), axis=0)
-        return self._at[[np.argmax(np.where(self._within, best, -np.inf))]]
-
-    @property
     def chance(self) -> float:
         """Probability that tests of this model and rig leave more than these do, over the nodes as likely as they are.
 

@@ -1,28 +1,33 @@
 """What has no name, described: a smooth correction where it stands, and the power law that it is like."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.correction import Correction, correct
 from bushfit.diagnosis.currency import Ledger
 from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import unnamed
 from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
+from bushfit.diagnosis.holdout import HoldOut, Part
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
-from bushfit.effects.unnamed import NAME
+from bushfit.effects.contract import Array
+from bushfit.effects.unnamed import NAME, Unnamed
 from bushfit.errors import FitError
-from bushfit.fitting.coordinates import Bounds, jacobian, residual
-from bushfit.fitting.data_sets import parted
+from bushfit.fitting.agreement import LeaveOut, left_out
+from bushfit.fitting.coordinates import Bounds
+from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.design import fit_from
+from bushfit.fitting.model_error import with_model_error
+from bushfit.fitting.robust import Estimate
 from bushfit.model.covariance import Z95
+from bushfit.model.model import Model
 from bushfit.units import number
 
-#: Evaluations of the model in its refit at most: a correction is of what the best parameters leave, so it has to end.
+#: Evaluations of the model at most in the refit that the power law stands beside: it has to end.
 _EVALUATIONS = 400
 #: Logarithm of odds below which a size of the rig's errors does not count; chosen for time: a twentieth of the best.
 _NEAR = 3.0
@@ -34,13 +39,16 @@ class Described:
 
     Args:
         after: the model with its correction, and the tests as far as it can answer them.
+        fitted: the parameters beside the correction, as a fit that counts it as an error of the model has them.
+        held: whole runs inside the range, predicted without the correction and with it; tells, and decides nothing.
         fingerprint: the nearest power law; None where these tests show none.
         words: how large the gap is and what it is like, for people.
         evidence: where the correction may be trusted, for people.
     """
 
     after: Evidence
-    correction: Correction
+    fitted: Estimate
+    held: HoldOut
     fingerprint: Fingerprint | None
     words: str
     evidence: str
@@ -57,10 +65,10 @@ class Described:
 def describe(
     evidence: Evidence, rig: RigSettings, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
 ) -> Described | None:
-    """A smooth correction of a fitted model and its fingerprint; None where the tests are no likelier with it.
+    """What a fitted model misses as a smooth correction of it, the same error of the model that every fit counts, and
+    the power law that it is like; None where the tests are no likelier with it, or its error is larger than the gap.
 
-    The parameters are fitted again with each loop standing on its first harmonic, because nothing is known of the law
-    in time of what has no name.
+    Nothing is known of its law in time: each loop stands on its first harmonic.
 
     Args:
         start: values of the model's parameters read off the data, for a model that the gap has bent too far.
@@ -68,22 +76,21 @@ def describe(
     """
     if NAME in evidence.model.effects:
         return None
+    fitted, correction = with_model_error(evidence.estimate, bounds)
+    if correction is None or correction.uncertainty >= 1.0:
+        return None
+    harmonic = tuple(data_set.timeless() for data_set in evidence.data_sets)
     try:
-        base = _refitted(evidence, held, bounds)
-        base = _refitted(base, (*held, *base.solution.at_bound), bounds)
+        base = _refitted(evidence.model, harmonic, held, bounds)
+        base = _refitted(base.model, harmonic, (*held, *base.solution.at_bound), bounds)
     except FitError:  # too few points are left for the parameters
         return None
-    bare, plain = weighed(base, rig)
-    correction = correct(base, bare, plain)
-    if correction is None:
-        return None
-    effects = (*base.model.effects, NAME)
-    model, names = replace(base.model, effects=effects, unnamed=correction.data), base.solution.coordinates.names
-    left, rows = residual(model, base.data_sets), jacobian(model, base.data_sets, names)
-    after = Evidence(replace(base.solution, model=model, residual=left, jacobian=rows), base.data_sets)
-    like = fingerprint(base, bare, plain, start, bounds)
-    whole = Evidence(replace(after.solution, residual=residual(model, evidence.data_sets)), evidence.data_sets)
-    return Described(after, correction, like, _words(correction, like), _trusted(correction, whole))
+    model = replace(fitted.solution.model, effects=(*evidence.model.effects, NAME), unnamed=correction)
+    after = Evidence(fitted.solution.at(model, harmonic), harmonic)
+    whole = Evidence(fitted.solution.at(model, evidence.data_sets), evidence.data_sets)
+    like = fingerprint(base, *weighed(base, rig), start, bounds)
+    told = _words(correction, like), _trusted(correction, whole)
+    return Described(after, fitted, _held_out(evidence, fitted), like, *told)
 
 
 def weighed(fitted: Evidence, rig: RigSettings) -> tuple[Evidence, Ledger]:
@@ -95,15 +102,47 @@ def weighed(fitted: Evidence, rig: RigSettings) -> tuple[Evidence, Ledger]:
     return bare, replace(plain, at=plain.likely(_NEAR))
 
 
-def _refitted(evidence: Evidence, held: Sequence[str], bounds: Bounds) -> Evidence:
-    """The model fitted to each sweep and to the first harmonic of each loop, to the end."""
-    data_sets = tuple(data_set.timeless() for data_set in evidence.data_sets)
-    return Evidence(fit_from(evidence.model, data_sets, held, bounds).finished(_EVALUATIONS).solution, data_sets)
+def _refitted(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Evidence:
+    return Evidence(fit_from(model, data_sets, held, bounds).finished(_EVALUATIONS).solution, tuple(data_sets))
 
 
-def _words(correction: Correction, like: Fingerprint | None) -> str:
+def _held_out(before: Evidence, fitted: Estimate) -> HoldOut:
+    """Whole runs inside the range, in turn predicted from the others, without the correction and with it."""
+    solution = before.solution
+    both = (
+        LeaveOut.of(solution.jacobian, solution.residual),
+        left_out(fitted.solution, fitted.minimised, fitted.solution.moving),
+    )
+    told = dict[str, Array]()
+    for part in _inside(before.data_sets):
+        rows = part.rows(before.data_sets)
+        held = [np.pad(rows, (0, each.residual.size - rows.size)) for each in both]
+        pairs = [each.predicted(chosen, np.arange(chosen.size)) for each, chosen in zip(both, held, strict=True)]
+        told[part.name] = np.array(pairs)
+    return HoldOut.of(told)
+
+
+def _inside(data_sets: Sequence[DataSet]) -> Iterator[Part]:
+    """Whole runs inside the range: every third frequency of each, the middle level, a repeat."""
+    chosen: dict[str, dict[DataSet, Array]] = {}
+    for sweep in parted(data_sets)[1]:
+        rank = np.unique(sweep.step, return_inverse=True)[1]
+        levels, level = np.unique(sweep.held, return_inverse=True)
+        several = np.ptp(sweep.repeat) > 0
+        for name, points in (
+            (f"every third {sweep.sweep.stepped or 'point'}", (rank % 3 == 1) & (rank < rank.max())),
+            ("the middle of what is held", (level == levels.size // 2) & (levels.size > 2)),
+            ("the last repeat", (sweep.repeat == sweep.repeat.max()) & several),
+        ):
+            if points.any():
+                chosen.setdefault(name, {})[sweep] = points
+    for name, own in chosen.items():
+        yield Part(name, [own.get(data, np.zeros(data.size // data.parts, dtype=bool)) for data in data_sets])
+
+
+def _words(correction: Unnamed, like: Fingerprint | None) -> str:
     """How large it is and what it is like."""
-    largest, band = (number(100.0 * share, 2) for share in (correction.data.largest, Z95 * correction.band))
+    largest, band = (number(100.0 * share, 2) for share in (correction.largest, Z95 * correction.uncertainty))
     said = [f"up to {largest} % of |K|, known within {band} % of itself"]
     if like is None or not any(like.told):
         said.append("nothing is told of its form")
@@ -113,17 +152,14 @@ def _words(correction: Correction, like: Fingerprint | None) -> str:
         said.append(
             "it is no power law of frequency and amplitude" + (f"; nearest: {like.words}" if all(like.told) else "")
         )
-    if correction.data.peak:
-        middle, width = (number(each, 2) for each in correction.data.peak)
-        said.append(f"with a peak, as of a resonance, at {middle} Hz, {width} Hz wide")
     return "; ".join(said)
 
 
-def _trusted(correction: Correction, whole: Evidence) -> str:
+def _trusted(correction: Unnamed, whole: Evidence) -> str:
     """Where it may be trusted, and by how much the form of the worst loop stays off, all harmonics counted."""
     patches = [
         f"{', '.join(patch.directions)} {_span(patch.frequency_Hz)} Hz, {_span(patch.strain, 100.0)} % strain"
-        for patch in correction.data.patches
+        for patch in correction.patches
     ]
     off = max((where.excess for where in locate(whole) if where.kind == "loop"), default=0.0)
     stays = f" (their form stays off by {number(off, 2)} times the noise)" if off else ""

@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.agreement import met_within, misfits, usable
 from bushfit.fitting.assess import Stage, apart_in_temperature, covariance, measured_range, quality
 from bushfit.fitting.coordinates import Bounds, Solution
@@ -22,10 +21,8 @@ from bushfit.model.result import Result
 
 #: Evaluations of the model in one fit at most; a model that fits badly is then taken as it is.
 EVALUATIONS = 40
-#: What is said of the parameters beside a correction.
-_BENT_BY_THE_GAP = (
-    "the parameters are those of the plain model, bent by the gap that was described: their intervals are invalid"
-)
+#: What is said of a correction.
+_CORRECTED = "a smooth correction of the model closes a gap without a name: the parameters are those beside it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +40,11 @@ class Evidence:
     def residual(self) -> Array:
         """Whitened residuals, model less measured, (n,)."""
         return self.solution.residual
+
+    @property
+    def estimate(self) -> Estimate:
+        """The same as a fit that leaves nothing out."""
+        return Estimate(self.solution, self.data_sets, self.data_sets, self.data_sets, ())
 
     @property
     def chi_square(self) -> float:
@@ -102,20 +104,28 @@ def fit(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds:
     return Evidence(descent.solution, tuple(data_sets))
 
 
-def result_of(evidence: Evidence, bounds: Bounds, told: Collection[str], *, lacking: bool = True) -> Result:
+def result_of(
+    evidence: Evidence,
+    bounds: Bounds,
+    told: Collection[str],
+    *,
+    lacking: bool = True,
+    corrected: Estimate | None = None,
+) -> Result:
     """The model with its uncertainty; a parameter at rest on a bound counts as held there.
 
-    Of effects with a twin of the rig the level is unresolved, but of those that are `told`. Beside a correction the
-    parameters are those of the plain model, and so are their errors, by its misfit; else a smooth error of the model
-    counts where it is `lacking` something, as in every fit.
+    Of effects with a twin of the rig the level is unresolved, but of those that are `told`. Where the model is
+    `lacking` something, a smooth error of it counts, as in every fit; where that stands as its correction, the fit
+    beside it is `corrected`.
     """
-    corrected, tests = UNNAMED in evidence.model.effects, evidence.data_sets
-    found, error = Estimate(evidence.solution, tests, tests, tests, ()), None
+    tests, model, error = evidence.data_sets, evidence.model, None
+    found = corrected or evidence.estimate
     if lacking and not corrected:
         found, error = with_model_error(found, bounds)
-    solution, model = found.solution, found.solution.model
+        model = found.solution.model
+    solution = found.solution
     moving = tuple(name for name in solution.coordinates.names if name not in solution.at_bound)
-    cov = covariance(model.without(UNNAMED), [Stage(moving, found.weighed)])
+    cov = covariance(solution.model, [Stage(moving, found.weighed)])
     return Result(
         model,
         moving,
@@ -123,10 +133,10 @@ def result_of(evidence: Evidence, bounds: Bounds, told: Collection[str], *, lack
         quality(model, tests, len(moving)),
         measured_range(model, tests),
         (
-            *([_BENT_BY_THE_GAP] if corrected else []),
+            *([_CORRECTED] if corrected else []),
             *([told_of(error)] if error else []),
             *apart_in_temperature(model, tests),
-            *cautions(model, solution, found.data_sets, bounds, cov),
+            *cautions(solution.model, solution, found.data_sets, bounds, cov),
         ),
         sources(tests),
         at_bound=solution.at_bound,

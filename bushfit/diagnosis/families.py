@@ -19,7 +19,6 @@ from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.design import with_effect
 from bushfit.fitting.model_error import log_likelihood, with_model_error
-from bushfit.fitting.robust import Estimate
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number
@@ -161,8 +160,7 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
     """The logarithm of the evidence of the last of some models, each with one effect more than that before it; what
     all families have in common counts nothing."""
     *before, last = chain
-    tests = last.data_sets
-    found = with_model_error(Estimate(last.solution, tests, tests, tests, ()), bounds)[0]
+    found = with_model_error(last.estimate, bounds)[0]
     priors = [
         laplace(name, replace(last, solution=found.solution), one) for name, one in zip(names, before, strict=True)
     ]

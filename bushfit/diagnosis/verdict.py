@@ -10,11 +10,11 @@ import numpy as np
 
 from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.claims import Claim
-from bushfit.diagnosis.described import describe
-from bushfit.diagnosis.document import Description, Verdict
+from bushfit.diagnosis.described import Described, describe
+from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.evidence import Evidence, fit, result_of
 from bushfit.diagnosis.explanations import FaultyPlace
-from bushfit.diagnosis.holdout import HoldOut, hold_out
+from bushfit.diagnosis.holdout import hold_out
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
@@ -137,8 +137,7 @@ class Told:
         ):
             words = f"a real gap stays that no known effect closes: {found.words}{lead}"
             names = [Named(UNNAMED, found.evidence)]
-            held = found.correction.held
-            return self._finished("described", words, found.after, names, description=found.description, held=held)
+            return self._finished("described", words, found.after, names, gap=found)
         words = "a real gap stays that no known effect closes" + lead
         advice = ""
         if spot and spot.places:
@@ -194,8 +193,7 @@ class Told:
         *,
         places: Hypothesis | None = None,
         next_test: str = "",
-        description: Description | None = None,
-        held: HoldOut | None = None,
+        gap: Described | None = None,
     ) -> Diagnosis:
         base, after, bounds = self._fitted(self.base), self._fitted(after), self.search.asked.bounds
         spots = list(places.places) if places else []
@@ -204,6 +202,7 @@ class Told:
         if spots:
             next_test = f"measure again: {spots[0].name}"
         lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
+        known, corrected = {*base.model.effects} - {*self.unresolved}, gap.fitted if gap else None
         where = (*(_place_where(base, each, places) for each in spots if places), *locate(base))
         return Diagnosis(
             verdict,
@@ -211,14 +210,14 @@ class Told:
             tuple(names),
             where,
             where if after is base else locate(after),
-            held or hold_out(base, after, bounds),
+            gap.held if gap else hold_out(base, after, bounds),
             next_test,
             tuple(self.candidates),
             base,
             after,
-            self.odds.averaged(result_of(after, bounds, {*base.model.effects} - {*self.unresolved}, lacking=lacking)),
+            self.odds.averaged(result_of(after, bounds, known, lacking=lacking, corrected=corrected)),
             self._notes(),
-            description,
+            gap.description if gap else None,
             self.odds,
         )
 

@@ -2,9 +2,8 @@
 
 It is a share of the stiffness. Its data are values at some nodes; between these it is what a Gaussian process with a
 Matern 5/2 kernel makes of them (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, Eqs. 2.25, 2.26
-and 4.17). A peak, as of a resonance, may stand beside that. Beyond their range it fades to 0 within the size of what it
-corrects. Standard deviations at the nodes go over from node to node just as smoothly: errors of neighbours are nearly
-one, their covariance would add little.
+and 4.17). Beyond their range it fades to 0 within the size of what it corrects. Standard deviations at the nodes go
+over from node to node just as smoothly: errors of neighbours are nearly one, their covariance would add little.
 """
 
 from collections.abc import Sequence
@@ -57,11 +56,10 @@ def correlation(nodes: Array) -> Array:
     return kernel(nodes, nodes) + _JITTER * np.eye(len(nodes))
 
 
-def in_lengths(points: Array, lengths: Sequence[float], tilt: float) -> Array:
-    """ln f + tilt ln e, ln e and temperature in units of the kernel's lengths, by `places_of`, (..., 2 or 3)."""
+def in_lengths(points: Array, lengths: Sequence[float]) -> Array:
+    """ln f, ln e and temperature in units of the kernel's lengths, by `places_of`, (..., 2 or 3)."""
     along, across = lengths
-    moved = points + tilt * points[..., 1:2] * np.eye(points.shape[-1])[0]
-    return moved / (along, across, along)[: points.shape[-1]]
+    return points / (along, across, along)[: points.shape[-1]]
 
 
 def places_of(frequency: Array, strain: Array, temperature: Array | None = None) -> Array:
@@ -73,21 +71,6 @@ def places_of(frequency: Array, strain: Array, temperature: Array | None = None)
     return np.stack(axes, axis=-1)
 
 
-def peak_at(peak: tuple[float, float] | None, nodes: Array, points: Array) -> Array:
-    """What a peak adds at points, (..., n, 2), by its strength at the least and at the largest ln e of nodes, (m, 2):
-    complex (..., n, 2), and (..., n, 0) without a peak.
-
-    It is the mode i w f/(f0^2 - f^2 + i w f), f0 its middle and w its width [Hz], linear in ln e between these two.
-    """
-    if peak is None:
-        return np.zeros((*points.shape[:-1], 0))
-    low, high = nodes[:, 1].min(), nodes[:, 1].max()
-    share = np.clip((points[..., 1] - low) / max(high - low, np.finfo(float).tiny), 0.0, 1.0)
-    frequency = np.exp(points[..., 0])
-    width = 1j * peak[1] * frequency
-    return (width / (peak[0] ** 2 - frequency**2 + width))[..., None] * np.stack((1.0 - share, share), axis=-1)
-
-
 @dataclass(frozen=True)
 class Patch:
     """A correction in some directions, as values at nodes.
@@ -96,11 +79,9 @@ class Patch:
         directions: that share it, by name.
         frequency_Hz: of the nodes, (m,).
         strain: of the nodes, equivalent, zero-to-peak, (m,).
-        in_phase, in_quadrature: shares of the stiffness at the nodes, without the peak, (m,) each.
-        in_phase_error, in_quadrature_error: standard deviations of the whole there, (m,) each.
+        in_phase, in_quadrature: shares of the stiffness at the nodes, (m,) each.
+        in_phase_error, in_quadrature_error: standard deviations there, (m,) each.
         temperature_K: of the nodes, (m,); none where it is not told apart.
-        peak_in_phase, peak_in_quadrature: strength of the peak at the least and at the largest strain of the nodes, as
-            shares of the stiffness, (2,) each; none without a peak.
     """
 
     directions: tuple[Name, ...]
@@ -111,8 +92,6 @@ class Patch:
     in_phase_error: Row
     in_quadrature_error: Row
     temperature_K: Row = ()  # noqa: N815
-    peak_in_phase: Row = ()
-    peak_in_quadrature: Row = ()
 
     def __post_init__(self) -> None:
         lists = (self.frequency_Hz, self.strain, self.in_phase, self.in_quadrature, self.temperature_K or self.strain)
@@ -131,12 +110,6 @@ class Patch:
         kelvin = np.array(self.temperature_K) if self.temperature_K else None
         return places_of(np.array(self.frequency_Hz), np.array(self.strain), kelvin)
 
-    def of_peak(self, peak: tuple[float, float] | None, points: Array) -> Array:
-        """What the peak adds at places, (..., n, 2 or 3), complex, (..., n)."""
-        return peak_at(peak, self.nodes, points) @ (
-            np.array(self.peak_in_phase) + 1j * np.array(self.peak_in_quadrature)
-        )
-
 
 @dataclass(frozen=True)
 class Unnamed:
@@ -144,41 +117,41 @@ class Unnamed:
 
     Args:
         size: standard deviation between nodes that lie far apart.
-        lengths: over which it changes, in ln frequency + tilt ln strain, and in ln strain; over temperature, as over
-            the frequency that the time scale shifts by.
+        lengths: over which it changes, in ln frequency and ln strain; over temperature, as over the frequency that the
+            time scale shifts by.
         patches: by direction; what is in none has no correction, within the size of the gap.
-        tilt: by how much what it shows moves along ln frequency with ln strain: 1 where it goes by the rate of strain,
-            -1 where frequencies rise with strain.
-        peak: its middle and width [Hz], where it has one.
     """
 
     size: Number
     lengths: tuple[Number, Number]
     patches: tuple[Patch, ...]
-    tilt: Number = 0.0
-    peak: tuple[Number, Number] | None = None
 
     def __post_init__(self) -> None:
-        if min(self.size, *self.lengths, *(self.peak or ())) <= 0.0:
-            raise ValueError(ModelError("a correction of no size or length", expected="size, lengths and peak above 0"))
-        strengths = {len(each) for patch in self.patches for each in (patch.peak_in_phase, patch.peak_in_quadrature)}
-        if strengths - {2 if self.peak else 0}:
-            expected = "two strengths, at the least and the largest strain, with a peak, and none without"
-            raise ValueError(ModelError("the strength of a peak", expected=expected))
+        if min(self.size, *self.lengths) <= 0.0:
+            raise ValueError(ModelError("a correction of no size or length", expected="size and lengths above 0"))
+
+    @cached_property
+    def _at_nodes(self) -> tuple[Array, Array]:
+        """Squares of the values at all nodes, and of their errors, (m,) each."""
+        values = [np.square((each.in_phase, each.in_quadrature)).sum(axis=0) for each in self.patches]
+        errors = [np.square((each.in_phase_error, each.in_quadrature_error)).sum(axis=0) for each in self.patches]
+        return np.concatenate(values), np.concatenate(errors)
 
     @property
     def largest(self) -> float:
         """The size of the gap: the largest correction at a node, as a share of the stiffness."""
-        smooth = [np.array(each.in_phase) + 1j * np.array(each.in_quadrature) for each in self.patches]
-        pairs = zip(self.patches, smooth, strict=True)
-        return max(float(np.abs(values + each.of_peak(self.peak, each.nodes)).max()) for each, values in pairs)
+        return float(np.sqrt(self._at_nodes[0].max()))
 
     @property
     def typical(self) -> float:
         """Root mean square of what it may be at the nodes, as a share of the stiffness."""
-        errors = [np.square((each.in_phase_error, each.in_quadrature_error)).sum(axis=0) for each in self.patches]
-        values = [np.square((each.in_phase, each.in_quadrature)).sum(axis=0) for each in self.patches]
-        return float(np.sqrt(np.mean(np.concatenate(values) + np.concatenate(errors))))
+        return float(np.sqrt(np.mean(self._at_nodes[0] + self._at_nodes[1])))
+
+    @property
+    def uncertainty(self) -> float:
+        """Its standard deviation at the nodes over its values, both as root mean squares."""
+        values, errors = self._at_nodes
+        return float(np.sqrt(errors.mean() / max(values.mean(), np.finfo(float).tiny)))
 
     @property
     def beyond(self) -> float:
@@ -201,11 +174,10 @@ class Unnamed:
         points = places_of(omega / (2.0 * np.pi), strain, kelvin)
         inside = np.clip(points, patch.nodes.min(axis=0), patch.nodes.max(axis=0))
         stays = kernel((points - inside) / _FADES, np.zeros((1, points.shape[-1])))[..., 0]
-        nodes = in_lengths(patch.nodes, self.lengths, self.tilt)
-        near = kernel(in_lengths(inside, self.lengths, self.tilt), nodes)
+        nodes = in_lengths(patch.nodes, self.lengths)
+        near = kernel(in_lengths(inside, self.lengths), nodes)
         weight = near @ np.linalg.inv(correlation(nodes))
         value = weight @ (np.array(patch.in_phase) + 1j * np.array(patch.in_quadrature))
-        value = value + patch.of_peak(self.peak, points)
         open_to = np.square(self.size) * np.maximum(1.0 - np.sum(weight * near, axis=-1), 0.0)
         at_nodes = np.array([patch.in_phase_error, patch.in_quadrature_error])
         between = [np.clip(weight @ error, error.min(), error.max()) for error in at_nodes]
@@ -242,15 +214,11 @@ def nodes_among(points: Array, most: int) -> Array:
     return np.array(chosen)
 
 
-def basis(places: Array, among: Array | None = None, most: int = MOST_NODES) -> tuple[Array, Array]:
+def basis(places: Array, most: int = MOST_NODES) -> tuple[Array, Array]:
     """Some places, in units of the kernel's lengths, (p, 2), to be nodes: all or those farthest apart, their indices,
-    (m,); and what independent amounts of unit variance make of the process at all places, (p, q).
-
-    `among` are the same places as they are told apart, in other units.
-    """
-    among = places if among is None else among
-    distinct = np.unique(among.round(_DIGITS), axis=0, return_index=True)[1]
-    own = distinct if distinct.size <= most else distinct[nodes_among(among[distinct], most)]
+    (m,); and what independent amounts of unit variance make of the process at all places, (p, q)."""
+    distinct = np.unique(places.round(_DIGITS), axis=0, return_index=True)[1]
+    own = distinct if distinct.size <= most else distinct[nodes_among(places[distinct], most)]
     size, vectors = np.linalg.eigh(correlation(places[own]))
     kept = (size > _LEAST_VARIANCE * size[-1]) & (np.arange(size.size) >= size.size - _MOST)  # the largest last
     return own, kernel(places, places[own]) @ vectors[:, kept] / np.sqrt(size[kept])
@@ -262,7 +230,7 @@ EFFECT = Layer(
     equation="(1 + c(ln f, ln X)) K",
     level=Level.COMPONENT,
     parameters=(),
-    source="Gaussian process orthogonal to the parameters: Kennedy and O'Hagan (2001), Plumlee and Joseph (2018)",
+    source="Gaussian process beside the parameters: Kennedy and O'Hagan (2001)",
     confirmed_by="test between the levels and frequencies of these tests, and on another bushing of the compound",
     harmonic_only=True,
     stiffness=response,

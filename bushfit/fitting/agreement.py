@@ -167,7 +167,7 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     The tests have the weights at which the solution is the least sum of squares; `left` are others.
     """
     free = solution.moving
-    whole, begin = _left_out(solution, data_sets, free), 0
+    whole, begin = left_out(solution, data_sets, free), 0
     found: dict[str, list[_Off]] = {}
     for data_set in data_sets:
         modelled, slopes = data_set.noise_free(solution.model).measured, _slopes(solution, data_set)[free]
@@ -185,7 +185,7 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     return tuple(_usable(place, parts) for place, parts in found.items())
 
 
-def _left_out(solution: Solution, data_sets: Sequence[DataSet], free: Sequence[int]) -> LeaveOut:
+def left_out(solution: Solution, data_sets: Sequence[DataSet], free: Sequence[int]) -> LeaveOut:
     """The fit of the parameters of these numbers without some of its residuals in noise; amounts of an error that its
     tests share stand behind them."""
     if not isinstance(data_sets, Joined):

@@ -198,7 +198,7 @@ class _Prior:
         nodes, shapes = [], []
         for group in groups:
             inside = np.flatnonzero(np.isin(tests.names, group))
-            own, near = basis(in_lengths(tests.points[inside], lengths, 0.0), most=most)
+            own, near = basis(in_lengths(tests.points[inside], lengths), most=most)
             here = np.zeros((near.shape[1], len(tests.points)))
             here[:, inside] = near.T
             nodes.append(inside[own])
