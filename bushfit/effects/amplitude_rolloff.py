@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Value, Values
 
 #: Frequency at which the amplitude has lost the share c [Hz]: the highest of the paper's sweeps.
 REFERENCE_FREQUENCY = 155.0

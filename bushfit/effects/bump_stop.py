@@ -1,8 +1,7 @@
 """Bump stop: a spring that is met beyond a gap, both ways."""
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
-from bushfit.effects.history import History
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
-from bushfit.effects.history import History
 
 #: Samples of the cycle from which the first harmonic of the bent waveform is taken: chosen, more change no digit that
 #: a test resolves.

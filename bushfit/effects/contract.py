@@ -21,13 +21,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cache, cached_property
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from bushfit.effects.history import Array as Array
 from bushfit.effects.history import History as History
 from bushfit.geometry import Bushing, Direction, Place
+
+if TYPE_CHECKING:
+    from bushfit.effects.unnamed import Unnamed
 
 #: A number, or an array that broadcasts against operating points or samples.
 Value = Any
@@ -123,14 +126,6 @@ class Circumstances:
 UNKNOWN = Circumstances()
 
 
-class Correction(Protocol):
-    """A smooth correction of the stiffness for what has no name, as a share of it; see effects/unnamed.py."""
-
-    def at(self, setting: Setting, omega: Array, amplitude: Array) -> tuple[Array, Array, Array]:
-        """The correction, complex (..., n), standard deviations of its parts, (2, ..., n), and its share that stands,
-        (..., n), at angular frequencies [rad/s] and amplitudes [m or rad]."""
-
-
 @dataclass(frozen=True)
 class Setting:
     """The test that a response belongs to.
@@ -147,7 +142,7 @@ class Setting:
     direction: Place
     kind: Literal["sweep", "loop"]
     under: Circumstances = UNKNOWN
-    unnamed: Correction | None = None
+    unnamed: Unnamed | None = None
 
 
 @dataclass(frozen=True)
@@ -331,6 +326,16 @@ class Family:
 def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str, Value]:
     """The named values times a factor, as far as the model has them: what most modifiers return."""
     return {name: p[name] * factor for name in names if name in p}
+
+
+def scaled_response(factor: Callable[[Values, Setting], Value]) -> Callable[..., Array]:
+    """The law of a layer that multiplies the response below it, stiffness and force alike, by a factor."""
+
+    def response(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -> Array:
+        *motion, setting = motion_and_setting
+        return factor(p, setting) * below(*motion)
+
+    return response
 
 
 def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, History, Values
 
 #: Below this z = 2x/(1 + y), Im h of `harmonic_shape` is taken from a series: the logarithm loses digits there.
 _SERIES_BELOW = 0.05

@@ -5,8 +5,7 @@ Such a cell serves the sweeps; the loops, as slow as the leak, go by one that ho
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.maxwell import relax
 
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Value, Values
 
 #: Amplitude below which the slip stiffness grows no more [m or rad]: less than any test reaches, and more than 0.
 SMALLEST_AMPLITUDE = 1e-12

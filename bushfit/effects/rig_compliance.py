@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.errors import ModelError
 
 #: The secants end when the logarithm of the amplitude is off by less than this, before a last step along the secant.

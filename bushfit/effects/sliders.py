@@ -8,8 +8,7 @@ Notes:
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Value, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, History, Value, Values
 
 #: Sliders that stand for all of them along other motions than a steady one to and fro; chosen: over a decade of slip
 #: strains their steps are 1e-4 of the modulus.

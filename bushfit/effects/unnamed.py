@@ -14,8 +14,17 @@ from functools import cached_property
 import numpy as np
 
 from bushfit import geometry
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Setting, StiffnessBelow, Values, harmonic_response
-from bushfit.effects.history import History
+from bushfit.effects.contract import (
+    Array,
+    ForceBelow,
+    History,
+    Layer,
+    Level,
+    Setting,
+    StiffnessBelow,
+    Values,
+    harmonic_response,
+)
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.validation import Name, Number

@@ -61,11 +61,6 @@ def harmonic_error(model: Model) -> float:
     return sum(effect.harmonic_error for effect in model.records)
 
 
-def test_its_law_stands_in_the_file_of_an_effect(effect: Effect) -> None:
-    law = next(getattr(effect, part) for part in ("modulus", "stiffness", "adjust") if hasattr(effect, part))
-    assert law.__module__.rpartition(".")[2] in {name.partition(".")[0] for name in LIBRARY}
-
-
 def test_record_is_complete(effect: Effect) -> None:
     assert effect.sentence.endswith(".")
     assert effect.equation

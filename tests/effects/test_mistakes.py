@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from bushfit.effects import LIBRARY
 from bushfit.effects.contract import Level
-from bushfit.effects.mistake import shown
-from bushfit.effects.mistakes import MISTAKES, candidate_named, mistake_named
+from bushfit.effects.mistakes import MISTAKES, candidate_named, file_or_name, mistake_named
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -110,7 +109,7 @@ def test_a_correction_names_file_table_and_line() -> None:
     assert 'units = { force = "kgf" }' in MISTAKES["kilogram_force"].corrected(LOOP)
     assert 'units = { stiffness = "kgf/mm" }' in MISTAKES["kilogram_force"].corrected(test)
     assert "inner_radius" in MISTAKES["diameters"].corrected(None)
-    assert shown(test) == "radial.csv"
+    assert file_or_name(test) == "radial.csv"
     assert not any("{{" in MISTAKES[name].corrected(test) + MISTAKES[name].corrected(LOOP) for name in NAMES)
 
 
