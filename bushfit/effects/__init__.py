@@ -32,7 +32,7 @@ _TABLE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("library.toml").
 #: What a file may have of the law of an effect: fields of its record.
 _LAW = (
     *("modulus", "stress", "modulus_sensitivities", "stress_sensitivities", "in_place_of"),  # of a branch
-    *("adjust", "pace", "stiffness", "force"),  # of a modifier, and of a layer
+    *("adjust", "shift_factor", "stiffness", "force"),  # of a modifier, and of a layer
 )
 #: The kind of an effect, by a part of the law that no other kind has.
 _KINDS: dict[str, type[Effect]] = {"modulus": Branch, "adjust": Modifier, "stiffness": Layer}

@@ -185,7 +185,7 @@ class Effect:
             a model of their own in the literature; None of what comes on top of the model.
         frees: mistakes of the record that are single values of it; where one explains the tests as well, it stands.
         under: what of a test's circumstances it depends on, by the names of `Circumstances`.
-        taken: what a prediction takes of these where they are not known, for its user; none of the rig's effects.
+        assumption: what a prediction takes of these where they are not known, for its user; none of the rig's effects.
         in_place_of: of one that replaces a branch, where a fit may begin, the likeliest first: its values by those of
             that branch.
         harmonic_only: whether it has no law in time: of a loop it answers the first harmonic alone, by
@@ -211,7 +211,7 @@ class Effect:
     variant_of: str | None = None
     frees: tuple[str, ...] = ()
     under: tuple[Literal["temperature", "turn", "strained", "left", "rested"], ...] = ()
-    taken: str = ""
+    assumption: str = ""
     harmonic_only: bool = False
     in_place_of: Callable[[Values], list[dict[str, float]]] | None = None
     after: str | None = None
@@ -264,12 +264,13 @@ class Modifier(Effect):
 
     Args:
         adjust: (values, condition) -> the changed values only.
-        pace: (values, circumstances) -> how many times as fast a motion is on the rubber's own time scale; 1 without.
+        shift_factor: (values, circumstances) -> how many times as fast a motion is on the rubber's own time scale, a_T;
+            1 without.
     """
 
     level: Level = Level.MATERIAL
     adjust: Callable[[Values, Condition], dict[str, Value]]
-    pace: Callable[[Values, Circumstances], Value] | None = None
+    shift_factor: Callable[[Values, Circumstances], Value] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

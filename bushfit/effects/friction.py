@@ -91,7 +91,7 @@ def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
     return s, big, p, np.sqrt(p * (p + twice)), twice / p
 
 
-def forgotten(x: Array) -> Array:
+def mean_stress_decay(x: Array) -> Array:
     """Natural logarithm by which a cycle of the strain amplitude x = e0/eps_half lowers a mean stress.
 
     Notes: a stroke from one turning point to the next keeps 1 - (z/(1 + z))^2 of it, with z of `harmonic_shape`.
@@ -115,26 +115,26 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
     }
 
 
-def _move(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
+def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
     """Eq. (5) from u_s = `start` over the distance d: u, and v and v + d of the module's notes."""
     room = 1.0 - sign * start
     reach = room + distance
     return start + sign * distance * room / reach, room, reach
 
 
-def _move_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any, Any]:
+def _stroke_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any, Any]:
     """du/du_s and du/dd of a move."""
     return 1.0 - (distance / reach) ** 2, sign * (room / reach) ** 2
 
 
-def _passed(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tuple[Any, Any, Any]]:
+def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tuple[Any, Any, Any]]:
     """u where each piece of a motion begins and the last one ends, its derivative by ln eps_half where the first u is
     held, and its derivative by the first u."""
     path = [(u, 0.0 * u, 1.0 + 0.0 * u)]
     for sense, distance in zip(senses, distances, strict=True):
         start, slope, kept = path[-1]
-        end, *room_and_reach = _move(start, sense, distance)
-        by_start, by_distance = _move_slopes(sense, distance, *room_and_reach)
+        end, *room_and_reach = _stroke(start, sense, distance)
+        by_start, by_distance = _stroke_slopes(sense, distance, *room_and_reach)
         path.append((end, by_start * slope - by_distance * distance, by_start * kept))
     return path
 
@@ -161,7 +161,7 @@ def _at_turns(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, A
     pieces = scaled.ravel() if single else np.moveaxis(scaled, -1, 0)
     signs, paths = (list[Any](each.tolist() if single else each) for each in (np.sign(pieces), np.abs(pieces)))
     u: Any = 0.0 if single else np.zeros_like(pieces[0])
-    path, first = _passed(signs, paths, u), 0.0
+    path, first = _strokes(signs, paths, u), 0.0
     for _ in range(_ROUNDS if periodic else 0):
         end, slope, kept = path[-1]
         room = 1.0 - kept + (kept >= 1.0)  # one at rest keeps all
@@ -169,13 +169,13 @@ def _at_turns(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, A
         if np.all(np.abs(closer - u) < _SETTLED):
             break
         u = closer.item() if single else closer
-        path = _passed(signs, paths, u)
+        path = _strokes(signs, paths, u)
     turns = [(u, slope + kept * first) for u, slope, kept in path[:-1]]
     at, slopes = (np.stack(each, axis=-1).reshape(scaled.shape) for each in zip(*turns, strict=True))
     return at, slopes
 
 
-def _begun(eps_half: Array, history: History) -> tuple[Array, Array, Array, Array]:
+def _at_samples(eps_half: Array, history: History) -> tuple[Array, Array, Array, Array]:
     """u and du/dln eps_half where each piece of one history or many begins, for one eps_half or many, and the sense and
     the distance d of every sample from there."""
     turning, eps_half = history.turning, np.atleast_1d(np.asarray(eps_half, dtype=float))
@@ -185,14 +185,14 @@ def _begun(eps_half: Array, history: History) -> tuple[Array, Array, Array, Arra
 
 def stress(p: Values, history: History) -> Array:
     """s_f along the history (Eq. 5): from (0, 0) at rest, or on the steady loop [Pa]."""
-    start, _, sense, distance = _begun(p["eps_half"], history)
-    return p["sigma_fmax"] * _move(history.turning.at_samples(start), sense, distance)[0]
+    start, _, sense, distance = _at_samples(p["eps_half"], history)
+    return p["sigma_fmax"] * _stroke(history.turning.at_samples(start), sense, distance)[0]
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """d/dsigma_fmax = u and d/deps_half = sigma_fmax du/deps_half."""
-    start, slope, sense, distance = _begun(p["eps_half"], history)
-    u, *room_and_reach = _move(history.turning.at_samples(start), sense, distance)
-    by_start, by_distance = _move_slopes(sense, distance, *room_and_reach)
+    start, slope, sense, distance = _at_samples(p["eps_half"], history)
+    u, *room_and_reach = _stroke(history.turning.at_samples(start), sense, distance)
+    by_start, by_distance = _stroke_slopes(sense, distance, *room_and_reach)
     slope = by_start * history.turning.at_samples(slope) - by_distance * distance  # by ln eps_half
     return {"sigma_fmax": u, "eps_half": p["sigma_fmax"] * slope / p["eps_half"]}

@@ -31,12 +31,6 @@ _LARGEST_MOTION = 2.0
 _REMEMBERED = 3
 #: Share of all their squares that is added to each, so that two that teach the same do no harm: above rounding.
 _SAME_DIRECTION = 1e-12
-#: Adds to each.
-_EACH = np.eye(_REMEMBERED)
-#: The name of its solutions.
-_NAME = "compliance"
-#: The name of the solutions of what gives way beneath it, as a sleeve in a rig.
-_BENEATH = "beneath"
 #: Least height of the pulse that measures a stiffness [m]: a motion that stands still beside others that move, as
 #: within a play, would have no pulse to divide by.
 _LEAST_PULSE = 1e-9
@@ -92,8 +86,8 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     imposed, solved, history = history.value, history.solved, history.driven()
     count = imposed.shape[-1]
     length = count if history.periodic else next_fast_len(2 * count, real=True)
-    beneath = solved.setdefault(_BENEATH, {})
-    rigid, reached = solved.pop(_NAME, (None, np.zeros_like(imposed)))
+    beneath = solved.setdefault("beneath", {})  # solutions of what gives way beneath it, as a sleeve in a rig
+    rigid, reached = solved.pop("compliance", (None, np.zeros_like(imposed)))
     if reached.shape not in (imposed.shape[-1:], imposed.shape):
         rigid, reached = None, np.zeros_like(imposed)
     if rigid is None:
@@ -109,14 +103,14 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         missing = felt - reached
         off = np.max(np.abs(compliance * missing), axis=-1, keepdims=True)
         change = np.fft.irfft(yielding * np.fft.rfft(missing, n=length), n=length)[..., :count]
-        past = past or _Past(change.shape)
+        past = past or _AndersonMixing(change.shape)
         step = past.step(reached, change)
         # what is no number counts as settled, so that it takes no other with it
-        if not np.any(off > history.accuracy * size) and _tells_apart(reached, missing):
+        if not np.any(off > history.accuracy * size) and _differences_resolved(reached, missing):
             reached = reached + step
             many = imposed.ndim > 1  # else of many models on one motion the last is kept
             kept = [each if many else each.reshape(-1, each.shape[-1])[-1].copy() for each in (rigid, reached)]
-            solved[_NAME] = (kept[0] if number < _MANY_ROUNDS else None, kept[1])
+            solved["compliance"] = (kept[0] if number < _MANY_ROUNDS else None, kept[1])
             return reached
         idle = 0 if np.any(off < _NEARER * best) else idle + 1
         if idle == _IDLE:
@@ -133,7 +127,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     return felt
 
 
-def _tells_apart(reached: Array, missing: Array) -> bool:
+def _differences_resolved(reached: Array, missing: Array) -> bool:
     """Whether the forces of models on one motion are known as well as their differences from the last of them ask."""
     if missing.ndim == 1:
         return True
@@ -142,7 +136,7 @@ def _tells_apart(reached: Array, missing: Array) -> bool:
     return not np.any(unknown > np.maximum(_RESOLVED * apart, _ROUNDING * np.max(np.abs(reached), axis=-1)))
 
 
-class _Past:
+class _AndersonMixing:
     """What the last rounds of an iteration teach of the next (D. G. Anderson, J. ACM 12 (1965) 547).
 
     Kept are the last few differences from one round to the next, by turns in one of a few places, empty at first.
@@ -166,7 +160,7 @@ class _Past:
         products = self._products
         products[..., k, :] = products[..., :, k] = (self._changed @ changed[..., None])[..., 0]
         little = _SAME_DIRECTION * np.einsum("...ii->...", products)[..., None, None] + np.finfo(float).tiny
-        weights = np.linalg.solve(products + little * _EACH, self._changed @ change[..., None])
+        weights = np.linalg.solve(products + little * np.eye(_REMEMBERED), self._changed @ change[..., None])
         return np.asarray(change - (weights.mT @ self._both)[..., 0, :])
 
 

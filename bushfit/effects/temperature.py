@@ -22,7 +22,7 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     return {**spring, **scaled_values(p, others, np.exp(-p["softening"] * warmer))}
 
 
-def pace(p: Values, under: Circumstances) -> Value:
+def shift_factor(p: Values, under: Circumstances) -> Value:
     """The shift factor a_T: a motion at w in rubber at T is one at w a_T in rubber at 23 degC; 1 where T is unknown."""
     return 1.0 if under.temperature is None else np.exp(log_shift(p["shift"], np.asarray(under.temperature)))
 

@@ -74,7 +74,26 @@ STRAINING = Motion(
 )
 
 
-class Direction(StrEnum):
+class _Tested:
+    """What a direction and a specimen answer alike."""
+
+    @property
+    def motion(self) -> Motion:
+        """The kind of motion that it is tested in."""
+        raise NotImplementedError
+
+    @property
+    def is_rotation(self) -> bool:
+        """Whether it counts rotation [rad] and moment [N m], and not displacement [m] and force [N]."""
+        return self.motion is ROTATION
+
+    @property
+    def display(self) -> Display:
+        """The units in which engineers read its displacement, force and stiffness, or strain, stress and modulus."""
+        return self.motion.display
+
+
+class Direction(_Tested, StrEnum):
     """Direction in which a bushing is tested: its name in files, and its kind of motion."""
 
     AXIAL = "axial"
@@ -85,16 +104,6 @@ class Direction(StrEnum):
     def motion(self) -> Motion:
         """Translation or rotation."""
         return _DEFINITIONS[self].motion
-
-    @property
-    def is_rotation(self) -> bool:
-        """Whether it counts rotation [rad] and moment [N m], and not displacement [m] and force [N]."""
-        return self.motion is ROTATION
-
-    @property
-    def display(self) -> Display:
-        """The units in which engineers read its displacement, force and stiffness."""
-        return self.motion.display
 
 
 @dataclass(frozen=True)
@@ -172,7 +181,7 @@ class Bushing:
 
 
 @dataclass(frozen=True)
-class Specimen:
+class Specimen(_Tested):
     """A body of the compound that is tested in one way only: a coupon, or a mount in plain shear.
 
     Args:
@@ -217,16 +226,6 @@ class Specimen:
     def motion(self) -> Motion:
         """Displacement and force of a block, or strain and stress of the material."""
         return TRANSLATION if self.kind == "shear" else STRAINING
-
-    @property
-    def is_rotation(self) -> bool:
-        """Whether it counts rotation; no specimen does."""
-        return False
-
-    @property
-    def display(self) -> Display:
-        """The units in which engineers read its displacement, force and stiffness, or strain, stress and modulus."""
-        return self.motion.display
 
 
 #: Where a response is measured or predicted: a direction of the bushing, or a specimen of its compound.

@@ -137,7 +137,7 @@ def model_arms(
     Effects that share a size, as the springpot and the spring in series with it, are one part. A size of 0 is none.
     """
     parts: dict[str, list[str]] = {}
-    for branch in model.fading:
+    for branch in model.viscoelastic:
         parts.setdefault(qualified_size(branch), []).append(branch.name)
     found = (
         fitted_arms(
@@ -149,7 +149,7 @@ def model_arms(
     return tuple(replace(part, under=under) for part in found)
 
 
-def listed(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
+def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
     """What each spring stands for, its modulus [Pa] and relaxation time [s]; first, without one, what is elastic."""
     values = _values(model, arms[0].under) if arms else model.values
     at_rest = [("elastic", values["mu"], np.nan)] if "mu" in values else []
@@ -166,8 +166,8 @@ def qualified_size(branch: Branch) -> str:
 
 def part_modulus(model: Model, size: str, omega: Array, under: Circumstances = UNKNOWN) -> Array:
     """mu^ [Pa] of the branches of one size at angular frequencies [rad/s], (n,)."""
-    still, values, reduced = np.zeros_like(omega), _values(model, under), omega * model.pace(under)
-    own = (branch for branch in model.fading if qualified_size(branch) == size)
+    still, values, reduced = np.zeros_like(omega), _values(model, under), omega * model.shift_factor(under)
+    own = (branch for branch in model.viscoelastic if qualified_size(branch) == size)
     return np.asarray(sum(branch.modulus(seen_by(branch, values), reduced, still) for branch in own))
 
 
@@ -175,7 +175,7 @@ def _values(model: Model, under: Circumstances) -> Values:
     """The values of a model as its temperature leaves them, whatever the motion."""
     if under.temperature is None:
         return model.values
-    others = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.pace]
+    others = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor]
     return model.without(*others).values_at(Specimen("compound", "modulus"), 1.0, 0.0, under)
 
 

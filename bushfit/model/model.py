@@ -80,9 +80,9 @@ class Model:
         return self._structure.parameters
 
     @property
-    def fading(self) -> tuple[Branch, ...]:
+    def viscoelastic(self) -> tuple[Branch, ...]:
         """The linear branches that fade with memory."""
-        return self._structure.fading
+        return self._structure.viscoelastic
 
     @property
     def only_branches(self) -> bool:
@@ -301,9 +301,9 @@ class Model:
             if structure.modifiers:
                 omega = np.atleast_1d(displacement.omega)
                 base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
-            if structure.paced:
-                strain = strain.faster(self.pace(setting.under, values))
-            together = displacement.periodic and structure.fading
+            if any(each.shift_factor for each in structure.modifiers):
+                strain = strain.faster(self.shift_factor(setting.under, values))
+            together = displacement.periodic and structure.viscoelastic
             alone = structure.others if together else structure.branches
             stresses = [branch.stress(seen_by(branch, base), strain) for branch in alone]
             if together:
@@ -315,7 +315,8 @@ class Model:
             count, step = strain.value.shape[-1], strain.step
             if base is values and count in known and known[count][0] is step:
                 return known[count][1]
-            moduli = (branch.modulus(seen_by(branch, base), omega, strain.amplitude) for branch in structure.fading)
+            linear = structure.viscoelastic
+            moduli = (branch.modulus(seen_by(branch, base), omega, strain.amplitude) for branch in linear)
             found = np.asarray(2.0 * sum(moduli))
             if base is values:
                 known[count] = step, found
@@ -329,14 +330,15 @@ class Model:
 
     def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
         """Complex stiffness of the rubber, with its parameters as in `base`."""
-        omega = omega * self.pace(setting.under, values)
+        omega = omega * self.shift_factor(setting.under, values)
         moduli = (branch.modulus(seen_by(branch, base), omega, strain) for branch in self._structure.branches)
         return np.atleast_1d(self.stiffness_per_modulus(setting.direction) * sum(moduli))
 
-    def pace(self, under: Circumstances, values: Values | None = None) -> Value:
+    def shift_factor(self, under: Circumstances, values: Values | None = None) -> Value:
         """How many times as fast a motion is on the rubber's own time scale as on the clock's: the shift factor a_T."""
         values = self.values if values is None else values
-        return prod(each.pace(seen_by(each, values), under) for each in self._structure.paced if each.pace)
+        shifts = ((each, each.shift_factor) for each in self._structure.modifiers)
+        return prod(shift(seen_by(each, values), under) for each, shift in shifts if shift)
 
     def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
         """All values as the modifiers leave them at an operating condition."""

@@ -14,20 +14,20 @@ class Structure:
     """The effects of a model by kind, and their parameters; the same for all models with these effects.
 
     Args:
-        fading: the linear branches that fade with memory, whose steady answers add up harmonic by harmonic.
+        records: all of them, from the rubber outward.
+        parameters: by their names in files and reports.
+        viscoelastic: the linear branches that fade with memory, whose steady answers add up harmonic by harmonic.
         others: the branches that do not.
-        paced: the modifiers that shift the rubber's time scale.
         moduli: names of the rubber's moduli and stresses, to which its stiffness is proportional together.
     """
 
     records: tuple[Effect, ...]
     parameters: Mapping[str, Parameter]
     branches: tuple[Branch, ...]
+    viscoelastic: tuple[Branch, ...]
+    others: tuple[Branch, ...]
     modifiers: tuple[Modifier, ...]
     layers: tuple[Layer, ...]
-    fading: tuple[Branch, ...]
-    others: tuple[Branch, ...]
-    paced: tuple[Modifier, ...]
     moduli: tuple[str, ...]
 
     @classmethod
@@ -37,27 +37,21 @@ class Structure:
         doubles = {name for name in names if names.count(name) > 1}
         if doubles:
             raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
-        place = {name.partition(".")[0]: place for place, name in enumerate(LIBRARY)}
-        known = map(effect_named, names)
-        order = sorted(
-            known, key=lambda effect: (effect.level, place.get(effect.name.partition(".")[0], len(place)), effect.name)
-        )
-        records = tuple(order)
+        kinds = [name.partition(".")[0] for name in LIBRARY]
+
+        def outward(effect: Effect) -> tuple[int, int, str]:
+            kind = effect.name.partition(".")[0]
+            return effect.level, kinds.index(kind) if kind in kinds else len(kinds), effect.name
+
+        records = tuple(sorted(map(effect_named, names), key=outward))
+        branches = tuple(effect for effect in records if isinstance(effect, Branch))
         return cls(
             records,
-            MappingProxyType(
-                {qualified(effect, parameter): parameter for effect in records for parameter in effect.parameters}
-            ),
-            tuple(effect for effect in records if isinstance(effect, Branch)),
+            MappingProxyType({qualified(effect, each): each for effect in records for each in effect.parameters}),
+            branches,
+            tuple(branch for branch in branches if branch.size),
+            tuple(branch for branch in branches if not branch.size),
             tuple(effect for effect in records if isinstance(effect, Modifier)),
             tuple(effect for effect in records if isinstance(effect, Layer)),
-            tuple(effect for effect in records if isinstance(effect, Branch) and effect.size),
-            tuple(effect for effect in records if isinstance(effect, Branch) and not effect.size),
-            tuple(effect for effect in records if isinstance(effect, Modifier) and effect.pace),
-            tuple(
-                qualified(effect, parameter)
-                for effect in records
-                for parameter in effect.parameters
-                if isinstance(effect, Branch) and parameter.unit.startswith("Pa")
-            ),
+            tuple(qualified(b, each) for b in branches for each in b.parameters if each.unit.startswith("Pa")),
         )

@@ -10,10 +10,10 @@ import pytest
 
 from bushfit.effects import History
 from bushfit.effects.friction import (
-    _passed,
-    forgotten,
+    _strokes,
     harmonic_shape,
     harmonic_slope,
+    mean_stress_decay,
     modulus,
     stress,
     stress_sensitivities,
@@ -149,7 +149,7 @@ def test_reversals_ignore_rests() -> None:
 @pytest.mark.parametrize("x", [1e-3, 0.3, 1.0, 20.0])
 def test_a_cycle_lowers_a_mean_stress_as_the_walk_along_it_does(x: float) -> None:
     begin = 2.0 * x / (math.sqrt(x * (x + 6.0) + 1.0) + x + 1.0)
-    path = _passed([-1.0, 1.0], [2.0 * x, 2.0 * x], begin)
+    path = _strokes([-1.0, 1.0], [2.0 * x, 2.0 * x], begin)
     end, _, kept = path[-1]
     assert end == pytest.approx(begin, rel=1e-12)
-    assert -math.log(kept) == pytest.approx(float(forgotten(np.array(x))), rel=1e-9)
+    assert -math.log(kept) == pytest.approx(float(mean_stress_decay(np.array(x))), rel=1e-9)

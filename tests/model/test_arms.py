@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from bushfit.effects import BASE
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
-from bushfit.model.arms import Arms, fitted_arms, listed, model_arms, part_modulus
+from bushfit.model.arms import Arms, arm_rows, fitted_arms, model_arms, part_modulus
 from bushfit.model.model import Model
 
 
@@ -75,7 +75,7 @@ def test_the_springpot_and_the_spring_in_series_are_one_part(paper_model: Model)
 def test_a_model_without_memory_has_none(paper_model: Model) -> None:
     still = Model.started(paper_model.bushing, BASE, {**paper_model.values, "m": 0.0})
     assert model_arms(still, (5.0, 155.0)) == ()
-    assert listed(still, ()) == [("elastic", 1.09e6, pytest.approx(float("nan"), nan_ok=True))]
+    assert arm_rows(still, ()) == [("elastic", 1.09e6, pytest.approx(float("nan"), nan_ok=True))]
 
 
 def test_what_no_passive_arms_can_do_is_refused() -> None:
