@@ -14,9 +14,6 @@ from hypothesis import strategies as st
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction
 from bushfit.geometry.shape import RADIUS_RATIO_RANGE, SLENDERNESS_RANGE, Correction, radial_correction
-from bushfit.model.file import from_document, to_document
-from bushfit.model.model import Model
-from bushfit.model.result import Result
 
 radius_ratios = st.floats(*RADIUS_RATIO_RANGE)
 slendernesses = st.floats(*map(math.log, SLENDERNESS_RANGE)).map(
@@ -104,12 +101,3 @@ def test_beyond_the_shapes_that_were_solved(inner: float, length: float) -> None
 @pytest.mark.parametrize("ends", [(0.0015, 0.001), (0.0092, 0.6)])
 def test_the_ends_of_the_ranges_belong_to_them(ends: tuple[float, float]) -> None:
     assert Bushing("tube", ends[0], 0.01, ends[1], "calibrated").correction is not None
-
-
-def test_a_model_file_keeps_a_calibrated_shape_and_is_the_papers_without(paper_model: Model) -> None:
-    calibrated = replace(paper_model.bushing, shape="calibrated")
-    document = to_document(Result(replace(paper_model, bushing=calibrated)))
-    assert from_document(document).model.bushing == calibrated
-    assert document["bushing"].pop("shape") == "calibrated"
-    assert from_document(document).model.bushing == paper_model.bushing
-    assert "shape" not in to_document(Result(paper_model))["bushing"]

@@ -47,14 +47,11 @@ def test_arms_keep_within_their_error_and_give_off_no_energy(alpha: float, decad
     assert error_of(arms, alpha) <= accuracy * 1.03
 
 
-def test_a_maxwell_arm_is_found_as_it_is(paper_model: Model) -> None:
+def test_a_maxwell_arm_is_found_as_it_is_and_a_dashpot_as_one_faster_than_the_band(paper_model: Model) -> None:
     model = paper_model.with_effect("maxwell", {"maxwell.mu1": 5e4, "maxwell.tau": 2e-3})
     springpots, arm = model_arms(model, (5.0, 155.0))
     assert (springpots.stands_for, arm.stands_for, arm.size) == ("springpot", "maxwell", "maxwell.mu1")
     np.testing.assert_allclose([arm.modulus, arm.time], [[5e4], [2e-3]], rtol=1e-4)
-
-
-def test_a_dashpot_is_an_arm_faster_than_the_band(paper_model: Model) -> None:
     _, arm = model_arms(paper_model.with_effect("viscous", {"viscous.eta": 100.0}), (5.0, 155.0))
     assert arm.time.size == 1
     assert arm.modulus[0] * arm.time[0] == pytest.approx(100.0, rel=0.01)
