@@ -17,7 +17,12 @@ def _share(p: Values, omega: Array | float) -> Value:
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K at the amplitude X (1 - c (f/155 Hz)^2) [N/m]."""
+    """K at the amplitude X (1 - c (f/155 Hz)^2) [N/m].
+
+    >>> reached = stiffness({"c": 0.05}, lambda omega, amplitude: amplitude, 2.0 * np.pi * 155.0, 1e-3, sweep)
+    >>> float(reached)
+    0.00095
+    """
     return below(omega, amplitude * _share(p, omega))
 
 

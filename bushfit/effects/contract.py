@@ -12,6 +12,9 @@ Notes:
     Every face broadcasts. The last axis holds operating points (frequency face) or samples (time face). Parameter
     values are numbers, or arrays whose last axis has length 1: a Jacobian by differences or a bootstrap is then one
     call with the values along a leading axis.
+
+    In the examples of the laws `paper` is the model of the paper's bushing, `spring` the response below a layer, of 500
+    N/mm, and `sweep` and `loop` are axial tests of that bushing.
 """
 
 from __future__ import annotations
@@ -94,7 +97,11 @@ class Parameter:
     scale: Literal["period", "frequency", "displacement", "strain", "force", "order"] | None = None
 
     def sized(self, share: float) -> float:
-        """The value at a share of the typical distance from the neutral one, or from 0 where none is neutral."""
+        """The value at a share of the typical distance from the neutral one, or from 0 where none is neutral.
+
+        >>> Parameter("c3", "1", (0.0, 1e5), 0.0, 20.0, "cubic stress coefficient over mu").sized(0.5)
+        10.0
+        """
         return (self.neutral or 0.0) + share * self.typical
 
 
@@ -325,7 +332,11 @@ class Family:
 
 
 def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str, Value]:
-    """The named values times a factor, as far as the model has them: what most modifiers return."""
+    """The named values times a factor, as far as the model has them: what most modifiers return.
+
+    >>> scaled_values({"mu": 1e6}, ("mu", "m"), 0.5)
+    {'mu': 500000.0}
+    """
     return {name: p[name] * factor for name in names if name in p}
 
 
@@ -354,6 +365,9 @@ def harmonic_response(transfer: Value, history: History) -> Array:
 
     Args:
         transfer: stress over strain (2 mu^) or force over displacement (K), (..., 1).
+
+    >>> harmonic_response(2.0, History.steady(np.array([3.0, 2.0, -1.0, 0.0]), 1.0)).round(6)
+    array([ 4.,  2., -4., -2.])
     """
     return np.real(np.asarray(transfer) * history.fundamental)
 

@@ -11,6 +11,11 @@ SMALLEST_STRAIN = 1e-9
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """m (e0/0.01)^(-q) [Pa s^alpha]."""
+    """m (e0/0.01)^(-q) [Pa s^alpha].
+
+    >>> model = paper.with_effect("coupled_breakdown", {"coupled_breakdown.q": 0.1})
+    >>> [round(model.values_at("axial", 25.0, x)["m"]) for x in (1e-4, 1e-3)]
+    [209921, 166746]
+    """
     ratio = np.maximum(condition.strain, SMALLEST_STRAIN) / REFERENCE_STRAIN
     return scaled_values(p, ("m",), np.power(ratio, -np.asarray(p["q"], dtype=float)))

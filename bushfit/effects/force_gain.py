@@ -1,4 +1,8 @@
-"""Force gain: the loop's force chain and the sweep's do not agree; loops are 1 + gain times what they should be."""
+"""Force gain: the loop's force chain and the sweep's do not agree; loops are 1 + gain times what they should be.
+
+>>> stiffness({"gain": 0.02}, spring, 1.0, 1e-4, loop), stiffness({"gain": 0.02}, spring, 1.0, 1e-4, sweep)
+(510000.0, 500000.0)
+"""
 
 from bushfit.effects.contract import scaled_response
 

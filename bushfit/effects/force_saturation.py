@@ -41,6 +41,11 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F, less a share of what of it lies beyond +-level [N]; the torque cell is another one, so not in torsion."""
+    """F, less a share of what of it lies beyond +-level [N]; the torque cell is another one, so not in torsion.
+
+    >>> motion = History.steady(np.array([1.0, -3.0]), 1.0)
+    >>> force({"level": 2.0, "share": 1.0}, lambda history: history.value, motion, sweep)
+    array([ 1., -2.])
+    """
     felt = below(history)
     return felt - p["share"] * dead_zone(felt, p["level"]) if setting.kind == "sweep" else felt

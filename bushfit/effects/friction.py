@@ -43,6 +43,9 @@ def harmonic_shape(x: Array) -> Array:
             Re h = p^2 / ((x + p + q) q)
             Im h = (2 - p^2/x ln(1 + z)) / (pi x)
                  = (2 (D - 2)/D - 8x/p T(z)) / pi,  T = 1/3 - z/4 + z^2/5 - ...   (small z)
+
+    >>> harmonic_shape(np.array([0.0, 1.0, 100.0])).round(4)
+    array([0.5   +0.j    , 0.1974+0.0755j, 0.0016+0.0058j])
     """
     s, big, p, q, z = _roots(x)
     shape = np.empty(x.shape, dtype=complex)
@@ -95,13 +98,20 @@ def mean_stress_decay(x: Array) -> Array:
     """Natural logarithm by which a cycle of the strain amplitude x = e0/eps_half lowers a mean stress.
 
     Notes: a stroke from one turning point to the next keeps 1 - (z/(1 + z))^2 of it, with z of `harmonic_shape`.
+
+    >>> mean_stress_decay(np.array([0.01, 1.0])).round(4)
+    array([8.000e-04, 8.406e-01])
     """
     z = _roots(x)[-1]
     return -2.0 * np.log1p(-np.square(z / (1.0 + z)))
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """(A + iB)/(2 e0) of the steady loop of strain amplitude e0 [Pa]."""
+    """(A + iB)/(2 e0) of the steady loop of strain amplitude e0 [Pa].
+
+    >>> modulus({"sigma_fmax": 2e4, "eps_half": 0.01}, 1.0, np.array([0.0, 0.01])).round()
+    array([1000000.     +0.j,  394736.+151040.j])
+    """
     return p["sigma_fmax"] / p["eps_half"] * harmonic_shape(strain / p["eps_half"])
 
 
@@ -184,7 +194,11 @@ def _at_samples(eps_half: Array, history: History) -> tuple[Array, Array, Array,
 
 
 def stress(p: Values, history: History) -> Array:
-    """s_f along the history (Eq. 5): from (0, 0) at rest, or on the steady loop [Pa]."""
+    """s_f along the history (Eq. 5): from (0, 0) at rest, or on the steady loop [Pa].
+
+    >>> stress({"sigma_fmax": 2e4, "eps_half": 0.01}, History(np.array([0.01, 0.0, 0.01]), 1.0, False, 1.0)).round()
+    array([10000., -2000.,  8476.])
+    """
     start, _, sense, distance = _at_samples(p["eps_half"], history)
     return p["sigma_fmax"] * _stroke(history.turning.at_samples(start), sense, distance)[0]
 

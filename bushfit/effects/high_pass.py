@@ -17,7 +17,11 @@ def _leak(p: Values, omega: Array) -> Value:
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K i omega T/(1 + i omega T) of a sweep [N/m]."""
+    """K i omega T/(1 + i omega T) of a sweep [N/m].
+
+    >>> round(abs(stiffness({"corner": 1.0}, spring, 2.0 * np.pi, 1e-4, sweep)))
+    353553
+    """
     return below(omega, amplitude) * (1.0 + (_leak(p, omega) if setting.kind == "sweep" else 0.0))
 
 

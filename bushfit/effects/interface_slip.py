@@ -15,7 +15,11 @@ def _force(p: Values, setting: Setting) -> Value:
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K + i 4 Fc/(pi X) [N/m]."""
+    """K + i 4 Fc/(pi X) [N/m].
+
+    >>> stiffness({"force": np.pi}, spring, 1.0, np.array([1e-4, 1e-3]), sweep).round()
+    array([500000.+40000.j, 500000. +4000.j])
+    """
     return below(omega, amplitude) + 4j * _force(p, setting) / (np.pi * np.maximum(amplitude, SMALLEST_AMPLITUDE))
 
 

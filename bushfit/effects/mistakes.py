@@ -120,7 +120,11 @@ class Mistake(Effect):
 
 
 def file_or_name(test: Loop | Sweep) -> str:
-    """The file of a test, or its name where it came from none."""
+    """The file of a test, or its name where it came from none.
+
+    >>> file_or_name(Loop("slow", Direction.AXIAL, *np.ones((3, 9))))
+    'slow'
+    """
     return test.source.file.name if test.source else test.name
 
 
@@ -224,6 +228,9 @@ def candidate_named(name: str) -> Effect:
 
     Raises:
         ModelError: there is none; the nearest name is suggested.
+
+    >>> candidate_named("peak_to_peak:sweep_axial").sentence
+    'the amplitudes of {files} are peak-to-peak'
     """
     mistake = mistake_named(name)
     if mistake is None and SEPARATOR in name:

@@ -9,6 +9,11 @@ REFERENCE_FREQUENCY = 25.0
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """sigma_fmax (f/25 Hz)^n [Pa]."""
+    """sigma_fmax (f/25 Hz)^n [Pa].
+
+    >>> model = paper.with_effect("rate_dependent_friction", {"rate_dependent_friction.n": 0.05})
+    >>> [round(model.values_at("axial", f, 1e-3)["sigma_fmax"]) for f in (25.0, 155.0)]
+    [14600, 15995]
+    """
     ratio = np.asarray(condition.omega) / (2.0 * np.pi * REFERENCE_FREQUENCY)
     return scaled_values(p, ("sigma_fmax",), np.power(ratio, p["n"]))

@@ -43,6 +43,10 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
     Notes:
         v + ln|1 + c K(X e^v)| = 0, by secants. Near the solution the last secant also gives K there, unasked.
+
+    >>> spring = lambda omega, amplitude: np.full(1, 1e6 + 0j)
+    >>> stiffness({"compliance": 1e-6}, spring, np.ones(1), np.full(1, 1e-4), sweep).round()
+    array([500000.+0.j])
     """
     compliance = p["compliance"]
 

@@ -4,7 +4,11 @@ from bushfit.effects.contract import Array, ForceBelow, History, Setting, Stiffn
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K at the amplitude scale X [N/m]."""
+    """K at the amplitude scale X [N/m].
+
+    >>> stiffness({"scale": 2.0}, lambda omega, amplitude: amplitude, 1.0, 1e-4, sweep)  # the amplitude counted
+    0.0002
+    """
     return below(omega, p["scale"] * amplitude)
 
 

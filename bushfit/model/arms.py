@@ -103,6 +103,10 @@ def fitted_arms(
 
     Raises:
         ModelError: no passive arms come as near, or an accuracy that is none.
+
+    >>> arms = fitted_arms(lambda omega: 1e5 * (1j * omega) ** 0.24, (5.0, 155.0))
+    >>> arms.time.size, round(float(arms.error), 4)
+    (4, 0.0042)
     """
     if not LEAST_ACCURACY <= accuracy < 1.0:
         raise ModelError("no error for arms", found=f"{100.0 * accuracy:g} %", expected="0.0001 % up to 100 %")
@@ -150,7 +154,11 @@ def model_arms(
 
 
 def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
-    """What each spring stands for, its modulus [Pa] and relaxation time [s]; first, without one, what is elastic."""
+    """What each spring stands for, its modulus [Pa] and relaxation time [s]; first, without one, what is elastic.
+
+    >>> [row[0] for row in arm_rows(paper, model_arms(paper, (5.0, 155.0)))]
+    ['elastic', 'springpot', 'springpot', 'springpot', 'springpot']
+    """
     values = _values(model, arms[0].under) if arms else model.values
     at_rest = [("elastic", values["mu"], np.nan)] if "mu" in values else []
     every = ((part.stands_for, *pair) for part in arms for pair in zip(part.modulus, part.time, strict=True))

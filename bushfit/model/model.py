@@ -124,7 +124,11 @@ class Model:
         values: Mapping[str, float],
         unnamed: Unnamed | None = None,
     ) -> "Model":
-        """A model with the values given; other parameters have their neutral value, or a typical one."""
+        """A model with the values given; other parameters have their neutral value, or a typical one.
+
+        >>> Model.started(paper.bushing, ["elastic", "viscous"], {"mu": 1e6}).values["viscous.eta"]
+        0.0
+        """
         defaults = {
             qualified(effect, parameter): parameter.typical if parameter.neutral is None else parameter.neutral
             for effect in map(effect_named, effects)
@@ -137,6 +141,9 @@ class Model:
         """The model with one effect more, in place of the branch that it replaces, if it replaces one.
 
         Parameters of it without a value start from those of that branch, or else as in `started`.
+
+        >>> paper.with_effect("sliders").effects
+        ('elastic', 'springpot', 'sliders')
         """
         effect = effect_named(name)
         kept = [other for other in self.effects if other != effect.replaces]
@@ -168,12 +175,20 @@ class Model:
         return Model.started(self.bushing, [*effects, *added], {**self.values, **moved}, self.unnamed)
 
     def without(self, *left: Level | str) -> "Model":
-        """The model without the effects of these levels and names."""
+        """The model without the effects of these levels and names.
+
+        >>> paper.with_effect("inertia").without(Level.INSTRUMENT).effects
+        ('elastic', 'springpot', 'friction')
+        """
         kept = [effect.name for effect in self.records if not {effect.level, effect.name} & {*left}]
         return Model.started(self.bushing, kept, self.values, self.unnamed if UNNAMED in kept else None)
 
     def equation(self) -> str:
-        """The model as text: the formula of its first-harmonic stiffness, other effects, and values in common units."""
+        """The model as text: the formula of its first-harmonic stiffness, other effects, and values in common units.
+
+        >>> print(paper.equation().splitlines()[1])
+          mu = 1.09 MPa
+        """
         branches = " + ".join(effect.equation for effect in self._structure.branches)
         lines = [f"K = k ({branches}), k the stiffness of this shape per modulus"]
         lines += [f"  {effect.name}: {effect.equation}" for effect in self.records if not isinstance(effect, Branch)]
@@ -206,6 +221,10 @@ class Model:
         Notes:
             The rubber has k = G mu^(omega, e0), with G of Eqs. 10, 11, 12 and e0 of Eqs. 7, 8 (Eqs. 6 to 12); the
             layers of the model stand around it.
+
+        >>> k = paper.stiffness("axial", 100.0, 1e-4)
+        >>> print(f"{abs(k) / 1e3:.1f} N/mm, loss factor {k.imag / k.real:.3f}")
+        675.5 N/mm, loss factor 0.135
         """
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
         amplitude = np.asarray(amplitude, dtype=float)
@@ -231,6 +250,10 @@ class Model:
         """Force over a history of displacement [m or rad], from rest or on the steady cycle: (..., n) [N or N m].
 
         The other arguments are as of `stiffness`.
+
+        >>> motion = History.steady(1e-3 * np.sin(np.linspace(0.0, 2.0 * np.pi, 256)), 0.1)
+        >>> round(float(paper.force("axial", motion).max()), 1)
+        458.1
         """
         setting = self.setting(direction, kind, under)
         respond = self._stack_force(setting, self.values if values is None else values, self.layers(setting))
@@ -251,7 +274,12 @@ class Model:
     def values_at(
         self, place: Place, frequency: float, amplitude: float, under: Circumstances = UNKNOWN
     ) -> dict[str, float]:
-        """All values as the modifiers leave them at an operating condition [Hz, m or rad]."""
+        """All values as the modifiers leave them at an operating condition [Hz, m or rad].
+
+        >>> model = paper.with_effect("rate_dependent_friction", {"rate_dependent_friction.n": 0.1})
+        >>> round(model.values_at("axial", 50.0, 1e-3)["sigma_fmax"])
+        15648
+        """
         omega, reached = 2.0 * np.pi * np.atleast_1d(frequency), np.atleast_1d(amplitude)
         found = self._adjusted(
             self.setting(place, under=under), self.values, omega, reached, reached * self.unit_strain(place)

@@ -39,6 +39,10 @@ def stiffness_and_slopes(
     """The complex dynamic stiffness, (n,) [N/m or N m/rad], and its derivatives by parameters, (k, n) [per unit].
 
     Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each.
+
+    >>> _, slopes = stiffness_and_slopes(paper, "axial", np.array([5.0]), np.array([1e-4]), ["mu"])
+    >>> slopes.round(4)
+    array([[0.3634+0.j]])
     """
     respond = partial(model.stiffness, direction, frequency, amplitude, kind=kind, under=under)
     if not model.only_branches:
