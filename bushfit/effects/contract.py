@@ -35,6 +35,10 @@ from bushfit.geometry import Bushing, Direction, Place
 if TYPE_CHECKING:
     from bushfit.effects.unnamed import Unnamed
 
+#: Frequency [Hz] and strain amplitude [1] at which laws compare: within the range of most tests.
+REFERENCE_FREQUENCY = 25.0
+REFERENCE_STRAIN = 0.01
+
 #: A number, or an array that broadcasts against operating points or samples.
 Value = Any
 #: Parameter values by name.

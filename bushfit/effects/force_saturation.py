@@ -11,8 +11,6 @@ from bushfit.effects.dead_zone import dead_zone, first_harmonic
 
 #: Amplitude of the force's first harmonic, over the level, below which no waveform of rubber reaches it; chosen.
 _NEAR = 0.5
-#: Least amplitude [m or rad] to divide by.
-_TINY = np.finfo(float).tiny
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
@@ -37,7 +35,9 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     bent = (beyond - sine) @ FIRST
     rest = np.zeros((*bent.shape[:-1], first.shape[-1]), dtype=complex)
     rest[..., near] = bent
-    return inside - p["share"] * (inside * first_harmonic(first, p["level"]) + rest / np.maximum(amplitude, _TINY))
+    return inside - p["share"] * (
+        inside * first_harmonic(first, p["level"]) + rest / np.maximum(amplitude, np.finfo(float).tiny)
+    )
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:

@@ -5,11 +5,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, History, Values, linear_stress
+from bushfit.effects.contract import REFERENCE_FREQUENCY, Array, History, Values, linear_stress
 from bushfit.effects.springpot import power_of_rate
 
-#: Frequency at which c compares springpot and spring [Hz]: within the range of most sweeps.
-REFERENCE_FREQUENCY = 25.0
 #: Size of the last sample's echo in the kernel, relative: between the rounding and the wrapping of its transform.
 _ECHO = 1e-8
 

@@ -4,9 +4,6 @@ import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Value, Values
 
-#: Amplitude below which the slip stiffness grows no more [m or rad]: less than any test reaches, and more than 0.
-SMALLEST_AMPLITUDE = 1e-12
-
 
 def _force(p: Values, setting: Setting) -> Value:
     """The slip force [N], or its moment about the axis in torsion, at the outer sleeve's face [N m]."""
@@ -20,7 +17,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     >>> stiffness({"force": np.pi}, spring, 1.0, np.array([1e-4, 1e-3]), sweep).round()
     array([500000.+40000.j, 500000. +4000.j])
     """
-    return below(omega, amplitude) + 4j * _force(p, setting) / (np.pi * np.maximum(amplitude, SMALLEST_AMPLITUDE))
+    reached = np.maximum(amplitude, 1e-12)  # less than any test, and more than 0
+    return below(omega, amplitude) + 4j * _force(p, setting) / (np.pi * reached)
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:

@@ -2,10 +2,7 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Condition, Value, Values, scaled_values
-
-#: Strain amplitude at which d is what the clock gains [1]: within the range of most tests.
-REFERENCE_STRAIN = 0.01
+from bushfit.effects.contract import REFERENCE_STRAIN, Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:

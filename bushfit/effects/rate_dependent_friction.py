@@ -2,10 +2,7 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Condition, Value, Values, scaled_values
-
-#: Frequency at which sigma_fmax is unchanged [Hz]: within the range of most sweeps.
-REFERENCE_FREQUENCY = 25.0
+from bushfit.effects.contract import REFERENCE_FREQUENCY, Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:

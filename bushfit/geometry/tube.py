@@ -19,10 +19,6 @@ SLENDERNESS_RANGE = (0.05, 100.0)
 _ROUNDING = 1e-9
 #: q = (b^2 - a^2)/(b^2 + a^2) up to which ln(b/a) - q is summed as a series; above it, the two no longer cancel.
 _LARGEST_Q_OF_SERIES = 0.5
-#: Terms of that series; at the largest q, the first one left out is 1e-17 of the sum.
-_SERIES_TERMS = 30
-#: Tubes whose radial factors are kept: a fit asks for those of one bushing thousands of times.
-_CACHED_TUBES = 256
 
 
 def axial_strain(a: float, b: float) -> float:
@@ -43,7 +39,7 @@ def axial_stiffness(a: float, b: float, length: float) -> float:
     return 2.0 * math.pi * length / _log_ratio(a, b)
 
 
-@lru_cache(maxsize=_CACHED_TUBES)
+@lru_cache(maxsize=256)  # a fit asks for those of one bushing thousands of times
 def radial_strain(a: float, b: float) -> float:
     """e/d = sqrt((a^2 + b^2) / ((b^4 - a^4) ln(b/a) - (a^2 - b^2)^2)) (Eq. 8).
 
@@ -54,12 +50,12 @@ def radial_strain(a: float, b: float) -> float:
     274.0
     """
     q = _q(a, b)
-    series = (q ** (2 * j + 3) / (2 * j + 3) for j in range(_SERIES_TERMS))
+    series = (q ** (2 * j + 3) / (2 * j + 3) for j in range(30))  # the next one is 1e-17 of the sum at the largest q
     difference = _log_ratio(a, b) - q if q > _LARGEST_Q_OF_SERIES else math.fsum(series)
     return 1.0 / math.sqrt(_area(a, b) * difference)
 
 
-@lru_cache(maxsize=_CACHED_TUBES)
+@lru_cache(maxsize=256)
 def radial_stiffness(a: float, b: float, length: float) -> float:
     """k/mu = 10 pi L / (7/2 ln(b/a) - 3/2 q + D), with q = (b^2 - a^2)/(b^2 + a^2) and D of Eq. 12 (Eq. 11).
 

@@ -15,7 +15,8 @@ from bushfit.effects import Branch, Modifier, qualified
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.errors import ModelError
 from bushfit.geometry import Specimen
-from bushfit.model.model import Model, seen_by
+from bushfit.model.model import Model
+from bushfit.model.structure import seen_by
 from bushfit.units import number
 
 #: Error that arms have at most where none is asked for, relative to the modulus: that of good tests.
@@ -28,31 +29,17 @@ _MOST_ARMS = 30
 _BETTER = 0.95
 #: Arms in a row that may be no better: then no number of them will do.
 _PATIENCE = 3
-#: Evaluations of one least-squares fit at most: chosen, ten times what it takes from such a start.
-_EVALUATIONS = 200
 #: Frequencies per decade at which the error is judged: it ripples once an arm, and arms lie half a decade apart.
 _PER_DECADE = 30
-#: Frequencies at least, for a narrow band.
-_FEWEST = 40
 #: Least-squares fits in which the weights move to where the error is largest; chosen: more gain nothing.
 _ROUNDS = 25
 #: Error of a plain least-squares fit over that asked for, up to which these weights can make it good: they halve it.
 _WORTHWHILE = 4.0
-#: Share of a weight that stays where the error is 0.
-_KEPT = 1e-3
 #: How far relaxation times may lie beyond the band: there an arm is a spring or a dashpot to seven digits.
 _BEYOND = 1e7
-#: Distance from these ends at which a fit may start: it has to start inside.
-_INSIDE = 1e-9
 #: Nepers by which the first relaxation times reach over the ends of the band, one try each: which is best goes by the
 #: number of arms.
 _OVERHANGS = (0.0, 1.0, 2.0)
-#: Least modulus of an arm at the start, relative to what the arms are to be together.
-_SMALLEST = 1e-3
-
-#: Logarithm of an arm's modulus over the target's, far beyond any, at which a step that goes too far is held: `exp`
-#: would overflow.
-_FAR = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +98,7 @@ def fitted_arms(
     if not LEAST_ACCURACY <= accuracy < 1.0:
         raise ModelError("no error for arms", found=f"{100.0 * accuracy:g} %", expected="0.0001 % up to 100 %")
     low, high = band
-    count = max(_FEWEST, int(_PER_DECADE * np.log10(high / low)))
+    count = max(40, int(_PER_DECADE * np.log10(high / low)))
     omega = 2.0 * np.pi * np.geomspace(low, high, count)
     target, best, stalled, arms = modulus(omega), np.inf, 0, 0
     while arms < _MOST_ARMS and stalled < _PATIENCE:
@@ -204,7 +191,7 @@ def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Arr
         apart = max(1.0, (last - first) / arms)
         time = np.exp(first + (last - first) * (np.arange(arms) + 0.5) / arms)
         loss = np.interp(-np.log(time), np.log(omega), target.imag)
-        yield np.maximum(2.0 / np.pi * loss * apart, _SMALLEST * np.abs(target).mean()), time
+        yield np.maximum(2.0 / np.pi * loss * apart, 1e-3 * np.abs(target).mean()), time
 
 
 def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 1) -> tuple[float, Array, Array]:
@@ -222,7 +209,8 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     def parts(x: Array) -> tuple[Array, Array]:
         """Each arm over the target, (n, k), and its slope by the logarithm of its time."""
         basis = _basis(omega, np.exp(x[count:]))
-        arm = basis * unit * np.exp(np.minimum(x[:count], _FAR)) / target[:, None]
+        # a step that goes too far is held, as `exp` would overflow
+        arm = basis * unit * np.exp(np.minimum(x[:count], 100.0)) / target[:, None]
         return arm, arm * (1.0 - basis)
 
     def residual(x: Array) -> Array:
@@ -237,13 +225,13 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     low, high = (np.repeat([reach, end], count) for reach, end in zip((-np.inf, np.inf), ends, strict=True))
     x, best = np.concatenate((np.log(moduli / unit), np.log(time))), (np.inf, moduli, time)
     for _ in range(rounds):
-        start = np.clip(x, low + _INSIDE, high - _INSIDE)
-        x = least_squares(residual, start, slopes, bounds=(low, high), max_nfev=_EVALUATIONS).x
+        start = np.clip(x, low + 1e-9, high - 1e-9)  # a fit has to start inside
+        x = least_squares(residual, start, slopes, bounds=(low, high), max_nfev=200).x  # ten times what it takes
         off = np.abs(parts(x)[0].sum(axis=1) - 1.0)
         if off.max() < best[0]:
             best = off.max(), unit * np.exp(x[:count]), np.exp(x[count:])
         if off.max() < LEAST_ACCURACY:
             break
-        root = root * np.sqrt(off / off.max() + _KEPT)
+        root = root * np.sqrt(off / off.max() + 1e-3)  # a share stays where the error is 0
         root /= np.sqrt(np.mean(np.square(root)))
     return best

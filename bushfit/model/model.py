@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
-from itertools import groupby
 from math import prod
 from types import MappingProxyType
 from typing import Any, Literal, cast
@@ -18,7 +17,7 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
-from bushfit.model.structure import Structure
+from bushfit.model.structure import Structure, as_one_layer, in_groups, seen_by
 from bushfit.units import for_people
 
 #: What records a response: a sweep or a loop, which may have force chains of their own.
@@ -297,7 +296,7 @@ class Model:
         layers = self.layers(setting)
         if not layers:
             return rubber
-        groups = _together(layers)
+        groups = in_groups(layers)
         per_sample = {
             name: value if np.ndim(value) == 0 else np.asarray(value)[..., None] for name, value in values.items()
         }
@@ -310,7 +309,7 @@ class Model:
 
             if count == 0:
                 return StiffnessBelow(rubber, cycle)
-            inner, (layer, own) = below(count - 1), _as_one(groups[count - 1], values)
+            inner, (layer, own) = below(count - 1), as_one_layer(groups[count - 1], values)
             return StiffnessBelow(
                 lambda omega, amplitude: layer.stiffness(own, inner, omega, amplitude, setting), cycle
             )
@@ -351,10 +350,10 @@ class Model:
             return found
 
         def wrap(below: ForceBelow, group: Sequence[Layer]) -> ForceBelow:
-            layer, own = _as_one(group, values)
+            layer, own = as_one_layer(group, values)
             return lambda displacement: layer.force(own, below, displacement, setting)
 
-        return reduce(wrap, _together(layers), cast(ForceBelow, rubber))
+        return reduce(wrap, in_groups(layers), cast(ForceBelow, rubber))
 
     def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
         """Complex stiffness of the rubber, with its parameters as in `base`."""
@@ -394,21 +393,3 @@ def _check(name: str, value: float, parameter: Parameter) -> None:
             found=f"{value:g}{unit}",
             expected=f"{low:g} to {high:g}{unit} ({parameter.meaning})",
         )
-
-
-def _together(layers: Sequence[Layer]) -> list[list[Layer]]:
-    """Layers that act one after the other; neighbours of one law whose amounts add, in a group."""
-    return [list(group) for _, group in groupby(layers, key=lambda layer: layer.force if layer.adds else layer.name)]
-
-
-def _as_one(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
-    """A group of layers as the first of them, with the values that it reads."""
-    first, own = group[0], [seen_by(layer, values) for layer in group]
-    return first, {**own[0], **({first.adds: sum(each[first.adds] for each in own)} if first.adds else {})}
-
-
-def seen_by(effect: Effect, values: Values) -> Values:
-    """The values that an effect reads: all by their full names, and its own by short ones, too."""
-    if effect.name in BASE:
-        return values
-    return {**values, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}

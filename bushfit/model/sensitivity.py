@@ -16,7 +16,8 @@ from bushfit.effects import Branch, Parameter, place_of, qualified
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Value, Values
 from bushfit.effects.history import History
 from bushfit.geometry import Place
-from bushfit.model.model import Kind, Model, seen_by
+from bushfit.model.model import Kind, Model
+from bushfit.model.structure import seen_by
 
 #: Step of the differences, relative to the value (log parameters) or to the typical size (linear ones);
 #: chosen: the differences are good to about a millionth.

@@ -1,11 +1,13 @@
-"""What a model is built of: its effects by kind, and their parameters."""
+"""What a model is built of: its effects by kind, their parameters, and the values that each of them reads."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import groupby
 from types import MappingProxyType
 
-from bushfit.effects import LIBRARY, Branch, Effect, Layer, Modifier, Parameter, effect_named, qualified
+from bushfit.effects import BASE, LIBRARY, Branch, Effect, Layer, Modifier, Parameter, effect_named, qualified
+from bushfit.effects.contract import Values
 from bushfit.errors import ModelError
 
 
@@ -55,3 +57,21 @@ class Structure:
             tuple(effect for effect in records if isinstance(effect, Layer)),
             tuple(qualified(b, each) for b in branches for each in b.parameters if each.unit.startswith("Pa")),
         )
+
+
+def in_groups(layers: Sequence[Layer]) -> list[list[Layer]]:
+    """Layers that act one after the other; neighbours of one law whose amounts add, in a group."""
+    return [list(group) for _, group in groupby(layers, key=lambda layer: layer.force if layer.adds else layer.name)]
+
+
+def as_one_layer(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
+    """A group of layers as the first of them, with the values that it reads."""
+    first, own = group[0], [seen_by(layer, values) for layer in group]
+    return first, {**own[0], **({first.adds: sum(each[first.adds] for each in own)} if first.adds else {})}
+
+
+def seen_by(effect: Effect, values: Values) -> Values:
+    """The values that an effect reads: all by their full names, and its own by short ones, too."""
+    if effect.name in BASE:
+        return values
+    return {**values, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}
