@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -16,8 +16,9 @@ from bushfit.validation import LARGEST_NUMBER, converted, unknown_key
 #: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
 #: far beyond every shaker, and numbers stay finite.
 LARGEST_SHAKEN = 1e6
-#: Ends the check of a list at its first error: those of a hundred thousand would fill the memory.
-FIRST_ERROR = Field(fail_fast=True)
+T = TypeVar("T")
+#: A list that is not empty; its check ends at the first error, as those of a hundred thousand would fill the memory.
+Several = Annotated[tuple[T, ...], Field(fail_fast=True), Field(min_length=1)]
 #: The second to the power of alpha, at the end of the unit of m.
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 #: A value of a parameter: a number here, a text or a number in the file.
@@ -84,7 +85,9 @@ Length = Annotated[float, si("m"), Field(gt=0)]
 Angle = Annotated[float, si("rad"), Field(gt=0)]
 Strain = Annotated[float, si("1"), Field(gt=0)]
 Frequency = Annotated[float, si("Hz"), Field(gt=0)]
-Frequencies = Annotated[tuple[Frequency, ...], FIRST_ERROR, table(_frequencies, _FREQUENCIES), Field(min_length=1)]
+Frequencies = Annotated[
+    tuple[Frequency, ...], Field(fail_fast=True), table(_frequencies, _FREQUENCIES), Field(min_length=1)
+]
 Displacement = Annotated[float, motion(), Field(gt=0)]
 SHAKEN = Field(ge=1.0 / LARGEST_SHAKEN, le=LARGEST_SHAKEN)
 Share = Annotated[float, si("1"), Field(ge=0, lt=1)]
