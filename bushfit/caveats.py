@@ -127,7 +127,7 @@ def of_points(
     yield from extrapolations(result, place, frequency, amplitude, temperature)
     known = set() if temperature is None else {"temperature"}
     effects = result.model.without(Level.INSTRUMENT).records
-    yield from (effect.taken for effect in effects if effect.taken and not known & {*effect.under})
+    yield from (effect.assumption for effect in effects if effect.assumption and not known & {*effect.under})
     rig = rig_effects(result)
     if rig and measured is not None and not np.isnan(measured).all():
         off = percent_off(stiffness / np.abs(measured))

@@ -20,8 +20,6 @@ T = TypeVar("T")
 
 #: Known keys that an error lists at most: one line of them.
 _MOST_LISTED = 12
-#: Similarity of difflib's, from 0 to 1, from which a known key is suggested for one that is not; chosen.
-_LEAST_SIMILARITY = 0.5
 #: pydantic's name for an error about a key that the table does not have.
 _UNKNOWN = "unexpected_keyword_argument"
 #: pydantic's names for what has the wrong shape, in the words of TOML.
@@ -65,7 +63,7 @@ Name = Annotated[str, Field(strict=True, min_length=1, max_length=200, pattern=r
 
 def unknown_key(key: str, known: Collection[str]) -> CampaignError:
     """The error for a key that is none of the known ones."""
-    hint = did_you_mean(key, known, likeness=_LEAST_SIMILARITY)
+    hint = did_you_mean(key, known, likeness=0.5)
     expected = "one of " + ", ".join([*known][:_MOST_LISTED]) + (", ..." if len(known) > _MOST_LISTED else "")
     return CampaignError("unknown key", found=f'"{key}"', expected=expected, hint=hint)
 

@@ -6,11 +6,12 @@ import re
 _UNSAFE_IN_FOLDERS = re.compile(r'[\x00-\x1f\x7f\ud800-\udfff/\\:*?"<>|]+')
 #: Names that Windows keeps for devices, with any ending.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
-#: Characters of a name at most: with the folders above it, a path stays below the 260 that Windows takes.
-_LONGEST_FOLDER = 60
 
 
 def folder_name(name: str) -> str:
-    """A text as the name of one folder; it is never empty, and never leads out of the folder that it is put in."""
-    safe = _UNSAFE_IN_FOLDERS.sub("_", name)[:_LONGEST_FOLDER].strip(" .") or "campaign"
+    """A text as the name of one folder; it is never empty, and never leads out of the folder that it is put in.
+
+    It has 60 characters at most: with the folders above it, a path stays below the 260 that Windows takes.
+    """
+    safe = _UNSAFE_IN_FOLDERS.sub("_", name)[:60].strip(" .") or "campaign"
     return f"_{safe}" if _DEVICES.fullmatch(safe) else safe

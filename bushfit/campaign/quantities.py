@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -13,15 +13,12 @@ from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
 from bushfit.units import quantity, sized, temperature
 from bushfit.validation import LARGEST_NUMBER, converted, unknown_key
 
-#: Steps of a range of frequencies at most: more than any sweep has, and quick to predict.
-_LARGEST_GRID = 100_000
-#: Relative width by which a range of frequencies is widened, so that rounding does not drop its last step.
-_ROUNDING = 1e-9
 #: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
 #: far beyond every shaker, and numbers stay finite.
 LARGEST_SHAKEN = 1e6
-#: Ends the check of a list at its first error: those of a hundred thousand would fill the memory.
-FIRST_ERROR = Field(fail_fast=True)
+T = TypeVar("T")
+#: A list that is not empty; its check ends at the first error, as those of a hundred thousand would fill the memory.
+Several = Annotated[tuple[T, ...], Field(fail_fast=True), Field(min_length=1)]
 #: The second to the power of alpha, at the end of the unit of m.
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 #: A value of a parameter: a number here, a text or a number in the file.
@@ -57,14 +54,15 @@ def table(convert: Callable[[dict[str, Any]], Any], written: Mapping[str, Any] |
 
 
 def _frequencies(raw: dict[str, Any]) -> list[str]:
-    """A list of frequencies as texts from { start, stop, step }, with both ends."""
+    """A list of frequencies as texts from { start, stop, step }, with both ends; 100 000 at most, more than any sweep
+    has."""
     expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
     if set(raw) != {"start", "stop", "step"}:
         raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
     start, stop, step = (quantity(raw[key], "Hz") for key in ("start", "stop", "step"))
-    if not (0.0 < start <= stop and step > 0.0 and (stop - start) / step < _LARGEST_GRID):
+    if not (0.0 < start <= stop and step > 0.0 and (stop - start) / step < 100_000):
         raise CampaignError("this is no range of frequencies", found=str(raw), expected="0 < start <= stop, step > 0")
-    count = int((stop - start) / step * (1.0 + _ROUNDING)) + 1
+    count = int((stop - start) / step * (1.0 + 1e-9)) + 1  # rounding must not drop the last step
     return [f"{value!r} Hz" for value in (start + step * np.arange(count)).tolist()]
 
 
@@ -87,7 +85,9 @@ Length = Annotated[float, si("m"), Field(gt=0)]
 Angle = Annotated[float, si("rad"), Field(gt=0)]
 Strain = Annotated[float, si("1"), Field(gt=0)]
 Frequency = Annotated[float, si("Hz"), Field(gt=0)]
-Frequencies = Annotated[tuple[Frequency, ...], FIRST_ERROR, table(_frequencies, _FREQUENCIES), Field(min_length=1)]
+Frequencies = Annotated[
+    tuple[Frequency, ...], Field(fail_fast=True), table(_frequencies, _FREQUENCIES), Field(min_length=1)
+]
 Displacement = Annotated[float, motion(), Field(gt=0)]
 SHAKEN = Field(ge=1.0 / LARGEST_SHAKEN, le=LARGEST_SHAKEN)
 Share = Annotated[float, si("1"), Field(ge=0, lt=1)]

@@ -11,7 +11,6 @@ from bushfit.campaign.compound import Compound
 from bushfit.campaign.files import LoopFile, SweepFile
 from bushfit.campaign.places import KEYS, with_places
 from bushfit.campaign.quantities import (
-    FIRST_ERROR,
     LARGEST_SHAKEN,
     SHAKEN,
     Angle,
@@ -20,6 +19,7 @@ from bushfit.campaign.quantities import (
     Frequencies,
     Frequency,
     Length,
+    Several,
     Share,
     Size,
     Strain,
@@ -169,7 +169,7 @@ class FitSettings:
         effects: added to the paper's model, such as "stiffness_factor.mount".
     """
 
-    dynamic_amplitudes: Annotated[tuple[Annotated[float, si("m", "rad"), Field(gt=0)], ...], FIRST_ERROR] = ()
+    dynamic_amplitudes: Annotated[tuple[Annotated[float, si("m", "rad"), Field(gt=0)], ...], Field(fail_fast=True)] = ()
     residuals: Residuals = "complex"
     loss: Loss = "linear"
     effects: tuple[Text, ...] = ()
@@ -189,10 +189,10 @@ class PredictSettings:
     """
 
     frequencies: Frequencies | None = None
-    amplitudes: Annotated[tuple[Length, ...], FIRST_ERROR, Field(min_length=1)] | None = None
-    torsion_amplitudes: Annotated[tuple[Angle, ...], FIRST_ERROR, Field(min_length=1)] | None = None
-    directions: Annotated[tuple[Name, ...], FIRST_ERROR, Field(min_length=1)] | None = None
-    strain_amplitudes: Annotated[tuple[Strain, ...], FIRST_ERROR, Field(min_length=1)] | None = None
+    amplitudes: Several[Length] | None = None
+    torsion_amplitudes: Several[Angle] | None = None
+    directions: Several[Name] | None = None
+    strain_amplitudes: Several[Strain] | None = None
 
 
 @dataclass(frozen=True)
@@ -229,8 +229,8 @@ class SimulatedLoop(SimulatedTest):
     frequency: Frequency = 0.0
     cycles: Count = 3
     waveform: Waveform = "sine"
-    amplitudes: Annotated[tuple[Displacement, ...], FIRST_ERROR, Field(min_length=1)] = ()
-    frequencies: Annotated[tuple[Frequency, ...], FIRST_ERROR, Field(min_length=1)] = ()
+    amplitudes: Several[Displacement] = ()
+    frequencies: Several[Frequency] = ()
     pause: Annotated[float, si("s"), Field(ge=0, le=86_400.0)] = 0.0  # a day: no rig rests for longer
 
     def __post_init__(self) -> None:
@@ -260,7 +260,7 @@ class SimulatedSweep(SimulatedTest):
         repeats: of this sweep; None for those of all.
     """
 
-    amplitudes: Annotated[tuple[Displacement, ...], FIRST_ERROR, Field(min_length=1)]
+    amplitudes: Several[Displacement]
     frequencies: Frequencies
     stepped: Stepped = "frequency"
     reached: Share = 0.0

@@ -13,8 +13,6 @@ from bushfit.reading.measurement import Loop, Sweep
 #: Amplitudes that differ by less than this share belong to one level [1]: more than a rig misses one by, and less than
 #: programmes step by (chosen).
 _LEVEL_STEP = 0.15
-#: Strain amplitude below which none is told from another [1]; an unknown one, of a resonance test, counts as none.
-_LEAST_STRAIN = 1e-9
 
 
 class Visit(NamedTuple):
@@ -86,7 +84,8 @@ def _last_larger(strain: Array, turn: Array) -> tuple[Array, Array]:
 
     Where none was larger, both are 0 and the point's own turn.
     """
-    level = np.round(np.log(np.maximum(strain, _LEAST_STRAIN)) / np.log1p(_LEVEL_STEP))
+    # an unknown strain, of a resonance test, counts as none
+    level = np.round(np.log(np.maximum(strain, 1e-9)) / np.log1p(_LEVEL_STEP))
     ends = np.append(np.flatnonzero(np.diff(level)), strain.size - 1)
     left, since = np.zeros(ends.size), np.zeros(ends.size)
     above: list[int] = []  # ends of runs before, each of a larger level than all after it

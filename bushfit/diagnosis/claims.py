@@ -13,8 +13,7 @@ import numpy as np
 
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.effects.mistake import Mistake, shown
-from bushfit.effects.mistakes import MISTAKES, SEPARATOR, labelled, mistake_named
+from bushfit.effects.mistakes import MISTAKES, SEPARATOR, Mistake, file_or_name, labelled, mistake_named
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_set import DataSet
@@ -63,7 +62,7 @@ class Claim:
     def words(self, data: Data) -> str:
         """What would be so, in words."""
         every = [*data.loops, *data.sweeps]
-        files = [shown(every[place].test) for place in self.tests]
+        files = [file_or_name(every[place].test) for place in self.tests]
         return self.mistake.sentence.format(files=" and ".join(filter(None, (", ".join(files[:-1]), *files[-1:]))))
 
     def corrections(self, data: Data) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ _TABLE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("library.toml").
 #: What a file may have of the law of an effect: fields of its record.
 _LAW = (
     *("modulus", "stress", "modulus_sensitivities", "stress_sensitivities", "in_place_of"),  # of a branch
-    *("adjust", "pace", "stiffness", "force"),  # of a modifier, and of a layer
+    *("adjust", "shift_factor", "stiffness", "force"),  # of a modifier, and of a layer
 )
 #: The kind of an effect, by a part of the law that no other kind has.
 _KINDS: dict[str, type[Effect]] = {"modulus": Branch, "adjust": Modifier, "stiffness": Layer}
@@ -78,7 +78,11 @@ BASE = ("elastic", "springpot", "friction")
 
 
 def with_base(names: Iterable[str]) -> tuple[str, ...]:
-    """The paper's branches, less those that these effects replace, and these."""
+    """The paper's branches, less those that these effects replace, and these.
+
+    >>> with_base(["sliders", "inertia"])
+    ('elastic', 'springpot', 'sliders', 'inertia')
+    """
     own = tuple(names)
     replaced = {effect_named(name).replaces for name in own}
     return (*(name for name in BASE if name not in replaced), *own)
@@ -89,6 +93,9 @@ def effect_named(name: str) -> Effect:
 
     Raises:
         ModelError: there is none; the nearest name is suggested.
+
+    >>> effect_named("inertia").phrase
+    'moving mass between bushing and load cell'
     """
     if name in LIBRARY:
         return LIBRARY[name]
@@ -106,14 +113,22 @@ def effect_named(name: str) -> Effect:
 
 
 def place_of(name: str) -> str | None:
-    """The place in the name of an effect that belongs to one, and of its parameter: `stiffness_factor.radial`."""
+    """The place in the name of an effect that belongs to one, and of its parameter: `stiffness_factor.radial`.
+
+    >>> place_of("stiffness_factor.radial"), place_of("inertia.mass")
+    ('radial', None)
+    """
     family, _, place = name.partition(".")
     own = name in LIBRARY or name not in _parameters()
     return place or None if family in FAMILIES and own else None
 
 
 def twins_of(name: str) -> tuple[str, ...]:
-    """The names of an effect and of all that no test tells from it, the bushing's first; (name,) without twins."""
+    """The names of an effect and of all that no test tells from it, the bushing's first; (name,) without twins.
+
+    >>> twins_of("guide_friction")
+    ('interface_slip', 'guide_friction')
+    """
     place = place_of(name)
     known = [*LIBRARY.values(), *(family.of_place(place) for family in FAMILIES.values() if place)]
     sets = ((effect.name, *effect.twins) for effect in known if effect.twins)
@@ -124,6 +139,9 @@ def qualified(effect: Effect, parameter: Parameter) -> str:
     """Name of a parameter in files and reports: plain for the paper's three, `<effect>.<name>` for the rest.
 
     An effect that belongs to a place, such as `stiffness_factor.radial`, is named like its one parameter.
+
+    >>> [qualified(LIBRARY[name], LIBRARY[name].amount) for name in ("elastic", "inertia", "stiffness_factor.radial")]
+    ['mu', 'inertia.mass', 'stiffness_factor.radial']
     """
     if effect.name in BASE:
         return parameter.name
@@ -131,7 +149,11 @@ def qualified(effect: Effect, parameter: Parameter) -> str:
 
 
 def effect_of(name: str) -> str:
-    """The name of the effect that a parameter belongs to, by the name of the parameter in files and reports."""
+    """The name of the effect that a parameter belongs to, by the name of the parameter in files and reports.
+
+    >>> effect_of("inertia.mass"), effect_of("alpha")
+    ('inertia', 'springpot')
+    """
     if place_of(name):
         return name
     effect, dot, _ = name.partition(".")
@@ -155,7 +177,11 @@ def is_parameter(name: str) -> bool:
 
 
 def parameter_named(name: str) -> Parameter:
-    """A parameter by its name in files and reports; `is_parameter` tells whether there is one."""
+    """A parameter by its name in files and reports; `is_parameter` tells whether there is one.
+
+    >>> parameter_named("inertia.mass").meaning
+    'moving mass'
+    """
     return _parameters()[name] if name in _parameters() else effect_named(name).parameters[0]
 
 
@@ -166,6 +192,9 @@ def at_places(places: Iterable[str]) -> dict[str, Effect]:
 
     Args:
         places: directions, or specimens by name; one that is axial counts as the first, which the moduli go by.
+
+    >>> [name for name in at_places(["axial", "mount"]) if name.endswith("mount")]
+    ['elastic_preload.mount', 'strain_scale.mount', 'stiffness_factor.mount', 'displacement_gain.mount']
     """
     known = list(dict.fromkeys(sorted(places, key=lambda place: place != Direction.AXIAL)))
     found = [family.of_place(place) for family in FAMILIES.values() for place in sorted(family.places(known))]

@@ -2,23 +2,25 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Value, Values
 
 #: Frequency at which the amplitude has lost the share c [Hz]: the highest of the paper's sweeps.
-REFERENCE_FREQUENCY = 155.0
-#: Least share of the amplitude that is left, at whatever frequency: the law must not reverse the motion.
-LEAST_SHARE = 0.05
+_HIGHEST_FREQUENCY = 155.0
 
 
 def _share(p: Values, omega: Array | float) -> Value:
-    """1 - c (f/155 Hz)^2."""
-    ratio = np.asarray(omega) / (2.0 * np.pi * REFERENCE_FREQUENCY)
-    return np.maximum(1.0 - p["c"] * ratio**2, LEAST_SHARE)
+    """1 - c (f/155 Hz)^2, at least 5 %: the law must not reverse the motion."""
+    ratio = np.asarray(omega) / (2.0 * np.pi * _HIGHEST_FREQUENCY)
+    return np.maximum(1.0 - p["c"] * ratio**2, 0.05)
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K at the amplitude X (1 - c (f/155 Hz)^2) [N/m]."""
+    """K at the amplitude X (1 - c (f/155 Hz)^2) [N/m].
+
+    >>> reached = stiffness({"c": 0.05}, lambda omega, amplitude: amplitude, 2.0 * np.pi * 155.0, 1e-3, sweep)
+    >>> float(reached)
+    0.00095
+    """
     return below(omega, amplitude * _share(p, omega))
 
 

@@ -11,5 +11,9 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """s = 2 mu c2 e^2 [Pa]."""
+    """s = 2 mu c2 e^2 [Pa].
+
+    >>> stress({"mu": 1e6, "c2": 1.0}, History.steady(np.array([0.01, -0.01]), 1.0))
+    array([200., 200.])
+    """
     return 2.0 * p["mu"] * p["c2"] * history.value**2

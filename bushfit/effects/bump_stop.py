@@ -1,12 +1,15 @@
 """Bump stop: a spring that is met beyond a gap, both ways."""
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
-from bushfit.effects.history import History
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K + k N(gap/X) [N/m], N of `dead_zone.first_harmonic`; exactly K up to the gap, and in torsion."""
+    """K + k N(gap/X) [N/m], N of `dead_zone.first_harmonic`; exactly K up to the gap, and in torsion.
+
+    >>> stiffness({"gap": 1e-3, "stiffness": 1e6}, spring, 1.0, np.array([1e-3, 2e-3, 1.0]), sweep).round()
+    array([ 500000.,  891002., 1498727.])
+    """
     return below(omega, amplitude) + p["stiffness"] * first_harmonic(amplitude, p["gap"])
 
 

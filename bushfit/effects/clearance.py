@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
-from bushfit.effects.history import History
 
 #: Samples of the cycle from which the first harmonic of the bent waveform is taken: chosen, more change no digit that
 #: a test resolves.
@@ -39,5 +38,10 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """The force of the bushing moved by what exceeds +-delta [N]."""
+    """The force of the bushing moved by what exceeds +-delta [N].
+
+    >>> motion = History.steady(np.array([0.2, 1.0, -1.0]), 1.0)
+    >>> force({"delta": 0.25}, lambda history: 2.0 * history.value, motion, loop)
+    array([ 0. ,  1.5, -1.5])
+    """
     return below(history.with_value(dead_zone(history.value, p["delta"])))

@@ -12,6 +12,9 @@ Notes:
     Every face broadcasts. The last axis holds operating points (frequency face) or samples (time face). Parameter
     values are numbers, or arrays whose last axis has length 1: a Jacobian by differences or a bootstrap is then one
     call with the values along a leading axis.
+
+    In the examples of the laws `paper` is the model of the paper's bushing, `spring` the response below a layer, of 500
+    N/mm, and `sweep` and `loop` are axial tests of that bushing.
 """
 
 from __future__ import annotations
@@ -21,13 +24,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cache, cached_property
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from bushfit.effects.history import Array as Array
 from bushfit.effects.history import History as History
 from bushfit.geometry import Bushing, Direction, Place
+
+if TYPE_CHECKING:
+    from bushfit.effects.unnamed import Unnamed
+
+#: Frequency [Hz] and strain amplitude [1] at which laws compare: within the range of most tests.
+REFERENCE_FREQUENCY = 25.0
+REFERENCE_STRAIN = 0.01
 
 #: A number, or an array that broadcasts against operating points or samples.
 Value = Any
@@ -91,7 +101,11 @@ class Parameter:
     scale: Literal["period", "frequency", "displacement", "strain", "force", "order"] | None = None
 
     def sized(self, share: float) -> float:
-        """The value at a share of the typical distance from the neutral one, or from 0 where none is neutral."""
+        """The value at a share of the typical distance from the neutral one, or from 0 where none is neutral.
+
+        >>> Parameter("c3", "1", (0.0, 1e5), 0.0, 20.0, "cubic stress coefficient over mu").sized(0.5)
+        10.0
+        """
         return (self.neutral or 0.0) + share * self.typical
 
 
@@ -123,14 +137,6 @@ class Circumstances:
 UNKNOWN = Circumstances()
 
 
-class Correction(Protocol):
-    """A smooth correction of the stiffness for what has no name, as a share of it; see effects/unnamed.py."""
-
-    def at(self, setting: Setting, omega: Array, amplitude: Array) -> tuple[Array, Array, Array]:
-        """The correction, complex (..., n), standard deviations of its parts, (2, ..., n), and its share that stands,
-        (..., n), at angular frequencies [rad/s] and amplitudes [m or rad]."""
-
-
 @dataclass(frozen=True)
 class Setting:
     """The test that a response belongs to.
@@ -147,7 +153,7 @@ class Setting:
     direction: Place
     kind: Literal["sweep", "loop"]
     under: Circumstances = UNKNOWN
-    unnamed: Correction | None = None
+    unnamed: Unnamed | None = None
 
 
 @dataclass(frozen=True)
@@ -190,7 +196,7 @@ class Effect:
             a model of their own in the literature; None of what comes on top of the model.
         frees: mistakes of the record that are single values of it; where one explains the tests as well, it stands.
         under: what of a test's circumstances it depends on, by the names of `Circumstances`.
-        taken: what a prediction takes of these where they are not known, for its user; none of the rig's effects.
+        assumption: what a prediction takes of these where they are not known, for its user; none of the rig's effects.
         in_place_of: of one that replaces a branch, where a fit may begin, the likeliest first: its values by those of
             that branch.
         harmonic_only: whether it has no law in time: of a loop it answers the first harmonic alone, by
@@ -216,7 +222,7 @@ class Effect:
     variant_of: str | None = None
     frees: tuple[str, ...] = ()
     under: tuple[Literal["temperature", "turn", "strained", "left", "rested"], ...] = ()
-    taken: str = ""
+    assumption: str = ""
     harmonic_only: bool = False
     in_place_of: Callable[[Values], list[dict[str, float]]] | None = None
     after: str | None = None
@@ -269,12 +275,13 @@ class Modifier(Effect):
 
     Args:
         adjust: (values, condition) -> the changed values only.
-        pace: (values, circumstances) -> how many times as fast a motion is on the rubber's own time scale; 1 without.
+        shift_factor: (values, circumstances) -> how many times as fast a motion is on the rubber's own time scale, a_T;
+            1 without.
     """
 
     level: Level = Level.MATERIAL
     adjust: Callable[[Values, Condition], dict[str, Value]]
-    pace: Callable[[Values, Circumstances], Value] | None = None
+    shift_factor: Callable[[Values, Circumstances], Value] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -329,8 +336,22 @@ class Family:
 
 
 def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str, Value]:
-    """The named values times a factor, as far as the model has them: what most modifiers return."""
+    """The named values times a factor, as far as the model has them: what most modifiers return.
+
+    >>> scaled_values({"mu": 1e6}, ("mu", "m"), 0.5)
+    {'mu': 500000.0}
+    """
     return {name: p[name] * factor for name in names if name in p}
+
+
+def scaled_response(factor: Callable[[Values, Setting], Value]) -> Callable[..., Array]:
+    """The law of a layer that multiplies the response below it, stiffness and force alike, by a factor."""
+
+    def response(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -> Array:
+        *motion, setting = motion_and_setting
+        return factor(p, setting) * below(*motion)
+
+    return response
 
 
 def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
@@ -348,6 +369,9 @@ def harmonic_response(transfer: Value, history: History) -> Array:
 
     Args:
         transfer: stress over strain (2 mu^) or force over displacement (K), (..., 1).
+
+    >>> harmonic_response(2.0, History.steady(np.array([3.0, 2.0, -1.0, 0.0]), 1.0)).round(6)
+    array([ 4.,  2., -4., -2.])
     """
     return np.real(np.asarray(transfer) * history.fundamental)
 

@@ -11,7 +11,11 @@ _SERIES = np.array([(-1.0) ** k / math.factorial(2 * k + 3) for k in range(12)])
 
 
 def dead_zone(value: Array, half_width: Value) -> Array:
-    """What of the values lies beyond +-half_width, and 0 within; all of them where half_width is 0."""
+    """What of the values lies beyond +-half_width, and 0 within; all of them where half_width is 0.
+
+    >>> dead_zone(np.array([-2.0, 0.5, 3.0]), 1.0)
+    array([-1.,  0.,  2.])
+    """
     return value - np.clip(value, -np.asarray(half_width), half_width)
 
 
@@ -23,6 +27,9 @@ def first_harmonic(amplitude: Array, half_width: Value) -> Array:
     Notes:
         With r = half_width/amplitude, N = 1 - 2/pi (asin r + r sqrt(1 - r^2)) for r < 1, and 0 beyond. With
         cos(t/2) = r the same is (t - sin t)/pi, whose series keeps its digits where N vanishes like (1 - r)^(3/2).
+
+    >>> first_harmonic(1.0, np.array([0.0, 0.5, 1.0])).round(3)
+    array([1.   , 0.391, 0.   ])
     """
     reach = np.maximum(np.asarray(amplitude) - half_width, 0.0)
     safe = np.where(reach > 0.0, amplitude, 1.0)

@@ -2,12 +2,15 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K exp(-i omega tau) [N/m]."""
+    """K exp(-i omega tau) [N/m].
+
+    >>> float(np.angle(stiffness({"tau": 1e-4}, spring, 1000.0, 1e-4, sweep)).round(6))
+    -0.1
+    """
     return below(omega, amplitude) * np.exp(-1j * np.asarray(omega) * p["tau"])
 
 

@@ -4,12 +4,15 @@ One transducer for all tests would be no effect that tests can show: mu, m and e
 """
 
 from bushfit.effects import strain_scale
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """scale K(scale X) [N/m]: the force of the true motion, over the motion that was read."""
+    """scale K(scale X) [N/m]: the force of the true motion, over the motion that was read.
+
+    >>> stiffness({"scale": 1.02}, spring, 1.0, 1e-4, sweep)
+    510000.0
+    """
     return p["scale"] * strain_scale.stiffness(p, below, omega, amplitude, setting)
 
 

@@ -6,7 +6,11 @@ from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = mu [Pa], whatever the frequency and the amplitude."""
+    """mu^ = mu [Pa], whatever the frequency and the amplitude.
+
+    >>> float(modulus({"mu": 1.09e6}, 100.0, 0.01))
+    1090000.0
+    """
     return np.asarray(p["mu"])
 
 

@@ -4,5 +4,9 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """mu times the factor."""
+    """mu times the factor.
+
+    >>> adjust({"mu": 1e6, "m": 2e5, "factor": 1.1}, None)
+    {'mu': 1100000.0}
+    """
     return scaled_values(p, ("mu",), p["factor"])

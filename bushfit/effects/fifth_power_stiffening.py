@@ -6,7 +6,11 @@ from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = 5/8 c5 mu e0^4 [Pa]: the first harmonic of cos^5 is 5/8."""
+    """mu^ = 5/8 c5 mu e0^4 [Pa]: the first harmonic of cos^5 is 5/8.
+
+    >>> round(modulus({"mu": 1e6, "c5": 2000.0}, 100.0, 0.1))
+    125000
+    """
     return 0.625 * p["c5"] * p["mu"] * np.asarray(strain) ** 4
 
 

@@ -12,6 +12,11 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
 
     Notes: the solution of lambda' = (lambda_inf(e0) - lambda)/tau for the intact share lambda of the network, where the
     amplitude is held at e0 and was held at e_l long enough before.
+
+    >>> from bushfit.effects.contract import Circumstances
+    >>> model = paper.with_effect("filler_recovery", {"filler_recovery.share": 0.2})
+    >>> model.values_at("axial", 25.0, 0.0, Circumstances(left=0.1, rested=0.0))["sigma_fmax"]
+    11680.0
     """
     left, rested = condition.setting.under.left, condition.setting.under.rested
     if left is None or rested is None:

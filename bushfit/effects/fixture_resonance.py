@@ -4,12 +4,16 @@ from functools import partial
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 
 
 def fixture(p: Values, omega: Array) -> Array:
-    """-M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr), wr = 2 pi frequency [N/m]."""
+    """-M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr), wr = 2 pi frequency [N/m].
+
+    >>> mode = {"mass": 0.1, "frequency": 300.0, "damping": 0.0}
+    >>> fixture(mode, 2.0 * np.pi * np.array([100.0, 200.0])).real.round()
+    array([ -44413., -284245.])
+    """
     ratio = np.asarray(omega) / (2.0 * np.pi * p["frequency"])
     return -p["mass"] * np.asarray(omega) ** 2 / (1.0 - ratio**2 + 2j * p["damping"] * ratio)
 

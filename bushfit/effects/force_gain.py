@@ -1,15 +1,9 @@
-"""Force gain: the loop's force chain and the sweep's do not agree."""
+"""Force gain: the loop's force chain and the sweep's do not agree; loops are 1 + gain times what they should be.
 
-from collections.abc import Callable
-from typing import Any
+>>> stiffness({"gain": 0.02}, spring, 1.0, 1e-4, loop), stiffness({"gain": 0.02}, spring, 1.0, 1e-4, sweep)
+(510000.0, 500000.0)
+"""
 
-from bushfit.effects.contract import Array, Values
+from bushfit.effects.contract import scaled_response
 
-
-def response(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -> Array:
-    """(1 + gain) times the response below in loops, that response in sweeps; K [N/m] and F [N] alike."""
-    *motion, setting = motion_and_setting
-    return (1.0 + p["gain"] if setting.kind == "loop" else 1.0) * below(*motion)
-
-
-stiffness = force = response
+stiffness = force = scaled_response(lambda p, setting: 1.0 + p["gain"] if setting.kind == "loop" else 1.0)

@@ -11,8 +11,6 @@ from bushfit.effects.dead_zone import dead_zone, first_harmonic
 
 #: Amplitude of the force's first harmonic, over the level, below which no waveform of rubber reaches it; chosen.
 _NEAR = 0.5
-#: Least amplitude [m or rad] to divide by.
-_TINY = np.finfo(float).tiny
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
@@ -37,10 +35,17 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     bent = (beyond - sine) @ FIRST
     rest = np.zeros((*bent.shape[:-1], first.shape[-1]), dtype=complex)
     rest[..., near] = bent
-    return inside - p["share"] * (inside * first_harmonic(first, p["level"]) + rest / np.maximum(amplitude, _TINY))
+    return inside - p["share"] * (
+        inside * first_harmonic(first, p["level"]) + rest / np.maximum(amplitude, np.finfo(float).tiny)
+    )
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F, less a share of what of it lies beyond +-level [N]; the torque cell is another one, so not in torsion."""
+    """F, less a share of what of it lies beyond +-level [N]; the torque cell is another one, so not in torsion.
+
+    >>> motion = History.steady(np.array([1.0, -3.0]), 1.0)
+    >>> force({"level": 2.0, "share": 1.0}, lambda history: history.value, motion, sweep)
+    array([ 1., -2.])
+    """
     felt = below(history)
     return felt - p["share"] * dead_zone(felt, p["level"]) if setting.kind == "sweep" else felt

@@ -5,11 +5,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, History, Values, linear_stress
+from bushfit.effects.contract import REFERENCE_FREQUENCY, Array, History, Values, linear_stress
 from bushfit.effects.springpot import power_of_rate
 
-#: Frequency at which c compares springpot and spring [Hz]: within the range of most sweeps.
-REFERENCE_FREQUENCY = 25.0
 #: Size of the last sample's echo in the kernel, relative: between the rounding and the wrapping of its transform.
 _ECHO = 1e-8
 
@@ -20,7 +18,11 @@ def _scaled(p: Values) -> Array:
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """What the spring takes off the springpot: -m/2 w z/(1 + z), w = (i omega)^alpha, z = tau^alpha w [Pa]."""
+    """What the spring takes off the springpot: -m/2 w z/(1 + z), w = (i omega)^alpha, z = tau^alpha w [Pa].
+
+    >>> modulus({"m": 2.0, "alpha": 0.5, "c": 1.0}, 2.0 * np.pi * np.array([1.0, 25.0]), 0.01).round(1)
+    array([-0.1-0.4j, -2.6-6.3j])
+    """
     rate = power_of_rate(p["alpha"], omega)
     turn = _scaled(p) * rate
     return -0.5 * p["m"] * rate * turn / (1.0 + turn)

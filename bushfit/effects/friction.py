@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, History, Values
 
 #: Below this z = 2x/(1 + y), Im h of `harmonic_shape` is taken from a series: the logarithm loses digits there.
 _SERIES_BELOW = 0.05
@@ -44,6 +43,9 @@ def harmonic_shape(x: Array) -> Array:
             Re h = p^2 / ((x + p + q) q)
             Im h = (2 - p^2/x ln(1 + z)) / (pi x)
                  = (2 (D - 2)/D - 8x/p T(z)) / pi,  T = 1/3 - z/4 + z^2/5 - ...   (small z)
+
+    >>> harmonic_shape(np.array([0.0, 1.0, 100.0])).round(4)
+    array([0.5   +0.j    , 0.1974+0.0755j, 0.0016+0.0058j])
     """
     s, big, p, q, z = _roots(x)
     shape = np.empty(x.shape, dtype=complex)
@@ -92,17 +94,24 @@ def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
     return s, big, p, np.sqrt(p * (p + twice)), twice / p
 
 
-def forgotten(x: Array) -> Array:
+def mean_stress_decay(x: Array) -> Array:
     """Natural logarithm by which a cycle of the strain amplitude x = e0/eps_half lowers a mean stress.
 
     Notes: a stroke from one turning point to the next keeps 1 - (z/(1 + z))^2 of it, with z of `harmonic_shape`.
+
+    >>> mean_stress_decay(np.array([0.01, 1.0])).round(4)
+    array([8.000e-04, 8.406e-01])
     """
     z = _roots(x)[-1]
     return -2.0 * np.log1p(-np.square(z / (1.0 + z)))
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """(A + iB)/(2 e0) of the steady loop of strain amplitude e0 [Pa]."""
+    """(A + iB)/(2 e0) of the steady loop of strain amplitude e0 [Pa].
+
+    >>> modulus({"sigma_fmax": 2e4, "eps_half": 0.01}, 1.0, np.array([0.0, 0.01])).round()
+    array([1000000.     +0.j,  394736.+151040.j])
+    """
     return p["sigma_fmax"] / p["eps_half"] * harmonic_shape(strain / p["eps_half"])
 
 
@@ -116,26 +125,26 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
     }
 
 
-def _move(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
+def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
     """Eq. (5) from u_s = `start` over the distance d: u, and v and v + d of the module's notes."""
     room = 1.0 - sign * start
     reach = room + distance
     return start + sign * distance * room / reach, room, reach
 
 
-def _move_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any, Any]:
+def _stroke_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any, Any]:
     """du/du_s and du/dd of a move."""
     return 1.0 - (distance / reach) ** 2, sign * (room / reach) ** 2
 
 
-def _passed(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tuple[Any, Any, Any]]:
+def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tuple[Any, Any, Any]]:
     """u where each piece of a motion begins and the last one ends, its derivative by ln eps_half where the first u is
     held, and its derivative by the first u."""
     path = [(u, 0.0 * u, 1.0 + 0.0 * u)]
     for sense, distance in zip(senses, distances, strict=True):
         start, slope, kept = path[-1]
-        end, *room_and_reach = _move(start, sense, distance)
-        by_start, by_distance = _move_slopes(sense, distance, *room_and_reach)
+        end, *room_and_reach = _stroke(start, sense, distance)
+        by_start, by_distance = _stroke_slopes(sense, distance, *room_and_reach)
         path.append((end, by_start * slope - by_distance * distance, by_start * kept))
     return path
 
@@ -162,7 +171,7 @@ def _at_turns(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, A
     pieces = scaled.ravel() if single else np.moveaxis(scaled, -1, 0)
     signs, paths = (list[Any](each.tolist() if single else each) for each in (np.sign(pieces), np.abs(pieces)))
     u: Any = 0.0 if single else np.zeros_like(pieces[0])
-    path, first = _passed(signs, paths, u), 0.0
+    path, first = _strokes(signs, paths, u), 0.0
     for _ in range(_ROUNDS if periodic else 0):
         end, slope, kept = path[-1]
         room = 1.0 - kept + (kept >= 1.0)  # one at rest keeps all
@@ -170,13 +179,13 @@ def _at_turns(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, A
         if np.all(np.abs(closer - u) < _SETTLED):
             break
         u = closer.item() if single else closer
-        path = _passed(signs, paths, u)
+        path = _strokes(signs, paths, u)
     turns = [(u, slope + kept * first) for u, slope, kept in path[:-1]]
     at, slopes = (np.stack(each, axis=-1).reshape(scaled.shape) for each in zip(*turns, strict=True))
     return at, slopes
 
 
-def _begun(eps_half: Array, history: History) -> tuple[Array, Array, Array, Array]:
+def _at_samples(eps_half: Array, history: History) -> tuple[Array, Array, Array, Array]:
     """u and du/dln eps_half where each piece of one history or many begins, for one eps_half or many, and the sense and
     the distance d of every sample from there."""
     turning, eps_half = history.turning, np.atleast_1d(np.asarray(eps_half, dtype=float))
@@ -185,15 +194,19 @@ def _begun(eps_half: Array, history: History) -> tuple[Array, Array, Array, Arra
 
 
 def stress(p: Values, history: History) -> Array:
-    """s_f along the history (Eq. 5): from (0, 0) at rest, or on the steady loop [Pa]."""
-    start, _, sense, distance = _begun(p["eps_half"], history)
-    return p["sigma_fmax"] * _move(history.turning.at_samples(start), sense, distance)[0]
+    """s_f along the history (Eq. 5): from (0, 0) at rest, or on the steady loop [Pa].
+
+    >>> stress({"sigma_fmax": 2e4, "eps_half": 0.01}, History(np.array([0.01, 0.0, 0.01]), 1.0, False, 1.0)).round()
+    array([10000., -2000.,  8476.])
+    """
+    start, _, sense, distance = _at_samples(p["eps_half"], history)
+    return p["sigma_fmax"] * _stroke(history.turning.at_samples(start), sense, distance)[0]
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """d/dsigma_fmax = u and d/deps_half = sigma_fmax du/deps_half."""
-    start, slope, sense, distance = _begun(p["eps_half"], history)
-    u, *room_and_reach = _move(history.turning.at_samples(start), sense, distance)
-    by_start, by_distance = _move_slopes(sense, distance, *room_and_reach)
+    start, slope, sense, distance = _at_samples(p["eps_half"], history)
+    u, *room_and_reach = _stroke(history.turning.at_samples(start), sense, distance)
+    by_start, by_distance = _stroke_slopes(sense, distance, *room_and_reach)
     slope = by_start * history.turning.at_samples(slope) - by_distance * distance  # by ln eps_half
     return {"sigma_fmax": u, "eps_half": p["sigma_fmax"] * slope / p["eps_half"]}

@@ -5,8 +5,7 @@ Such a cell serves the sweeps; the loops, as slow as the leak, go by one that ho
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.maxwell import relax
 
 
@@ -18,7 +17,11 @@ def _leak(p: Values, omega: Array) -> Value:
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K i omega T/(1 + i omega T) of a sweep [N/m]."""
+    """K i omega T/(1 + i omega T) of a sweep [N/m].
+
+    >>> round(abs(stiffness({"corner": 1.0}, spring, 2.0 * np.pi, 1e-4, sweep)))
+    353553
+    """
     return below(omega, amplitude) * (1.0 + (_leak(p, omega) if setting.kind == "sweep" else 0.0))
 
 

@@ -27,6 +27,10 @@ class History:
         solved: where equations over this motion were solved last, by name: good starts of the next solution, no more.
         accuracy: how far equations over this motion may be from solved, relative to it, before a last step; answers
             from another start differ by as little.
+
+    >>> cycle = History.steady(np.array([0.0, 1.0, 0.0, -1.0]), 5.0)
+    >>> cycle.step, cycle.amplitude, cycle.turning.strides
+    (0.05, array([1.]), array([-2.,  2.]))
     """
 
     value: Array
@@ -184,6 +188,9 @@ def reversals(value: Array) -> Array:
     """Whether the motion reverses at each sample but the last, (..., n) -> (..., n - 1).
 
     Where it rests before it turns, the last sample of the rest counts.
+
+    >>> reversals(np.array([0.0, 1.0, 1.0, 0.0]))
+    array([False, False,  True])
     """
     steps = np.diff(value, axis=-1)
     rising = steps > 0.0

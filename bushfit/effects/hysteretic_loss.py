@@ -6,7 +6,11 @@ from bushfit.effects.contract import Array, Values, harmonic_stress
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = i eta mu [Pa]."""
+    """mu^ = i eta mu [Pa].
+
+    >>> modulus({"mu": 1e6, "eta": 0.02}, 100.0, 0.01)
+    20000j
+    """
     return 1j * p["eta"] * p["mu"]
 
 

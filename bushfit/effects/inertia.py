@@ -2,12 +2,15 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K - M omega^2 [N/m]; a mass that is moved, not turned, does not act in torsion."""
+    """K - M omega^2 [N/m]; a mass that is moved, not turned, does not act in torsion.
+
+    >>> round(stiffness({"mass": 0.1}, spring, 1000.0, 1e-4, sweep))
+    400000
+    """
     return below(omega, amplitude) - p["mass"] * np.asarray(omega) ** 2
 
 

@@ -2,11 +2,7 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
-from bushfit.effects.history import History
-
-#: Amplitude below which the slip stiffness grows no more [m or rad]: less than any test reaches, and more than 0.
-SMALLEST_AMPLITUDE = 1e-12
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Value, Values
 
 
 def _force(p: Values, setting: Setting) -> Value:
@@ -16,8 +12,13 @@ def _force(p: Values, setting: Setting) -> Value:
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K + i 4 Fc/(pi X) [N/m]."""
-    return below(omega, amplitude) + 4j * _force(p, setting) / (np.pi * np.maximum(amplitude, SMALLEST_AMPLITUDE))
+    """K + i 4 Fc/(pi X) [N/m].
+
+    >>> stiffness({"force": np.pi}, spring, 1.0, np.array([1e-4, 1e-3]), sweep).round()
+    array([500000.+40000.j, 500000. +4000.j])
+    """
+    reached = np.maximum(amplitude, 1e-12)  # less than any test, and more than 0
+    return below(omega, amplitude) + 4j * _force(p, setting) / (np.pi * reached)
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:

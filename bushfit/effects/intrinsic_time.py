@@ -2,13 +2,15 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Condition, Value, Values, scaled_values
-
-#: Strain amplitude at which d is what the clock gains [1]: within the range of most tests.
-REFERENCE_STRAIN = 0.01
+from bushfit.effects.contract import REFERENCE_STRAIN, Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """m (1 + d e0/0.01)^(-alpha): the rate counts per intrinsic time z, dz/dt = 1 + d e0/0.01 [Pa s^alpha]."""
+    """m (1 + d e0/0.01)^(-alpha): the rate counts per intrinsic time z, dz/dt = 1 + d e0/0.01 [Pa s^alpha].
+
+    >>> model = paper.with_effect("intrinsic_time", {"intrinsic_time.d": 1.0})
+    >>> [round(model.values_at("axial", 25.0, x)["m"]) for x in (1e-4, 1e-3)]
+    [178233, 124685]
+    """
     pace = 1.0 + np.asarray(p["d"]) * condition.strain / REFERENCE_STRAIN
     return scaled_values(p, ("m",), np.power(pace, -np.asarray(p.get("alpha", 0.0))))

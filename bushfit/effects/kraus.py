@@ -6,13 +6,14 @@ import numpy as np
 
 from bushfit.effects.contract import Array, Values, harmonic_stress
 
-#: Least strain over e_c at which the powers are taken: less than any test reaches, and more than 0.
-_LEAST = 1e-12
-
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """delta (1 + 2 i r x^n)/(1 + x^2n), x = e0/e_c [Pa]."""
-    ratio = np.power(np.maximum(strain / p["e_c"], _LEAST), p["n"])
+    """delta (1 + 2 i r x^n)/(1 + x^2n), x = e0/e_c [Pa].
+
+    >>> modulus({"delta": 5e5, "r": 0.2, "e_c": 0.01, "n": 0.6}, 1.0, np.array([1e-4, 0.01, 1.0])).round(-3)
+    array([498000. +13000.j, 250000.+100000.j,   2000. +13000.j])
+    """
+    ratio = np.power(np.maximum(strain / p["e_c"], 1e-12), p["n"])  # of more than 0
     return p["delta"] * (1.0 + 2.0j * p["r"] * ratio) / (1.0 + ratio**2)
 
 

@@ -2,12 +2,16 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K at f exp(rate) in loops, K in sweeps [N/m or N m/rad]."""
+    """K at f exp(rate) in loops, K in sweeps [N/m or N m/rad].
+
+    >>> omega = stiffness({"rate": np.log(10.0)}, lambda omega, amplitude: omega, 1.0, 1e-3, loop)
+    >>> round(float(omega), 6)
+    10.0
+    """
     return below(omega * np.exp(p["rate"]) if setting.kind == "loop" else omega, amplitude)
 
 

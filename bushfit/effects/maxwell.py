@@ -6,7 +6,11 @@ from bushfit.effects.contract import Array, History, Value, Values, linear_stres
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = mu1 i omega tau / (1 + i omega tau) [Pa]."""
+    """mu^ = mu1 i omega tau / (1 + i omega tau) [Pa].
+
+    >>> complex(modulus({"mu1": 5e4, "tau": 0.01}, 100.0, 0.01))
+    (25000+25000j)
+    """
     turn = 1j * np.asarray(omega) * p["tau"]
     return p["mu1"] * turn / (1.0 + turn)
 
@@ -15,6 +19,9 @@ def relax(rate: Value, values: Array, step: Value) -> Array:
     """The response y to dy/dt + rate y = dx/dt from rest, row by row, exact for an x that is straight between samples.
 
     y_n = r y_{n-1} + (1 - r)/(rate step) (x_n - x_{n-1}), r = exp(-rate step).
+
+    >>> relax(1.0, np.array([1.0, 2.0, 2.0]), np.log(2.0)).round(3)
+    array([0.721, 1.082, 0.541])
     """
     from scipy.signal import lfilter
     from scipy.special import exprel

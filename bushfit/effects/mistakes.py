@@ -5,18 +5,21 @@ user says so.
 """
 
 import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
 from bushfit.effects import effect_named
-from bushfit.effects.contract import Effect
-from bushfit.effects.mistake import Mistake
+from bushfit.effects.contract import Effect, Level
 from bushfit.errors import ModelError
-from bushfit.geometry import ROTATION, TRANSLATION
-from bushfit.reading.measurement import Complex
+from bushfit.geometry import ROTATION, TRANSLATION, Bushing, Direction, Motion, Place
+from bushfit.reading.measurement import Complex, Loop, Sweep
+
+_Test = TypeVar("_Test", bound=Loop | Sweep)
 
 #: [deg] A radian.
 _RADIAN = float(np.degrees(1.0))
@@ -28,6 +31,108 @@ _MOST_LOSS = 1.0
 
 #: What puts between the name of a mistake and that of the test it was made in.
 SEPARATOR = ":"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mistake(Effect):
+    """What the record says is not what was measured.
+
+    `sentence` is what would be so, with a slot for the files: "the amplitudes of {files} are peak-to-peak".
+
+    Args:
+        line: what to write into the campaign, or to correct where no key does it.
+        sweep_line: the same for a sweep, where it differs.
+        kinds: tests in which it is made, sweeps unless told; none for one that is made in [bushing].
+        motion: of the tests in which it is made; None for any.
+        displacement, force, time: true value over the one stated; `displacement` of the radii, where it is made there.
+        stiffness: true complex stiffness by the one stated, (n,) each, for what the three factors cannot say; of a
+            sweep only.
+        doubt: whether a complex stiffness as stated leaves room for the mistake; None for always.
+        swaps: whether the direction is another one.
+    """
+
+    level: Level = Level.RECORD
+    parameters: tuple[()] = ()
+    source: str = "usage in test laboratories"
+    line: str
+    sweep_line: str = ""
+    kinds: tuple[Literal["sweep", "loop"], ...] = ("sweep",)
+    motion: Motion | None = None
+    displacement: float = 1.0
+    force: float = 1.0
+    time: float = 1.0
+    stiffness: Callable[[Complex], Complex] | None = None
+    doubt: Callable[[Complex], bool] | None = None
+    swaps: bool = False
+
+    def mended(self, test: _Test) -> _Test | None:
+        """The test as it was measured if this mistake was made in it; None where it cannot have been made."""
+        if not self.possible(test):
+            return None
+        direction = self._direction(test.direction)
+        if isinstance(test, Loop):
+            motion, force = self.displacement * test.displacement, self.force * test.force
+            return replace(test, direction=direction, time=self.time * test.time, displacement=motion, force=force)
+        return replace(
+            test,
+            direction=direction,
+            amplitude=self.displacement * test.amplitude,
+            reached=None if test.reached is None else self.displacement * test.reached,
+            stiffness=self.force * (self.stiffness(test.stiffness) if self.stiffness else test.stiffness),
+        )
+
+    def mended_cycle(self, cycle: Sweep) -> Sweep:
+        """The fundamental of a mended loop, from the fundamental of the loop as stated."""
+        return replace(
+            cycle,
+            direction=self._direction(cycle.direction),
+            frequency=cycle.frequency / self.time,
+            amplitude=self.displacement * cycle.amplitude,
+            stiffness=self.force / self.displacement * cycle.stiffness,
+        )
+
+    def possible(self, test: Loop | Sweep) -> bool:
+        """Whether it can have been made in a test."""
+        kind, place = "loop" if isinstance(test, Loop) else "sweep", test.direction
+        fits = kind in self.kinds and self.motion in (None, place.motion)
+        doubtful = self.doubt is None or (isinstance(test, Sweep) and self.doubt(test.stiffness))
+        return fits and doubtful and not (self.swaps and other_direction(place) is None)
+
+    def _direction(self, place: Place) -> Place:
+        return (other_direction(place) if self.swaps else None) or place
+
+    def mended_bushing(self, bushing: Bushing) -> Bushing:
+        """The bushing as it is, if the mistake was made in its radii."""
+        inner, outer = (self.displacement * radius for radius in (bushing.inner_radius, bushing.outer_radius))
+        return replace(bushing, inner_radius=inner, outer_radius=outer)
+
+    def corrected(self, test: Loop | Sweep | None) -> str:
+        """What to write into the campaign for a test, or to correct in its file; None stands for the bushing."""
+        if test is None:
+            return self.line
+        other = other_direction(test.direction) if self.swaps else None
+        kind, line = ("loops", self.line) if isinstance(test, Loop) else ("sweeps", self.sweep_line or self.line)
+        return f"[[{kind}]] of {file_or_name(test)}: {line.replace('{direction}', str(other))}"
+
+    def in_words(self, test: Loop | Sweep) -> str:
+        """That it was made in a test, and the line for the campaign that puts it right."""
+        return f"{self.sentence.format(files=file_or_name(test))} (then, in the campaign: {self.corrected(test)})"
+
+
+def file_or_name(test: Loop | Sweep) -> str:
+    """The file of a test, or its name where it came from none.
+
+    >>> file_or_name(Loop("slow", Direction.AXIAL, *np.ones((3, 9))))
+    'slow'
+    """
+    return test.source.file.name if test.source else test.name
+
+
+def other_direction(place: Place) -> Direction | None:
+    """Radial for axial and the reverse; None for what cannot be taken for either."""
+    if place is Direction.AXIAL:
+        return Direction.RADIAL
+    return Direction.AXIAL if place is Direction.RADIAL else None
 
 
 def _loss(stiffness: Complex) -> float:
@@ -123,6 +228,9 @@ def candidate_named(name: str) -> Effect:
 
     Raises:
         ModelError: there is none; the nearest name is suggested.
+
+    >>> candidate_named("peak_to_peak:sweep_axial").sentence
+    'the amplitudes of {files} are peak-to-peak'
     """
     mistake = mistake_named(name)
     if mistake is None and SEPARATOR in name:

@@ -10,6 +10,11 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     """All moduli and stresses times 1 - share erf(1 - (e0/e_max)^2), e_max the largest strain amplitude so far.
 
     Where it is not known what went before, no larger one did, and nothing changes.
+
+    >>> from bushfit.effects.contract import Circumstances
+    >>> model = paper.with_effect("mullins_levels", {"mullins_levels.share": 0.2})
+    >>> round(model.values_at("axial", 25.0, 0.0, Circumstances(strained=0.1))["mu"])
+    906291
     """
     before = condition.setting.under.strained
     if before is None:

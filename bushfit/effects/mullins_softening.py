@@ -14,6 +14,10 @@ def stress(p: Values, history: History) -> Array:
     """s = 2 mu share exp(-N/cycles) e [Pa], N = f t the cycles since the record began.
 
     A single steady cycle has forgotten its beginning, and gets none.
+
+    >>> strain = History.steady(np.full(4, 0.01), 1.0, cycles=2)
+    >>> stress({"mu": 1e6, "share": 0.05, "cycles": 1.0}, strain).round()
+    array([1000.,  607.,  368.,  223.])
     """
     if history.periodic and history.cycles == 1:
         return np.zeros(history.value.shape)

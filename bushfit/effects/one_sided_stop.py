@@ -7,7 +7,11 @@ from bushfit.effects.dead_zone import first_harmonic
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K + k N(gap/X)/2 [N/m], half of what a stop both ways does."""
+    """K + k N(gap/X)/2 [N/m], half of what a stop both ways does.
+
+    >>> stiffness({"gap": 1e-3, "stiffness": 1e6}, spring, 1.0, np.array([1e-3, 2e-3, 1.0]), sweep).round()
+    array([500000., 695501., 999363.])
+    """
     return below(omega, amplitude) + 0.5 * p["stiffness"] * first_harmonic(amplitude, p["gap"])
 
 

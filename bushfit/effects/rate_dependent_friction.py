@@ -2,13 +2,15 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Condition, Value, Values, scaled_values
-
-#: Frequency at which sigma_fmax is unchanged [Hz]: within the range of most sweeps.
-REFERENCE_FREQUENCY = 25.0
+from bushfit.effects.contract import REFERENCE_FREQUENCY, Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """sigma_fmax (f/25 Hz)^n [Pa]."""
+    """sigma_fmax (f/25 Hz)^n [Pa].
+
+    >>> model = paper.with_effect("rate_dependent_friction", {"rate_dependent_friction.n": 0.05})
+    >>> [round(model.values_at("axial", f, 1e-3)["sigma_fmax"]) for f in (25.0, 155.0)]
+    [14600, 15995]
+    """
     ratio = np.asarray(condition.omega) / (2.0 * np.pi * REFERENCE_FREQUENCY)
     return scaled_values(p, ("sigma_fmax",), np.power(ratio, p["n"]))

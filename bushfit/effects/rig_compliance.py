@@ -3,46 +3,20 @@
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.errors import ModelError
 
 #: The secants end when the logarithm of the amplitude is off by less than this, before a last step along the secant.
 _NEAR = 1e-8
-#: Share of the difference between the forces of two models on one motion that may be missing of it: chosen, less than a
-#: fit notices, whose derivatives these differences are.
-_RESOLVED = 1e-3
-#: Difference of two forces that is rounding, relative to them.
-_ROUNDING = 1e-13
 #: Most rounds of an iteration: chosen, many more than a rig takes that is stiffer than the bushing.
 _ROUNDS = 60
 #: Share of the least that was missing so far, below which a round brought the motion nearer.
 _NEARER = 0.9
 #: Rounds in a row that bring it no nearer, after which it stays as it is; chosen: a slow approach needs twelve.
 _IDLE = 20
-#: What may be missing of the motion when all rounds are used up, relative to the imposed motion: less than any test
-#: resolves.
-_UNSETTLED = 1e-3
-#: Rounds after which K was poor, and is measured anew for the next solution; chosen: twice the usual.
-_MANY_ROUNDS = 16
-#: Largest motion of the bushing that an iteration may try, relative to the imposed motion.
-_LARGEST_MOTION = 2.0
 #: Differences between the last rounds from which the next is foreseen; chosen: three take a third of the rounds, more
 #: no less.
 _REMEMBERED = 3
-#: Share of all their squares that is added to each, so that two that teach the same do no harm: above rounding.
-_SAME_DIRECTION = 1e-12
-#: Adds to each.
-_EACH = np.eye(_REMEMBERED)
-#: The name of its solutions.
-_NAME = "compliance"
-#: The name of the solutions of what gives way beneath it, as a sleeve in a rig.
-_BENEATH = "beneath"
-#: Least height of the pulse that measures a stiffness [m]: a motion that stands still beside others that move, as
-#: within a play, would have no pulse to divide by.
-_LEAST_PULSE = 1e-9
-#: Sample at which the pulse stands that measures a stiffness: a few after the start, for the force before it.
-_PULSE_AT = 4
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
@@ -50,6 +24,10 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
     Notes:
         v + ln|1 + c K(X e^v)| = 0, by secants. Near the solution the last secant also gives K there, unasked.
+
+    >>> spring = lambda omega, amplitude: np.full(1, 1e6 + 0j)
+    >>> stiffness({"compliance": 1e-6}, spring, np.ones(1), np.full(1, 1e-4), sweep).round()
+    array([500000.+0.j])
     """
     compliance = p["compliance"]
 
@@ -93,15 +71,15 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     imposed, solved, history = history.value, history.solved, history.driven()
     count = imposed.shape[-1]
     length = count if history.periodic else next_fast_len(2 * count, real=True)
-    beneath = solved.setdefault(_BENEATH, {})
-    rigid, reached = solved.pop(_NAME, (None, np.zeros_like(imposed)))
+    beneath = solved.setdefault("beneath", {})  # solutions of what gives way beneath it, as a sleeve in a rig
+    rigid, reached = solved.pop("compliance", (None, np.zeros_like(imposed)))
     if reached.shape not in (imposed.shape[-1:], imposed.shape):
         rigid, reached = None, np.zeros_like(imposed)
     if rigid is None:
         rigid = _pulse_stiffness(below, history, length)
     yielding = 1.0 / (1.0 + compliance * rigid)
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
-    farthest = _LARGEST_MOTION * size
+    farthest = 2.0 * size  # that a round may try
     best = last = np.full_like(size, np.inf)
     pace, idle, past = np.ones_like(size), 0, None
     for number in range(_ROUNDS):
@@ -110,14 +88,15 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         missing = felt - reached
         off = np.max(np.abs(compliance * missing), axis=-1, keepdims=True)
         change = np.fft.irfft(yielding * np.fft.rfft(missing, n=length), n=length)[..., :count]
-        past = past or _Past(change.shape)
+        past = past or _AndersonMixing(change.shape)
         step = past.step(reached, change)
         # what is no number counts as settled, so that it takes no other with it
-        if not np.any(off > history.accuracy * size) and _tells_apart(reached, missing):
+        if not np.any(off > history.accuracy * size) and _differences_resolved(reached, missing):
             reached = reached + step
             many = imposed.ndim > 1  # else of many models on one motion the last is kept
             kept = [each if many else each.reshape(-1, each.shape[-1])[-1].copy() for each in (rigid, reached)]
-            solved[_NAME] = (kept[0] if number < _MANY_ROUNDS else None, kept[1])
+            poor = number >= 16  # rounds, twice the usual: K is measured anew for the next solution
+            solved["compliance"] = (None if poor else kept[0], kept[1])
             return reached
         idle = 0 if np.any(off < _NEARER * best) else idle + 1
         if idle == _IDLE:
@@ -125,7 +104,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         best = np.where(off < _NEARER * best, off, best)
         pace, last = np.where(off < last, np.minimum(1.0, 2.0 * pace), 0.5 * pace), off
         reached = reached + pace * step
-    if not history.periodic and np.any(off > _UNSETTLED * size):
+    if not history.periodic and np.any(off > 1e-3 * size):  # less than any test resolves
         raise ModelError(
             "a rig or sleeve gives way too much to be followed through time",
             found=f"{float(np.max(compliance)):.3g} m/N",
@@ -134,16 +113,17 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     return felt
 
 
-def _tells_apart(reached: Array, missing: Array) -> bool:
-    """Whether the forces of models on one motion are known as well as their differences from the last of them ask."""
+def _differences_resolved(reached: Array, missing: Array) -> bool:
+    """Whether the forces of models on one motion are known as well as their differences from the last of them ask: to
+    a thousandth (chosen, less than a fit notices, whose derivatives these differences are), or to rounding."""
     if missing.ndim == 1:
         return True
     reached = np.broadcast_to(reached, missing.shape)
     apart, unknown = (np.max(np.abs(each - each[-1]), axis=-1) for each in (reached, missing))
-    return not np.any(unknown > np.maximum(_RESOLVED * apart, _ROUNDING * np.max(np.abs(reached), axis=-1)))
+    return not np.any(unknown > np.maximum(1e-3 * apart, 1e-13 * np.max(np.abs(reached), axis=-1)))
 
 
-class _Past:
+class _AndersonMixing:
     """What the last rounds of an iteration teach of the next (D. G. Anderson, J. ACM 12 (1965) 547).
 
     Kept are the last few differences from one round to the next, by turns in one of a few places, empty at first.
@@ -166,19 +146,21 @@ class _Past:
         self._changed[..., k, :], self._both[..., k, :] = changed, changed + reached - before[0]
         products = self._products
         products[..., k, :] = products[..., :, k] = (self._changed @ changed[..., None])[..., 0]
-        little = _SAME_DIRECTION * np.einsum("...ii->...", products)[..., None, None] + np.finfo(float).tiny
-        weights = np.linalg.solve(products + little * _EACH, self._changed @ change[..., None])
+        # above rounding, so that two differences that teach the same do no harm
+        little = 1e-12 * np.einsum("...ii->...", products)[..., None, None] + np.finfo(float).tiny
+        weights = np.linalg.solve(products + little * np.eye(_REMEMBERED), self._changed @ change[..., None])
         return np.asarray(change - (weights.mT @ self._both)[..., 0, :])
 
 
 def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
     """Complex stiffness [N/m] at each harmonic of `length` samples: force over displacement of a single pulse.
 
-    The pulse is as high as the amplitude of the motion, if that moves. Its force counts from the one before it, to
-    which friction does not let it return; the real part is never negative.
+    The pulse, some samples after the start, is as high as the amplitude of the motion, or 1 nm where that stands still,
+    as within a play. Its force counts from the one before it, to which friction does not let it return; the real part
+    is never negative.
     """
     pulse = np.zeros(history.value.shape)
-    pulse[..., _PULSE_AT : _PULSE_AT + 1] = np.maximum(history.amplitude, _LEAST_PULSE)
+    pulse[..., 4:5] = np.maximum(history.amplitude, 1e-9)
     answer = below(history.with_value(pulse).driven())
     measured = np.fft.rfft(answer - answer[..., :1], n=length) / np.fft.rfft(pulse, n=length)
     return np.maximum(measured.real, 0.0) + 1j * measured.imag

@@ -9,6 +9,10 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     """All moduli and stresses divided by 1 + beta P, P = pi f X^2 K'' of the unheated bushing [W].
 
     In torsion X is the rotation [rad] and K'' the loss stiffness [N m/rad].
+
+    >>> model = paper.with_effect("self_heating", {"self_heating.beta": 0.01})
+    >>> [round(model.values_at("axial", 100.0, x)["mu"]) for x in (1e-4, 1e-3)]
+    [1086921, 859815]
     """
     loss = np.imag(condition.stiffness(p))
     power = 0.5 * np.asarray(condition.omega) * np.asarray(condition.amplitude) ** 2 * loss

@@ -8,8 +8,7 @@ Notes:
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Value, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, History, Value, Values
 
 #: Sliders that stand for all of them along other motions than a steady one to and fro; chosen: over a decade of slip
 #: strains their steps are 1e-4 of the modulus.
@@ -31,6 +30,9 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
         A slider that slips, r = e_y/e0 < 1 and cos t = 1 - 2r, gives A = s (t - sin(2t)/2)/(pi r) and
         B = 4 s (1 - r)/pi; one that does not gives A = s/r. Of these over e_y the integrals over ln e_y are
         (4 (t + sin t) - (t - sin(2t)/2)/r + 4i (ln r - r))/(pi e0) and -1/e_y.
+
+    >>> modulus({"sigma": 2e4, "e_s": 0.01, "spread": 1.0}, 1.0, np.array([1e-3, 0.01, 0.1])).round(-3)
+    array([1175000.     +0.j,  826000.+234000.j,   54000.+112000.j])
     """
     low, high = _ends(p)
     strain = np.maximum(strain, np.finfo(float).tiny)

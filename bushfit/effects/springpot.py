@@ -15,7 +15,11 @@ def power_of_rate(alpha: Array, omega: Array) -> Array:
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = m/2 (i omega)^alpha [Pa]."""
+    """mu^ = m/2 (i omega)^alpha [Pa].
+
+    >>> abs(modulus({"m": 2e5, "alpha": 0.24}, np.array([1.0, 2.0 * np.pi * 100.0]), 0.01)).round()
+    array([100000., 469422.])
+    """
     return 0.5 * p["m"] * power_of_rate(p["alpha"], omega)
 
 
@@ -27,7 +31,11 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
 
 def grunwald_letnikov_weights(alpha: Value, count: int) -> Array:
-    """w_0 = 1, w_j = w_{j-1} (j - 1 - alpha)/j (Eq. 3): the first `count` weights."""
+    """w_0 = 1, w_j = w_{j-1} (j - 1 - alpha)/j (Eq. 3): the first `count` weights.
+
+    >>> grunwald_letnikov_weights(0.5, 4)
+    array([ 1.    , -0.5   , -0.125 , -0.0625])
+    """
     j = np.arange(1, count)
     return np.insert(np.cumprod((j - 1.0 - alpha) / j, axis=-1), 0, 1.0, axis=-1)
 
@@ -36,6 +44,9 @@ def fractional_derivative(alpha: Value, values: Array, step: float) -> Array:
     """D^alpha by Gruenwald-Letnikov with full memory, from rest before the first sample (Eq. 3).
 
     First order in the step: the factor (1 - exp(-i omega step))^alpha stands for (i omega step)^alpha.
+
+    >>> fractional_derivative(1.0, np.array([0.5, 2.0, 3.0]), 0.5).round(6)
+    array([1., 3., 2.])
     """
     count = values.shape[-1]
     length = next_fast_len(2 * count, real=True)

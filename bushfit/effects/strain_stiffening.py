@@ -6,7 +6,11 @@ from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = 3/4 c3 mu e0^2 [Pa]: the first harmonic of cos^3 is 3/4."""
+    """mu^ = 3/4 c3 mu e0^2 [Pa]: the first harmonic of cos^3 is 3/4.
+
+    >>> round(modulus({"mu": 1e6, "c3": 20.0}, 100.0, 0.1))
+    150000
+    """
     return 0.75 * p["c3"] * p["mu"] * np.asarray(strain) ** 2
 
 

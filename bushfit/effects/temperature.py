@@ -22,8 +22,12 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     return {**spring, **scaled_values(p, others, np.exp(-p["softening"] * warmer))}
 
 
-def pace(p: Values, under: Circumstances) -> Value:
-    """The shift factor a_T: a motion at w in rubber at T is one at w a_T in rubber at 23 degC; 1 where T is unknown."""
+def shift_factor(p: Values, under: Circumstances) -> Value:
+    """The shift factor a_T: a motion at w in rubber at T is one at w a_T in rubber at 23 degC; 1 where T is unknown.
+
+    >>> shift_factor({"shift": 0.03}, Circumstances(temperature=np.array([286.15, 296.15, 306.15]))).round(3)
+    array([1.366, 1.   , 0.749])
+    """
     return 1.0 if under.temperature is None else np.exp(log_shift(p["shift"], np.asarray(under.temperature)))
 
 

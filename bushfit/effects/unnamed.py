@@ -13,8 +13,17 @@ from functools import cached_property
 import numpy as np
 
 from bushfit import geometry
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Setting, StiffnessBelow, Values, harmonic_response
-from bushfit.effects.history import History
+from bushfit.effects.contract import (
+    Array,
+    ForceBelow,
+    History,
+    Layer,
+    Level,
+    Setting,
+    StiffnessBelow,
+    Values,
+    harmonic_response,
+)
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.validation import Name, Number
@@ -46,7 +55,11 @@ Row = tuple[Number, ...]
 
 
 def kernel(one: Array, other: Array) -> Array:
-    """Matern 5/2 correlation of points in units of the kernel's lengths, (..., n, d) and (m, d) -> (..., n, m)."""
+    """Matern 5/2 correlation of points in units of the kernel's lengths, (..., n, d) and (m, d) -> (..., n, m).
+
+    >>> kernel(np.zeros((1, 2)), np.array([[0.0, 0.0], [1.0, 0.0], [9.0, 0.0]])).round(3)
+    array([[1.   , 0.524, 0.   ]])
+    """
     distance = np.sqrt(5.0) * np.linalg.norm(one[..., :, None, :] - other, axis=-1)
     return (1.0 + distance + np.square(distance) / 3.0) * np.exp(-distance)
 

@@ -6,7 +6,11 @@ from bushfit.effects.contract import Array, History, Values, linear_stress
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = i omega eta [Pa]."""
+    """mu^ = i omega eta [Pa].
+
+    >>> complex(modulus({"eta": 100.0}, 10.0, 0.01))
+    1000j
+    """
     return 1j * np.asarray(omega) * p["eta"]
 
 

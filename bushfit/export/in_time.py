@@ -150,7 +150,7 @@ def _values(
 ) -> tuple[tuple[Value, ...], list[dict[str, str]]]:
     """All values, and for each place the name of its own by that of the parameter: where modifiers make it differ from
     place to place it is called `<parameter>.<place>`."""
-    sizes, parts = {part.size for part in arms}, {qualified_size(branch) for branch in model.fading}
+    sizes, parts = {part.size for part in arms}, {qualified_size(branch) for branch in model.viscoelastic}
     constants, settable = list[Value](), list[Value]()
     names = [dict[str, str]() for _ in places]
     for effect in model.records:

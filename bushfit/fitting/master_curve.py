@@ -60,7 +60,7 @@ def law(result: Result, temperature: Array) -> tuple[Array, Array]:
     step = _APART * (error or np.nan)
 
     def shift(of: float) -> Array:
-        return np.log(result.model.with_values({SHIFT: of}).pace(Circumstances(temperature)))
+        return np.log(result.model.with_values({SHIFT: of}).shift_factor(Circumstances(temperature)))
 
     slope = (shift(value + step) - shift(value - step)) / (2.0 * step) if error else np.full(temperature.shape, np.nan)
     return shift(value), np.abs(slope) * (error or np.nan)
@@ -68,7 +68,7 @@ def law(result: Result, temperature: Array) -> tuple[Array, Array]:
 
 def _shifted(result: Result, sweep: SweepData) -> Shifted:
     model, frequency = result.model, sweep.frequency
-    pace = np.broadcast_to(model.pace(sweep.circumstances), frequency.shape)
+    pace = np.broadcast_to(model.shift_factor(sweep.circumstances), frequency.shape)
     at_reference = model.stiffness(sweep.direction, frequency * pace, sweep.amplitude)
     reduced = sweep.measured * at_reference / sweep.stiffness(model)
     temperature = float(np.mean(sweep.temperature))

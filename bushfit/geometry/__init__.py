@@ -74,7 +74,26 @@ STRAINING = Motion(
 )
 
 
-class Direction(StrEnum):
+class _Tested:
+    """What a direction and a specimen answer alike."""
+
+    @property
+    def motion(self) -> Motion:
+        """The kind of motion that it is tested in."""
+        raise NotImplementedError
+
+    @property
+    def is_rotation(self) -> bool:
+        """Whether it counts rotation [rad] and moment [N m], and not displacement [m] and force [N]."""
+        return self.motion is ROTATION
+
+    @property
+    def display(self) -> Display:
+        """The units in which engineers read its displacement, force and stiffness, or strain, stress and modulus."""
+        return self.motion.display
+
+
+class Direction(_Tested, StrEnum):
     """Direction in which a bushing is tested: its name in files, and its kind of motion."""
 
     AXIAL = "axial"
@@ -85,16 +104,6 @@ class Direction(StrEnum):
     def motion(self) -> Motion:
         """Translation or rotation."""
         return _DEFINITIONS[self].motion
-
-    @property
-    def is_rotation(self) -> bool:
-        """Whether it counts rotation [rad] and moment [N m], and not displacement [m] and force [N]."""
-        return self.motion is ROTATION
-
-    @property
-    def display(self) -> Display:
-        """The units in which engineers read its displacement, force and stiffness."""
-        return self.motion.display
 
 
 @dataclass(frozen=True)
@@ -110,6 +119,10 @@ class Bushing:
     Raises:
         ModelError: a radius or length that is not positive and finite, or a >= b; a calibrated shape that no finite
             elements were computed for.
+
+    >>> tube = Bushing("CMP 15 961", 0.010, 0.018, 0.034)
+    >>> round(tube.unit_strain(Direction.RADIAL) / tube.unit_strain(Direction.AXIAL), 2)
+    4.45
     """
 
     name: str
@@ -172,7 +185,7 @@ class Bushing:
 
 
 @dataclass(frozen=True)
-class Specimen:
+class Specimen(_Tested):
     """A body of the compound that is tested in one way only: a coupon, or a mount in plain shear.
 
     Args:
@@ -218,16 +231,6 @@ class Specimen:
         """Displacement and force of a block, or strain and stress of the material."""
         return TRANSLATION if self.kind == "shear" else STRAINING
 
-    @property
-    def is_rotation(self) -> bool:
-        """Whether it counts rotation; no specimen does."""
-        return False
-
-    @property
-    def display(self) -> Display:
-        """The units in which engineers read its displacement, force and stiffness, or strain, stress and modulus."""
-        return self.motion.display
-
 
 #: Where a response is measured or predicted: a direction of the bushing, or a specimen of its compound.
 Place = Direction | Specimen
@@ -238,6 +241,9 @@ def place_named(name: str, specimens: Iterable[Specimen]) -> Place:
 
     Raises:
         ModelError: it is neither.
+
+    >>> place_named("mount", [Specimen("mount", "shear", area=1e-3, thickness=0.01)]).motion.words
+    ('displacement', 'force', 'stiffness')
     """
     known: dict[str, Place] = {str(place): place for place in (*Direction, *specimens)}
     if name not in known:
@@ -250,6 +256,9 @@ def unit_strain(bushing: Bushing | None, place: Place) -> float:
 
     Raises:
         ModelError: a direction where there is no bushing.
+
+    >>> unit_strain(None, Specimen("coupon", "modulus"))
+    0.5
     """
     if not isinstance(place, Specimen):
         return _present(bushing, place).unit_strain(place)
@@ -263,6 +272,9 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
 
     Raises:
         ModelError: a direction where there is no bushing.
+
+    >>> stiffness_per_modulus(None, Specimen("mount", "shear", area=1e-3, thickness=0.01, elements=2))
+    0.2
     """
     if not isinstance(place, Specimen):
         return _present(bushing, place).stiffness_per_modulus(place)
@@ -272,7 +284,11 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
 
 
 def stated_strain(place: Place) -> float:
-    """What one unit of displacement or strain in a test's file is as it is counted: 2 of the tensor's shear, else 1."""
+    """What one unit of displacement or strain in a test's file is as it is counted: 2 of the tensor's shear, else 1.
+
+    >>> stated_strain(Specimen("coupon", "modulus", "tensor")), stated_strain(Direction.AXIAL)
+    (2.0, 1.0)
+    """
     return 2.0 if isinstance(place, Specimen) and place.strain == "tensor" else 1.0
 
 

@@ -78,6 +78,9 @@ def radial_correction(radius_ratio: float, slenderness: float) -> Correction | N
         slenderness: L/b, length over outer radius.
 
     Notes: within 1 % of finite elements in stiffness, and 3 % in strain.
+
+    >>> [round(factor, 3) for factor in radial_correction(10 / 18, 34 / 18)]
+    [0.953, 0.736, 11.571]
     """
     place = coordinates(radius_ratio, slenderness)
     if max(map(abs, place)) > 1.0 + _ROUNDING:

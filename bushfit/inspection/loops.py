@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.effects.mistake import told
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.clock import waveform
 from bushfit.fitting.drive import TOLD_MEAN, Drive, drive_of
@@ -108,7 +107,7 @@ def _crawling(drive: Drive) -> Iterator[str]:
     """A sentence on a loop that takes longer than any laboratory waits, and on what the file may say instead."""
     if drive.frequency * _LONGEST_CYCLE < 1.0:
         mistakes = [mistake for mistake in MISTAKES.values() if mistake.time < 1.0]
-        unless = ", or ".join(told(mistake, drive.loop) for mistake in mistakes)
+        unless = ", or ".join(mistake.in_words(drive.loop) for mistake in mistakes)
         yield f"one cycle takes {number(1.0 / drive.frequency / 60.0, 2)} min, as hardly any test does, unless {unless}"
 
 

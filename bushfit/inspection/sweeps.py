@@ -6,7 +6,6 @@ import numpy as np
 from scipy.stats import linregress, poisson
 
 from bushfit.effects.contract import Array
-from bushfit.effects.mistake import told
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.data_set import shown_amplitude
 from bushfit.fitting.noise import SweepNoise, sweep_noise
@@ -224,7 +223,7 @@ def _doubtful_loss(sweep: Sweep) -> Iterator[str]:
     """A sentence on a loss that hardly any filled rubber has, and on what the file may say instead."""
     mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.possible(sweep)]
     if mistakes:
-        unless = ", or ".join(told(mistake, sweep) for mistake in mistakes)
+        unless = ", or ".join(mistake.in_words(sweep) for mistake in mistakes)
         loss = float(np.median(loss_factor(sweep.stiffness)))
         yield f"the loss factor is {number(loss, 2)} in the median, that of hardly any rubber, unless {unless}"
 

@@ -15,7 +15,8 @@ from bushfit.effects import Branch, Modifier, qualified
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.errors import ModelError
 from bushfit.geometry import Specimen
-from bushfit.model.model import Model, seen_by
+from bushfit.model.model import Model
+from bushfit.model.structure import seen_by
 from bushfit.units import number
 
 #: Error that arms have at most where none is asked for, relative to the modulus: that of good tests.
@@ -28,31 +29,17 @@ _MOST_ARMS = 30
 _BETTER = 0.95
 #: Arms in a row that may be no better: then no number of them will do.
 _PATIENCE = 3
-#: Evaluations of one least-squares fit at most: chosen, ten times what it takes from such a start.
-_EVALUATIONS = 200
 #: Frequencies per decade at which the error is judged: it ripples once an arm, and arms lie half a decade apart.
 _PER_DECADE = 30
-#: Frequencies at least, for a narrow band.
-_FEWEST = 40
 #: Least-squares fits in which the weights move to where the error is largest; chosen: more gain nothing.
 _ROUNDS = 25
 #: Error of a plain least-squares fit over that asked for, up to which these weights can make it good: they halve it.
 _WORTHWHILE = 4.0
-#: Share of a weight that stays where the error is 0.
-_KEPT = 1e-3
 #: How far relaxation times may lie beyond the band: there an arm is a spring or a dashpot to seven digits.
 _BEYOND = 1e7
-#: Distance from these ends at which a fit may start: it has to start inside.
-_INSIDE = 1e-9
 #: Nepers by which the first relaxation times reach over the ends of the band, one try each: which is best goes by the
 #: number of arms.
 _OVERHANGS = (0.0, 1.0, 2.0)
-#: Least modulus of an arm at the start, relative to what the arms are to be together.
-_SMALLEST = 1e-3
-
-#: Logarithm of an arm's modulus over the target's, far beyond any, at which a step that goes too far is held: `exp`
-#: would overflow.
-_FAR = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,11 +90,15 @@ def fitted_arms(
 
     Raises:
         ModelError: no passive arms come as near, or an accuracy that is none.
+
+    >>> arms = fitted_arms(lambda omega: 1e5 * (1j * omega) ** 0.24, (5.0, 155.0))
+    >>> arms.time.size, round(float(arms.error), 4)
+    (4, 0.0042)
     """
     if not LEAST_ACCURACY <= accuracy < 1.0:
         raise ModelError("no error for arms", found=f"{100.0 * accuracy:g} %", expected="0.0001 % up to 100 %")
     low, high = band
-    count = max(_FEWEST, int(_PER_DECADE * np.log10(high / low)))
+    count = max(40, int(_PER_DECADE * np.log10(high / low)))
     omega = 2.0 * np.pi * np.geomspace(low, high, count)
     target, best, stalled, arms = modulus(omega), np.inf, 0, 0
     while arms < _MOST_ARMS and stalled < _PATIENCE:
@@ -137,7 +128,7 @@ def model_arms(
     Effects that share a size, as the springpot and the spring in series with it, are one part. A size of 0 is none.
     """
     parts: dict[str, list[str]] = {}
-    for branch in model.fading:
+    for branch in model.viscoelastic:
         parts.setdefault(qualified_size(branch), []).append(branch.name)
     found = (
         fitted_arms(
@@ -149,8 +140,12 @@ def model_arms(
     return tuple(replace(part, under=under) for part in found)
 
 
-def listed(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
-    """What each spring stands for, its modulus [Pa] and relaxation time [s]; first, without one, what is elastic."""
+def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
+    """What each spring stands for, its modulus [Pa] and relaxation time [s]; first, without one, what is elastic.
+
+    >>> [row[0] for row in arm_rows(paper, model_arms(paper, (5.0, 155.0)))]
+    ['elastic', 'springpot', 'springpot', 'springpot', 'springpot']
+    """
     values = _values(model, arms[0].under) if arms else model.values
     at_rest = [("elastic", values["mu"], np.nan)] if "mu" in values else []
     every = ((part.stands_for, *pair) for part in arms for pair in zip(part.modulus, part.time, strict=True))
@@ -166,8 +161,8 @@ def qualified_size(branch: Branch) -> str:
 
 def part_modulus(model: Model, size: str, omega: Array, under: Circumstances = UNKNOWN) -> Array:
     """mu^ [Pa] of the branches of one size at angular frequencies [rad/s], (n,)."""
-    still, values, reduced = np.zeros_like(omega), _values(model, under), omega * model.pace(under)
-    own = (branch for branch in model.fading if qualified_size(branch) == size)
+    still, values, reduced = np.zeros_like(omega), _values(model, under), omega * model.shift_factor(under)
+    own = (branch for branch in model.viscoelastic if qualified_size(branch) == size)
     return np.asarray(sum(branch.modulus(seen_by(branch, values), reduced, still) for branch in own))
 
 
@@ -175,7 +170,7 @@ def _values(model: Model, under: Circumstances) -> Values:
     """The values of a model as its temperature leaves them, whatever the motion."""
     if under.temperature is None:
         return model.values
-    others = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.pace]
+    others = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor]
     return model.without(*others).values_at(Specimen("compound", "modulus"), 1.0, 0.0, under)
 
 
@@ -196,7 +191,7 @@ def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Arr
         apart = max(1.0, (last - first) / arms)
         time = np.exp(first + (last - first) * (np.arange(arms) + 0.5) / arms)
         loss = np.interp(-np.log(time), np.log(omega), target.imag)
-        yield np.maximum(2.0 / np.pi * loss * apart, _SMALLEST * np.abs(target).mean()), time
+        yield np.maximum(2.0 / np.pi * loss * apart, 1e-3 * np.abs(target).mean()), time
 
 
 def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 1) -> tuple[float, Array, Array]:
@@ -214,7 +209,8 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     def parts(x: Array) -> tuple[Array, Array]:
         """Each arm over the target, (n, k), and its slope by the logarithm of its time."""
         basis = _basis(omega, np.exp(x[count:]))
-        arm = basis * unit * np.exp(np.minimum(x[:count], _FAR)) / target[:, None]
+        # a step that goes too far is held, as `exp` would overflow
+        arm = basis * unit * np.exp(np.minimum(x[:count], 100.0)) / target[:, None]
         return arm, arm * (1.0 - basis)
 
     def residual(x: Array) -> Array:
@@ -229,13 +225,13 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     low, high = (np.repeat([reach, end], count) for reach, end in zip((-np.inf, np.inf), ends, strict=True))
     x, best = np.concatenate((np.log(moduli / unit), np.log(time))), (np.inf, moduli, time)
     for _ in range(rounds):
-        start = np.clip(x, low + _INSIDE, high - _INSIDE)
-        x = least_squares(residual, start, slopes, bounds=(low, high), max_nfev=_EVALUATIONS).x
+        start = np.clip(x, low + 1e-9, high - 1e-9)  # a fit has to start inside
+        x = least_squares(residual, start, slopes, bounds=(low, high), max_nfev=200).x  # ten times what it takes
         off = np.abs(parts(x)[0].sum(axis=1) - 1.0)
         if off.max() < best[0]:
             best = off.max(), unit * np.exp(x[:count]), np.exp(x[count:])
         if off.max() < LEAST_ACCURACY:
             break
-        root = root * np.sqrt(off / off.max() + _KEPT)
+        root = root * np.sqrt(off / off.max() + 1e-3)  # a share stays where the error is 0
         root /= np.sqrt(np.mean(np.square(root)))
     return best

@@ -27,6 +27,10 @@ class Covariance:
         matrix: (k, k).
         spread: for each figure of the noise behind the matrix that was itself estimated, how far the matrix moves, up
             or down, when that figure moves up by its own standard error, (k, k) each.
+
+    >>> known = Covariance(("mu", "m"), np.array([[4.0, 3.0], [3.0, 9.0]]))
+    >>> known.stderr("m"), known.correlations(), round(known.half("mu"), 2)
+    (3.0, [('mu', 'm', 0.5)], 3.92)
     """
 
     names: tuple[str, ...] = ()

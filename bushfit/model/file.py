@@ -13,7 +13,6 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from bushfit.effects import LIBRARY
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError, naming
 from bushfit.geometry import Bushing, Specimen
@@ -27,8 +26,8 @@ from bushfit.version import __version__
 
 #: The effect that older files have in place of a factor of its own for the radial direction, and its parameter.
 _RADIAL_FACTOR = ("radial_factor", "radial_factor.excess")
-#: That effect as it is called today.
-FACTOR = LIBRARY["stiffness_factor.radial"]
+#: That effect and its parameter as they are called today.
+_FACTOR = "stiffness_factor.radial"
 #: Size of a model file at most [bytes]: a hundred times what a model with every effect of the library takes.
 _LARGEST_BYTES = 10_000_000
 #: Packages that the numbers rest on; a model file records their versions.
@@ -203,9 +202,9 @@ def _renamed(document: dict[str, Any]) -> dict[str, Any]:
     old, excess = _RADIAL_FACTOR
     if not (isinstance(effects := document.get("effects"), list) and old in effects):
         return document
-    text = json.dumps(document).replace(f'"{excess}"', f'"{FACTOR.name}"').replace(f'"{old}"', f'"{FACTOR.name}"')
+    text = json.dumps(document).replace(f'"{excess}"', f'"{_FACTOR}"').replace(f'"{old}"', f'"{_FACTOR}"')
     renamed = json.loads(text)
-    entry = renamed["parameters"].get(FACTOR.name) if isinstance(renamed.get("parameters"), dict) else None
+    entry = renamed["parameters"].get(_FACTOR) if isinstance(renamed.get("parameters"), dict) else None
     if isinstance(entry, dict) and isinstance(entry.get("value"), int | float):
         entry["value"] += 1.0
         if isinstance(entry.get("profile95"), list):

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
-from itertools import groupby
 from math import prod
 from types import MappingProxyType
 from typing import Any, Literal, cast
@@ -18,7 +17,7 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
-from bushfit.model.structure import Structure
+from bushfit.model.structure import Structure, as_one_layer, in_groups, seen_by
 from bushfit.units import for_people
 
 #: What records a response: a sweep or a loop, which may have force chains of their own.
@@ -80,9 +79,9 @@ class Model:
         return self._structure.parameters
 
     @property
-    def fading(self) -> tuple[Branch, ...]:
+    def viscoelastic(self) -> tuple[Branch, ...]:
         """The linear branches that fade with memory."""
-        return self._structure.fading
+        return self._structure.viscoelastic
 
     @property
     def only_branches(self) -> bool:
@@ -124,7 +123,11 @@ class Model:
         values: Mapping[str, float],
         unnamed: Unnamed | None = None,
     ) -> "Model":
-        """A model with the values given; other parameters have their neutral value, or a typical one."""
+        """A model with the values given; other parameters have their neutral value, or a typical one.
+
+        >>> Model.started(paper.bushing, ["elastic", "viscous"], {"mu": 1e6}).values["viscous.eta"]
+        0.0
+        """
         defaults = {
             qualified(effect, parameter): parameter.typical if parameter.neutral is None else parameter.neutral
             for effect in map(effect_named, effects)
@@ -137,6 +140,9 @@ class Model:
         """The model with one effect more, in place of the branch that it replaces, if it replaces one.
 
         Parameters of it without a value start from those of that branch, or else as in `started`.
+
+        >>> paper.with_effect("sliders").effects
+        ('elastic', 'springpot', 'sliders')
         """
         effect = effect_named(name)
         kept = [other for other in self.effects if other != effect.replaces]
@@ -168,12 +174,20 @@ class Model:
         return Model.started(self.bushing, [*effects, *added], {**self.values, **moved}, self.unnamed)
 
     def without(self, *left: Level | str) -> "Model":
-        """The model without the effects of these levels and names."""
+        """The model without the effects of these levels and names.
+
+        >>> paper.with_effect("inertia").without(Level.INSTRUMENT).effects
+        ('elastic', 'springpot', 'friction')
+        """
         kept = [effect.name for effect in self.records if not {effect.level, effect.name} & {*left}]
         return Model.started(self.bushing, kept, self.values, self.unnamed if UNNAMED in kept else None)
 
     def equation(self) -> str:
-        """The model as text: the formula of its first-harmonic stiffness, other effects, and values in common units."""
+        """The model as text: the formula of its first-harmonic stiffness, other effects, and values in common units.
+
+        >>> print(paper.equation().splitlines()[1])
+          mu = 1.09 MPa
+        """
         branches = " + ".join(effect.equation for effect in self._structure.branches)
         lines = [f"K = k ({branches}), k the stiffness of this shape per modulus"]
         lines += [f"  {effect.name}: {effect.equation}" for effect in self.records if not isinstance(effect, Branch)]
@@ -206,6 +220,10 @@ class Model:
         Notes:
             The rubber has k = G mu^(omega, e0), with G of Eqs. 10, 11, 12 and e0 of Eqs. 7, 8 (Eqs. 6 to 12); the
             layers of the model stand around it.
+
+        >>> k = paper.stiffness("axial", 100.0, 1e-4)
+        >>> print(f"{abs(k) / 1e3:.1f} N/mm, loss factor {k.imag / k.real:.3f}")
+        675.5 N/mm, loss factor 0.135
         """
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
         amplitude = np.asarray(amplitude, dtype=float)
@@ -231,6 +249,10 @@ class Model:
         """Force over a history of displacement [m or rad], from rest or on the steady cycle: (..., n) [N or N m].
 
         The other arguments are as of `stiffness`.
+
+        >>> motion = History.steady(1e-3 * np.sin(np.linspace(0.0, 2.0 * np.pi, 256)), 0.1)
+        >>> round(float(paper.force("axial", motion).max()), 1)
+        458.1
         """
         setting = self.setting(direction, kind, under)
         respond = self._stack_force(setting, self.values if values is None else values, self.layers(setting))
@@ -251,7 +273,12 @@ class Model:
     def values_at(
         self, place: Place, frequency: float, amplitude: float, under: Circumstances = UNKNOWN
     ) -> dict[str, float]:
-        """All values as the modifiers leave them at an operating condition [Hz, m or rad]."""
+        """All values as the modifiers leave them at an operating condition [Hz, m or rad].
+
+        >>> model = paper.with_effect("rate_dependent_friction", {"rate_dependent_friction.n": 0.1})
+        >>> round(model.values_at("axial", 50.0, 1e-3)["sigma_fmax"])
+        15648
+        """
         omega, reached = 2.0 * np.pi * np.atleast_1d(frequency), np.atleast_1d(amplitude)
         found = self._adjusted(
             self.setting(place, under=under), self.values, omega, reached, reached * self.unit_strain(place)
@@ -269,7 +296,7 @@ class Model:
         layers = self.layers(setting)
         if not layers:
             return rubber
-        groups = _together(layers)
+        groups = in_groups(layers)
         per_sample = {
             name: value if np.ndim(value) == 0 else np.asarray(value)[..., None] for name, value in values.items()
         }
@@ -282,7 +309,7 @@ class Model:
 
             if count == 0:
                 return StiffnessBelow(rubber, cycle)
-            inner, (layer, own) = below(count - 1), _as_one(groups[count - 1], values)
+            inner, (layer, own) = below(count - 1), as_one_layer(groups[count - 1], values)
             return StiffnessBelow(
                 lambda omega, amplitude: layer.stiffness(own, inner, omega, amplitude, setting), cycle
             )
@@ -301,9 +328,9 @@ class Model:
             if structure.modifiers:
                 omega = np.atleast_1d(displacement.omega)
                 base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
-            if structure.paced:
-                strain = strain.faster(self.pace(setting.under, values))
-            together = displacement.periodic and structure.fading
+            if any(each.shift_factor for each in structure.modifiers):
+                strain = strain.faster(self.shift_factor(setting.under, values))
+            together = displacement.periodic and structure.viscoelastic
             alone = structure.others if together else structure.branches
             stresses = [branch.stress(seen_by(branch, base), strain) for branch in alone]
             if together:
@@ -315,28 +342,30 @@ class Model:
             count, step = strain.value.shape[-1], strain.step
             if base is values and count in known and known[count][0] is step:
                 return known[count][1]
-            moduli = (branch.modulus(seen_by(branch, base), omega, strain.amplitude) for branch in structure.fading)
+            linear = structure.viscoelastic
+            moduli = (branch.modulus(seen_by(branch, base), omega, strain.amplitude) for branch in linear)
             found = np.asarray(2.0 * sum(moduli))
             if base is values:
                 known[count] = step, found
             return found
 
         def wrap(below: ForceBelow, group: Sequence[Layer]) -> ForceBelow:
-            layer, own = _as_one(group, values)
+            layer, own = as_one_layer(group, values)
             return lambda displacement: layer.force(own, below, displacement, setting)
 
-        return reduce(wrap, _together(layers), cast(ForceBelow, rubber))
+        return reduce(wrap, in_groups(layers), cast(ForceBelow, rubber))
 
     def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
         """Complex stiffness of the rubber, with its parameters as in `base`."""
-        omega = omega * self.pace(setting.under, values)
+        omega = omega * self.shift_factor(setting.under, values)
         moduli = (branch.modulus(seen_by(branch, base), omega, strain) for branch in self._structure.branches)
         return np.atleast_1d(self.stiffness_per_modulus(setting.direction) * sum(moduli))
 
-    def pace(self, under: Circumstances, values: Values | None = None) -> Value:
+    def shift_factor(self, under: Circumstances, values: Values | None = None) -> Value:
         """How many times as fast a motion is on the rubber's own time scale as on the clock's: the shift factor a_T."""
         values = self.values if values is None else values
-        return prod(each.pace(seen_by(each, values), under) for each in self._structure.paced if each.pace)
+        shifts = ((each, each.shift_factor) for each in self._structure.modifiers)
+        return prod(shift(seen_by(each, values), under) for each, shift in shifts if shift)
 
     def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
         """All values as the modifiers leave them at an operating condition."""
@@ -364,21 +393,3 @@ def _check(name: str, value: float, parameter: Parameter) -> None:
             found=f"{value:g}{unit}",
             expected=f"{low:g} to {high:g}{unit} ({parameter.meaning})",
         )
-
-
-def _together(layers: Sequence[Layer]) -> list[list[Layer]]:
-    """Layers that act one after the other; neighbours of one law whose amounts add, in a group."""
-    return [list(group) for _, group in groupby(layers, key=lambda layer: layer.force if layer.adds else layer.name)]
-
-
-def _as_one(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
-    """A group of layers as the first of them, with the values that it reads."""
-    first, own = group[0], [seen_by(layer, values) for layer in group]
-    return first, {**own[0], **({first.adds: sum(each[first.adds] for each in own)} if first.adds else {})}
-
-
-def seen_by(effect: Effect, values: Values) -> Values:
-    """The values that an effect reads: all by their full names, and its own by short ones, too."""
-    if effect.name in BASE:
-        return values
-    return {**values, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}

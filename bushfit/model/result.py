@@ -194,6 +194,10 @@ class Result:
         """95 % interval of a parameter [its SI unit], cut at its bounds; None where it was held at an exact value.
 
         Notes: symmetric in the logarithm for strictly positive parameters, and in the value for others.
+
+        >>> fitted = Result(paper, ("mu",), Covariance(("mu",), np.array([[1e8]])))
+        >>> [round(end) for end in fitted.interval("mu")]
+        [1070575, 1109777]
         """
         stderr, value = self.covariance.stderr(name), self.model.values[name]
         if stderr is None:

@@ -31,7 +31,11 @@ class Record:
 
 
 def wave(waveform: str, phase: Array) -> Array:
-    """Sine or triangle of amplitude 1 at a phase [cycles], starting upward from zero; any shape."""
+    """Sine or triangle of amplitude 1 at a phase [cycles], starting upward from zero; any shape.
+
+    >>> wave("triangle", np.array([0.0, 0.125, 0.25, 0.75])).round(6)
+    array([ 0. ,  0.5,  1. , -1. ])
+    """
     if waveform == "sine":
         return np.sin(2.0 * np.pi * phase)
     return 2.0 / np.pi * np.arcsin(np.clip(np.sin(2.0 * np.pi * phase), -1.0, 1.0))
@@ -124,6 +128,10 @@ def dynamic_stiffness(
     """Complex dynamic stiffness by stepped sine, one settled cycle per operating point: (n,) [N/m or N m/rad].
 
     Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each; circumstances are numbers or likewise.
+
+    >>> measured = dynamic_stiffness(paper, "axial", 20.0, 1e-3)
+    >>> bool(abs(measured / paper.stiffness("axial", 20.0, 1e-3) - 1.0).max() < 1e-3)
+    True
     """
     measured = partial(record, model, direction, cycles=1, run_in=run_in, steps_per_cycle=steps_per_cycle)
     points = enumerate(zip(np.atleast_1d(frequency), np.atleast_1d(amplitude), strict=True))

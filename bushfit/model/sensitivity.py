@@ -16,7 +16,8 @@ from bushfit.effects import Branch, Parameter, place_of, qualified
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Value, Values
 from bushfit.effects.history import History
 from bushfit.geometry import Place
-from bushfit.model.model import Kind, Model, seen_by
+from bushfit.model.model import Kind, Model
+from bushfit.model.structure import seen_by
 
 #: Step of the differences, relative to the value (log parameters) or to the typical size (linear ones);
 #: chosen: the differences are good to about a millionth.
@@ -39,6 +40,10 @@ def stiffness_and_slopes(
     """The complex dynamic stiffness, (n,) [N/m or N m/rad], and its derivatives by parameters, (k, n) [per unit].
 
     Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each.
+
+    >>> _, slopes = stiffness_and_slopes(paper, "axial", np.array([5.0]), np.array([1e-4]), ["mu"])
+    >>> slopes.round(4)
+    array([[0.3634+0.j]])
     """
     respond = partial(model.stiffness, direction, frequency, amplitude, kind=kind, under=under)
     if not model.only_branches:

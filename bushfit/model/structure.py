@@ -1,11 +1,13 @@
-"""What a model is built of: its effects by kind, and their parameters."""
+"""What a model is built of: its effects by kind, their parameters, and the values that each of them reads."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import groupby
 from types import MappingProxyType
 
-from bushfit.effects import LIBRARY, Branch, Effect, Layer, Modifier, Parameter, effect_named, qualified
+from bushfit.effects import BASE, LIBRARY, Branch, Effect, Layer, Modifier, Parameter, effect_named, qualified
+from bushfit.effects.contract import Values
 from bushfit.errors import ModelError
 
 
@@ -14,20 +16,20 @@ class Structure:
     """The effects of a model by kind, and their parameters; the same for all models with these effects.
 
     Args:
-        fading: the linear branches that fade with memory, whose steady answers add up harmonic by harmonic.
+        records: all of them, from the rubber outward.
+        parameters: by their names in files and reports.
+        viscoelastic: the linear branches that fade with memory, whose steady answers add up harmonic by harmonic.
         others: the branches that do not.
-        paced: the modifiers that shift the rubber's time scale.
         moduli: names of the rubber's moduli and stresses, to which its stiffness is proportional together.
     """
 
     records: tuple[Effect, ...]
     parameters: Mapping[str, Parameter]
     branches: tuple[Branch, ...]
+    viscoelastic: tuple[Branch, ...]
+    others: tuple[Branch, ...]
     modifiers: tuple[Modifier, ...]
     layers: tuple[Layer, ...]
-    fading: tuple[Branch, ...]
-    others: tuple[Branch, ...]
-    paced: tuple[Modifier, ...]
     moduli: tuple[str, ...]
 
     @classmethod
@@ -37,27 +39,39 @@ class Structure:
         doubles = {name for name in names if names.count(name) > 1}
         if doubles:
             raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
-        place = {name.partition(".")[0]: place for place, name in enumerate(LIBRARY)}
-        known = map(effect_named, names)
-        order = sorted(
-            known, key=lambda effect: (effect.level, place.get(effect.name.partition(".")[0], len(place)), effect.name)
-        )
-        records = tuple(order)
+        kinds = [name.partition(".")[0] for name in LIBRARY]
+
+        def outward(effect: Effect) -> tuple[int, int, str]:
+            kind = effect.name.partition(".")[0]
+            return effect.level, kinds.index(kind) if kind in kinds else len(kinds), effect.name
+
+        records = tuple(sorted(map(effect_named, names), key=outward))
+        branches = tuple(effect for effect in records if isinstance(effect, Branch))
         return cls(
             records,
-            MappingProxyType(
-                {qualified(effect, parameter): parameter for effect in records for parameter in effect.parameters}
-            ),
-            tuple(effect for effect in records if isinstance(effect, Branch)),
+            MappingProxyType({qualified(effect, each): each for effect in records for each in effect.parameters}),
+            branches,
+            tuple(branch for branch in branches if branch.size),
+            tuple(branch for branch in branches if not branch.size),
             tuple(effect for effect in records if isinstance(effect, Modifier)),
             tuple(effect for effect in records if isinstance(effect, Layer)),
-            tuple(effect for effect in records if isinstance(effect, Branch) and effect.size),
-            tuple(effect for effect in records if isinstance(effect, Branch) and not effect.size),
-            tuple(effect for effect in records if isinstance(effect, Modifier) and effect.pace),
-            tuple(
-                qualified(effect, parameter)
-                for effect in records
-                for parameter in effect.parameters
-                if isinstance(effect, Branch) and parameter.unit.startswith("Pa")
-            ),
+            tuple(qualified(b, each) for b in branches for each in b.parameters if each.unit.startswith("Pa")),
         )
+
+
+def in_groups(layers: Sequence[Layer]) -> list[list[Layer]]:
+    """Layers that act one after the other; neighbours of one law whose amounts add, in a group."""
+    return [list(group) for _, group in groupby(layers, key=lambda layer: layer.force if layer.adds else layer.name)]
+
+
+def as_one_layer(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
+    """A group of layers as the first of them, with the values that it reads."""
+    first, own = group[0], [seen_by(layer, values) for layer in group]
+    return first, {**own[0], **({first.adds: sum(each[first.adds] for each in own)} if first.adds else {})}
+
+
+def seen_by(effect: Effect, values: Values) -> Values:
+    """The values that an effect reads: all by their full names, and its own by short ones, too."""
+    if effect.name in BASE:
+        return values
+    return {**values, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}

@@ -144,9 +144,9 @@ def shaken_table(found: PredictedResonance) -> pd.DataFrame:
 def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:
     """Maxwell arms, a row an arm, and before them the spring that stands beside: modulus, stiffness at each place,
     relaxation time."""
-    from bushfit.model.arms import listed
+    from bushfit.model.arms import arm_rows
 
-    names, moduli, times = zip(*listed(model, arms), strict=True)
+    names, moduli, times = zip(*arm_rows(model, arms), strict=True)
     modulus = np.array(moduli)
     columns = {"in place of": names, "relaxation time [s]": times, "shear modulus [MPa]": 1e-6 * modulus}
     for place in places:

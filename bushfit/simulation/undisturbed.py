@@ -124,7 +124,7 @@ def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[in
     if "eps_half" not in truth.values:
         return _LEAST_RUN_IN, (0, 1.0)
     strain = np.array(amplitude * truth.unit_strain(place) / truth.values["eps_half"])
-    cycles = -np.log(_KEPT) / np.maximum(friction.forgotten(strain), np.finfo(float).tiny)
+    cycles = -np.log(_KEPT) / np.maximum(friction.mean_stress_decay(strain), np.finfo(float).tiny)
     follows = any(isinstance(effect, Modifier) for effect in truth.records)
     if cycles > _LEAST_RUN_IN + _SWELL_CYCLES and not follows:
         return _LEAST_RUN_IN, (_SWELL_CYCLES, float(_SWELL_TO / strain))

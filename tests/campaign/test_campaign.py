@@ -1,32 +1,79 @@
-"""Campaigns: the tests that a file names, read with what it says of them."""
+"""Campaign files: what they say arrives in SI with the tests they name, and what they may not say has its one error.
+
+Most of what can be wrong with a campaign stands in cli/spoiled_rows.py, with the command that says it.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import math
+import pickle
+import tomllib
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
-from campaigns import BUSHING, LOOP, TESTS, campaign_from
+from hypothesis import example, given
+from hypothesis import strategies as st
 
-from bushfit.campaign.campaign import load_campaign
+from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.naming import folder_name
+from bushfit.campaign.toml import read_toml
+from bushfit.errors import BushfitError, CampaignError, MeasurementError, UnitError
 from bushfit.geometry import Bushing, Direction
+
+BUSHING = """
+[bushing]
+name = "CMP 15 961"
+inner_radius = "10 mm"
+outer_radius = "18 mm"
+length = "34 mm"
+"""
+TESTS = """
+[[loops]]
+file = "loop.csv"
+direction = "axial"
+
+[[sweeps]]
+file = "sweep.csv"
+direction = "radial"
+"""
+SIMULATE = BUSHING + "[simulate]\n"
+LOOP = "displacement [mm],force [N],time [s]\n" + "".join(f"{math.sin(i)},{math.sin(i + 0.1)},{i}\n" for i in range(20))
+SWEEP = "frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]\n" + "".join(
+    f"{f},0.1,600,0.1\n" for f in (5, 15, 25)
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the tables that the campaigns name."""
+    (tmp_path / "loop.csv").write_text(LOOP)
+    (tmp_path / "sweep.csv").write_text(SWEEP)
+    return tmp_path
+
+
+def campaign_from(text: str, folder: Path) -> Campaign:
+    (folder / "campaign.toml").write_text(text)
+    return load_campaign(folder / "campaign.toml")
 
 
 def test_a_plain_campaign(folder: Path) -> None:
     campaign = campaign_from(BUSHING + TESTS, folder)
     assert campaign.name == "CMP 15 961"
     assert campaign.bushing == Bushing("CMP 15 961", 0.010, 0.018, 0.034)
-    assert [(loop.name, loop.direction) for loop in campaign.loops] == [("loop", Direction.AXIAL)]
-    assert [(sweep.name, sweep.direction) for sweep in campaign.sweeps] == [("sweep", Direction.RADIAL)]
+    tests = [(test.name, test.direction) for test in (*campaign.loops, *campaign.sweeps)]
+    assert tests == [("loop", Direction.AXIAL), ("sweep", Direction.RADIAL)]
     assert campaign.loops[0].source is not None
     assert campaign.loops[0].source.file == Path("loop.csv")
-    assert campaign.fit.parameters == {}
-    assert campaign.predict.frequencies is None
-    assert campaign.simulate is None
+    assert (campaign.fit.parameters, campaign.predict.frequencies, campaign.simulate) == ({}, None, None)
 
 
 def test_what_a_campaign_says_of_its_files(folder: Path) -> None:
     (folder / "loop.csv").write_text(LOOP.replace("force [N]", "Kraft").replace("time [s]", "x [s]"))
-    options = """
+    campaign = campaign_from(
+        """
 name = "of files"
 bushing = { name = "b", inner_radius = "1 cm", outer_radius = "18 mm", length = "34 mm" }
 [[loops]]
@@ -42,8 +89,9 @@ file = "sweep.csv"
 direction = "axial"
 amplitude = "peak-to-peak"
 noise = "1 %"
-"""
-    campaign = campaign_from(options, folder)
+""",
+        folder,
+    )
     assert campaign.name == "of files"
     assert campaign.loops[0].noise == 0.005
     assert campaign.loops[0].force.max() == pytest.approx(1000.0, rel=1e-2)
@@ -57,8 +105,156 @@ def test_names_of_tests_differ(folder: Path) -> None:
     assert [loop.name for loop in campaign.loops] == ["loop.csv", "more/loop.csv"]
 
 
-def test_the_campaign_of_the_paper(root: Path) -> None:
-    campaign = load_campaign(root / "configs/cmp_15961.toml")
-    axial = campaign.sweeps[0]
-    assert axial.stiffness[0].real == pytest.approx(591_445, rel=1e-5)
-    assert set(axial.repeat) == {1, 2, 3}
+def test_settings_arrive_in_si(folder: Path) -> None:
+    settings = """
+[fit]
+dynamic_amplitudes = ["0.1 mm", "0.5 deg"]
+residuals = "magnitude_loss_factor"
+[fit.mu]
+value = "1.09 MPa"
+min = "0.1 MPa"
+vary = false
+[fit.m]
+max = "0.2 MPa s^alpha"
+[fit.eps_half]
+value = "1.3 %"
+[fit."inertia.mass"]
+value = "100 g"
+[predict]
+frequencies = { start = "5 Hz", stop = "155 Hz", step = "10 Hz" }
+directions = ["axial", "torsion"]
+[simulate]
+parameters = { mu = "1.2 MPa", m = "0.2 MPa*s^alpha", alpha = 0.24 }
+effects = { inertia = { mass = 0.1 }, delay = { tau = "50 us" } }
+noise = "0.5 %"
+loops = [{ direction = "axial", amplitude = "1 mm", frequency = "0.1 Hz" }]
+sweeps = [{ direction = "torsion", amplitudes = ["1 deg"], frequencies = ["5 Hz"] }]
+"""
+    campaign = campaign_from(BUSHING + settings, folder)
+    fit, predict, simulate = campaign.fit, campaign.predict, campaign.simulate
+    assert (fit.parameters["mu"].value, fit.parameters["mu"].min, fit.parameters["mu"].vary) == (1.09e6, 1e5, False)
+    assert fit.parameters["m"].max == 2e5
+    assert fit.parameters["eps_half"].value == 0.013
+    assert fit.parameters["inertia.mass"].value == 0.1
+    assert fit.dynamic_amplitudes == pytest.approx((1e-4, math.radians(0.5)))
+    assert fit.residuals == "magnitude_loss_factor"
+    assert predict.frequencies == tuple(range(5, 156, 10))
+    assert predict.directions == (Direction.AXIAL, Direction.TORSION)
+    assert simulate is not None
+    assert simulate.parameters == {"mu": 1.2e6, "m": 2e5, "alpha": 0.24}
+    assert simulate.effects == {"inertia": {"mass": 0.1}, "delay": {"tau": 5e-5}}
+    assert (simulate.noise, simulate.gain_error, simulate.loops[0].cycles) == (0.005, 0.0, 3)
+    assert simulate.sweeps[0].amplitudes == pytest.approx((math.radians(1),))
+
+
+def test_a_limit_beyond_what_a_parameter_can_have_is_moved_there(folder: Path) -> None:
+    """A least modulus of 0 says that it is not negative; a logarithm has no 0."""
+    limits = campaign_from(SIMULATE + '[fit.mu]\nmin = "0 MPa"\nmax = "1e6 MPa"', folder).fit.parameters["mu"]
+    assert (limits.min, limits.max) == (1e3, 1e9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "words"),
+    [
+        (MeasurementError, BUSHING + TESTS.replace("loop.csv", "x" * 5000), ["cannot be read", "too long"]),
+        (MeasurementError, BUSHING + TESTS.replace("loop.csv", "\\u0000"), ["no such file"]),
+        (CampaignError, BUSHING + TESTS + 'noice = "1 %"', ["sweeps #1.noice", 'mean "noise"']),
+        (UnitError, BUSHING + TESTS + "noise = 0.5", ["sweeps #1.noise", "without a unit", "%"]),
+        (UnitError, BUSHING + TESTS.replace("\n\n", '\nrate = "1 deg/s"\n\n'), ["loops #1.rate", "a speed"]),
+        (CampaignError, SIMULATE + '[fit."inertia.mas"]\nvary = true', ["fit.inertia.mas", 'mean "inertia.mass"']),
+        (CampaignError, SIMULATE + "[fit.parameters.mu]", ["fit", "unknown key"]),
+        (CampaignError, SIMULATE + "[fit]\nmu = 3", ["fit.mu", "a table"]),
+        (UnitError, SIMULATE + '[fit."inertia.mass"]\nvalue = "1 N"', ["fit.inertia.mass.value", "kg"]),
+        (CampaignError, SIMULATE + '[fit.mu]\nmin = "2 GPa"\nmax = "3 GPa"', ["fit.mu", "within 1000 to 1e+09 Pa"]),
+        (UnitError, SIMULATE + '[predict]\nfrequencies = ["5 mm"]', ["predict.frequencies #1", "a frequency"]),
+    ],
+)
+def test_what_is_wrong_has_one_clear_error_which_travels_between_processes(
+    kind: type[BushfitError], text: str, words: list[str], folder: Path
+) -> None:
+    with pytest.raises(BushfitError) as caught:
+        campaign_from(text, folder)
+    message = str(caught.value)
+    assert type(caught.value) is kind
+    assert str(folder) in message
+    assert all(word in message for word in words), message
+    assert str(pickle.loads(pickle.dumps(caught.value))) == message
+
+
+VALUES = st.recursive(
+    st.sampled_from(['"1 mm"', '"5 Hz"', "1", "-1.5", "nan", "true", '"axial"', '"loop.csv"', "1979-05-27", '"1 MPa"']),
+    lambda inner: (
+        st.lists(inner, max_size=3).map(lambda parts: f"[{', '.join(parts)}]")
+        | st.dictionaries(
+            st.sampled_from(["mu", "value", "direction", "file", "start", "stop", "step"]), inner, max_size=3
+        ).map(lambda table: "{" + ", ".join(f"{key} = {value}" for key, value in table.items()) + "}")
+    ),
+    max_leaves=6,
+)
+KEYS = ["mu", "frequencies", "directions", "parameters", "effects", "loops", "sweeps", "file", "residuals"]
+
+
+@given(st.sampled_from(["fit", "predict", "simulate", "loops", "sweeps"]), st.sampled_from(KEYS), VALUES)
+def test_any_value_is_understood_or_a_clear_error(
+    tmp_path_factory: pytest.TempPathFactory, table: str, key: str, value: Any
+) -> None:
+    header = f"[[{table}]]" if table in ("loops", "sweeps") else f"[{table}]"
+    with contextlib.suppress(BushfitError):
+        campaign_from(f"{BUSHING}\n{header}\n{key} = {value}\n", tmp_path_factory.getbasetemp())
+
+
+@dataclass(frozen=True)
+class Schema:
+    name: str
+    count: int = 1
+
+
+def read(folder: Path, content: str) -> Schema:
+    (folder / "x.toml").write_bytes(content.encode())
+    return read_toml(folder / "x.toml", Schema, what="a list", largest=1000)
+
+
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+def test_any_toml_becomes_the_dataclass_asked_for(mark: str, tmp_path: Path) -> None:
+    assert read(tmp_path, f'{mark}name = "Büchse"\r\ncount = 2\r\n') == Schema("Büchse", 2)
+    with pytest.raises(CampaignError, match=r"too large[\s\S]*at most 1000 bytes[\s\S]*give a list, not a measurement"):
+        read(tmp_path, f'name = "{"x" * 1000}"')
+
+
+def test_keys_of_fifteen_parts_are_still_read(tmp_path: Path) -> None:
+    deep = ".".join("abcdefghijklmno") + " = 1"
+    assert tomllib.loads(deep)
+    with pytest.raises(CampaignError, match="a key is missing"):
+        read(tmp_path, deep)
+
+
+@pytest.mark.parametrize(
+    ("name", "folder"),
+    [
+        ("CMP 15 961", "CMP 15 961"),
+        ("Buchse Ø 36", "Buchse Ø 36"),
+        ("../../etc", "_.._etc"),
+        ("..", "campaign"),
+        ("a/b\\c:d", "a_b_c_d"),
+        ("nul.txt", "_nul.txt"),
+        ("console", "console"),
+        ("a\ud800b", "a_b"),
+        ("line\nbreak", "line_break"),
+        ("x" * 500, "x" * 60),
+    ],
+)
+def test_names_as_folders(name: str, folder: str) -> None:
+    assert Campaign(name, Path("c.toml"), Bushing("b", 1.0, 2.0, 3.0)).slug == folder
+
+
+@given(st.text(max_size=300))
+@example("con")
+@example("Aux .txt")
+@example("../" * 50)
+def test_a_name_is_one_folder_on_every_system(name: str) -> None:
+    folder = folder_name(name)
+    assert (Path("/results") / folder).resolve().parent == Path("/results")
+    assert folder.strip(" .") == folder
+    assert 0 < len(folder.encode("utf-8", "surrogatepass")) < 250
+    assert not set(folder) & set('/\\:*?"<>|\n')
+    assert folder.partition(".")[0].upper() not in {"CON", "PRN", "AUX", "NUL", "COM1", "LPT9"}

@@ -59,7 +59,7 @@ def write(folder: Path, order: tuple[str, str]) -> Path:
     (folder / "cold.csv").write_text("\n".join([rows, *lines]))
     warm = [f"{line},{30 + i}" for i, line in enumerate(lines)]
     (folder / "warm.csv").write_text("\n".join([f"{rows},temperature [degC]", *warm]))
-    text = '[bushing]\nname = "b"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n'
+    text = 'bushing = { name = "b", inner_radius = "10 mm", outer_radius = "18 mm", length = "34 mm" }\n'
     text += f'[[sweeps]]\nfile = "cold.csv"\ndirection = "axial"\ntemperature = "20 degC"\n{order[0]}\n'
     text += f'[[sweeps]]\nfile = "warm.csv"\ndirection = "axial"\n{order[1]}\n'
     (folder / "campaign.toml").write_text(text)

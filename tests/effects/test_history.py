@@ -57,7 +57,6 @@ def test_a_motion_from_rest_begins_at_zero() -> None:
         ([0, 1, 2, 1], [False, False, True]),
         ([0, 1, 1, 0], [False, False, True]),
         ([0, 1, 1, 2], [False, False, False]),
-        ([1, 1, 1, 1], [False, False, False]),
         ([0, 1, 0, 1], [False, True, True]),
     ],
 )

@@ -19,7 +19,7 @@ from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction, Specimen
 from bushfit.jobs.fits import Fit
 from bushfit.jobs.predict import Predict
-from bushfit.model.arms import listed, model_arms
+from bushfit.model.arms import arm_rows, model_arms
 from bushfit.model.model import Model
 from bushfit.prediction import predict
 from bushfit.report.artifacts import temperature_contents
@@ -112,7 +112,7 @@ def test_arms_stand_for_the_rubber_at_a_temperature(truth: Model, degrees: float
     under, compound = Circumstances(CELSIUS + degrees), Specimen("compound", "modulus")
     frequency = np.geomspace(1.0, 100.0, 9)
     arms = model_arms(truth, (1.0, 100.0), 1e-3, under)
-    spring = listed(truth, arms)[0][1]
+    spring = arm_rows(truth, arms)[0][1]
     softer = np.exp(-VALUES["temperature.softening"] * (degrees - 23.0))
     friction = softer * truth.values["sigma_fmax"] / (2.0 * truth.values["eps_half"])
     found = spring + friction + sum(part.at(2.0 * np.pi * frequency) for part in arms)

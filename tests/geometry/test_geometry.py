@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import csv
+import itertools
 import math
 import re
 from pathlib import Path
@@ -48,55 +48,23 @@ def radial(bushing: Bushing) -> float:
 
 @pytest.mark.parametrize("stride", [4, pytest.param(1, marks=pytest.mark.slow)])
 def test_radial_against_many_digits(stride: int) -> None:
-    worst = {True: (0.0, ""), False: (0.0, "")}
-    for ratio in RATIOS[::stride]:
-        for slenderness in LENGTHS[::stride]:
-            bushing = tube(ratio, slenderness)
-            exact = radial_exact(bushing.inner_radius, bushing.outer_radius, bushing.length)
-            error = abs(float(radial(bushing) / exact - 1))
-            extreme = slenderness > 300.0 * (1.0 - ratio)  # length over thickness
-            worst[extreme] = max(worst[extreme], (error, f"a/b = {ratio}, L/b = {slenderness}"))
-    for extreme, (error, where) in worst.items():
-        label = "long and thin" if extreme else "other"
-        print(f"Eq. 11, {label} tubes: {-math.log10(error):.1f} digits at worst, {where}")
-    assert worst[False][0] < 1e-9
-    assert worst[True][0] < 1e-7
-
-
-@pytest.mark.parametrize("ratio", RATIOS)
-def test_long_and_short_limits(ratio: float) -> None:
-    """4 pi L/(ln(b/a) - q) for L -> inf and 10 pi L/(7/2 ln(b/a) - 3/2 q) for L -> 0, approached from one side."""
-    log, q = math.log(1.0 / ratio), (1.0 - ratio**2) / (1.0 + ratio**2)
-    long = [radial(b) / (4.0 * math.pi * b.length / (log - q)) for b in (tube(ratio, s) for s in (25.0, 50.0, 100.0))]
-    thickness = 1.0 - ratio
-    short = [
-        radial(b) / (10.0 * math.pi * b.length / (3.5 * log - 1.5 * q))
-        for b in (tube(ratio, s) for s in (0.2, 0.1, 0.05))
-    ]
-    print(f"a/b = {ratio}: over the long limit {long[-1]:.6f}, over the short limit {short[-1]:.6f}")
-    gaps = [1.0 - value for value in long]
-    assert all(gap > 0.0 for gap in gaps)
-    assert gaps[0] / gaps[1] == pytest.approx(4.0, rel=0.05)  # the gap closes as 1/L^2
-    assert gaps[1] / gaps[2] == pytest.approx(4.0, rel=0.05)
-    assert gaps[-1] < 1e-2
-    assert all(value > 1.0 for value in short)
-    assert short[0] > short[1] > short[2]
-    assert short[-1] - 1.0 < 0.45 * 0.05 / thickness
+    for ratio, slenderness in itertools.product(RATIOS[::stride], LENGTHS[::stride]):
+        bushing = tube(ratio, slenderness)
+        exact = radial_exact(bushing.inner_radius, bushing.outer_radius, bushing.length)
+        long_and_thin = slenderness > 300.0 * (1.0 - ratio)  # length over thickness
+        assert abs(float(radial(bushing) / exact - 1)) < (1e-7 if long_and_thin else 1e-9), (ratio, slenderness)
 
 
 def test_within_the_finite_element_table(root: Path) -> None:
-    with (root / "data/reference/radial_fe.csv").open(newline="") as stream:
-        rows = list(csv.reader(stream))[1:]
+    rows = np.loadtxt(root / "data/reference/radial_fe.csv", delimiter=",", skiprows=1)
     gaps = []
-    for row in rows:
-        a, b, length, element, formula = map(float, row)
+    for a, b, length, element, formula in rows:
         found = radial(Bushing("row", a / 1e3, b / 1e3, length / 1e3))
         gaps.append(100.0 * (found / element - 1.0))
         print(f"a {a:g} b {b:g} L {length:g} mm: Eq. 11 {gaps[-1]:+.2f} % from the finite elements")
         assert found == pytest.approx(formula, rel=1e-5)
     assert len(gaps) == 14
-    assert min(gaps) > -2.0
-    assert max(gaps) < 11.0
+    assert -2.0 < min(gaps) < max(gaps) < 11.0
 
 
 shapes = st.builds(
@@ -139,19 +107,11 @@ def test_radial_stiffness_lies_above_its_short_and_below_its_long_formula(bushin
     assert short * (1.0 - 1e-7) < radial(bushing) < long * (1.0 + 1e-7)
 
 
-def test_friction_sees_four_times_the_axial_strain_in_radial(bushing: Bushing) -> None:
-    ratio = bushing.unit_strain(Direction.RADIAL) / bushing.unit_strain(Direction.AXIAL)
-    print(f"radial over axial strain: {ratio:.3f}")
-    assert ratio == pytest.approx(4.4, abs=0.05)
-
-
 @pytest.mark.parametrize(
     ("lengths", "words"),
     [
         ((0.018, 0.010, 0.034), "inner_radius below outer_radius"),
-        ((0.018, 0.018, 0.034), "inner_radius below outer_radius"),
         ((0.0, 0.018, 0.034), "inner_radius: impossible bushing"),
-        ((0.010, -0.018, 0.034), "outer_radius: impossible bushing"),
         ((0.010, 0.018, math.nan), "length: impossible bushing"),
         ((0.010, math.inf, 0.034), "outer_radius: impossible bushing"),
     ],
@@ -167,9 +127,3 @@ def test_radial_is_refused_beyond_the_checked_shapes(lengths: tuple[float, float
     assert np.isfinite(bushing.stiffness_per_modulus(Direction.AXIAL))
     with pytest.raises(ModelError, match="not checked for this shape"):
         radial(bushing)
-
-
-def test_directions_name_their_units() -> None:
-    assert [d.motion.displacement_unit for d in Direction] == ["m", "m", "rad"]
-    assert [d.motion.force_unit for d in Direction] == ["N", "N", "N*m"]
-    assert [d.motion.stiffness_unit for d in Direction] == ["N/m", "N/m", "N*m/rad"]

@@ -1,4 +1,4 @@
-"""Model files: what is written comes back, and whatever else a file holds is one clear error."""
+"""Model files: what is written comes back; what else a file may hold is one clear error, see cli/spoiled_rows.py."""
 
 from __future__ import annotations
 
@@ -23,15 +23,12 @@ def document(result: Result) -> dict[str, Any]:
     return json.loads(json.dumps(to_document(result), allow_nan=False))  # type: ignore[no-any-return]
 
 
-def test_schema_of_the_interface(document: dict[str, Any]) -> None:
-    assert list(document) == [
-        "schema", "bushing", "effects", "parameters", "covariance", "fit", "warnings", "outliers",
-        "provenance",
-    ]  # fmt: skip
+def test_the_keys_of_the_interface(document: dict[str, Any]) -> None:
+    keys = "schema bushing effects parameters covariance fit warnings outliers provenance"
+    assert list(document) == keys.split()
     assert document["schema"] == SCHEMAS[0] == "bushfit/model/1"
-    assert document["bushing"] == {
-        "name": "CMP 15 961", "inner_radius_m": 0.01, "outer_radius_m": 0.018, "length_m": 0.034,
-    }  # fmt: skip
+    sizes = {"inner_radius_m": 0.01, "outer_radius_m": 0.018, "length_m": 0.034}
+    assert document["bushing"] == {"name": "CMP 15 961", **sizes}
     assert document["effects"] == ["elastic", "springpot", "friction"]
     assert set(document["parameters"]) == set(FIVE) == set(document["covariance"]["names"])
     for entry in document["parameters"].values():
@@ -39,42 +36,31 @@ def test_schema_of_the_interface(document: dict[str, Any]) -> None:
         assert entry["ci95"][0] < entry["value"] < entry["ci95"][1]
         assert entry["vary"] is True
     assert document["parameters"]["m"]["unit"] == "Pa*s^alpha"
-    assert np.shape(document["covariance"]["matrix"]) == (5, 5)
-    assert np.shape(document["covariance"]["spread"])[1:] == (5, 5)
+    assert np.shape(document["covariance"]["matrix"]) == np.shape(document["covariance"]["spread"])[1:] == (5, 5)
     assert {"nrmse", "reduced_chi_square", "points", "noise"} <= set(document["fit"])
-    assert document["warnings"] == [] or all(isinstance(line, str) for line in document["warnings"])
-    for source in document["provenance"]["inputs"]:
-        assert len(source["sha256"]) == 64
+    assert {len(source["sha256"]) for source in document["provenance"]["inputs"]} == {64}
     assert {"bushfit", "inputs", "packages"} == set(document["provenance"])
 
 
 def test_there_and_back(result: Result, document: dict[str, Any]) -> None:
     back = from_document(document)
-    assert back.model == result.model
-    assert back.fitted == result.fitted
-    assert back.quality == result.quality
-    assert back.measured == result.measured
-    assert back.warnings == result.warnings
+    for key in ("model", "fitted", "quality", "measured", "warnings"):
+        assert getattr(back, key) == getattr(result, key)
     np.testing.assert_array_equal(back.covariance.matrix, result.covariance.matrix)
     np.testing.assert_array_equal(back.covariance.spread, result.covariance.spread)
-    again = to_document(back)
-    assert {**again, "provenance": None} == {**document, "provenance": None}
+    assert {**to_document(back), "provenance": None} == {**document, "provenance": None}
 
 
-def test_what_is_unresolved_stays_so(result: Result) -> None:
-    unresolved = replace(result, model=result.model.with_effect("clearance"), unresolved=("clearance",))
-    document = json.loads(json.dumps(to_document(unresolved)))
-    assert document["unresolved"] == ["clearance"]
-    assert from_document(document).unresolved == ("clearance",)
-
-
-def test_a_file_that_does_not_say_which_directions_were_fitted_is_read(
-    result: Result, document: dict[str, Any]
-) -> None:
+def test_what_is_left_out_where_it_is_not_so(result: Result, document: dict[str, Any]) -> None:
+    """Effects that may be the rig's, a shape that is not the paper's; directions are not in older files."""
+    bushing = replace(result.model.bushing, shape="calibrated")  # type: ignore[type-var]
+    model = replace(result.model.with_effect("clearance"), bushing=bushing)
+    more = json.loads(json.dumps(to_document(replace(result, model=model, unresolved=("clearance",)))))
+    assert (more["unresolved"], more["bushing"]["shape"]) == (["clearance"], "calibrated")
+    assert (from_document(more).unresolved, from_document(more).model.bushing) == (("clearance",), bushing)
     del document["fit"]["directions"]
-    back = from_document(document)
     assert result.measured is not None
-    assert back.measured == replace(result.measured, directions=())
+    assert from_document(document).measured == replace(result.measured, directions=())
 
 
 def test_a_model_alone_is_a_result(paper_model: Model, tmp_path: Path) -> None:
@@ -96,67 +82,34 @@ def test_the_radial_factor_of_older_files_is_read(document: dict[str, Any]) -> N
     assert result.model.values["stiffness_factor.radial"] == pytest.approx(1.05)
     assert result.covariance.stderr("stiffness_factor.radial") == pytest.approx(0.01)
     assert result.profile["stiffness_factor.radial"] == (pytest.approx(1.04), None)
-    radial, axial = (
-        abs(
-            result.model.stiffness(direction, 50.0, 1e-4)
-            / result.model.without(Level.COMPONENT).stiffness(direction, 50.0, 1e-4)
-        )
-        for direction in ("radial", "axial")
-    )
-    assert (radial, axial) == (pytest.approx(1.05), pytest.approx(1.0))
-
-
-def test_an_older_file_with_a_misnamed_factor_is_one_clear_error(document: dict[str, Any]) -> None:
-    document["effects"].append("radial_factor")
-    document["parameters"]["radial_factor.factor"] = {"value": 0.05, "unit": "1", "vary": True}
+    plain = result.model.without(Level.COMPONENT)
+    for direction, factor in (("radial", 1.05), ("axial", 1.0)):
+        ratio = result.model.stiffness(direction, 50.0, 1e-4) / plain.stiffness(direction, 50.0, 1e-4)
+        assert abs(ratio) == pytest.approx(factor)
+    document["parameters"]["radial_factor.factor"] = document["parameters"].pop("radial_factor.excess")
     with pytest.raises(ModelError, match=r"stiffness_factor\.radial"):
         from_document(document)
 
 
-@pytest.mark.parametrize("schema", ["bushfit/model/3", "bushfit/diagnosis/1", None, 3])
-def test_an_unknown_schema_is_refused_by_name(document: dict[str, Any], tmp_path: Path, schema: object) -> None:
-    document["schema"] = schema
-    file = tmp_path / "model.json"
-    file.write_text(json.dumps(document))
-    with pytest.raises(ModelError) as caught:
-        load_result(file)
-    assert repr(schema) in str(caught.value)
-    assert "bushfit/model/1" in str(caught.value)
-    assert str(file) in str(caught.value)
+@pytest.mark.parametrize("schema", ["bushfit/model/3", None])
+def test_an_unknown_schema_is_refused_by_name(document: dict[str, Any], schema: object) -> None:
+    with pytest.raises(ModelError, match=f"{schema}[\\s\\S]*bushfit/model/1 or bushfit/model/2"):
+        from_document(document | {"schema": schema})
 
 
 Change = Callable[[dict[str, Any]], object]
 
-
 DAMAGES: dict[str, Change] = {
-    "no bushing": lambda d: d.pop("bushing"),
-    "no parameters": lambda d: d.pop("parameters"),
-    "text value": lambda d: d["parameters"]["mu"].update(value="stiff"),
-    "null value": lambda d: d["parameters"]["mu"].update(value=None),
-    "impossible value": lambda d: d["parameters"]["alpha"].update(value=7.0),
-    "unknown effect": lambda d: d["effects"].append("magic"),
-    "unknown parameter": lambda d: d["parameters"].update(nu={"value": 1.0}),
-    "short covariance": lambda d: d["covariance"]["matrix"].pop(),
-    "covariance of others": lambda d: d["covariance"].update(names=["a", "b", "c", "d", "e"]),
     "short spread": lambda d: d["covariance"]["spread"][0].pop(),
     "spread is a number": lambda d: d["covariance"].update(spread=3.0),
-    "infinite covariance": lambda d: d["covariance"]["matrix"][0].__setitem__(0, float("inf")),
-    "covariance is text": lambda d: d.update(covariance="none"),
-    "fit is a list": lambda d: d.update(fit=[1, 2]),
-    "fit lacks a number": lambda d: d["fit"].pop("nrmse"),
     "unknown direction": lambda d: d["fit"].update(directions=["sideways"]),
-    "a range without frequencies": lambda d: d["fit"].pop("frequency_Hz"),
     "range of three": lambda d: d["fit"].update(strain=[1, 2, 3]),
-    "at another bound": lambda d: d["parameters"]["mu"].update(at_bound="middle"),
-    "profile of one end": lambda d: d["parameters"]["mu"].update(profile95=[1.0]),
     "profile of texts": lambda d: d["parameters"]["mu"].update(profile95=["1", "2"]),
-    "outlier without row": lambda d: d.update(outliers=[{"test": "a", "file": None, "column": "force", "distance": 9}]),
     "outlier at half a row": lambda d: d.update(
         outliers=[{"test": "a", "file": None, "row": 1.5, "column": "force", "distance": 9}]
     ),
     "outliers is null": lambda d: d.update(outliers=None),
     "provenance is text": lambda d: d.update(provenance="here"),
-    "warnings is a number": lambda d: d.update(warnings=3),
 }
 
 
@@ -168,20 +121,3 @@ def test_damaged_content_is_one_clear_error(document: dict[str, Any], tmp_path: 
     with pytest.raises(ModelError) as caught:
         load_result(file)
     assert str(caught.value).startswith(str(file))
-
-
-@pytest.mark.parametrize(
-    "content", [b"", b"{", b"[1, 2]", b'"text"', b"\xff\xfe\x00", b"[" * 100_000, b'{"schema": "bushfit/model/1"}']
-)
-def test_files_that_are_no_model(tmp_path: Path, content: bytes) -> None:
-    file = tmp_path / "model.json"
-    file.write_bytes(content)
-    with pytest.raises(ModelError, match=r"model\.json"):
-        load_result(file)
-
-
-def test_missing_files_and_folders(tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match="no such file"):
-        load_result(tmp_path / "absent.json")
-    with pytest.raises(ModelError, match="this is not a file"):
-        load_result(tmp_path)

@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import Generator
 
-from bushfit.effects.mistake import Mistake, other_direction
-from bushfit.effects.mistakes import MISTAKES, labelled
+from bushfit.effects.mistakes import MISTAKES, Mistake, labelled, other_direction
 from bushfit.geometry import ROTATION, Direction, Place
 from bushfit.reading.measurement import Complex, Floats, Loop, Sweep
 from bushfit.simulation.measured import Simulated
