@@ -35,6 +35,13 @@ def caveats(result: Result) -> list[str]:
     for name in result.unresolved:
         twins = " or ".join(effect_named(name).twins)
         lines.append(f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}")
+    if result.alternatives:
+        added = (set(each.model.effects) - {*result.model.effects} for each in result.alternatives)
+        names = " or ".join(dict.fromkeys(" and ".join(sorted(each)) or "other values" for each in added))
+        lines.append(
+            f"the tests cannot tell what the model lacks, {names}: it is predicted without, and low and high of "
+            "predictions hold the model with each of these"
+        )
     if "springpot" not in result.model.effects:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:

@@ -6,7 +6,7 @@ may be either's, an effect with a twin that these tests cannot tell from it, giv
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations
@@ -99,7 +99,8 @@ def predict(
 
     Frequencies are in Hz, amplitudes zero-to-peak in m or rad. With `rig` its effects are kept, as in the tests;
     `sweeps` are what was measured, to stand beside. A temperature [K] is for a model with an effect of it, which
-    stands at its reference otherwise.
+    stands at its reference otherwise. The bands hold every model that the tests leave possible: with and without what
+    may be the rig's, and with each of the effects that they cannot tell apart.
 
     Raises:
         ModelError: a frequency or amplitude that is not positive.
@@ -110,24 +111,35 @@ def predict(
     amplitude, frequency = (
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
-    models = [result.model] if rig else _readings(result)
-    first, *others = (_predicted(result, model, direction, frequency, amplitude, temperature) for model in models)
+    at = direction, frequency, amplitude, temperature
+    models = [result.model] if rig else _readings(result.model, result.unresolved)
+    first, *others = (_predicted(result, model, *at) for model in models)
+    explained = replace(result, model_error=None)
+    alternatives = [_predicted(explained, model, *at) for model in _alternatives(result, rig=rig)]
     measured = None if sweeps is None else _measured(direction, frequency, amplitude, sweeps)
     found = replace(first, if_rigs=others[-1] if others else None, measured=measured)
-    every = (first, *others)
+    every = (first, *others, *alternatives)
     bands: dict[str, Any] = {name: _spanned([getattr(each, name) for each in every]) for name in _BANDS}
-    at = np.array((frequency, amplitude, first.stiffness.value))
+    points = np.array((frequency, amplitude, first.stiffness.value))
     if_rigs = others[-1].stiffness.value if others else None
-    told = of_points(result, direction, at, if_rigs, None if rig else measured, temperature)
+    told = of_points(result, direction, points, if_rigs, None if rig else measured, temperature)
     return replace(found, **bands, warnings=tuple(told))
 
 
-def _readings(result: Result) -> list[Model]:
+def _readings(model: Model, unresolved: Sequence[str]) -> list[Model]:
     """The models that the car may have: without the rig's effects, and of those that are unresolved with all first,
     with none last."""
-    bare = result.model.without(Level.INSTRUMENT)
-    count = range(len(result.unresolved) + 1)
-    return [bare.without(*left) for size in count for left in combinations(result.unresolved, size)]
+    bare = model.without(Level.INSTRUMENT)
+    count = range(len(unresolved) + 1)
+    return [bare.without(*left) for size in count for left in combinations(unresolved, size)]
+
+
+def _alternatives(result: Result, *, rig: bool) -> Iterator[Model]:
+    """The models that may be right instead, each as the rig has it, or in all its readings."""
+    for each in result.alternatives:
+        known = {*result.model.effects} - {*result.unresolved}
+        twins = [effect.name for effect in each.model.records if effect.twins and effect.name not in known]
+        yield from [each.model] if rig else _readings(each.model, twins)
 
 
 def _predicted(
@@ -243,7 +255,7 @@ def predict_resonance(
     """
     if place.motion is not TRANSLATION:
         raise ModelError("no mass stands on this", found=str(place), expected="a direction or mount with a stiffness")
-    bushings, *others = _readings(result)
+    bushings, *others = _readings(result.model, result.unresolved)
     under = Circumstances(temperature)
     if frequencies is None:
         small = bushings.stiffness(place, 1.0, _SMALL_STRAIN / bushings.unit_strain(place), under=under)

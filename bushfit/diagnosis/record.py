@@ -23,7 +23,8 @@ from bushfit.effects import effect_of, parameter_named
 from bushfit.effects.mistakes import candidate_named, labelled
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place
-from bushfit.model.result import Result
+from bushfit.model.model import Model
+from bushfit.model.result import Alternative, Result
 from bushfit.validation import plain
 
 #: Probability below which nothing is told of what may be else.
@@ -100,25 +101,32 @@ class Odds:
     Args:
         nothing: probability that nothing is missing beyond noise and tolerance.
         told: explanations in words with their probabilities, if anything is missing; the most probable first.
-        values: of the parameters under each of these, as far as it was fitted; else none.
+        models: of each of these, as far as it was fitted.
         labels: each of these by the names of its parts, joined by " + ".
+        apart: whether one of these is right and no other, as far as the tests go.
     """
 
     nothing: float
     told: tuple[tuple[str, float], ...] = ()
-    values: tuple[Mapping[str, float], ...] = ()
+    models: tuple[Model | None, ...] = ()
     labels: tuple[str, ...] = ()
+    apart: bool = False
 
     def averaged(self, result: Result) -> Result:
-        """A result whose covariance counts that another explanation may hold: each adds the square of how far its
-        parameters lie off, times its probability."""
+        """A result that counts that another explanation may hold: to the covariance each adds the square of how far its
+        parameters lie off, times its probability; of several that the tests cannot tell apart each is an alternative
+        in what is predicted."""
         cov = result.covariance
         here = np.array([result.model.values[name] for name in cov.names])
-        matrix = cov.matrix.copy()
-        for (_, probability), values in zip(self.told, self.values, strict=True):
-            off = np.array([values.get(name, own) for name, own in zip(cov.names, here, strict=True)]) - here
+        matrix, others = cov.matrix.copy(), list[Alternative]()
+        for (_, probability), model in zip(self.told, self.models, strict=True):
+            if model is None:
+                continue
+            off = np.array([model.values.get(name, own) for name, own in zip(cov.names, here, strict=True)]) - here
             matrix += (1.0 - self.nothing) * probability * np.outer(off, off)
-        return replace(result, covariance=replace(cov, matrix=matrix))
+            if self.apart:
+                others.append(Alternative(model, (1.0 - self.nothing) * probability))
+        return replace(result, covariance=replace(cov, matrix=matrix), alternatives=tuple(others))
 
 
 @dataclass(frozen=True)

@@ -158,9 +158,10 @@ class Told:
     def odds(self) -> Odds:
         """What is told, the most probable first."""
         told = sorted(self.finding.told, key=lambda each: -each.probability)
-        values = (each.best.weighed.state.evidence.model.values if each.best.refitted else {} for each in told)
+        models = (each.best.weighed.state.evidence.model if each.best.refitted else None for each in told)
         pairs = ((self._in_words(each), each.probability) for each in told)
-        return Odds(self.finding.nothing, tuple(pairs), tuple(values), tuple(map(self.label, told)))
+        labels, apart = tuple(map(self.label, told)), self.finding.verdict == "ambiguous"
+        return Odds(self.finding.nothing, tuple(pairs), tuple(models), labels, apart)
 
     def _in_words(self, each: Composition) -> str:
         """A composition as it is told to people: what each of its parts is, with its name."""

@@ -251,6 +251,21 @@ class ProvenanceTable:
 
 
 @dataclass(frozen=True)
+class AlternativeTable:
+    """Another model of the same bushing that may be the right one, as the tests cannot tell.
+
+    Args:
+        effects: by name, in order.
+        values: of its parameters by name, in SI units.
+        probability: of it, by the diagnosis that found it.
+    """
+
+    effects: tuple[str, ...]
+    values: Mapping[str, Number]
+    probability: Number
+
+
+@dataclass(frozen=True)
 class ModelFile:
     """A bushing or compound: the effects that its response is made of, their parameters, and how uncertain these are.
 
@@ -268,6 +283,7 @@ class ModelFile:
         unresolved: effects of the model that may as well be the rig's, as the tests cannot tell.
         unnamed: data of the effect of that name: a smooth correction of the stiffness.
         model_error: what the fit counted beside noise, as a share of the stiffness; null where noise was all.
+        alternatives: models that explain the tests, where these cannot tell which does.
         campaign: that the model was fitted to; null where it is known of none.
     """
 
@@ -286,4 +302,5 @@ class ModelFile:
     unresolved: tuple[str, ...] = ()
     unnamed: Unnamed | None = None
     model_error: Unnamed | None = None
+    alternatives: tuple[AlternativeTable, ...] = ()
     campaign: CampaignTable | None = None

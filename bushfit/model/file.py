@@ -19,7 +19,7 @@ from bushfit.geometry import Bushing, Specimen
 from bushfit.model.covariance import Covariance
 from bushfit.model.document import SCHEMAS, CovarianceTable, ModelFile
 from bushfit.model.model import Model
-from bushfit.model.result import Quality, Range, Result
+from bushfit.model.result import Alternative, Quality, Range, Result
 from bushfit.reading.files import read_utf8
 from bushfit.validation import check_tables
 from bushfit.version import __version__
@@ -125,6 +125,10 @@ def _result(tables: ModelFile) -> Result:
         usable=fit.usable if fit else (),
         unresolved=tuple(name for name in tables.unresolved if name in model.effects),
         model_error=tables.model_error,
+        alternatives=tuple(
+            Alternative(Model(model.bushing, each.effects, each.values), each.probability)
+            for each in tables.alternatives
+        ),
     )
     with naming(place="fit, directions"):
         for name in result.measured.directions if result.measured else ():
@@ -156,6 +160,7 @@ def to_document(result: Result) -> dict[str, Any]:
         "fit": _fit(result, result.quality, result.measured) if result.quality and result.measured else None,
         **({"unresolved": list(result.unresolved)} if result.unresolved else {}),
         **({"model_error": asdict(result.model_error)} if result.model_error else {}),
+        **({"alternatives": [_alternative(each) for each in result.alternatives]} if result.alternatives else {}),
         "warnings": list(result.warnings),
         "outliers": [asdict(outlier) for outlier in result.outliers],
         "provenance": {
@@ -168,6 +173,11 @@ def to_document(result: Result) -> dict[str, Any]:
             "packages": dict(versions()),
         },
     }
+
+
+def _alternative(each: Alternative) -> dict[str, Any]:
+    model = each.model
+    return {"effects": list(model.effects), "values": dict(model.values), "probability": each.probability}
 
 
 def model_document(model: Model) -> dict[str, Any]:

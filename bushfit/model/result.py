@@ -132,6 +132,18 @@ class Outlier:
         return f"{self.file or self.test}, {self.column}"
 
 
+@dataclass(frozen=True)
+class Alternative:
+    """Another model that may be the right one, as the tests cannot tell.
+
+    Args:
+        probability: of it, by the diagnosis that found it.
+    """
+
+    model: Model
+    probability: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """A fitted model, or one given by hand, as the JSON files hold it.
@@ -145,6 +157,7 @@ class Result:
         at_bound: parameters that came to rest on the least or largest value they may have, and on which.
         unresolved: effects of the model with a twin of the rig, which these tests cannot tell from it.
         model_error: what the fit counted beside noise, as a share of the stiffness; None where noise was all.
+        alternatives: models that explain the tests, where these cannot tell which does.
     """
 
     model: Model
@@ -162,6 +175,7 @@ class Result:
     usable: tuple[Usable, ...] = ()
     unresolved: tuple[str, ...] = ()
     model_error: Unnamed | None = None
+    alternatives: tuple[Alternative, ...] = ()
 
     def __repr__(self) -> str:
         """The parameters with their standard errors, a line each, and how well the model meets its tests."""
@@ -218,10 +232,13 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
     What belongs to the material is kept, and the factors of specimens of it.
     """
     names = [specimen.name for specimen in result.specimens]
-    records = result.model.records
-    kept = [effect.name for effect in records if effect.level is Level.MATERIAL or effect.corrects in names]
-    model = Model.started(bushing, kept, result.model.values)
-    left = ", ".join(effect.name for effect in records if effect.name not in kept)
+
+    def moved(model: Model) -> Model:
+        kept = [each.name for each in model.records if each.level is Level.MATERIAL or each.corrects in names]
+        return Model.started(bushing, kept, model.values)
+
+    model = moved(result.model)
+    left = ", ".join(name for name in result.model.effects if name not in model.effects)
     said = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"
     said += f"; left out, because they belong to {result.name} or its rig: {left}" if left else ""
     measured = result.measured
@@ -233,5 +250,6 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
     covariance = result.covariance.restricted(there)
     told = tuple(f"{result.name}: {line}" for line in result.warnings)
     carried_there = Result(model, fitted, covariance, None, measured, told, result.inputs, specimens=result.specimens)
-    unresolved = tuple(name for name in result.unresolved if name in kept)
-    return replace(carried_there, unresolved=unresolved, model_error=result.model_error), said
+    unresolved = tuple(name for name in result.unresolved if name in model.effects)
+    others = tuple(replace(each, model=moved(each.model)) for each in result.alternatives)
+    return replace(carried_there, unresolved=unresolved, model_error=result.model_error, alternatives=others), said
