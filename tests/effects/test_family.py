@@ -12,7 +12,6 @@ import pytest
 from random_models import ADDED, UNDER, operating_point, random_model, sized
 
 from bushfit.effects import (
-    BASE,
     LIBRARY,
     Effect,
     History,
@@ -272,12 +271,3 @@ def test_a_model_survives_files_and_processes(effect: Effect, rng: np.random.Gen
         assert copy.effects == tuple(e.name for e in model.records)
         assert copy.values == model.values
         assert np.array_equal(copy.stiffness("axial", 50.0, 1e-4), model.stiffness("axial", 50.0, 1e-4))
-
-
-def test_prediction_leaves_the_instrument_out(rng: np.random.Generator) -> None:
-    model = random_model(rng)
-    added = [name for name in ADDED if not LIBRARY[name].replaces]
-    for name in added:
-        model = sized(model, name, Direction.AXIAL, 2e-4, rng)
-    kept = {effect.name for effect in model.without(Level.INSTRUMENT).records}
-    assert kept == {name for name in (*BASE, *added) if LIBRARY[name].level is not Level.INSTRUMENT}
