@@ -337,14 +337,12 @@ def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str,
     return {name: p[name] * factor for name in names if name in p}
 
 
-def scaled_response(factor: Callable[[Values, Setting], Value]) -> Callable[..., Array]:
-    """The law of a layer that multiplies the response below it, stiffness and force alike, by a factor."""
-
-    def response(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -> Array:
-        *motion, setting = motion_and_setting
-        return factor(p, setting) * below(*motion)
-
-    return response
+def scaled_response(
+    factor: Callable[[Values, Setting], Value], p: Values, below: Callable[..., Array], *motion_and_setting: Any
+) -> Array:
+    """The response below a layer, stiffness or force alike, times a factor by values and test."""
+    *motion, setting = motion_and_setting
+    return factor(p, setting) * below(*motion)
 
 
 def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
