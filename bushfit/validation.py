@@ -166,10 +166,8 @@ def _place(table: type, location: tuple[int | str, ...]) -> str:
 
 def known_keys(table: type) -> Sequence[str]:
     """The keys that a table of the file may have."""
-    gathered = in_table(table)
-    return [
-        key for entry in fields(table) for key in (gathered[entry.name]() if entry.name in gathered else [entry.name])
-    ]
+    inside = in_table(table)
+    return [key for entry in fields(table) for key in (inside[entry.name]() if entry.name in inside else [entry.name])]
 
 
 def in_table(table: type) -> Mapping[str, Callable[[], Iterable[str]]]:

@@ -10,7 +10,6 @@ from typing import Any
 
 from bushfit.campaign.compound import Compound
 from bushfit.campaign.files import LoopFile, SweepFile
-from bushfit.campaign.naming import folder_name
 from bushfit.campaign.places import place_tested
 from bushfit.campaign.schema import (
     CampaignFile,
@@ -70,11 +69,6 @@ class Campaign:
         kinds = {"loop": len(self.loops), "sweep": len(self.sweeps)}
         counts = (f"{count} {kind}{'s' * (count != 1)}" for kind, count in kinds.items())
         return f"Campaign {self.name}: {', '.join(counts)}"
-
-    @property
-    def slug(self) -> str:
-        """The name of the campaign's folder of results."""
-        return folder_name(self.name)
 
 
 def load_campaign(path: str | Path) -> Campaign:
@@ -254,6 +248,6 @@ def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
         at = None if test.temperature is None else f"{test.temperature - CELSIUS:.4g} degC"
         others = [other for other in tests if other.file == test.file] if files[test.file] > 1 else []
         keys = [key for key in ("direction", "specimen_number") if len({getattr(one, key) for one in others}) > 1]
-        told = (stem, test.sheet, at, *(getattr(test, key) for key in keys), *test.rows.values())
-        names.append(" ".join(filter(None, told)) if others else test.file if stems[stem] > 1 else stem)
+        parts = (stem, test.sheet, at, *(getattr(test, key) for key in keys), *test.rows.values())
+        names.append(" ".join(filter(None, parts)) if others else test.file if stems[stem] > 1 else stem)
     return names

@@ -23,7 +23,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
-from functools import cache, cached_property
+from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -111,14 +111,15 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Circumstances:
-    """What a test was made under besides its motion; where it is not known, effects of it stand still.
+    """Temperature and history of a test; what is not known is None, and effects that depend on it then do nothing.
 
     Args:
         temperature: of the rubber [K], a number or one per operating point, (n,).
-        turn: when in the session a point was measured, from 0 for the first to 1 for the last, as temperature.
-        strained: largest strain amplitude that the rubber had seen before [1], as temperature.
-        left: last strain amplitude before that was larger than the point's [1], as temperature; 0 where none was.
-        rested: turns since then, as temperature.
+        turn: when in the session a point was measured, from 0 for the first to 1 for the last; a number or (n,), as all
+            that follows.
+        strained: largest strain amplitude that the rubber had seen before [1].
+        left: last strain amplitude before that was larger than the point's [1]; 0 where none was.
+        rested: turns since then.
     """
 
     temperature: Array | float | None = None
@@ -192,9 +193,6 @@ class Effect:
         twins: names of effects, of the rig above all, with the same equation for all tests. Of such twins the one that
             belongs to the bushing, which is this one, is proposed; its size is then known, its level is not.
         replaces: the branch of the paper that it stands in place of; None where it is added to the others.
-        variant_of: the branch of the paper whose law it changes without standing in its place, where both together are
-            a model of their own in the literature; None of what comes on top of the model.
-        frees: mistakes of the record that are single values of it; where one explains the tests as well, it stands.
         under: what of a test's circumstances it depends on, by the names of `Circumstances`.
         assumption: what a prediction takes of these where they are not known, for its user; none of the rig's effects.
         in_place_of: of one that replaces a branch, where a fit may begin, the likeliest first: its values by those of
@@ -219,8 +217,6 @@ class Effect:
     corrects: str | None = None
     twins: tuple[str, ...] = ()
     replaces: str | None = None
-    variant_of: str | None = None
-    frees: tuple[str, ...] = ()
     under: tuple[Literal["temperature", "turn", "strained", "left", "rested"], ...] = ()
     assumption: str = ""
     harmonic_only: bool = False
@@ -321,12 +317,9 @@ class Family:
         """Of the kind."""
         return self.record.name.partition(".")[0]
 
-    @cached_property
-    def of_place(self) -> Callable[[str], Effect]:
+    @cache  # noqa: B019  # the families live as long as the program
+    def of_place(self, place: str) -> Effect:
         """The effect of one place, kept from one call to the next."""
-        return cache(self._of_place)
-
-    def _of_place(self, place: str) -> Effect:
         record = replace(self.record, **(self.radial if place == Direction.RADIAL else {}))
         named = {each.name: getattr(record, each.name) for each in fields(record)}
         texts: dict[str, Any] = {key: text.format(place=place) for key, text in named.items() if isinstance(text, str)}
@@ -344,14 +337,12 @@ def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str,
     return {name: p[name] * factor for name in names if name in p}
 
 
-def scaled_response(factor: Callable[[Values, Setting], Value]) -> Callable[..., Array]:
-    """The law of a layer that multiplies the response below it, stiffness and force alike, by a factor."""
-
-    def response(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -> Array:
-        *motion, setting = motion_and_setting
-        return factor(p, setting) * below(*motion)
-
-    return response
+def scaled_response(
+    factor: Callable[[Values, Setting], Value], p: Values, below: Callable[..., Array], *motion_and_setting: Any
+) -> Array:
+    """The response below a layer, stiffness or force alike, times a factor by values and test."""
+    *motion, setting = motion_and_setting
+    return factor(p, setting) * below(*motion)
 
 
 def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:

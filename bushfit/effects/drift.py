@@ -1,5 +1,7 @@
 """Drift: the gain of the force chain moves with time over the session."""
 
+from functools import partial
+
 import numpy as np
 
 from bushfit.effects.contract import Setting, Value, Values, scaled_response
@@ -16,4 +18,4 @@ def _gain(p: Values, setting: Setting) -> Value:
     return 1.0 if turn is None else 1.0 + p["gain"] * np.asarray(turn)
 
 
-stiffness = force = scaled_response(_gain)
+stiffness = force = partial(scaled_response, _gain)

@@ -4,6 +4,13 @@
 (510000.0, 500000.0)
 """
 
-from bushfit.effects.contract import scaled_response
+from functools import partial
 
-stiffness = force = scaled_response(lambda p, setting: 1.0 + p["gain"] if setting.kind == "loop" else 1.0)
+from bushfit.effects.contract import Setting, Value, Values, scaled_response
+
+
+def _gain(p: Values, setting: Setting) -> Value:
+    return 1.0 + p["gain"] if setting.kind == "loop" else 1.0
+
+
+stiffness = force = partial(scaled_response, _gain)

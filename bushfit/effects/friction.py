@@ -133,7 +133,7 @@ def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
 
 
 def _stroke_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any, Any]:
-    """du/du_s and du/dd of a move."""
+    """du/du_s and du/dd of a stroke."""
     return 1.0 - (distance / reach) ** 2, sign * (room / reach) ** 2
 
 

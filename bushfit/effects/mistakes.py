@@ -21,15 +21,7 @@ from bushfit.reading.measurement import Complex, Loop, Sweep
 
 _Test = TypeVar("_Test", bound=Loop | Sweep)
 
-#: [deg] A radian.
-_RADIAN = float(np.degrees(1.0))
-#: Loss factor below which that of a filled rubber is in doubt; chosen: the least damping of them have twice that.
-_LEAST_LOSS = 0.02
-#: Loss factor above which that of a rubber in a bushing is in doubt; chosen: the largest reach it at no temperature of
-#: use.
-_MOST_LOSS = 1.0
-
-#: What puts between the name of a mistake and that of the test it was made in.
+#: Between the name of a mistake and that of the test it was made in.
 SEPARATOR = ":"
 
 
@@ -140,14 +132,6 @@ def _loss(stiffness: Complex) -> float:
     return float(np.median(stiffness.imag / stiffness.real))
 
 
-def _little_loss(stiffness: Complex) -> bool:
-    return 0.0 < _loss(stiffness) < _LEAST_LOSS
-
-
-def _much_loss(stiffness: Complex) -> bool:
-    return _loss(stiffness) > _MOST_LOSS
-
-
 def _times_loss(factor: float, stiffness: Complex) -> Complex:
     """The same |K|, and the loss factor times a factor."""
     loss = 1.0 + 1j * factor * stiffness.imag / stiffness.real
@@ -160,38 +144,23 @@ def _sine(stiffness: Complex) -> Complex:
     return np.asarray(np.abs(stiffness) * (np.sqrt(1.0 - sine**2) + 1j * sine))
 
 
-def _magnitude(stiffness: Complex) -> Complex:
-    """K' where |K| was stated."""
-    return np.asarray(stiffness * np.abs(stiffness) / stiffness.real)
-
-
-def _storage(stiffness: Complex) -> Complex:
-    """|K| where K' was stated, beside the right K''."""
-    storage = np.sqrt(np.maximum(stiffness.real**2 - stiffness.imag**2, 0.0))
-    return np.asarray(storage + 1j * stiffness.imag)
-
-
-def _turned(stiffness: Complex) -> Complex:
-    """The same |K|, and the phase in radians where it was read in degrees."""
-    return np.asarray(np.abs(stiffness) * np.exp(1j * _RADIAN * np.angle(stiffness)))
-
-
-def _complement(stiffness: Complex) -> Complex:
-    """The same |K|, and 90 deg less the phase."""
-    return np.asarray(1j * np.conj(stiffness))
-
-
 #: Laws that the table names: true complex stiffness by the one stated, whether it leaves room for a mistake, a motion.
 _LAWS: dict[str, Any] = {
-    "turned": _turned,
-    "complement": _complement,
+    # the phase is 90 deg less
+    "complement": lambda k: 1j * np.conj(k),
+    # the phase is in radians where it was read in degrees
+    "turned": lambda k: np.abs(k) * np.exp(1j * np.degrees(1.0) * np.angle(k)),
     "hundredth_of_loss": partial(_times_loss, 0.01),
     "hundredfold_loss": partial(_times_loss, 100.0),
     "sine": _sine,
-    "magnitude": _magnitude,
-    "storage": _storage,
-    "little_loss": _little_loss,
-    "much_loss": _much_loss,
+    # K' where |K| was stated
+    "magnitude": lambda k: k * np.abs(k) / k.real,
+    # |K| where K' was stated, beside the right K''
+    "storage": lambda k: np.sqrt(np.maximum(k.real**2 - k.imag**2, 0.0)) + 1j * k.imag,
+    # chosen: the least damping of filled rubbers have twice that
+    "little_loss": lambda k: 0.0 < _loss(k) < 0.02,
+    # chosen: the largest loss of a rubber in a bushing reaches that at no temperature of use
+    "much_loss": lambda k: _loss(k) > 1.0,
     "translation": TRANSLATION,
     "rotation": ROTATION,
 }

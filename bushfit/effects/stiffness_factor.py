@@ -6,6 +6,13 @@ The law of all that scales the response of one place; `transducer_gain` and `pre
 450000.0
 """
 
-from bushfit.effects.contract import scaled_response
+from functools import partial
 
-stiffness = force = scaled_response(lambda p, _: p["factor"])
+from bushfit.effects.contract import Setting, Value, Values, scaled_response
+
+
+def _factor(p: Values, setting: Setting) -> Value:
+    return p["factor"]
+
+
+stiffness = force = partial(scaled_response, _factor)

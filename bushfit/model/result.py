@@ -238,18 +238,23 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
         return Model.started(bushing, kept, model.values)
 
     model = moved(result.model)
-    left = ", ".join(name for name in result.model.effects if name not in model.effects)
-    said = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"
-    said += f"; left out, because they belong to {result.name} or its rig: {left}" if left else ""
     measured = result.measured
     if measured:
         of_specimens = tuple(name for name in measured.directions if name in names)
         measured = replace(measured, directions=of_specimens or (result.name,))
-    there = [name for name in result.covariance.names if name in model.values]
-    fitted = tuple(name for name in result.fitted if name in model.values)
-    covariance = result.covariance.restricted(there)
-    told = tuple(f"{result.name}: {line}" for line in result.warnings)
-    carried_there = Result(model, fitted, covariance, None, measured, told, result.inputs, specimens=result.specimens)
-    unresolved = tuple(name for name in result.unresolved if name in model.effects)
-    others = tuple(replace(each, model=moved(each.model)) for each in result.alternatives)
-    return replace(carried_there, unresolved=unresolved, model_error=result.model_error, alternatives=others), said
+    elsewhere = Result(
+        model,
+        fitted=tuple(name for name in result.fitted if name in model.values),
+        covariance=result.covariance.restricted([*model.values]),
+        measured=measured,
+        warnings=tuple(f"{result.name}: {line}" for line in result.warnings),
+        inputs=result.inputs,
+        specimens=result.specimens,
+        unresolved=tuple(name for name in result.unresolved if name in model.effects),
+        model_error=result.model_error,
+        alternatives=tuple(replace(each, model=moved(each.model)) for each in result.alternatives),
+    )
+    sentence = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"
+    if left := ", ".join(name for name in result.model.effects if name not in model.effects):
+        sentence += f"; left out, because they belong to {result.name} or its rig: {left}"
+    return elsewhere, sentence

@@ -94,11 +94,11 @@ def imposed(
     Raises:
         ModelError: an effect has no law in time.
     """
-    timeless = [effect.name for effect in model.records if effect.harmonic_only]
-    if timeless:
+    untimed = [effect.name for effect in model.records if effect.harmonic_only]
+    if untimed:
         raise ModelError(
             "the rig follows a motion through time, for which there is no law",
-            place=timeless[0],
+            place=untimed[0],
             found="a law of the steady first harmonic alone",
             expected="effects with a law in time",
             hint="ask predict for the stiffness of the steady state",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import pickle
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,6 @@ import pytest
 from random_models import ADDED, UNDER, operating_point, random_model, sized
 
 from bushfit.effects import (
-    BASE,
     LIBRARY,
     Effect,
     History,
@@ -24,6 +24,7 @@ from bushfit.effects import (
     qualified,
     twins_of,
 )
+from bushfit.effects.contract import Circumstances
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
@@ -35,6 +36,16 @@ from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
 HARMONIC_ONLY = tuple(name for name in ADDED if LIBRARY[name].harmonic_only)
 #: The reversal of dry friction falls on a sample only to the accuracy of the sampling.
 SAMPLES = 2**14
+
+
+def drawn(rng: np.random.Generator, *names: str) -> tuple[Model, Model, Direction, float, float]:
+    """A random model, the same with effects of a size that matters, and a direction, frequency and amplitude."""
+    plain = random_model(rng)
+    direction, frequency, amplitude = operating_point(plain, rng)
+    model = plain
+    for name in dict.fromkeys(names):
+        model = sized(model, name, direction, amplitude, rng)
+    return plain, model, direction, frequency, amplitude
 
 
 def beside(plain: Model, name: str) -> Model:
@@ -95,9 +106,7 @@ def test_neutral_value_gives_the_plain_model_back(effect: Effect, rng: np.random
 
 def test_first_harmonic_of_the_time_face_is_the_frequency_face(effect: Effect, rng: np.random.Generator) -> None:
     for _ in range(12):
-        plain = random_model(rng)
-        direction, frequency, amplitude = operating_point(plain, rng)
-        model = sized(plain, effect.name, direction, amplitude, rng)
+        _, model, direction, frequency, amplitude = drawn(rng, effect.name)
         assert harmonic_gap(model, direction, frequency, amplitude) <= effect.harmonic_error + 1e-6
 
 
@@ -151,9 +160,7 @@ def random_cycle(rng: np.random.Generator, amplitude: float) -> History:
 @pytest.mark.parametrize("name", [name for name in ADDED if name != "delay"])  # a late channel is not passive
 def test_passive_effects_dissipate_in_any_closed_cycle(name: str, rng: np.random.Generator) -> None:
     for _ in range(15):
-        plain = random_model(rng)
-        direction, frequency, amplitude = operating_point(plain, rng)
-        model = sized(plain, name, direction, amplitude, rng)
+        _, model, direction, frequency, amplitude = drawn(rng, name)
         if not isinstance(LIBRARY[name], Modifier):
             model = model.with_values({key: 0.0 for key in ("m", "sigma_fmax") if key in model.values})
         history = random_cycle(rng, amplitude)
@@ -176,9 +183,7 @@ def five_point(model: Model, key: str, respond: object, relative: float = 2e-3) 
 
 
 def test_sensitivities_match_finite_differences(effect: Effect, rng: np.random.Generator) -> None:
-    plain = random_model(rng)
-    direction, _, amplitude = operating_point(plain, rng)
-    model = sized(plain, effect.name, direction, amplitude, rng)
+    _, model, direction, _, amplitude = drawn(rng, effect.name)
     names = list(model.parameters)
     frequency = np.array([5.0, 60.0, 155.0])
     amplitudes = amplitude * np.array([0.91, 1.07, 2.1])
@@ -237,9 +242,7 @@ def test_any_two_compose(effect: Effect, rng: np.random.Generator) -> None:
     for other in ADDED:
         if other == effect.name:
             continue
-        plain = random_model(rng)
-        direction, frequency, amplitude = operating_point(plain, rng)
-        model = sized(plain, effect.name, direction, amplitude, rng)
+        plain, model, direction, frequency, amplitude = drawn(rng, effect.name)
         both = sized(model, other, direction, amplitude, rng)
         turned = plain.with_effect(other).with_effect(effect.name).with_values(both.values)
         at = (direction, frequency, amplitude)
@@ -251,13 +254,10 @@ def test_any_two_compose(effect: Effect, rng: np.random.Generator) -> None:
 
 def test_any_three_compose(rng: np.random.Generator) -> None:
     for _ in range(60):
-        model = random_model(rng)
-        direction, frequency, amplitude = operating_point(model, rng)
-        chosen = rng.choice(ADDED, size=3, replace=False)
+        chosen = [str(name) for name in rng.choice(ADDED, size=3, replace=False)]
         if sum(name.startswith("rig_compliance") for name in chosen) > 1:
             continue  # a compliance within another takes its rounds in every round
-        for name in chosen:
-            model = sized(model, str(name), direction, amplitude, rng)
+        _, model, direction, frequency, amplitude = drawn(rng, *chosen)
         gap = harmonic_gap(model, direction, frequency, amplitude)
         assert gap <= 2.0 * harmonic_error(model) + 1e-6, (model.effects, gap)
 
@@ -274,10 +274,51 @@ def test_a_model_survives_files_and_processes(effect: Effect, rng: np.random.Gen
         assert np.array_equal(copy.stiffness("axial", 50.0, 1e-4), model.stiffness("axial", 50.0, 1e-4))
 
 
-def test_prediction_leaves_the_instrument_out(rng: np.random.Generator) -> None:
-    model = random_model(rng)
-    added = [name for name in ADDED if not LIBRARY[name].replaces]
-    for name in added:
-        model = sized(model, name, Direction.AXIAL, 2e-4, rng)
-    kept = {effect.name for effect in model.without(Level.INSTRUMENT).records}
-    assert kept == {name for name in (*BASE, *added) if LIBRARY[name].level is not Level.INSTRUMENT}
+def stacked(models: list[Model]) -> Mapping[str, np.ndarray]:
+    return {name: np.array([[model.values[name]] for model in models]) for name in models[0].parameters}
+
+
+@pytest.mark.parametrize("others", [(), ("loop_clock",)], ids=["alone", "in another time each"])
+def test_a_stack_of_values_equals_one_after_the_other(
+    effect: Effect, others: tuple[str, ...], rng: np.random.Generator
+) -> None:
+    _, model, direction, _, amplitude = drawn(rng, effect.name, *others)
+    models = [
+        model.with_values({name: value * rng.uniform(0.9, 1.1) for name, value in model.values.items()})
+        for _ in range(3)
+    ]
+    frequency, amplitudes = np.array([0.1, 40.0, 155.0, 155.0]), amplitude * np.array([1.0, 0.5, 1.5, 0.0])
+    turns = np.linspace(0.0, 1.0, 4)
+    each_point = Circumstances(295.0 + turns, turns, 0.1 * turns, 0.1 * turns, 0.1 - 0.1 * turns)
+    both = model.stiffness(direction, frequency, amplitudes, kind="loop", values=stacked(models), under=each_point)
+    assert both.shape == (3, 4)
+    for row, each in zip(both, models, strict=True):
+        for i, one in enumerate(row):
+            under = each_point.at(i)
+            alone = each.stiffness(direction, frequency[i], amplitudes[i], kind="loop", under=under)
+            np.testing.assert_allclose(one, alone, rtol=1e-12)
+    phase = np.arange(600) / 200
+    motion = amplitude * np.sin(2.0 * np.pi * phase)
+    for history in (
+        History.steady(motion, 5.0, cycles=3),
+        History(motion, 1e-3, periodic=False, frequency=5.0),
+    ):
+        answer = model.force(direction, history, kind="loop", values=stacked(models), under=UNDER)
+        both = np.broadcast_to(answer, (3, 600))
+        for row, each in zip(both, models, strict=True):
+            expected = each.force(direction, history, kind="loop", under=UNDER)
+            np.testing.assert_allclose(row, expected, rtol=1e-10, atol=1e-10 * np.ptp(expected))
+
+
+@pytest.mark.parametrize("other", ["clearance", "force_saturation", "rig_compliance"])
+def test_a_stack_of_its_amount_alone_does_so_in_sweeps(effect: Effect, other: str, rng: np.random.Generator) -> None:
+    """What bends the waveform asks whole cycles, in which the amount may act where it does not in the stiffness."""
+    _, model, direction, _, amplitude = drawn(rng, effect.name, other)
+    amount = qualified(effect, effect.amount)
+    amounts = model.values[amount] * np.array([0.9, 1.0, 1.1])
+    frequency, amplitudes = np.array([0.1, 40.0, 155.0, 155.0]), amplitude * np.array([1.0, 0.5, 1.5, 0.0])
+    at = (direction, frequency, amplitudes)
+    both = model.stiffness(*at, values={**model.values, amount: amounts[:, None]}, under=UNDER)
+    for row, each in zip(np.broadcast_to(both, (3, 4)), amounts, strict=True):
+        alone = model.with_values({amount: float(each)}).stiffness(*at, under=UNDER)
+        np.testing.assert_allclose(row, alone, rtol=1e-10)

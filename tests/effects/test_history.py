@@ -11,27 +11,11 @@ COUNT, FREQUENCY = 1024, 2.0
 PHASE = 2.0 * np.pi * np.arange(COUNT) / COUNT
 
 
-def test_a_steady_cycle_knows_its_clock() -> None:
-    history = History.steady(np.sin(PHASE), FREQUENCY)
-    assert history.step == pytest.approx(1.0 / (FREQUENCY * COUNT))
-    assert history.omega == pytest.approx(4.0 * np.pi)
-    assert history.cycles == 1
-    assert History.steady(np.sin(3.0 * PHASE), FREQUENCY, cycles=3).cycles == 3
-    assert history.amplitude == pytest.approx(1.0, rel=1e-4)
-
-
 def test_derivatives_are_those_of_the_motion() -> None:
     history = History.steady(np.sin(PHASE), FREQUENCY)
     np.testing.assert_allclose(history.rate, history.omega * np.cos(PHASE), atol=1e-4 * history.omega)
     from_rest = History(np.sin(PHASE), history.step, periodic=False, frequency=FREQUENCY)
     np.testing.assert_allclose(from_rest.acceleration[2:-2], -(history.omega**2) * np.sin(PHASE)[2:-2], atol=0.01)
-
-
-def test_the_spectrum_holds_each_harmonic_at_its_frequency() -> None:
-    history = History.steady(2.0 * np.sin(PHASE) + 0.5 * np.cos(3.0 * PHASE), FREQUENCY)
-    size = np.abs(history.spectrum) / (COUNT / 2)
-    np.testing.assert_allclose(size[[1, 3]], [2.0, 0.5], atol=1e-12)
-    np.testing.assert_allclose(history.harmonics[[1, 3]], [4.0 * np.pi, 12.0 * np.pi])
 
 
 def test_a_sine_turns_at_its_top_and_bottom_wherever_it_begins() -> None:

@@ -8,11 +8,10 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from bushfit.effects import BASE, LIBRARY, Effect, History, qualified, sliders, springpot
 from bushfit.effects.contract import Circumstances
-from bushfit.effects.dead_zone import dead_zone, first_harmonic
+from bushfit.effects.dead_zone import first_harmonic
 from bushfit.effects.maxwell import relax
 from bushfit.effects.temperature import log_shift
 from bushfit.geometry import Bushing, Direction
@@ -137,15 +136,6 @@ def test_the_amplitude_at_the_bushing_closes_the_circle() -> None:
     np.testing.assert_allclose(seen, bushing / (1.0 + 1e-7 * bushing), rtol=1e-13)
 
 
-def test_mullins_softening_fades_over_the_cycles() -> None:
-    model = added("mullins_softening", share=0.2)
-    history = History.steady(1e-3 * np.sin(2.0 * np.pi * np.arange(4 * 256) / 256), 0.1, cycles=4)
-    extra = (model.force("axial", history) - PLAIN.force("axial", history)).reshape(4, 256)
-    peaks = extra.max(axis=1)
-    np.testing.assert_allclose(peaks[1:] / peaks[:-1], np.exp(-1.0), rtol=1e-10)
-    assert np.sum(extra * np.diff(history.value, append=0.0).reshape(4, 256)) > 0.0
-
-
 def test_heating_counts_the_loss_of_the_unheated_bushing() -> None:
     at = ("axial", 100.0, 1e-3)
     cold = PLAIN.stiffness(*at)
@@ -160,12 +150,6 @@ def test_instrument_masses_springs_and_offsets_do_not_act_in_torsion() -> None:
     at = (Direction.TORSION, FREQUENCY, AMPLITUDE)
     assert np.array_equal(model.stiffness(*at), PLAIN.stiffness(*at))
     assert np.array_equal(model.force(Direction.TORSION, LOOP), PLAIN.force(Direction.TORSION, LOOP))
-
-
-def test_force_gain_tells_loops_from_sweeps() -> None:
-    model = added("force_gain", gain=0.02)
-    assert np.array_equal(model.force("axial", LOOP, kind="sweep"), PLAIN.force("axial", LOOP))
-    np.testing.assert_allclose(model.force("axial", LOOP, kind="loop"), 1.02 * PLAIN.force("axial", LOOP), rtol=1e-15)
 
 
 @pytest.mark.parametrize("effect", [effect for effect in LIBRARY.values() if effect.corrects], ids=lambda one: one.name)
@@ -208,12 +192,6 @@ def test_describing_function_against_sixty_digits(ratio: float) -> None:
         r = mpmath.mpf(ratio)
         exact = 1 - 2 / mpmath.pi * (mpmath.asin(r) + r * mpmath.sqrt(1 - r * r))
         assert abs(float(first_harmonic(np.array(1.0), ratio)) / float(exact) - 1.0) < 1e-13
-
-
-@pytest.mark.parametrize("ratio", [0.0, 0.3, 0.8])
-def test_describing_function_against_quadrature(ratio: float) -> None:
-    value, _ = quad(lambda t: float(dead_zone(np.cos(t), ratio)) * np.cos(t), 0.0, np.pi, points=[np.arccos(ratio)])
-    assert abs(2.0 / np.pi * value - float(first_harmonic(np.array(1.0), ratio))) < 1e-9
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 1e-9, 0.99e-4, 1e-4])

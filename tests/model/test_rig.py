@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from bushfit.effects import History
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
@@ -81,21 +80,3 @@ def test_a_triangle_is_not_a_sine(paper_model: Model) -> None:
     assert triangle.force.max() == pytest.approx(sine.force.max(), rel=1e-2)
     middle = np.argmin(np.abs(sine.displacement - 5e-4))
     assert abs(triangle.displacement[middle] - 5e-4) > 5e-5
-
-
-def test_any_history_has_memory(paper_model: Model) -> None:
-    """A smaller motion inside a larger one does not return to where it left: the springpot and friction remember."""
-    step = 1e-2
-    out = np.concatenate([np.linspace(0.0, 1e-3, 200), np.linspace(1e-3, 5e-4, 100), np.linspace(5e-4, 1e-3, 100)])
-    force = paper_model.force("axial", History(out, step, periodic=False, frequency=0.1))
-    assert force[199] != pytest.approx(force[-1], rel=1e-6)
-    shorter = paper_model.force("axial", History(out[:250], step, periodic=False, frequency=0.1))
-    np.testing.assert_allclose(force[:250], shorter, rtol=1e-9, atol=1e-9)  # causal
-
-
-def test_dynamic_stiffness_measures_points_one_by_one(paper_model: Model) -> None:
-    frequency, amplitude = np.array([5.0, 155.0]), np.array([1e-4, 5e-4])
-    found = rig.dynamic_stiffness(paper_model, Direction.AXIAL, frequency, amplitude)
-    gap = np.abs(found / paper_model.stiffness("axial", frequency, amplitude) - 1.0).max()
-    print(f"dynamic_stiffness with its defaults: {gap:.1e} from the closed form")
-    assert gap < 5e-4
