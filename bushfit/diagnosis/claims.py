@@ -17,8 +17,7 @@ from bushfit.effects.mistake import Mistake, shown
 from bushfit.effects.mistakes import MISTAKES, SEPARATOR, labelled, mistake_named
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_set import DataSet
-from bushfit.fitting.data_sets import SweepData, loop_data, with_gain_errors
+from bushfit.fitting.data_sets import DataSet, SweepData, loop_data, with_gain_errors
 from bushfit.geometry import Bushing, Place
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep

@@ -97,7 +97,7 @@ def weighed(fitted: Evidence, rig: RigSettings) -> tuple[Evidence, Ledger]:
 
 def _refitted(evidence: Evidence, held: Sequence[str], bounds: Bounds) -> Evidence:
     """The model fitted to each sweep and to the first harmonic of each loop, to the end."""
-    data_sets = tuple(data_set.timeless() for data_set in evidence.data_sets)
+    data_sets = tuple(data_set.fundamental() for data_set in evidence.data_sets)
     return Evidence(fit_from(evidence.model, data_sets, held, bounds).finished(_EVALUATIONS).solution, data_sets)
 
 

@@ -11,8 +11,7 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.agreement import met_within, misfits, usable
 from bushfit.fitting.assess import Stage, apart_in_temperature, covariance, measured_range, quality
 from bushfit.fitting.coordinates import Bounds, Solution
-from bushfit.fitting.data_set import DataSet
-from bushfit.fitting.data_sets import sources
+from bushfit.fitting.data_sets import DataSet, sources
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import told_of, with_model_error
 from bushfit.fitting.procedures import cautions

@@ -49,7 +49,7 @@ class Part:
     def rest(self, data_sets: Sequence[DataSet]) -> list[DataSet]:
         """The tests without it, with the same noise."""
         left = [(data, of) for data, of in zip(data_sets, self.points, strict=True) if not of.all()]
-        return [data.without(np.flatnonzero(of)).standing() if of.any() else data for data, of in left]
+        return [data.without(np.flatnonzero(of)).with_weight() if of.any() else data for data, of in left]
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,7 @@ def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
     """Fit the model as it came, with the effects that the user adopts; the rig's errors are part of every explanation,
     so a loop's gain weighs, whether its class is stated or assumed."""
     hint = "add measured tests to the campaign"
-    data_sets = data.some([*data.loops, *data.sweeps], "there is nothing to diagnose", hint)
+    data_sets = data.some(data.data_sets, "there is nothing to diagnose", hint)
     held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
     start = data.start(data_sets, {})
     model = model or data.started(data.effects, data_sets, {})
@@ -127,6 +127,6 @@ def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
         names = [name for name in model.parameters if name not in held]
         robust = estimate(model, data_sets, names, data.bounds, robust=True)
         outliers, data_sets = robust.outliers, robust.data_sets
-    data_sets = [data_set.standing() for data_set in with_gains(data_sets, weigh=True)]
+    data_sets = [data_set.with_weight() for data_set in with_gains(data_sets, weigh=True)]
     descent = fit_from(model, data_sets, held, data.bounds).finished(EVALUATIONS)
     return _Begun(Evidence(descent.solution, tuple(data_sets)), start, held, outliers)

@@ -136,7 +136,7 @@ def is_far(step: Array) -> bool:
 def misfits(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Misfit, ...]:
     """How well a model meets each test, and each run of those that have several; `left` are tests not fitted."""
     pairs = [(data_set, True) for data_set in fitted] + [(data_set, False) for data_set in left]
-    return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.standing(), was_fitted=was))
+    return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.with_weight(), was_fitted=was))
 
 
 def _misfits(model: Model, data_set: DataSet, *, was_fitted: bool) -> Iterator[Misfit]:

@@ -26,7 +26,7 @@ from bushfit.reading.measurement import Sweep
 #: Difference of two amplitudes relative to their size up to which they are the same level.
 _SAME_LEVEL = 1e-3
 
-_Kind = TypeVar("_Kind", LoopData, SweepData, DataSet)
+_Kind = TypeVar("_Kind", LoopData, SweepData, LoopData | SweepData)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +57,19 @@ class Data:
 
     def in_session(self) -> "Data":
         """The same data, each point with what it was measured under."""
-        tests = [data_set.test for data_set in (*self.loops, *self.sweeps)]
-        under = iter(measured_session(self.campaign.bushing, tests))
+        under = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
         loops = tuple(replace(loop, under=next(under).at(0)) for loop in self.loops)
         return replace(self, loops=loops, sweeps=tuple(replace(sweep, under=next(under)) for sweep in self.sweeps))
 
     @property
+    def data_sets(self) -> list[DataSet]:
+        """All tests, loops first."""
+        return [*self.loops, *self.sweeps]
+
+    @property
     def notes(self) -> list[str]:
         """What is odd about the tests themselves, whatever is fitted to them."""
-        return [f"{test.name}: {note}" for test in (*self.loops, *self.sweeps) for note in test.notes]
+        return [f"{test.name}: {note}" for test in self.data_sets for note in test.notes]
 
     @property
     def assumed(self) -> list[str]:
@@ -156,7 +160,7 @@ class Data:
             ModelError: a name that is neither a direction nor a specimen of the campaign.
         """
         hint = "add measured tests, or make some with bushfit simulate"
-        data_sets = self.some([*self.loops, *self.sweeps], "there is nothing to fit", hint)
+        data_sets = self.some(self.data_sets, "there is nothing to fit", hint)
         if places is None:
             return [*_compound(self.loops), *_compound(self.sweeps)]
         with naming(self.campaign.path):

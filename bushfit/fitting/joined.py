@@ -8,7 +8,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.common_error import CommonError
-from bushfit.fitting.data_set import DataSet
+from bushfit.fitting.data_sets import DataSet
 
 
 @dataclass(frozen=True, eq=False)

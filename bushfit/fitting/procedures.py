@@ -87,7 +87,7 @@ def fit_joint(
         if effect.corrects:
             place_named(effect.corrects, data.campaign.specimens)
     data_sets = data.chosen(directions)
-    left: list[DataSet] = [data_set for data_set in (*data.loops, *data.sweeps) if data_set not in data_sets]
+    left = [data_set for data_set in data.data_sets if data_set not in data_sets]
     effects = data.effects if effects is None else effects
     found = _solve(data, data_sets, effects, {})
     most = largest_error(data.campaign.rig)

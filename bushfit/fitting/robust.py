@@ -16,7 +16,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import Bounds, Solution
-from bushfit.fitting.data_set import DataSet
+from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.outliers import misfit_scale
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model

@@ -9,7 +9,7 @@ import numpy as np
 
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
-from bushfit.fitting.data_set import DataSet, keep, kept, shown_amplitude
+from bushfit.fitting.data_set import MeasuredTest, keep, kept, shown_amplitude
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import outlying_points, unlike
 from bushfit.fitting.repeats import FLOOR, unit
@@ -72,8 +72,10 @@ _DIGITS = 9
 
 
 @dataclass(frozen=True, eq=False)
-class SweepData(DataSet):
-    """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor; see `DataSet`.
+class SweepData(MeasuredTest):
+    """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor.
+
+    What has no explanation here answers as in `LoopData`.
 
     Points stand sorted by run (what it holds, repeat), then step; a run is a block. The residual
     ln K/K_meas has the gain error in its real and the phase error in its imaginary part.
@@ -90,7 +92,7 @@ class SweepData(DataSet):
     weight: Array | None = None
     part: Array | None = None
     under: Circumstances = UNKNOWN
-    beside: str | None = None
+    contradiction: str | None = None
     kind = "sweep"
     components = ("storage", "loss")
 
@@ -110,8 +112,9 @@ class SweepData(DataSet):
             * (len(rows) > _MOST_LISTED)
             for share, *_ in apart[:1]
         ]
+        recorded = self.source.notes if self.source else ()
         beyond = (words for name, words in self.noise.beyond.items() if name == self.name)
-        return [*super().notes, *told, *filter(None, [self.beside, self._rounded]), *beyond]
+        return [*recorded, *told, *filter(None, [self.contradiction, self._rounded]), *beyond]
 
     @property
     def _rounded(self) -> str | None:
@@ -139,6 +142,10 @@ class SweepData(DataSet):
         return 2 * int(np.count_nonzero(self.weights))
 
     @property
+    def independent(self) -> float:
+        return float(self.counted)
+
+    @property
     def relative_noise(self) -> float:
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
@@ -146,9 +153,12 @@ class SweepData(DataSet):
         """The part of the sweep at some of its levels, with the same noise."""
         return self._part(np.isin(self.amplitude, amplitudes))
 
-    def standing(self) -> Self:
-        standing = self.weights > 0.0
-        return self if standing.all() else self._part(standing)
+    def with_weight(self) -> Self:
+        counted = self.weights > 0.0
+        return self if counted.all() else self._part(counted)
+
+    def fundamental(self) -> Self:
+        return self
 
     def _part(self, chosen: Array) -> Self:
         return replace(self, weight=self.weights[chosen], part=self.order[chosen])
@@ -238,12 +248,15 @@ class SweepData(DataSet):
         return np.stack((off.real, off.imag))
 
     def distance(self, model: Model) -> Array:
-        """As of `DataSet`, less what its block shares; of gain and phase the root mean square."""
+        """Less what its block shares; of gain and phase the root mean square."""
         return self.apart(self.deviation(model)) / np.sqrt(2.0)
 
     def apart(self, deviation: Array, *, shared: bool = True) -> Array:
         """Length of deviations, (n,), in units of the random noise, less the likeliest error that a block shares."""
         return np.hypot(*self._whitening.own(deviation, shared=shared))
+
+    def misfit(self, model: Model) -> Array:
+        return self.residual(model)
 
     def shown(self, model: Model) -> Array:
         deviation = self.deviation(model)

@@ -48,11 +48,11 @@ def test_only_tests_of_the_same_points_contradict_one_another(measured: Data) ->
     loop = measured.loops[0].test
     hot = replace(loop, name="hot", force=1.15 * loop.force, temperature=313.15)
     for tests in ([low, high], [cold, warm]):
-        assert [one.beside for one in sweep_data(tests)] == [None, None]
-    assert [one.beside for one in loop_data([replace(loop, temperature=296.15), hot])] == [None, None]
+        assert [one.contradiction for one in sweep_data(tests)] == [None, None]
+    assert [one.contradiction for one in loop_data([replace(loop, temperature=296.15), hot])] == [None, None]
     for _, one in (sweep_data([sweep, other]), loop_data([loop, replace(hot, temperature=None)])):
-        assert one.beside is not None
-        assert re.search(r"lies 1[5-7] % apart", one.beside)
+        assert one.contradiction is not None
+        assert re.search(r"lies 1[5-7] % apart", one.contradiction)
 
 
 def test_axial_tests_are_used_unless_told(measured: Data) -> None:
