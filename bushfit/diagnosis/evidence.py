@@ -13,7 +13,7 @@ from bushfit.fitting.assess import Stage, apart_in_temperature, covariance, meas
 from bushfit.fitting.coordinates import Bounds, Solution
 from bushfit.fitting.data_sets import DataSet, sources
 from bushfit.fitting.design import fit_from
-from bushfit.fitting.model_error import told_of, with_model_error
+from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.robust import Estimate
 from bushfit.model.model import Model
@@ -123,7 +123,7 @@ def result_of(evidence: Evidence, bounds: Bounds, told: Collection[str], *, lack
         measured_range(model, tests),
         (
             *([_BENT_BY_THE_GAP] if corrected else []),
-            *([told_of(error)] if error else []),
+            *([model_error_warning(error)] if error else []),
             *apart_in_temperature(model, tests),
             *cautions(model, solution, found.data_sets, bounds, cov),
         ),

@@ -21,7 +21,7 @@ from bushfit.effects.mistakes import candidate_named, mistake_named
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import parted, with_gains
 from bushfit.fitting.design import fit_from
-from bushfit.fitting.robust import estimate, outliers_at, told
+from bushfit.fitting.robust import estimate, outlier_warnings, outliers_at
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
@@ -68,7 +68,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     found = Told(search, judged(hypotheses, settings.tolerance), hypotheses, settings.unresolved).diagnosis()
     fewer += _left_out_of_fewer(whole, data, begun.outliers)
     of_loops = outliers_at(found.result.model, data.loops)
-    outliers = (*told(of_loops, robust=data.robust), *told(left, robust=True))
+    outliers = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(left, robust=True))
     notes = (*said, *fewer, *found.notes, *data.assumed, *outliers)
     warnings = (*said, *found.result.warnings, *outliers)
     result = replace(found.result, outliers=(*of_loops, *left), warnings=warnings, specimens=data.campaign.specimens)

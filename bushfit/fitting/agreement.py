@@ -11,11 +11,10 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Solution, jacobian, residual
-from bushfit.fitting.data_sets import DataSet, SweepData
+from bushfit.fitting.data_sets import DataSet, SweepData, log_slopes, rows_of
 from bushfit.fitting.joined import Joined
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Usable
-from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import loss_factor
 
 #: A part without which some parameter's variance would grow by more than this factor is not held out: what is left does
@@ -167,20 +166,20 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     The tests have the weights at which the solution is the least sum of squares; `left` are others.
     """
     free = solution.moving
-    whole, begin = _left_out(solution, data_sets, free), 0
-    found: dict[str, list[_Off]] = {}
-    for data_set in data_sets:
-        modelled, slopes = data_set.noise_free(solution.model).measured, _slopes(solution, data_set)[free]
+    whole, found = _left_out(solution, data_sets, free), dict[str, list[_Off]]()
+    per_coordinate = solution.coordinates.slopes(solution.model.values)[:, None]
+    for data_set, rows in zip(data_sets, rows_of(data_sets), strict=True):
+        modelled = data_set.noise_free(solution.model).measured
+        slopes = (log_slopes(solution.model, data_set, solution.coordinates.names) * per_coordinate)[free]
         for run in _runs(data_set):
             points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
-            step = whole.step(begin + np.flatnonzero(points), len(free))
+            step = whole.step(rows.start + np.flatnonzero(points), len(free))
             if step is not None and is_far(step):
                 step = None
             moved = modelled if step is None else modelled * np.exp(step @ slopes)
             counted = run.points & (data_set.weights > 0.0 if isinstance(data_set, SweepData) else True)
             off = _off(moved[counted], data_set.measured[counted])
             found.setdefault(str(data_set.direction), []).append((off, step is not None))
-        begin += data_set.size
     _add(found, solution.model, left, held_out=True)
     return tuple(_usable(place, parts) for place, parts in found.items())
 
@@ -224,14 +223,6 @@ def _usable(place: str, parts: Sequence[_Off]) -> Usable:
 def _off(modelled: Array, measured: Array) -> Array:
     """Relative difference of |K|, and difference of the loss factor, without sign, (2, n)."""
     return np.abs([np.abs(modelled / measured) - 1.0, loss_factor(modelled) - loss_factor(measured)])
-
-
-def _slopes(solution: Solution, data_set: DataSet) -> Array:
-    """Derivatives of ln K by coordinate at the operating points, (k, n)."""
-    model, names = solution.model, solution.coordinates.names
-    test = data_set.direction, data_set.frequency, data_set.amplitude
-    stiffness, slopes = stiffness_and_slopes(model, *test, names, data_set.kind, data_set.circumstances)
-    return slopes / stiffness * solution.coordinates.slopes(model.values)[:, None]
 
 
 def _runs(data_set: DataSet) -> Iterator[_Run]:

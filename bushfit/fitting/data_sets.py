@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import accumulate, pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -11,11 +12,12 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.drive import Drive, drive_of
 from bushfit.fitting.loop_data import LoopData
 from bushfit.fitting.noise import SweepNoise, sweep_noise
-from bushfit.fitting.outliers import unlike
+from bushfit.fitting.outliers import contradictions
 from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.sweep_data import SweepData
-from bushfit.geometry import Place, Specimen
+from bushfit.geometry import Bushing, Place, Specimen, unit_strain
 from bushfit.model.model import Model
+from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.units import number
 
@@ -105,7 +107,7 @@ def with_contradictions(found: Sequence[_Kind], at: Sequence[Array]) -> list[_Ki
     points = np.stack([*at, _sessions(np.hstack([one.temperature for one in found]))])
     stiffness = np.concatenate([one.measured for one in found])
     marked = list(found)
-    for apart, one, other in reversed(unlike(stiffness, np.unique(points, axis=1, return_inverse=True)[1])):
+    for apart, one, other in reversed(contradictions(stiffness, np.unique(points, axis=1, return_inverse=True)[1])):
         first, later = sorted((int(owner[one]), int(owner[other])))
         if first != later:  # a file that contradicts itself tells so
             said = f"it repeats {found[first].name}, and their stiffness lies {number(100.0 * apart, 2)} % apart"
@@ -134,6 +136,26 @@ def parted(data_sets: Iterable[DataSet]) -> tuple[list[LoopData], list[SweepData
     every = list(data_sets)
     loops = [data_set for data_set in every if isinstance(data_set, LoopData)]
     return loops, [data_set for data_set in every if isinstance(data_set, SweepData)]
+
+
+def rows_of(data_sets: Iterable[DataSet]) -> list[slice]:
+    """Where the residuals of each data set stand among those of all."""
+    ends = accumulate((data_set.size for data_set in data_sets), initial=0)
+    return [slice(*pair) for pair in pairwise(ends)]
+
+
+def reached(bushing: Bushing | None, data_sets: Iterable[DataSet]) -> tuple[Array, Array]:
+    """Frequencies [Hz] and equivalent strains of all operating points, loops included, (n,) each."""
+    every = list(data_sets)
+    strains = [data_set.amplitude * unit_strain(bushing, data_set.direction) for data_set in every]
+    return np.concatenate([data_set.frequency for data_set in every]), np.concatenate(strains)
+
+
+def log_slopes(model: Model, data_set: DataSet, names: Sequence[str]) -> Array:
+    """Derivatives of ln K of a model at the operating points of a test by parameter, complex (len(names), n)."""
+    test = data_set.direction, data_set.frequency, data_set.amplitude
+    stiffness, slopes = stiffness_and_slopes(model, *test, names, data_set.kind, data_set.circumstances)
+    return slopes / stiffness
 
 
 def sources(data_sets: Iterable[DataSet]) -> tuple[Source, ...]:

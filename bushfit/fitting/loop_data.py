@@ -263,7 +263,7 @@ class LoopData(MeasuredTest):
 
     def _whitened(self, rows: Array) -> Array:
         """Rows in units of noise, (..., n), as independent numbers, 0 where one is told from a row left out."""
-        return self._less_common(self._counted(self.drive.row_noise.whiten(rows) * self._told))
+        return self._less_common(self._counted(self.drive.row_noise.whiten(rows) * self._counting))
 
     def _less_common(self, white: Array) -> Array:
         """Whitened rows, (..., n), whitened by the errors that all of them share as well."""
@@ -282,7 +282,7 @@ class LoopData(MeasuredTest):
             beyond = slice(3, len(self._waves))  # the first harmonic is part of the error of the stiffness
             order = np.repeat(np.arange(2, _SMOOTH_HARMONICS + 1), 2)[:, None]
             waves = self._waves[beyond] * self._per_noise * (self.shape_error * self.drive.half_range / order)
-            columns += list(self.drive.row_noise.whiten(waves) * self._told)
+            columns += list(self.drive.row_noise.whiten(waves) * self._counting)
         return CommonError.of_all(np.array(columns)) if columns else None
 
     def _counted(self, white: Array) -> Array:
@@ -305,23 +305,23 @@ class LoopData(MeasuredTest):
         """
         waves, counted = self._waves.T, self.weights > 0.0
         smooth = waves @ np.linalg.lstsq(waves[counted], self.drive.force[counted], rcond=None)[0]
-        rows = self.drive.row_noise.whiten(smooth * self._per_noise) * self._told
+        rows = self.drive.row_noise.whiten(smooth * self._per_noise) * self._counting
         return self._counted(rows)
 
     @cached_property
     def _fundamental(self) -> Array:
         """Orthonormal basis of the residuals that a first harmonic makes, (n, 2)."""
-        waves = self.drive.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._told
+        waves = self.drive.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._counting
         return np.linalg.qr(waves.T)[0]
 
     @cached_property
     def _rows(self) -> int:
         """Rows that carry weight, as far as they tell one from another."""
-        return round(self.drive.row_noise.share * np.count_nonzero(self._told))
+        return round(self.drive.row_noise.share * np.count_nonzero(self._counting))
 
     @cached_property
-    def _told(self) -> Array:
-        return self.drive.row_noise.told(self.drive.weight)
+    def _counting(self) -> Array:
+        return self.drive.row_noise.counting(self.drive.weight)
 
     @cached_property
     def _per_noise(self) -> Array:

@@ -13,7 +13,7 @@ from scipy.special import chdtrc, fdtrc
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.repeats import FEWEST_SOUGHT, FLOOR, LineNoise, at_nominal, disturbed, free_of, told_by_line
+from bushfit.fitting.repeats import FEWEST_SOUGHT, FLOOR, LineNoise, at_nominal, disturbed, free_of, line_noise
 from bushfit.fitting.rig_class import class_words, largest_error, of_class, words_of
 from bushfit.reading.measurement import Sweep
 
@@ -100,16 +100,16 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     """
     at_levels = [(sweep, at_nominal(sweep)) for sweep in sweeps]
 
-    def told(without: Collection[float]) -> dict[LineKey, LineNoise]:
+    def of_lines(without: Collection[float]) -> dict[LineKey, LineNoise]:
         return {
-            (sweep.name, float(held)): told_by_line(sweep, log_stiffness, held, without)
+            (sweep.name, float(held)): line_noise(sweep, log_stiffness, held, without)
             for sweep, log_stiffness in at_levels
             for held in np.unique(sweep.held)
         }
 
-    lines = told(())
+    lines = of_lines(())
     if apart := disturbed(lines.values()):
-        lines = told(apart)
+        lines = of_lines(apart)
     slopes = _slopes(sweeps, lines)
     for key, line in lines.items():
         if key[0] in slopes and line.steps.size:

@@ -153,7 +153,7 @@ def outlying_points(
     )
 
 
-def unlike(stiffness: Array, place: Array) -> list[tuple[float, int, int]]:
+def contradictions(stiffness: Array, place: Array) -> list[tuple[float, int, int]]:
     """The two points of each place, (n,), that lie farthest apart in |K| or in phase, the worst first: how far, as a
     share of |K|, from _UNLIKE on, and their numbers. Points of one `place` repeat each other."""
     value, ends, found = np.log(stiffness), np.cumsum(np.bincount(place)), dict[int, tuple[float, int, int]]()

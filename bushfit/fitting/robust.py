@@ -112,7 +112,7 @@ def _efficiency(parts: int) -> float:
     return float(slope**2 * parts / (density @ (weight * z) ** 2))
 
 
-def told(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
+def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
     """A sentence on the outliers that the fit follows and one on those left out, the first of each test by row.
 
     A displacement that is an outlier is never followed, see `drive`.

@@ -13,8 +13,8 @@ from bushfit.effects.contract import Array
 from bushfit.effects.friction import harmonic_shape
 from bushfit.errors import FitError
 from bushfit.fitting.assess import implausible
-from bushfit.fitting.data_sets import DataSet
-from bushfit.geometry import Bushing, stiffness_per_modulus, unit_strain
+from bushfit.fitting.data_sets import DataSet, reached
+from bushfit.geometry import Bushing, stiffness_per_modulus
 
 #: Strain amplitude of the largest test over eps_half, before anything is known; chosen: the fit finds the rest.
 _SCALED_STRAIN = 3.0
@@ -55,7 +55,8 @@ def start_values(bushing: Bushing | None, data_sets: Sequence[DataSet], known: M
         - mu from the slope (secant of a loop's fundamental) of the slowest test, less what friction adds;
         - alpha from the slope of ln K'' over ln f, m from the growth of K' over ln f.
     """
-    strain, frequency, modulus = _points(bushing, data_sets)
+    frequency, strain = reached(bushing, data_sets)
+    modulus = np.concatenate([each.measured / stiffness_per_modulus(bushing, each.direction) for each in data_sets])
     slow = frequency <= _SLOW * frequency.min()
     largest = int(np.argmax(np.where(slow, strain, 0.0)))
     eps_half = known.get("eps_half", float(strain.max()) / _SCALED_STRAIN)
@@ -95,12 +96,3 @@ def _slope(x: Array, y: Array) -> float:
     """Slope of the straight line through points, (n,) each."""
     apart = x - x.mean()
     return float(apart @ y / (apart @ apart))
-
-
-def _points(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Array]:
-    """Strain amplitude, frequency [Hz] and complex modulus [Pa] of every operating point, loops included, (n,) each."""
-    return (
-        np.concatenate([each.amplitude * unit_strain(bushing, each.direction) for each in data_sets]),
-        np.concatenate([each.frequency for each in data_sets]),
-        np.concatenate([each.measured / stiffness_per_modulus(bushing, each.direction) for each in data_sets]),
-    )

@@ -11,7 +11,7 @@ from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.fitting.data_set import MeasuredTest, keep, kept, shown_amplitude
 from bushfit.fitting.noise import SweepNoise
-from bushfit.fitting.outliers import outlying_points, unlike
+from bushfit.fitting.outliers import contradictions, outlying_points
 from bushfit.fitting.repeats import FLOOR, unit
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
@@ -103,7 +103,7 @@ class SweepData(MeasuredTest):
     @cached_property
     def notes(self) -> list[str]:
         place = np.unique([self.frequency, self.amplitude], axis=1, return_inverse=True)[1]
-        apart = unlike(self.measured, place)
+        apart = contradictions(self.measured, place)
         rows = [f"{one} and {other}" for _, *pair in apart for one, other in [sorted(self.order[pair] + 1)]]
         told = [
             f"{self.source.file if self.source else self.name}: points that repeat each other lie up to "

@@ -23,7 +23,7 @@ from bushfit.fitting.assess import Stage, covariance, linear_errors
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.data import Data
 from bushfit.fitting.fourier import basis
-from bushfit.fitting.model_error import told_of, with_model_error
+from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.robust import estimate
 from bushfit.geometry import Direction
@@ -242,6 +242,6 @@ def test_parameters_on_their_bounds_beside_a_model_error(
 
 def test_no_length_is_told_along_an_axis_that_the_tests_do_not_have() -> None:
     rows = ((10.0, 10.0), (1e-3, 1e-2), (0.01, 0.02), (0.0, 0.0), (0.001, 0.001), (0.001, 0.001))
-    line = told_of(Unnamed(0.02, (0.4, 2.0), (Patch(("axial",), *rows),)))
+    line = model_error_warning(Unnamed(0.02, (0.4, 2.0), (Patch(("axial",), *rows),)))
     assert "decades of strain" in line
     assert "frequency" not in line

@@ -15,7 +15,7 @@ from bushfit.fitting.drive import drive_of
 from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.outliers import outlier_limit
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, fit_two_step
-from bushfit.fitting.robust import told
+from bushfit.fitting.robust import outlier_warnings
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
@@ -191,11 +191,11 @@ def test_without_repeats_an_outlier_is_found(rig: Rig, paper_noise: SimulateSett
 
 def test_an_outlier_of_the_displacement_is_said_to_be_left_out_whatever_the_loss() -> None:
     both = [Outlier("loop", None, row, column, 9.0) for row, column in ((7, "force"), (9, "displacement"))]
-    followed, left = told(both, robust=False)
+    followed, left = outlier_warnings(both, robust=False)
     assert followed.startswith("1 point lies")
     assert "follows them: loop, force row 7; --loss soft_l1" in followed
     assert left.endswith("left out of the fit: loop, displacement row 9")
-    (line,) = told(both, robust=True)
+    (line,) = outlier_warnings(both, robust=True)
     assert "2 points lie" in line
     assert "follows" not in line
 

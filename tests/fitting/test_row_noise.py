@@ -154,7 +154,7 @@ def test_rows_of_other_cycles_are_whitened_anew() -> None:
     np.testing.assert_allclose(white.T @ white, np.eye(sum(lengths)), atol=1e-12)
     weight = np.ones(sum(lengths))
     weight[[3, 11]] = 0.0
-    assert np.flatnonzero(~noise.told(weight)).tolist() == [3, 4, 11]
+    assert np.flatnonzero(~noise.counting(weight)).tolist() == [3, 4, 11]
 
 
 @pytest.mark.parametrize(("cycles", "rows", "correlation"), [(20, 1000, 0.98), (5, 1500, 0.94), (8, 2000, 0.95)])
