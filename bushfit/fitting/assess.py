@@ -23,10 +23,8 @@ _LACK_OF_FIT = 5.0
 #: Standard error given to a combination of parameters that the data leave open, in coordinates, which are of order
 #: one: beyond all bounds, and small enough to cancel where a quantity does not depend on the combination.
 _LARGEST_ERROR = 1e3
-#: Least shear modulus of a rubber [Pa]: that of the softest gel of a mount, with room.
-_SOFTEST = 5e4
-#: Largest shear modulus of a rubber [Pa]: that of the hardest compound at small strain, with room.
-_HARDEST = 1e8
+#: Shear moduli of rubber [Pa], with room: from the softest gel of a mount to the hardest compound at small strain.
+_SOFTEST, _HARDEST = 5e4, 1e8
 #: Modulus of the fastest and smallest test over that of the slowest and largest, at most, for any rubber.
 _MOST_STIFFENING = 20.0
 #: [K] Range of temperatures that the tests of one fit may have; chosen: filled rubber softens by up to 1 % a kelvin,

@@ -32,7 +32,7 @@ from bushfit.effects.temperature import REFERENCE
 from bushfit.effects.unnamed import MOST_NODES, Patch, Unnamed, basis, in_lengths, places_of
 from bushfit.errors import FitError
 from bushfit.fitting.common_error import CommonError, Seen
-from bushfit.fitting.coordinates import Bounds, Solution, anderson, coordinate_bounds
+from bushfit.fitting.coordinates import ROUNDING, Bounds, Solution, anderson, coordinate_bounds
 from bushfit.fitting.data_sets import DataSet, LoopData, log_slopes, parted, reached, rows_of
 from bushfit.fitting.joined import Joined
 from bushfit.fitting.levels import level_columns
@@ -55,8 +55,6 @@ _ODDS = 0.2
 _SHOWS, _FEW = 0.5, 16
 #: Difference of the logarithm of the likelihood from the best, beyond which an error is tried no more.
 _FAR = 12.0
-#: Singular value, relative to the largest, below which what parameters make is rounding.
-_ROUNDING = 1e-10
 #: Rounds in which error and parameters follow each other, at most, and the share of a standard error by which the
 #: parameters still move when they have settled.
 _MOST_ROUNDS, _SETTLED = 12, 0.1
@@ -164,7 +162,7 @@ class _FittedTests:
         )
         scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         size, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-        known = size > _ROUNDING * size.max(initial=0.0)
+        known = size > ROUNDING * size.max(initial=0.0)
         span = (vectors[:, known] / np.sqrt(size[known])).T @ (rows / scale[:, None])
         left = self.solution.residual - (self.solution.residual @ span.T) @ span
         return self.seen.of(span), self.seen.of(left)
@@ -257,7 +255,7 @@ class _Error:
         information[np.diag_indices(len(columns))] += 1.0 / size**2
         scale = 1.0 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         known, vectors = np.linalg.eigh(information * np.outer(scale, scale))
-        root = (vectors / np.sqrt(np.maximum(known, _ROUNDING))).T * scale
+        root = (vectors / np.sqrt(np.maximum(known, ROUNDING))).T * scale
         whole = root @ np.concatenate((self.shapes, self.tests.slopes))
         errors = np.linalg.norm(whole.real, axis=0), np.linalg.norm(whole.imag, axis=0)
         patches = []
