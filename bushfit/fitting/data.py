@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.session import measured_session
-from bushfit.effects import BASE, effect_named, qualified, with_base
+from bushfit.effects import BASE, effect_named, effect_of, with_base
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError, naming
 from bushfit.fitting.coordinates import Bounds, residual
@@ -130,7 +130,8 @@ class Data:
                 values = start_values(bushing, data_sets, {**known, **held})
             every.append((Model.started(bushing, effects, values), values))
         model, values = every[0] if fixed == self.given else min(every, key=lambda pair: _misfit(pair[0], data_sets))
-        added = [name for name in effects if name not in BASE and not self.given.keys() & _own(name)]
+        given = {effect_of(name) for name in self.given}
+        added = [name for name in effects if name not in BASE and name not in given]
         added = [name for name in added if effect_named(name).replaces not in effects]
         if not added:
             return model
@@ -209,11 +210,6 @@ class Data:
             found=", ".join(f"{x:.4g}" for x in wanted),
             expected="some of " + ", ".join(f"{x:.4g}" for x in levels),
         )
-
-
-def _own(effect: str) -> set[str]:
-    """Names of the parameters of an effect."""
-    return {qualified(effect_named(effect), each) for each in effect_named(effect).parameters}
 
 
 def _misfit(model: Model, data_sets: Sequence[DataSet]) -> float:

@@ -125,10 +125,6 @@ class Descent:
         return float(self.residual @ self.residual)
 
     @property
-    def _least_fall(self) -> float:
-        return _LEAST_FALL if self.tolerance is None else self.tolerance * self.chi_square
-
-    @property
     def expected_fall(self) -> float:
         """By how much chi-square would yet fall were the model linear."""
         return max(self._step(0.0)[1], 0.0)
@@ -145,7 +141,8 @@ class Descent:
         """The fit one evaluation on: at a lower chi-square with less damping, or where it was with more."""
         damping = self.damping
         step, expected = self._step(damping)
-        evaluations, converged = self.evaluations + 1, 0.0 <= expected < self._least_fall
+        least = _LEAST_FALL if self.tolerance is None else self.tolerance * self.chi_square
+        evaluations, converged = self.evaluations + 1, 0.0 <= expected < least
         bend = self._bend(step, damping)
         # so far out between the bounds, or on a way that bends so much, that only caution leads down
         while expected < 0.0 or self._length(bend) > _MOST_BENT * self._length(step):

@@ -274,7 +274,8 @@ def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATE
     if not names:
         return found, None
     tests = _FittedTests(found.solution, found.minimised, _of_class(found.minimised, rig))
-    if not _shows(tests):
+    together = _Prior.of(tests, (tests.directions,), _LENGTHS[1:3], _FEW)
+    if _Error(tests, together).best[0] <= _SHOWS:
         return found, None
     tried = _tried(tests)
     if float(logsumexp([each.log_evidence for each in tried])) - np.log(len(tried)) + np.log(_ODDS) < 0.0:
@@ -341,11 +342,6 @@ def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[Dat
     """A fit with its parameters at other values, and the tests in noise alone."""
     found = solution.at(solution.model.with_values(values), data_sets)
     return _FittedTests(found, data_sets, found.jacobian[:0])
-
-
-def _shows(tests: _FittedTests) -> bool:
-    """Whether tests are any likelier with an error of middling lengths that all of them share: few clean ones are."""
-    return _Error(tests, _Prior.of(tests, (tests.directions,), _LENGTHS[1:3], _FEW)).best[0] > _SHOWS
 
 
 def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> Array:

@@ -61,7 +61,8 @@ class Line:
     @cached_property
     def smooth(self) -> Array:
         """The part of the misfit that is a polynomial in the logarithm of the step, complex, (n,)."""
-        basis = _polynomials(self.step)
+        x = np.log(self.step)
+        basis = np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))
         return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]
 
 
@@ -375,9 +376,3 @@ class SweepData(MeasuredTest):
         unit, factor = self.direction.display.displacement
         amplitude = self.amplitude * factor
         return {"frequency [Hz]": self.frequency, f"amplitude [{unit}]": amplitude, "repeat": self.repeat}
-
-
-def _polynomials(step: Array) -> Array:
-    """Legendre polynomials in the logarithm of steps over their range, (n, degree + 1)."""
-    x = np.log(step)
-    return np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))

@@ -32,15 +32,6 @@ def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measu
     np.testing.assert_allclose([certain.stderr(name) for name in FIVE], plain, rtol=0.1)
 
 
-def test_half_the_data_make_wider_errors(measured: Data, result: Result) -> None:
-    model, data_sets = result.model, measured.chosen(None)
-    names = ("mu", "sigma_fmax", "eps_half")
-    loops = [replace(loop, gain_error=0.0) for loop in measured.loops]
-    every = [*loops, *(each for each in data_sets if not isinstance(each, LoopData))]
-    few, many = (covariance(model, [Stage(names, part)]) for part in (loops, every))
-    assert all(few.stderr(name) > many.stderr(name) for name in names)  # type: ignore[operator]
-
-
 def test_quality_and_reach_are_those_of_the_data(measured: Data, result: Result) -> None:
     data_sets = measured.chosen(None)
     found = quality(result.model, data_sets, 5)

@@ -57,23 +57,6 @@ def test_the_papers_bushing_from_its_campaign(measured: Data, result: Result, ta
         assert all(low <= table_1[n] <= high for n in FIVE for low, high in [found.interval(n) or (0.0, 0.0)])
 
 
-@pytest.mark.parametrize("name", NAMES[1:])
-def test_other_bushings_from_one_campaign(rig: Rig, models: dict[str, Model], name: str) -> None:
-    """Joint within 4 %, given loops at three rates. The two-step values lie within their own errors, which are wide:
-    a loop and a sweep of one amplitude leave m open by 4 to 30 % whatever the seed."""
-    model = models[name]
-    top = float(f"{0.06 / model.bushing.unit_strain(Direction.AXIAL):.2g}")
-    sweep = SimulatedSweep(Direction.AXIAL, (0.1 * top, 0.2 * top, 0.5 * top), BAND)
-    loops = tuple(SimulatedLoop(Direction.AXIAL, top, rate) for rate in (0.01, 0.1, 1.0))
-    data = Data.of(rig(model=model, loops=loops, sweeps=(sweep,)))
-    assert np.max(np.abs(errors(fit_joint(data), model.values))) < 0.04
-    two_step = fit_two_step(data).result
-    for parameter in FIVE:
-        stderr = two_step.covariance.stderr(parameter)
-        assert stderr is not None
-        assert abs(two_step.model.values[parameter] - model.values[parameter]) < 3.5 * stderr
-
-
 @pytest.mark.parametrize(
     ("name", "seeds"), [(NAMES[0], 8), *(pytest.param(name, 20, marks=pytest.mark.slow) for name in NAMES)]
 )
@@ -120,21 +103,6 @@ def test_start_values_of_the_campaign_do_not_matter(measured: Data, result: Resu
     data = Data.of(replace(measured.campaign, fit=FitSettings(parameters=start)))
     assert data.given["mu"] == best["mu"] * factor
     assert np.max(np.abs(errors(fit_joint(data), best))) < 1e-3
-
-
-def test_radial_sweep_follows_from_axial_tests(measured: Data, result: Result) -> None:
-    """The paper's claim: within 3 % in magnitude and 0.01 in loss factor of the means over the repeats."""
-    (sweep,) = [data_set.sweep for data_set in measured.sweeps if data_set.direction is Direction.RADIAL]
-    gaps = []
-    for amplitude in np.unique(sweep.amplitude):
-        for frequency in np.unique(sweep.frequency):
-            mean = sweep.stiffness[(sweep.amplitude == amplitude) & (sweep.frequency == frequency)].mean()
-            found = complex(result.model.stiffness(Direction.RADIAL, frequency, amplitude))
-            gaps.append((abs(found) / abs(mean) - 1.0, found.imag / found.real - mean.imag / mean.real))
-    magnitude, loss = np.max(np.abs(gaps), axis=0)
-    assert len(gaps) == 48
-    assert magnitude < 0.03
-    assert loss < 0.01
 
 
 @pytest.mark.parametrize("waveform", ["sine", "triangle"])

@@ -43,6 +43,8 @@ def test_good_data_make_it_the_symmetric_interval(rig: Rig) -> None:
     result = fit_joint(data, profile=lambda *done: told.append(done))
     assert told == [(name, 4 - place) for place, name in enumerate(FIVE)]
     assert fit_joint(data).profile == {}
+    for profile in (result.profile, {"mu": (1.0, None)}):
+        assert from_document(to_document(replace(result, profile=profile))).profile == profile
     assert to_document(fit_joint(data))["covariance"] == to_document(result)["covariance"]
     for name in FIVE:
         symmetric, profile = result.interval(name), result.profile[name]
@@ -132,14 +134,6 @@ def test_a_singular_campaign_has_open_ends(
     assert result.profile["mu"][0] is None
     for name in open_ones:
         assert result.profile[name] == (None, None)
-
-
-def test_profiles_are_kept_in_the_document(rig: Rig) -> None:
-    result = profiled(rig(2, **plan(1e-3)))
-    again = from_document(to_document(result))
-    assert again.profile == result.profile
-    open_end = replace(result, profile={"mu": (1.0, None)})
-    assert from_document(to_document(open_end)).profile == {"mu": (1.0, None)}
 
 
 def test_a_single_parameter_has_no_profile(rig: Rig, paper_model: Model) -> None:
