@@ -78,16 +78,11 @@ def told(shares: np.ndarray) -> str:
     [
         ("paper", {"force_correlation": 0.98}, 20),
         *(
-            pytest.param(name, noise, SEEDS, marks=pytest.mark.slow)
-            for name, noise in (
-                ("paper", {}),
-                ("soft and long", {}),
-                ("stiff and thin", {}),
-                ("strongly filled", {}),
-                ("paper", {"shared": True}),
-                ("stiff and thin", {"shared": True}),
-                ("paper", {"force_correlation": 0.9}),
-                ("paper", {"force_correlation": 0.98}),
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (
+                *(("paper", {"force_correlation": correlation}, SEEDS // 2) for correlation in (0.0, 0.9, 0.98)),
+                *((name, {}, SEEDS) for name in ("paper", "soft and long", "stiff and thin", "strongly filled")),
+                *((name, {"shared": True}, SEEDS) for name in ("paper", "stiff and thin")),
             )
         ),
     ],
@@ -102,7 +97,7 @@ def test_95_percent_intervals_and_bands_cover(
         f"{name}, {noise}, {seeds} seeds: {told(inside)} of all intervals hold the truth, {told(banded)} of all bands"
     )
     print(f"  of each parameter {each.round(3)}; axial and radial |K|, loss factor, K', K'': {bands.round(3).tolist()}")
-    widest = 0.02 if seeds == SEEDS else 0.10
+    widest = {SEEDS: 0.02, SEEDS // 2: 0.03}.get(seeds, 0.10)
     assert abs(np.mean(inside) - 0.95) <= widest
     assert abs(np.mean(banded) - 0.95) <= widest
     if seeds == SEEDS:

@@ -133,6 +133,7 @@ def test_random_starts_end_at_one_minimum(measured: Data, axial: list[DataSet], 
             ends.append([solution.model.values[name] for name in FIVE])
             costs.append(solution.chi_square)
     stderr = np.array([result.covariance.stderr(name) or 0.0 for name in FIVE])
+    print(f"{len(ends)} of {many} starts end apart by {np.ptp(ends, axis=0) / best}")
     assert len(ends) >= 0.9 * many
     assert np.ptp(costs) < 1e-3
     assert np.all(np.abs(np.array(ends) - best) < 0.02 * stderr)
