@@ -10,9 +10,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.common_error import Joined
 from bushfit.fitting.coordinates import Solution, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, SweepData, log_slopes, rows_of
-from bushfit.fitting.joined import Joined
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Usable
 from bushfit.reading.measurement import loss_factor

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.common_error import Joined
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual, together
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, reached, repeats_of, rows_of
-from bushfit.fitting.joined import Joined
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model

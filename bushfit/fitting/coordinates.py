@@ -14,8 +14,8 @@ import numpy as np
 from bushfit.effects import Parameter
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
+from bushfit.fitting.common_error import Joined
 from bushfit.fitting.data_sets import DataSet
-from bushfit.fitting.joined import Joined
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import End

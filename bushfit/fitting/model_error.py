@@ -31,10 +31,9 @@ from bushfit.effects.contract import Array
 from bushfit.effects.temperature import REFERENCE
 from bushfit.effects.unnamed import MOST_NODES, Patch, Unnamed, basis, in_lengths, places_of
 from bushfit.errors import FitError
-from bushfit.fitting.common_error import CommonError, Seen
+from bushfit.fitting.common_error import CommonError, Joined, Seen
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Solution, anderson, coordinate_bounds
 from bushfit.fitting.data_sets import DataSet, LoopData, log_slopes, parted, reached, rows_of
-from bushfit.fitting.joined import Joined
 from bushfit.fitting.levels import level_columns
 from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.robust import Estimate

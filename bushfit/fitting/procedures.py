@@ -20,11 +20,11 @@ from bushfit.fitting.assess import (
     quality,
     unfitted,
 )
+from bushfit.fitting.common_error import Joined
 from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, anderson
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, sources, with_level_errors
 from bushfit.fitting.identify import left_open
-from bushfit.fitting.joined import Joined
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.profile import limit95, profile95
