@@ -164,7 +164,7 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     The tests have the weights at which the solution is the least sum of squares; `left` are others.
     """
     free = solution.moving
-    whole, parts = _left_out(solution, data_sets, free), list[_Part]()
+    whole, parts = left_out(solution, data_sets, free), list[_Part]()
     per_coordinate = solution.coordinates.slopes(solution.model.values)[:, None]
     for data_set, rows in zip(data_sets, rows_of(data_sets), strict=True):
         modelled = data_set.noise_free(solution.model).measured
@@ -179,7 +179,7 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     return _by_place([*parts, *_as_modelled(solution.model, left, predicted=True)])
 
 
-def _left_out(solution: Solution, data_sets: Sequence[DataSet], free: Sequence[int]) -> LeaveOut:
+def left_out(solution: Solution, data_sets: Sequence[DataSet], free: Sequence[int]) -> LeaveOut:
     """The fit of the parameters of these numbers without some of its residuals in noise; amounts of an error that its
     tests share stand behind them."""
     if not isinstance(data_sets, Joined):
