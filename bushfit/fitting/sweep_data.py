@@ -217,11 +217,6 @@ class SweepData(MeasuredTest):
         label = np.stack((self.held, self.repeat.astype(float)))
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
-    @cached_property
-    def _line_starts(self) -> Array:
-        """Index of the first point of each line."""
-        return np.concatenate(([0], 1 + np.flatnonzero(np.diff(self.held))))
-
     @kept
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
         """Model stiffness at the points, (..., n); what repeats is computed once."""
@@ -325,7 +320,8 @@ class SweepData(MeasuredTest):
         random = self.noise.scatter(self.name, self.held, self.step)
         if self.sweep.relative_error is not None and self.sweep.noise is None:
             random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)
-        return Whitening(self.block_starts, self._line_starts, random, self.noise, self.weights)
+        line_starts = np.concatenate(([0], 1 + np.flatnonzero(np.diff(self.held))))
+        return Whitening(self.block_starts, line_starts, random, self.noise, self.weights)
 
     @cached_property
     def weights(self) -> Array:
