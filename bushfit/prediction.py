@@ -195,7 +195,7 @@ def _spanned(bands: Sequence[Band]) -> Band:
 
 def _measured(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequence[SweepData]) -> Array:
     """Complex stiffness measured at operating points, each (n,): the mean of the repeats, nan where there is none."""
-    mine = [sweep.standing() for sweep in sweeps if sweep.direction == direction]
+    mine = [sweep.with_weight() for sweep in sweeps if sweep.direction == direction]
     f, x, stiffness = (
         np.concatenate([np.empty(0), *(getattr(sweep, name) for sweep in mine)])
         for name in ("frequency", "amplitude", "measured")

@@ -16,8 +16,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import MISTAKES, SEPARATOR, Mistake, file_or_name, labelled, mistake_named
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_set import DataSet
-from bushfit.fitting.data_sets import SweepData, loop_data, with_gain_errors
+from bushfit.fitting.data_sets import DataSet, SweepData, loop_data, with_gain_errors
 from bushfit.geometry import Bushing, Place
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep

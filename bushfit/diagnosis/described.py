@@ -79,7 +79,7 @@ def describe(
     fitted, correction = with_model_error(evidence.estimate, bounds)
     if correction is None or correction.uncertainty >= 1.0:
         return None
-    harmonic = tuple(data_set.timeless() for data_set in evidence.data_sets)
+    harmonic = tuple(data_set.fundamental() for data_set in evidence.data_sets)
     try:
         base = _refitted(evidence.model, harmonic, held, bounds)
         base = _refitted(base.model, harmonic, (*held, *base.solution.at_bound), bounds)

@@ -10,10 +10,9 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.agreement import met_within, misfits, usable
 from bushfit.fitting.assess import Stage, apart_in_temperature, covariance, measured_range, quality
 from bushfit.fitting.coordinates import Bounds, Solution
-from bushfit.fitting.data_set import DataSet
-from bushfit.fitting.data_sets import sources
+from bushfit.fitting.data_sets import DataSet, sources
 from bushfit.fitting.design import fit_from
-from bushfit.fitting.model_error import told_of, with_model_error
+from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.robust import Estimate
 from bushfit.model.model import Model
@@ -134,7 +133,7 @@ def result_of(
         measured_range(model, tests),
         (
             *([_CORRECTED] if corrected else []),
-            *([told_of(error)] if error else []),
+            *([model_error_warning(error)] if error else []),
             *apart_in_temperature(model, tests),
             *cautions(solution.model, solution, found.data_sets, bounds, cov),
         ),

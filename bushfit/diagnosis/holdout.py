@@ -20,7 +20,7 @@ from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.effects import effect_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.agreement import LeaveOut, is_far
+from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, SweepData, parted
 from bushfit.reading.measurement import Stepped
@@ -49,7 +49,7 @@ class Part:
     def rest(self, data_sets: Sequence[DataSet]) -> list[DataSet]:
         """The tests without it, with the same noise."""
         left = [(data, of) for data, of in zip(data_sets, self.points, strict=True) if not of.all()]
-        return [data.without(np.flatnonzero(of)).standing() if of.any() else data for data, of in left]
+        return [data.without(np.flatnonzero(of)).with_weight() if of.any() else data for data, of in left]
 
 
 @dataclass(frozen=True)
@@ -180,8 +180,7 @@ class _Fitted:
         if left_open := [names[self.free[i]] for i in np.flatnonzero(self.whole.open(rows))]:
             reason = f"the rest does not tell {', '.join(left_open)}"
             return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_of, left_open))))
-        step = self.whole.step(rows)
-        if step is not None and not is_far(step):
+        if self.whole.step(rows) is not None:
             return _with_pull(self.whole, rows, clusters, stepped=True)
         refitted = _refitted(evidence, part, bounds)
         if refitted is None or refitted.whole.open(rows).any():

@@ -11,12 +11,11 @@ from bushfit.diagnosis.propose import Proposal
 from bushfit.effects import qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.common_error import CommonError
+from bushfit.fitting.common_error import CommonError, Joined
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import fit_from, probes
-from bushfit.fitting.joined import Joined
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 

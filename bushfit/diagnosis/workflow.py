@@ -21,7 +21,7 @@ from bushfit.effects.mistakes import candidate_named, mistake_named
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import parted, with_gains
 from bushfit.fitting.design import fit_from
-from bushfit.fitting.robust import estimate, outliers_at, told
+from bushfit.fitting.robust import estimate, outlier_warnings, outliers_at
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
@@ -68,7 +68,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     found = Told(search, judged(hypotheses, settings.tolerance), hypotheses, settings.unresolved).diagnosis()
     fewer += _left_out_of_fewer(whole, data, begun.outliers)
     of_loops = outliers_at(found.result.model, data.loops)
-    outliers = (*told(of_loops, robust=data.robust), *told(left, robust=True))
+    outliers = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(left, robust=True))
     notes = (*said, *fewer, *found.notes, *data.assumed, *outliers)
     warnings = (*said, *found.result.warnings, *outliers)
     result = replace(found.result, outliers=(*of_loops, *left), warnings=warnings, specimens=data.campaign.specimens)
@@ -111,7 +111,7 @@ def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
     """Fit the model as it came, with the effects that the user adopts; the rig's errors are part of every explanation,
     so a loop's gain weighs, whether its class is stated or assumed."""
     hint = "add measured tests to the campaign"
-    data_sets = data.some([*data.loops, *data.sweeps], "there is nothing to diagnose", hint)
+    data_sets = data.some(data.data_sets, "there is nothing to diagnose", hint)
     held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
     start = data.start(data_sets, {})
     model = model or data.started(data.effects, data_sets, {})
@@ -127,6 +127,6 @@ def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
         names = [name for name in model.parameters if name not in held]
         robust = estimate(model, data_sets, names, data.bounds, robust=True)
         outliers, data_sets = robust.outliers, robust.data_sets
-    data_sets = [data_set.standing() for data_set in with_gains(data_sets, weigh=True)]
+    data_sets = [data_set.with_weight() for data_set in with_gains(data_sets, weigh=True)]
     descent = fit_from(model, data_sets, held, data.bounds).finished(EVALUATIONS)
     return _Begun(Evidence(descent.solution, tuple(data_sets)), start, held, outliers)

@@ -1,1 +1,1 @@
-"""Fits: residuals in units of noise, lmfit, uncertainty."""
+"""Fits: residuals in units of noise, least squares, uncertainty."""

@@ -10,12 +10,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.common_error import Joined
 from bushfit.fitting.coordinates import Solution, jacobian, residual
-from bushfit.fitting.data_sets import DataSet, SweepData
-from bushfit.fitting.joined import Joined
+from bushfit.fitting.data_sets import DataSet, SweepData, log_slopes, rows_of
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Usable
-from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import loss_factor
 
 #: A part without which some parameter's variance would grow by more than this factor is not held out: what is left does
@@ -31,8 +30,8 @@ _SHARE = 0.95
 #: Share of the points of a place that have to be held out for these to speak for it.
 _ENOUGH = 0.5
 
-#: How far points are off in |K| and loss factor, (2, n), and whether they were predicted without their run.
-_Off = tuple[Array, bool]
+#: A place, how far points there are off in |K| and loss factor, (2, n), and whether these were predicted from others.
+_Part = tuple[str, Array, bool]
 
 
 class _Run(NamedTuple):
@@ -78,12 +77,15 @@ class LeaveOut:
         return without > _MOST_GROWTH * np.sum(np.square(self.back), axis=1)
 
     def step(self, rows: Array, first: int | None = None) -> Array | None:
-        """How far the first parameters, or all, move without these rows, in coordinates, (k,); None where the rest
-        leaves one of these open.
+        """How far the first parameters, or all, move without these rows, in coordinates, (k,).
 
-        It is one Gauss-Newton step, which is exact where the model is linear over that step.
+        It is one Gauss-Newton step, which is exact where the model is linear over that step; None where the step is too
+        long to tell of a refit, and where the rest leaves one of these parameters open.
         """
-        return None if self.open(rows)[:first].any() else (self.back @ self._moved(rows))[:first]
+        if self.open(rows)[:first].any():
+            return None
+        step = (self.back @ self._moved(rows))[:first]
+        return None if np.abs(step).max(initial=0.0) > _LONGEST_STEP else step
 
     def predicted(self, rows: Array, clusters: Array, *, stepped: bool = True) -> tuple[Array, Array]:
         """Residuals of these rows, (n,) each, after that step: in units of noise, and whitened by the error of the
@@ -128,15 +130,10 @@ class LeaveOut:
         return -np.linalg.solve(self._rest(rows), self.along - self.basis[rows].T @ self.residual[rows])
 
 
-def is_far(step: Array) -> bool:
-    """Whether a step, in coordinates, is too long for one Gauss-Newton step to tell of a refit."""
-    return bool(np.abs(step).max(initial=0.0) > _LONGEST_STEP)
-
-
 def misfits(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Misfit, ...]:
     """How well a model meets each test, and each run of those that have several; `left` are tests not fitted."""
     pairs = [(data_set, True) for data_set in fitted] + [(data_set, False) for data_set in left]
-    return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.standing(), was_fitted=was))
+    return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.with_weight(), was_fitted=was))
 
 
 def _misfits(model: Model, data_set: DataSet, *, was_fitted: bool) -> Iterator[Misfit]:
@@ -167,22 +164,19 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     The tests have the weights at which the solution is the least sum of squares; `left` are others.
     """
     free = solution.moving
-    whole, begin = left_out(solution, data_sets, free), 0
-    found: dict[str, list[_Off]] = {}
-    for data_set in data_sets:
-        modelled, slopes = data_set.noise_free(solution.model).measured, _slopes(solution, data_set)[free]
+    whole, parts = left_out(solution, data_sets, free), list[_Part]()
+    per_coordinate = solution.coordinates.slopes(solution.model.values)[:, None]
+    for data_set, rows in zip(data_sets, rows_of(data_sets), strict=True):
+        modelled = data_set.noise_free(solution.model).measured
+        slopes = (log_slopes(solution.model, data_set, solution.coordinates.names) * per_coordinate)[free]
         for run in _runs(data_set):
             points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
-            step = whole.step(begin + np.flatnonzero(points), len(free))
-            if step is not None and is_far(step):
-                step = None
+            step = whole.step(rows.start + np.flatnonzero(points), len(free))
             moved = modelled if step is None else modelled * np.exp(step @ slopes)
             counted = run.points & (data_set.weights > 0.0 if isinstance(data_set, SweepData) else True)
             off = _off(moved[counted], data_set.measured[counted])
-            found.setdefault(str(data_set.direction), []).append((off, step is not None))
-        begin += data_set.size
-    _add(found, solution.model, left, held_out=True)
-    return tuple(_usable(place, parts) for place, parts in found.items())
+            parts.append((str(data_set.direction), off, step is not None))
+    return _by_place([*parts, *_as_modelled(solution.model, left, predicted=True)])
 
 
 def left_out(solution: Solution, data_sets: Sequence[DataSet], free: Sequence[int]) -> LeaveOut:
@@ -198,40 +192,31 @@ def left_out(solution: Solution, data_sets: Sequence[DataSet], free: Sequence[in
 
 def met_within(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet]) -> tuple[Usable, ...]:
     """As `usable` of a model whose fit is not at hand: the tests that it was fitted to count as the fit has them."""
-    found: dict[str, list[_Off]] = {}
-    _add(found, model, fitted, held_out=False)
-    _add(found, model, left, held_out=True)
-    return tuple(_usable(place, parts) for place, parts in found.items())
+    return _by_place([*_as_modelled(model, fitted, predicted=False), *_as_modelled(model, left, predicted=True)])
 
 
-def _add(found: dict[str, list[_Off]], model: Model, data_sets: Sequence[DataSet], *, held_out: bool) -> None:
-    """Add to `found`, by place, how far the points of tests are off."""
+def _as_modelled(model: Model, data_sets: Sequence[DataSet], *, predicted: bool) -> Iterator[_Part]:
     for data_set in data_sets:
-        off = _off(data_set.noise_free(model).measured, data_set.measured)
-        found.setdefault(str(data_set.direction), []).append((off, held_out))
+        yield str(data_set.direction), _off(data_set.noise_free(model).measured, data_set.measured), predicted
 
 
-def _usable(place: str, parts: Sequence[_Off]) -> Usable:
-    """The figures of a place from how far its points are off, (2, n) a part, and whether each was predicted."""
-    every = np.concatenate([off for off, _ in parts], axis=1)
-    predicted = np.concatenate([np.empty((2, 0)), *(off for off, held_out in parts if held_out)], axis=1)
-    held_out = predicted.shape[1] >= _ENOUGH * every.shape[1]
-    off = predicted if held_out else every
-    stiffness, loss = np.quantile(off, _SHARE, axis=1, method="higher").tolist()
-    return Usable(place, stiffness, loss, off.shape[1], held_out)
+def _by_place(parts: Sequence[_Part]) -> tuple[Usable, ...]:
+    """The figures of each place: of its predicted points where these are enough, else of all."""
+    found = []
+    for place in dict.fromkeys(place for place, _, _ in parts):
+        mine = [(off, predicted) for own, off, predicted in parts if own == place]
+        every = np.concatenate([off for off, _ in mine], axis=1)
+        held_out = np.concatenate([np.empty((2, 0)), *(off for off, predicted in mine if predicted)], axis=1)
+        enough = held_out.shape[1] >= _ENOUGH * every.shape[1]
+        off = held_out if enough else every
+        stiffness, loss = np.quantile(off, _SHARE, axis=1, method="higher").tolist()
+        found.append(Usable(place, stiffness, loss, off.shape[1], enough))
+    return tuple(found)
 
 
 def _off(modelled: Array, measured: Array) -> Array:
     """Relative difference of |K|, and difference of the loss factor, without sign, (2, n)."""
     return np.abs([np.abs(modelled / measured) - 1.0, loss_factor(modelled) - loss_factor(measured)])
-
-
-def _slopes(solution: Solution, data_set: DataSet) -> Array:
-    """Derivatives of ln K by coordinate at the operating points, (k, n)."""
-    model, names = solution.model, solution.coordinates.names
-    test = data_set.direction, data_set.frequency, data_set.amplitude
-    stiffness, slopes = stiffness_and_slopes(model, *test, names, data_set.kind, data_set.circumstances)
-    return slopes / stiffness * solution.coordinates.slopes(model.values)[:, None]
 
 
 def _runs(data_set: DataSet) -> Iterator[_Run]:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.common_error import Joined
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual, together
-from bushfit.fitting.data_sets import DataSet, LoopData, parted, repeats_of
-from bushfit.fitting.joined import Joined
+from bushfit.fitting.data_sets import DataSet, LoopData, parted, reached, repeats_of, rows_of
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -23,10 +23,8 @@ _LACK_OF_FIT = 5.0
 #: Standard error given to a combination of parameters that the data leave open, in coordinates, which are of order
 #: one: beyond all bounds, and small enough to cancel where a quantity does not depend on the combination.
 _LARGEST_ERROR = 1e3
-#: Least shear modulus of a rubber [Pa]: that of the softest gel of a mount, with room.
-_SOFTEST = 5e4
-#: Largest shear modulus of a rubber [Pa]: that of the hardest compound at small strain, with room.
-_HARDEST = 1e8
+#: Shear moduli of rubber [Pa], with room: from the softest gel of a mount to the hardest compound at small strain.
+_SOFTEST, _HARDEST = 5e4, 1e8
 #: Modulus of the fastest and smallest test over that of the slowest and largest, at most, for any rubber.
 _MOST_STIFFENING = 20.0
 #: [K] Range of temperatures that the tests of one fit may have; chosen: filled rubber softens by up to 1 % a kelvin,
@@ -92,11 +90,10 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
 
 def _of_gains(stage: Stage, influence: Array) -> Array:
     """What errors of gains that do not weigh add to the covariance, (k, k), by the influence of residuals, (k, n)."""
-    ends = np.cumsum([0, *(data_set.size for data_set in stage.data_sets)])
     added = np.zeros((len(influence), len(influence)))
-    for data_set, first, last in zip(stage.data_sets, ends[:-1], ends[1:], strict=True):
+    for data_set, rows in zip(stage.data_sets, rows_of(stage.data_sets), strict=True):
         if isinstance(data_set, LoopData) and not data_set.gain_weighs:
-            moved = data_set.gain_error * (influence[:, first:last] @ data_set.gain_and_offset()[0])
+            moved = data_set.gain_error * (influence[:, rows] @ data_set.gain_and_offset()[0])
             added += np.outer(moved, moved)
     return added
 
@@ -145,12 +142,11 @@ def _unsure(stages: Sequence[Stage], influences: Sequence[Array], bases: Sequenc
             taken = 1.0 - 1.0 / (1.0 + np.square(error.along[1]))
             along = error.seen.of(move) @ error.along[0]
             moved[id(stage.data_sets)] = [move @ influence.T, move @ move.T, move @ unit.T, along]
-        ends = np.cumsum([0, *(data_set.size for data_set in stage.data_sets)])
-        for i, (data_set, first, last) in enumerate(zip(stage.data_sets, ends[:-1], ends[1:], strict=True)):
-            own = influence[:, first:last]
+        for i, (data_set, rows) in enumerate(zip(stage.data_sets, rows_of(stage.data_sets), strict=True)):
+            own = influence[:, rows]
             for variance, move in data_set.unsure(own).items():
                 along = error.seen.of_part(i, move) @ error.along[0][error.seen.places[i]] if error else move[:, :0]
-                products = [move @ own.T, move @ move.T, move @ unit[:, first:last].T, along]
+                products = [move @ own.T, move @ move.T, move @ unit[:, rows].T, along]
                 so_far = moved.get(variance)
                 moved[variance] = (
                     [one + other for one, other in zip(products, so_far, strict=True)] if so_far else products
@@ -190,12 +186,11 @@ def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Qual
 
 def measured_range(model: Model, data_sets: Sequence[DataSet]) -> Range:
     """Frequencies [Hz], equivalent strains, directions and temperatures [K] that the data sets reach."""
-    f = np.concatenate([data_set.frequency for data_set in data_sets])
-    e = np.concatenate([data_set.amplitude * model.unit_strain(data_set.direction) for data_set in data_sets])
     found = [str(data_set.direction) for data_set in data_sets]
     directions = tuple(dict.fromkeys([*(str(direction) for direction in Direction if direction in found), *found]))
     kelvin = [np.ravel(data_set.test.temperature) for data_set in data_sets if data_set.test.temperature is not None]
-    ends = [(float(each.min()), float(each.max())) for each in (f, e, *([np.concatenate(kelvin)] if kelvin else []))]
+    axes = [*reached(model.bushing, data_sets), *([np.concatenate(kelvin)] if kelvin else [])]
+    ends = [(float(each.min()), float(each.max())) for each in axes]
     return Range(ends[0], ends[1], directions, *ends[2:])
 
 
@@ -206,9 +201,8 @@ def lack_of_fit(model: Model, data_sets: Sequence[DataSet], parameters: int) -> 
 
 def missed(model: Model, data_sets: Sequence[DataSet]) -> list[float | None]:
     """The same of each test by itself, an error that all share counted."""
-    ends = np.cumsum([data_set.size for data_set in data_sets])[:-1]
-    parts = zip(np.split(residual(model, data_sets), ends), data_sets, strict=True)
-    return [_beyond_noise(*_over_freedom(part, [data_set], 0)) for part, data_set in parts]
+    residuals, parts = residual(model, data_sets), zip(rows_of(data_sets), data_sets, strict=True)
+    return [_beyond_noise(*_over_freedom(residuals[rows], [data_set], 0)) for rows, data_set in parts]
 
 
 def _beyond_noise(chi_square: float, freedom: int) -> float | None:

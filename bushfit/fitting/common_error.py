@@ -1,13 +1,19 @@
 """Errors that residuals have in common, so that these are independent only when whitened together."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
 from bushfit.effects.contract import Array
+
+if TYPE_CHECKING:
+    from bushfit.fitting.data_sets import DataSet
 
 #: Variance along a direction, relative to the largest, below which it is rounding.
 _ROUNDING = 1e-14
@@ -65,7 +71,7 @@ class CommonError:
     seen: Seen
 
     @classmethod
-    def of_all(cls, columns: Array) -> "CommonError":
+    def of_all(cls, columns: Array) -> CommonError:
         """An error that moves any of the residuals, (q, n)."""
         return cls(columns, Seen([(slice(0, columns.shape[1]), None)]))
 
@@ -86,3 +92,38 @@ class CommonError:
         """Residuals in units of noise, (..., n), as independent numbers of unit variance."""
         vectors, size = self.along
         return rows - self.seen.back((self.seen.of(rows) @ vectors * (1.0 - 1.0 / np.hypot(1.0, size))) @ vectors.T)
+
+
+@dataclass(frozen=True, eq=False)
+class Joined(Sequence["DataSet"]):
+    """Tests with an error of the model in common beside the noise of each: their residuals are whitened together.
+
+    Args:
+        freedom: degrees of freedom that tell the size of the error.
+    """
+
+    data_sets: tuple[DataSet, ...]
+    error: CommonError
+    freedom: float
+
+    @overload
+    def __getitem__(self, index: int) -> DataSet: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[DataSet]: ...
+    def __getitem__(self, index: int | slice) -> DataSet | Sequence[DataSet]:
+        return self.data_sets[index]
+
+    def __len__(self) -> int:
+        return len(self.data_sets)
+
+    def unsure(self, influence: Array) -> Array:
+        """As `DataSet.unsure`, of the variance of the error, (k, n) -> (k, n)."""
+        vectors, size = self.error.along
+        moved = self.error.seen.of(influence) @ vectors * np.square(size) * np.sqrt(2.0 / self.freedom)
+        return self.error.seen.back(moved @ vectors.T)
+
+    def beside(self, jacobian: Array) -> Array:
+        """Derivatives of residuals in units of noise, (k, n), with those by the amounts below, and what is known of the
+        amounts beforehand as q more residuals, (k + q, n + q)."""
+        k, columns = len(jacobian), self.error.seen.back(self.error.columns)
+        return np.block([[jacobian, np.zeros((k, len(columns)))], [columns, np.eye(len(columns))]])

@@ -14,16 +14,17 @@ import numpy as np
 from bushfit.effects import Parameter
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
+from bushfit.fitting.common_error import Joined
 from bushfit.fitting.data_sets import DataSet
-from bushfit.fitting.joined import Joined
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import End
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
-#: Smallest singular value of the derivatives that counts, relative to the largest: below it is their rounding.
-_LEAST_SINGULAR_VALUE = 1e-10
+#: Smallest singular value of derivatives, or eigenvalue of their squares once scaled, that counts, relative to the
+#: largest: below it is their rounding.
+ROUNDING = 1e-10
 #: Least and largest factor by which an accelerated pass extrapolates the last change.
 _STRIDES = (-0.5, 5.0)
 #: A parameter this close to a bound rests on it, in coordinates, which are of order one however wide the bounds.
@@ -94,7 +95,7 @@ class Solution:
         """By how much one Gauss-Newton step would lower chi-square, the parameters `beside` held."""
         free = [i for i, name in enumerate(self.coordinates.names) if name not in beside]
         left, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
-        seen = values > _LEAST_SINGULAR_VALUE * values.max(initial=0.0)
+        seen = values > ROUNDING * values.max(initial=0.0)
         return float(np.sum(np.square(left[:, seen].T @ self.residual)))
 
     def at(self, model: Model, data_sets: Sequence[DataSet]) -> Solution:

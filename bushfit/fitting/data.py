@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.session import measured_session
-from bushfit.effects import BASE, effect_named, qualified, with_base
+from bushfit.effects import BASE, effect_named, effect_of, with_base
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError, naming
 from bushfit.fitting.coordinates import Bounds, residual
@@ -26,7 +26,7 @@ from bushfit.reading.measurement import Sweep
 #: Difference of two amplitudes relative to their size up to which they are the same level.
 _SAME_LEVEL = 1e-3
 
-_Kind = TypeVar("_Kind", LoopData, SweepData, DataSet)
+_Kind = TypeVar("_Kind", LoopData, SweepData, LoopData | SweepData)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +57,19 @@ class Data:
 
     def in_session(self) -> "Data":
         """The same data, each point with what it was measured under."""
-        tests = [data_set.test for data_set in (*self.loops, *self.sweeps)]
-        under = iter(measured_session(self.campaign.bushing, tests))
+        under = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
         loops = tuple(replace(loop, under=next(under).at(0)) for loop in self.loops)
         return replace(self, loops=loops, sweeps=tuple(replace(sweep, under=next(under)) for sweep in self.sweeps))
 
     @property
+    def data_sets(self) -> list[DataSet]:
+        """All tests, loops first."""
+        return [*self.loops, *self.sweeps]
+
+    @property
     def notes(self) -> list[str]:
         """What is odd about the tests themselves, whatever is fitted to them."""
-        return [f"{test.name}: {note}" for test in (*self.loops, *self.sweeps) for note in test.notes]
+        return [f"{test.name}: {note}" for test in self.data_sets for note in test.notes]
 
     @property
     def assumed(self) -> list[str]:
@@ -126,7 +130,8 @@ class Data:
                 values = start_values(bushing, data_sets, {**known, **held})
             every.append((Model.started(bushing, effects, values), values))
         model, values = every[0] if fixed == self.given else min(every, key=lambda pair: _misfit(pair[0], data_sets))
-        added = [name for name in effects if name not in BASE and not self.given.keys() & _own(name)]
+        given = {effect_of(name) for name in self.given}
+        added = [name for name in effects if name not in BASE and name not in given]
         added = [name for name in added if effect_named(name).replaces not in effects]
         if not added:
             return model
@@ -156,7 +161,7 @@ class Data:
             ModelError: a name that is neither a direction nor a specimen of the campaign.
         """
         hint = "add measured tests, or make some with bushfit simulate"
-        data_sets = self.some([*self.loops, *self.sweeps], "there is nothing to fit", hint)
+        data_sets = self.some(self.data_sets, "there is nothing to fit", hint)
         if places is None:
             return [*_compound(self.loops), *_compound(self.sweeps)]
         with naming(self.campaign.path):
@@ -205,11 +210,6 @@ class Data:
             found=", ".join(f"{x:.4g}" for x in wanted),
             expected="some of " + ", ".join(f"{x:.4g}" for x in levels),
         )
-
-
-def _own(effect: str) -> set[str]:
-    """Names of the parameters of an effect."""
-    return {qualified(effect_named(effect), each) for each in effect_named(effect).parameters}
 
 
 def _misfit(model: Model, data_sets: Sequence[DataSet]) -> float:

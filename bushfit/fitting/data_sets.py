@@ -2,21 +2,22 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import accumulate, pairwise
 from typing import TypeVar
 
 import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, Residuals, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.drive import Drive, drive_of
 from bushfit.fitting.loop_data import LoopData
 from bushfit.fitting.noise import SweepNoise, sweep_noise
-from bushfit.fitting.outliers import unlike
+from bushfit.fitting.outliers import contradictions
 from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.sweep_data import SweepData
-from bushfit.geometry import Place, Specimen
+from bushfit.geometry import Bushing, Place, Specimen, unit_strain
 from bushfit.model.model import Model
+from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.units import number
 
@@ -28,6 +29,9 @@ _SAME_LOOP = 0.02
 #: Step in temperature up to which tests count as made at one [K].
 _SAME_KELVIN = 1.0
 
+#: One measured test with its noise, see `data_set.MeasuredTest`.
+DataSet = LoopData | SweepData
+
 _Kind = TypeVar("_Kind", LoopData, SweepData)
 
 
@@ -37,7 +41,7 @@ def loop_data(
     """One data set per loop; rows that are outliers carry no weight where they are to be left out."""
     drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
     found = [LoopData(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
-    return with_gain_errors(told_of_others(found, [_first_alike(found)]), stated)
+    return with_gain_errors(with_contradictions(found, [_first_alike(found)]), stated)
 
 
 def with_gain_errors(loops: Sequence[LoopData], stated: RigSettings) -> list[LoopData]:
@@ -91,10 +95,10 @@ def sweep_data(
     names = [str(one.direction) for one in found]
     places = [np.full(one.measured.size, names.index(name)) for one, name in zip(found, names, strict=True)]
     at = (places, [one.frequency for one in found], [one.amplitude for one in found])
-    return told_of_others(found, [np.concatenate([np.empty(0), *each]) for each in at])
+    return with_contradictions(found, [np.concatenate([np.empty(0), *each]) for each in at])
 
 
-def told_of_others(found: Sequence[_Kind], at: Sequence[Array]) -> list[_Kind]:
+def with_contradictions(found: Sequence[_Kind], at: Sequence[Array]) -> list[_Kind]:
     """Loops, or sweeps, each with a sentence on the earlier one whose points it repeats and lies farthest from; points
     repeat one another where all of `at`, (n,) each, and their temperatures are the same."""
     if len(found) < 2:
@@ -102,13 +106,13 @@ def told_of_others(found: Sequence[_Kind], at: Sequence[Array]) -> list[_Kind]:
     owner = np.repeat(np.arange(len(found)), [one.measured.size for one in found])
     points = np.stack([*at, _sessions(np.hstack([one.temperature for one in found]))])
     stiffness = np.concatenate([one.measured for one in found])
-    told = list(found)
-    for apart, one, other in reversed(unlike(stiffness, np.unique(points, axis=1, return_inverse=True)[1])):
+    marked = list(found)
+    for apart, one, other in reversed(contradictions(stiffness, np.unique(points, axis=1, return_inverse=True)[1])):
         first, later = sorted((int(owner[one]), int(owner[other])))
         if first != later:  # a file that contradicts itself tells so
             said = f"it repeats {found[first].name}, and their stiffness lies {number(100.0 * apart, 2)} % apart"
-            told[later] = replace(found[later], beside=said)
-    return told
+            marked[later] = replace(found[later], contradiction=said)
+    return marked
 
 
 def _sessions(temperature: Array) -> Array:
@@ -132,6 +136,26 @@ def parted(data_sets: Iterable[DataSet]) -> tuple[list[LoopData], list[SweepData
     every = list(data_sets)
     loops = [data_set for data_set in every if isinstance(data_set, LoopData)]
     return loops, [data_set for data_set in every if isinstance(data_set, SweepData)]
+
+
+def rows_of(data_sets: Iterable[DataSet]) -> list[slice]:
+    """Where the residuals of each data set stand among those of all."""
+    ends = accumulate((data_set.size for data_set in data_sets), initial=0)
+    return [slice(*pair) for pair in pairwise(ends)]
+
+
+def reached(bushing: Bushing | None, data_sets: Iterable[DataSet]) -> tuple[Array, Array]:
+    """Frequencies [Hz] and equivalent strains of all operating points, loops included, (n,) each."""
+    every = list(data_sets)
+    strains = [data_set.amplitude * unit_strain(bushing, data_set.direction) for data_set in every]
+    return np.concatenate([data_set.frequency for data_set in every]), np.concatenate(strains)
+
+
+def log_slopes(model: Model, data_set: DataSet, names: Sequence[str]) -> Array:
+    """Derivatives of ln K of a model at the operating points of a test by parameter, complex (len(names), n)."""
+    test = data_set.direction, data_set.frequency, data_set.amplitude
+    stiffness, slopes = stiffness_and_slopes(model, *test, names, data_set.kind, data_set.circumstances)
+    return slopes / stiffness
 
 
 def sources(data_sets: Iterable[DataSet]) -> tuple[Source, ...]:

@@ -21,6 +21,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import (
+    ROUNDING,
     Bounds,
     Coordinates,
     Solution,
@@ -42,8 +43,6 @@ _FIRST_GROWTH = 2.0
 _LONGEST_STEP = 2.0
 #: Least fall of chi-square with which a step is taken, relative to the fall expected (usual for such methods).
 _LEAST_GAIN_RATIO = 1e-4
-#: Least eigenvalue of the scaled curvature that counts, relative to the largest: below it is the derivatives' rounding.
-_LEAST_CURVATURE = 1e-10
 #: Cosine between a step and the last one, in units of noise, from which it goes on as that one went: chosen.
 _SAME_WAY = 0.8
 #: Share of a step's length that its bend may have, both in units of noise; chosen: further on the way bends otherwise,
@@ -126,10 +125,6 @@ class Descent:
         return float(self.residual @ self.residual)
 
     @property
-    def _least_fall(self) -> float:
-        return _LEAST_FALL if self.tolerance is None else self.tolerance * self.chi_square
-
-    @property
     def expected_fall(self) -> float:
         """By how much chi-square would yet fall were the model linear."""
         return max(self._step(0.0)[1], 0.0)
@@ -146,7 +141,8 @@ class Descent:
         """The fit one evaluation on: at a lower chi-square with less damping, or where it was with more."""
         damping = self.damping
         step, expected = self._step(damping)
-        evaluations, converged = self.evaluations + 1, 0.0 <= expected < self._least_fall
+        least = _LEAST_FALL if self.tolerance is None else self.tolerance * self.chi_square
+        evaluations, converged = self.evaluations + 1, 0.0 <= expected < least
         bend = self._bend(step, damping)
         # so far out between the bounds, or on a way that bends so much, that only caution leads down
         while expected < 0.0 or self._length(bend) > _MOST_BENT * self._length(step):
@@ -252,4 +248,4 @@ def _solved(curvature: Array, pull: Array, free: Array) -> Array:
     """The free parameters at which a curvature, (k, k), meets a pull, (k,), none along what rounding decides."""
     scale = np.sqrt(np.diag(curvature)[free])
     own = curvature[np.ix_(free, free)] / np.outer(scale, scale)
-    return np.linalg.lstsq(own, pull[free] / scale, rcond=_LEAST_CURVATURE)[0] / scale
+    return np.linalg.lstsq(own, pull[free] / scale, rcond=ROUNDING)[0] / scale

@@ -9,7 +9,7 @@ from bushfit.effects import Effect, Parameter, effect_named, qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import Bounds, Solution
-from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.fitting.data_sets import DataSet, parted, reached
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
@@ -98,7 +98,7 @@ def _starts(fitted: Model, data_sets: Sequence[DataSet], effect: Effect) -> Iter
 
 def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:
     """Values of a shape parameter that these tests could show, by what it is measured against."""
-    frequencies = np.concatenate([data_set.frequency for data_set in data_sets])
+    frequencies, strains = reached(model.bushing, data_sets)
     match parameter.scale:
         case "period":
             swept = np.concatenate([sweep.frequency for sweep in parted(data_sets)[1]] or [frequencies])
@@ -108,9 +108,8 @@ def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> 
         case "displacement":
             low, high = stroke(data_sets)
         case "strain":
-            strains = [data_set.amplitude * model.unit_strain(data_set.direction) for data_set in data_sets]
-            low = 0.03 * np.concatenate(strains).min()
-            high = max(0.5 * model.values.get("eps_half", np.concatenate(strains).max()), low)
+            low = 0.03 * strains.min()
+            high = max(0.5 * model.values.get("eps_half", strains.max()), low)
         case "force":
             along = [sweep for sweep in parted(data_sets)[1] if not sweep.direction.is_rotation]
             high = max((float(np.max(np.abs(each.measured) * each.amplitude)) for each in along), default=1.0)

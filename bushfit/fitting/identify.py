@@ -12,10 +12,10 @@ import numpy as np
 
 from bushfit.effects import effect_of
 from bushfit.fitting.assess import measured_range
+from bushfit.fitting.common_error import Joined
 from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.information import Information, further_test, percent, relative_sizes
-from bushfit.fitting.joined import Joined
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
 from bushfit.units import told

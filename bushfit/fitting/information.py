@@ -22,14 +22,8 @@ _LEAST_SIZE = 0.05
 _BEYOND = 10.0
 #: Rate of a proposed loop where there is none [Hz]: quasi-static on most rigs.
 _NEW_RATE = 0.1
-#: Its cycles, from rest: the first shows how it settles.
-_NEW_CYCLES = 2.0
-#: Its rows.
-_NEW_ROWS = 400
 #: Its noise over half its force range: that of most force sensors.
 _FORCE_NOISE = 5e-3
-#: Frequencies of a proposed sweep at each amplitude.
-_NEW_FREQUENCIES = 9
 #: Band of a proposed sweep where nothing fast was measured [Hz]: that of most rigs.
 _NEW_BAND = (5.0, 150.0)
 #: Highest frequency of the tests below which nothing fast was measured [Hz].
@@ -137,9 +131,7 @@ def _new_loops(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str
     largest = max(float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction == direction)
     for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
         size = times * largest
-        loop = new_loop(
-            model, direction, _NEW_RATE, size, _FORCE_NOISE, cycles=_NEW_CYCLES, rows=_NEW_ROWS, from_rest=True
-        )
+        loop = new_loop(model, direction, _NEW_RATE, size, _FORCE_NOISE, cycles=2.0, rows=400, from_rest=True)
         yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", replace(loop, gain_error=ASSUMED[0])
 
 
@@ -176,7 +168,7 @@ def _sweep(
     model: Model, sweeps: Sequence[SweepData], like: DataSet, band: tuple[float, float], amplitudes: Sequence[float]
 ) -> SweepData:
     """A sweep as the model would have it, as noisy as the campaign's or most rigs', in its direction or `like`'s."""
-    frequency, amplitude = (x.ravel() for x in np.meshgrid(np.geomspace(*band, _NEW_FREQUENCIES), amplitudes))
+    frequency, amplitude = (x.ravel() for x in np.meshgrid(np.geomspace(*band, 9), amplitudes))
     direction = sweeps[0].direction if sweeps else like.direction
     shared = sweeps[0].noise.shared if sweeps else ASSUMED
     random = sweeps[0].relative_noise if sweeps else ASSUMED[0]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.fitting.data_sets import DataSet, SweepData, parted, rows_of
 
 #: Relative change of the variances at which the scoring ends: far below their standard error.
 _SETTLED = 1e-3
@@ -95,14 +95,16 @@ def level_errors(
 def level_columns(data_sets: Sequence[DataSet]) -> tuple[Array, Array, tuple[float, float]]:
     """Whitened unit error of each level in gain and in phase, (c, n), which of the two it is, (c,), and the error that
     is counted already."""
-    ends = np.cumsum([0, *(data_set.size for data_set in data_sets)])
     rows, which, before = [], [], (0.0, 0.0)
-    for sweep in parted(data_sets)[1]:
-        begin, before = int(ends[list(data_sets).index(sweep)]), sweep.noise.level
+    size = sum(data_set.size for data_set in data_sets)
+    for sweep, own in zip(data_sets, rows_of(data_sets), strict=True):
+        if not isinstance(sweep, SweepData):
+            continue
+        before = sweep.noise.level
         for held in np.unique(sweep.held):
             for kind, column in enumerate(sweep.moved_together(sweep.held == held)):
-                row = np.zeros(ends[-1])
-                row[begin : begin + sweep.size] = column
+                row = np.zeros(size)
+                row[own] = column
                 rows.append(row)
                 which.append(kind)
     return np.array(rows), np.array(which), before

@@ -10,7 +10,7 @@ import numpy as np
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.effects.history import History
 from bushfit.fitting.common_error import CommonError
-from bushfit.fitting.data_set import DataSet, keep, kept
+from bushfit.fitting.data_set import MeasuredTest, keep, kept
 from bushfit.fitting.drive import Drive
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -29,8 +29,8 @@ def smooth_waves(phase: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class LoopData(DataSet):
-    """Force over the rows of a loop; see `DataSet` for its answers.
+class LoopData(MeasuredTest):
+    """Force over the rows of a loop.
 
     Rows that are left out carry no weight from the start, see `drive_of`, and stay: the others need them to keep time.
 
@@ -42,6 +42,7 @@ class LoopData(DataSet):
             widens the errors of what is fitted, and bends no fit to meet the shape of a loop that a model misses.
         shape_error: standard deviation of the model's error of each part of harmonic h, over half the force range and
             1/h, from the second on; 0 where noise is all that is counted.
+        contradiction: what an earlier test of the same points says otherwise, in words.
     """
 
     drive: Drive
@@ -50,20 +51,23 @@ class LoopData(DataSet):
     gain_error: float = 0.0
     gain_weighs: bool = False
     shape_error: float = 0.0
-    beside: str | None = None
+    contradiction: str | None = None
     kind = "loop"
     components = ("force",)
 
     @property
     def size(self) -> int:
+        """Number of residuals."""
         return 2 if self.fundamental_only else int(self.drive.force.size)
 
     @cached_property
     def counted(self) -> int:
+        """Number of residuals that carry weight."""
         return 2 if self.fundamental_only else self._rows
 
     @property
     def independent(self) -> float:
+        """Number of independent points behind what varies slowly: fewer than `counted` where noise is correlated."""
         return self.counted / (1.0 if self.fundamental_only else self.drive.row_noise.rows_as_one)
 
     @property
@@ -72,7 +76,8 @@ class LoopData(DataSet):
 
     @property
     def notes(self) -> Sequence[str]:
-        return (*self.drive.notes, *filter(None, [self.beside]))
+        """What is odd about the record, for the user."""
+        return (*self.drive.notes, *filter(None, [self.contradiction]))
 
     @property
     def temperature(self) -> float:
@@ -81,18 +86,22 @@ class LoopData(DataSet):
 
     @property
     def frequency(self) -> Array:
+        """Of the operating points [Hz], (n,); a loop has one."""
         return np.array([self.drive.frequency])
 
     @property
     def amplitude(self) -> Array:
+        """Of the operating points, zero-to-peak [m or rad], (n,)."""
         return np.array([self.drive.amplitude])
 
     @property
     def circumstances(self) -> Circumstances:
+        """What the operating points were measured under."""
         return self.under
 
     @cached_property
     def measured(self) -> Array:
+        """Complex stiffness at the operating points [N/m or N m/rad], (n,)."""
         return np.array([self.drive.first_harmonic()])
 
     @property
@@ -101,6 +110,7 @@ class LoopData(DataSet):
 
     @property
     def relative_noise(self) -> float:
+        """Standard deviation of one point, relative to half the force range, or of a sweep to |K|."""
         return self.drive.noise / self.drive.half_range
 
     @kept
@@ -115,21 +125,28 @@ class LoopData(DataSet):
         return self.drive.at_rows(self.drive.from_datum(force)) + (self.drive.datum or 0.0)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
+        """Whitened residuals, (..., size); `values` in place of the model's own add leading axes."""
         return self._whitened((self.force(model, values) - self.drive.force) * self._per_noise)
 
     @kept
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the whitened residuals by parameter, (len(names), size)."""
         force, slopes = force_and_slopes(model, self.direction, self._history(model), names, self.under)
         keep(self, "force", model, self._at_rows(force))
         return self._whitened(self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise)
 
     def moved(self, change: Array, model: Model, beside: Array | float = 0.0) -> Array:
+        """What a small change of the model's stiffness at the operating points, complex (..., n) [N/m or N m/rad], does
+        to the whitened residuals, (..., size), with another stiffness beside the model's; a loop changes by its first
+        harmonic."""
         return np.concatenate((change.real, change.imag), axis=-1) @ self._unit_changes
 
     def residual_with(self, added: Array, model: Model) -> Array:
+        """Whitened residuals with a stiffness of any size added, complex (n,), (size,); as `moved`, but exact."""
         return self.residual(model) + self.moved(added, model)
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
+        """As `jacobian`, of `residual_with`: what is added stays as it is, or stays the same share of the model's."""
         slopes = self.jacobian(model, names)
         if as_share:
             test = self.direction, self.frequency, self.amplitude
@@ -141,10 +158,12 @@ class LoopData(DataSet):
         return self.drive.history(any(effect.settles for effect in model.records))
 
     def noise_free(self, model: Model) -> Self:
+        """The same test as the model would have it, without noise."""
         force = self.force(model)
         return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
 
-    def timeless(self) -> Self:
+    def fundamental(self) -> Self:
+        """The same test as far as an addition without a law in time can answer it: a loop by its first harmonic."""
         return replace(self, fundamental_only=True)
 
     def with_noise(self, relative: float) -> Self:
@@ -155,23 +174,39 @@ class LoopData(DataSet):
         return ((self.force(model) - self.drive.force) / self.drive.half_range)[None]
 
     def distance(self, model: Model) -> Array:
+        """How far each point lies off the model, in units of noise, (n,)."""
         return np.abs(self.misfit(model))
 
     def misfit(self, model: Model) -> Array:
+        """As `residual`, but each row of a loop in units of its own noise, whatever those before it tell, (size,)."""
         return (self.force(model) - self.drive.force) * self._per_noise
 
     def shown(self, model: Model) -> Array:
+        """As `misfit`, and of points without weight how far one lies off, in units of noise, (size,)."""
         off = (self.force(model) - self.drive.force) / self.drive.noise
         return np.where(self.weights > 0.0, self.misfit(model), off)
 
     def weighted(self, weight: Array) -> Self:
+        """The same test with the weight of each point, (n,), times a share."""
         return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
 
+    def without(self, points: Array) -> Self:
+        """The same test with no weight on some of its points, by number; a loop's outliers have none from the start."""
+        return self
+
+    def with_weight(self) -> Self:
+        """The part of the test that carries weight."""
+        return self
+
     def outlying(self, model: Model) -> Array:
-        """Rows of the record, from 0, whose force stands out from the loop's own harmonics; no model is asked."""
+        """Numbers of the points that are outliers: far off the model and off their neighbours alike.
+
+        Of a loop rows of the record, from 0, whose force stands out from its own harmonics; no model is asked.
+        """
         return self.drive.outliers["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
+        """Outliers by file and row."""
         file = str(self.source.file) if self.source else None
         before = self.drive.first_row + (self.test.part.first_row if self.test.part else 0)
         for column, (rows, distance) in self.drive.outliers.items():
@@ -179,6 +214,15 @@ class LoopData(DataSet):
                 yield Outlier(self.name, file, row + before + 1, column, off)
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
+        """How an estimator reacts to each variance of the noise that was itself estimated.
+
+        Args:
+            influence: what the estimator takes of each whitened residual, (k, size).
+
+        Returns:
+            Per variance, (k, size): the influence times the whitened derivative of the residuals' covariance by that
+            variance, times its standard error.
+        """
         own = self._less_common(influence)
         whole = own @ self._fundamental.T if self.fundamental_only else own
         by_noise = [self._less_common(self._counted(part)) for part in self.drive.row_noise.unsure(whole)]
@@ -195,6 +239,7 @@ class LoopData(DataSet):
         return rows
 
     def smooth_misfit(self, model: Model) -> float:
+        """Largest smooth misfit, relative as `off`."""
         sizes = np.linalg.lstsq(self.contrasts().T, self.residual(model), rcond=None)[0]
         return float(np.abs(sizes @ self._waves[:, self.weights > 0.0]).max())
 
@@ -204,6 +249,7 @@ class LoopData(DataSet):
         return np.array([self._less_common(self.unit_gain), self._whitened(offset * self._per_noise)])
 
     def columns(self) -> dict[str, Any]:
+        """What names each residual's point in a table: columns by header."""
         unit, factor = self.direction.display.displacement
         return {
             "time [s]": self.drive.phase / self.drive.frequency,
@@ -217,7 +263,7 @@ class LoopData(DataSet):
 
     def _whitened(self, rows: Array) -> Array:
         """Rows in units of noise, (..., n), as independent numbers, 0 where one is told from a row left out."""
-        return self._less_common(self._counted(self.drive.row_noise.whiten(rows) * self._told))
+        return self._less_common(self._counted(self.drive.row_noise.whiten(rows) * self._counting))
 
     def _less_common(self, white: Array) -> Array:
         """Whitened rows, (..., n), whitened by the errors that all of them share as well."""
@@ -236,7 +282,7 @@ class LoopData(DataSet):
             beyond = slice(3, len(self._waves))  # the first harmonic is part of the error of the stiffness
             order = np.repeat(np.arange(2, _SMOOTH_HARMONICS + 1), 2)[:, None]
             waves = self._waves[beyond] * self._per_noise * (self.shape_error * self.drive.half_range / order)
-            columns += list(self.drive.row_noise.whiten(waves) * self._told)
+            columns += list(self.drive.row_noise.whiten(waves) * self._counting)
         return CommonError.of_all(np.array(columns)) if columns else None
 
     def _counted(self, white: Array) -> Array:
@@ -259,23 +305,23 @@ class LoopData(DataSet):
         """
         waves, counted = self._waves.T, self.weights > 0.0
         smooth = waves @ np.linalg.lstsq(waves[counted], self.drive.force[counted], rcond=None)[0]
-        rows = self.drive.row_noise.whiten(smooth * self._per_noise) * self._told
+        rows = self.drive.row_noise.whiten(smooth * self._per_noise) * self._counting
         return self._counted(rows)
 
     @cached_property
     def _fundamental(self) -> Array:
         """Orthonormal basis of the residuals that a first harmonic makes, (n, 2)."""
-        waves = self.drive.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._told
+        waves = self.drive.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._counting
         return np.linalg.qr(waves.T)[0]
 
     @cached_property
     def _rows(self) -> int:
         """Rows that carry weight, as far as they tell one from another."""
-        return round(self.drive.row_noise.share * np.count_nonzero(self._told))
+        return round(self.drive.row_noise.share * np.count_nonzero(self._counting))
 
     @cached_property
-    def _told(self) -> Array:
-        return self.drive.row_noise.told(self.drive.weight)
+    def _counting(self) -> Array:
+        return self.drive.row_noise.counting(self.drive.weight)
 
     @cached_property
     def _per_noise(self) -> Array:

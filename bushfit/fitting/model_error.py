@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, pairwise, product
+from itertools import chain, product
 
 import numpy as np
 from scipy.special import logsumexp
@@ -31,17 +31,15 @@ from bushfit.effects.contract import Array
 from bushfit.effects.temperature import REFERENCE
 from bushfit.effects.unnamed import MOST_NODES, Patch, Unnamed, basis, in_lengths, places_of
 from bushfit.errors import FitError
-from bushfit.fitting.common_error import CommonError, Seen
-from bushfit.fitting.coordinates import Bounds, Solution, anderson, coordinate_bounds
-from bushfit.fitting.data_sets import DataSet, LoopData, parted
-from bushfit.fitting.joined import Joined
+from bushfit.fitting.common_error import CommonError, Joined, Seen
+from bushfit.fitting.coordinates import ROUNDING, Bounds, Solution, anderson, coordinate_bounds
+from bushfit.fitting.data_sets import DataSet, LoopData, log_slopes, parted, reached, rows_of
 from bushfit.fitting.levels import level_columns
 from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.robust import Estimate
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import Model
-from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.units import number
 
 #: Sizes tried, relative to |K|: from what the best rigs repeat to what no one calls a fit.
@@ -56,8 +54,6 @@ _ODDS = 0.2
 _SHOWS, _FEW = 0.5, 16
 #: Difference of the logarithm of the likelihood from the best, beyond which an error is tried no more.
 _FAR = 12.0
-#: Singular value, relative to the largest, below which what parameters make is rounding.
-_ROUNDING = 1e-10
 #: Rounds in which error and parameters follow each other, at most, and the share of a standard error by which the
 #: parameters still move when they have settled.
 _MOST_ROUNDS, _SETTLED = 12, 0.1
@@ -67,7 +63,7 @@ _Groups = tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
-class _Beside:
+class _FittedTests:
     """A fitted model and its tests, as far as errors beside it are concerned.
 
     Args:
@@ -100,12 +96,11 @@ class _Beside:
     def conditions(self) -> list[Array]:
         """Frequency [Hz] and equivalent strain of each point, and its temperature [K] if the model knows of it."""
         model = self.solution.model
-        strains = [each.amplitude * model.unit_strain(each.direction) for each in self.data_sets]
-        found = [np.concatenate([each.frequency for each in self.data_sets]), np.concatenate(strains)]
+        found = [*reached(model.bushing, self.data_sets)]
         if model.knows_temperature:
             known = [REFERENCE if (at := each.circumstances.temperature) is None else at for each in self.data_sets]
-            pairs = zip(known, strains, strict=True)
-            found.append(np.concatenate([np.broadcast_to(kelvin, strain.shape) for kelvin, strain in pairs]))
+            pairs = zip(known, self.data_sets, strict=True)
+            found.append(np.concatenate([np.broadcast_to(kelvin, each.frequency.shape) for kelvin, each in pairs]))
         return found
 
     @property
@@ -117,19 +112,15 @@ class _Beside:
     def slopes(self) -> Array:
         """Derivatives of ln K at the points by coordinate, of the parameters that rest on no bound, complex (k, p)."""
         model, coordinates = self.solution.model, self.solution.coordinates
-        names, found = [coordinates.names[i] for i in self.solution.moving], []
-        for each in self.data_sets:
-            test = each.direction, each.frequency, each.amplitude
-            stiffness, slopes = stiffness_and_slopes(model, *test, names, each.kind, each.circumstances)
-            found.append(slopes / stiffness)
-        return np.concatenate(found, axis=-1) * coordinates.slopes(model.values)[self.solution.moving, None]
+        names = [coordinates.names[i] for i in self.solution.moving]
+        found = np.concatenate([log_slopes(model, each, names) for each in self.data_sets], axis=-1)
+        return found * coordinates.slopes(model.values)[self.solution.moving, None]
 
     @cached_property
     def seen(self) -> Seen:
         """What changes of the tests' stiffness can move of the residuals: all of a sweep, two numbers of a loop."""
-        ends = np.cumsum([0, *(each.size for each in self.data_sets)]).tolist()
-        rows = [slice(*pair) for pair in pairwise(ends)]
-        return Seen([(own, None if loop is None else loop[0]) for own, loop in zip(rows, self._loops, strict=True)])
+        pairs = zip(rows_of(self.data_sets), self._loops, strict=True)
+        return Seen([(own, None if loop is None else loop[0]) for own, loop in pairs])
 
     def made(self, shapes: Array) -> Array:
         """Of the residuals that relative changes of the stiffness make, complex (c, p), what is seen, (c, d)."""
@@ -170,7 +161,7 @@ class _Beside:
         )
         scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         size, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-        known = size > _ROUNDING * size.max(initial=0.0)
+        known = size > ROUNDING * size.max(initial=0.0)
         span = (vectors[:, known] / np.sqrt(size[known])).T @ (rows / scale[:, None])
         left = self.solution.residual - (self.solution.residual @ span.T) @ span
         return self.seen.of(span), self.seen.of(left)
@@ -193,7 +184,7 @@ class _Prior:
     shapes: Array
 
     @classmethod
-    def of(cls, tests: _Beside, groups: _Groups, lengths: tuple[float, float], most: int = MOST_NODES) -> _Prior:
+    def of(cls, tests: _FittedTests, groups: _Groups, lengths: tuple[float, float], most: int = MOST_NODES) -> _Prior:
         """The error at the points of some tests, by so many nodes at most."""
         nodes, shapes = [], []
         for group in groups:
@@ -210,7 +201,7 @@ class _Prior:
 class _Error:
     """A smooth error beside a fitted model."""
 
-    beside: _Beside
+    tests: _FittedTests
     prior: _Prior
 
     @cached_property
@@ -221,8 +212,8 @@ class _Error:
     @cached_property
     def _spectrum(self) -> tuple[Array, Array]:
         """l and b^2 of the notes, (2 q,) each."""
-        span, left = self.beside.left
-        columns = self.beside.made(self.shapes)
+        span, left = self.tests.left
+        columns = self.tests.made(self.shapes)
         taken = columns @ span.T
         values, vectors = np.linalg.eigh(columns @ columns.T - taken @ taken.T)
         return np.maximum(values, 0.0), np.square(vectors.T @ (columns @ left))
@@ -248,28 +239,28 @@ class _Error:
         """The tests, with weights of their own, and the error that they share."""
         told = np.square(self.best[1]) * self._spectrum[0]
         freedom = float(np.sum(np.square(told / (1.0 + told))))
-        beside = replace(self.beside, data_sets=data_sets)
-        error = CommonError(self.best[1] * beside.made(self.shapes), beside.seen)
+        tests = replace(self.tests, data_sets=data_sets)
+        error = CommonError(self.best[1] * tests.made(self.shapes), tests.seen)
         return Joined(tuple(data_sets), error, max(freedom, 1.0))
 
     def data(self, size: float) -> Unnamed:
         """The error, of a size, as the tests leave it."""
-        columns, rows = self.beside.made(self.shapes), self.beside.moving
+        columns, rows = self.tests.made(self.shapes), self.tests.moving
         inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
-        value = (-inverse @ columns @ self.beside.seen.of(self.beside.solution.residual)) @ self.shapes
-        both = np.concatenate((columns, self.beside.seen.of(rows)))
+        value = (-inverse @ columns @ self.tests.seen.of(self.tests.solution.residual)) @ self.shapes
+        both = np.concatenate((columns, self.tests.seen.of(rows)))
         information = both @ both.T
         information[len(columns) :, len(columns) :] = rows @ rows.T  # loops tell more than by a change of stiffness
         information[np.diag_indices(len(columns))] += 1.0 / size**2
         scale = 1.0 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         known, vectors = np.linalg.eigh(information * np.outer(scale, scale))
-        root = (vectors / np.sqrt(np.maximum(known, _ROUNDING))).T * scale
-        whole = root @ np.concatenate((self.shapes, self.beside.slopes))
+        root = (vectors / np.sqrt(np.maximum(known, ROUNDING))).T * scale
+        whole = root @ np.concatenate((self.shapes, self.tests.slopes))
         errors = np.linalg.norm(whole.real, axis=0), np.linalg.norm(whole.imag, axis=0)
         patches = []
         for group, nodes in zip(self.prior.groups, self.prior.nodes, strict=True):
             lists = (value[nodes].real, value[nodes].imag, *(error[nodes] for error in errors))
-            frequency, strain, *kelvin = (tuple(axis[nodes].tolist()) for axis in self.beside.conditions)
+            frequency, strain, *kelvin = (tuple(axis[nodes].tolist()) for axis in self.tests.conditions)
             patches.append(Patch(group, frequency, strain, *(tuple(one.tolist()) for one in lists), *kelvin))
         return Unnamed(size, self.prior.lengths, tuple(patches))
 
@@ -281,10 +272,11 @@ def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATE
     names = found.solution.coordinates.names
     if not names:
         return found, None
-    beside = _Beside(found.solution, found.minimised, _of_class(found.minimised, rig))
-    if not _shows(beside):
+    tests = _FittedTests(found.solution, found.minimised, _of_class(found.minimised, rig))
+    together = _Prior.of(tests, (tests.directions,), _LENGTHS[1:3], _FEW)
+    if _Error(tests, together).best[0] <= _SHOWS:
         return found, None
-    tried = _tried(beside)
+    tried = _tried(tests)
     if float(logsumexp([each.log_evidence for each in tried])) - np.log(len(tried)) + np.log(_ODDS) < 0.0:
         return found, None
     asked, answered = list[Array](), list[Array]()
@@ -292,7 +284,7 @@ def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATE
         error = max(tried, key=lambda each: each.best[0])
         if error.best[1] >= _SIZES[-1]:  # that is no error of a model, but another thing than it
             return found, None
-        before, shaped = beside.solution, _shaped(found.minimised, error.best[1])
+        before, shaped = tests.solution, _shaped(found.minimised, error.best[1])
         joined, starts = error.joined(shaped), [before.model] if asked else [before.model, *_alive(before, shaped)]
         ends = [solve(start, joined, names, bounds, strict=False) for start in starts]
         after = min(ends, key=lambda each: each.chi_square)
@@ -301,14 +293,14 @@ def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATE
         if float(np.linalg.norm((answered[-1] - asked[-1]) @ after.jacobian)) < _SETTLED:
             break
         ahead = np.clip(anderson(asked, answered), *coordinate_bounds(after.coordinates, bounds))
-        beside = _at(after, after.coordinates.possible(ahead), shaped)
-        tried = [_Error(beside, each.prior) for each in tried]
+        tests = _at(after, after.coordinates.possible(ahead), shaped)
+        tried = [_Error(tests, each.prior) for each in tried]
         if len(asked) > 1:  # about a model that the error no longer bends
             best = max(each.best[0] for each in tried)
             tried = [each for each in tried if each.best[0] > best - _FAR]
-    beside = _at(after, after.model.values, shaped)
+    tests = _at(after, after.model.values, shaped)
     size = error.best[1]
-    data = replace(error, beside=beside).data(size)
+    data = replace(error, tests=tests).data(size)
     if data.typical >= _SIZES[-1]:
         return found, None
     each = found.data_sets, found.minimised, found.weighed
@@ -345,15 +337,10 @@ def _alive(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
     return []
 
 
-def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[DataSet]) -> _Beside:
+def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[DataSet]) -> _FittedTests:
     """A fit with its parameters at other values, and the tests in noise alone."""
     found = solution.at(solution.model.with_values(values), data_sets)
-    return _Beside(found, data_sets, found.jacobian[:0])
-
-
-def _shows(beside: _Beside) -> bool:
-    """Whether tests are any likelier with an error of middling lengths that all of them share: few clean ones are."""
-    return _Error(beside, _Prior.of(beside, (beside.directions,), _LENGTHS[1:3], _FEW)).best[0] > _SHOWS
+    return _FittedTests(found, data_sets, found.jacobian[:0])
 
 
 def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> Array:
@@ -361,13 +348,13 @@ def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> Array:
     gain and phase of each level, (w, n)."""
     levels, which, before = level_columns(data_sets)
     beyond = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(before), 0.0))
-    ends, rows = np.cumsum([0, *(each.size for each in data_sets)]), [levels.T * beyond[which]] if which.size else []
-    for each, first, last in zip(data_sets, ends[:-1], ends[1:], strict=True):
+    size = sum(each.size for each in data_sets)
+    rows = [*(levels * beyond[which, None] if which.size else ())]
+    for each, own in zip(data_sets, rows_of(data_sets), strict=True):
         if isinstance(each, LoopData) and not each.gain_weighs:
-            gain = np.zeros((ends[-1], 1))
-            gain[first:last, 0] = each.gain_error * each.unit_gain
-            rows.append(gain)
-    return np.concatenate(rows, axis=1).T if rows else np.empty((0, ends[-1]))
+            rows.append(np.zeros(size))
+            rows[-1][own] = each.gain_error * each.unit_gain
+    return np.array(rows).reshape(-1, size)
 
 
 def _shaped(data_sets: Sequence[DataSet], size: float) -> list[DataSet]:
@@ -375,14 +362,14 @@ def _shaped(data_sets: Sequence[DataSet], size: float) -> list[DataSet]:
     return [replace(each, shape_error=size) if isinstance(each, LoopData) else each for each in data_sets]
 
 
-def _tried(beside: _Beside) -> list[_Error]:
+def _tried(tests: _FittedTests) -> list[_Error]:
     """Errors of all tests together, and of each direction by itself, of all lengths."""
-    shared = dict.fromkeys([(beside.directions,), tuple((name,) for name in beside.directions)])
+    shared = dict.fromkeys([(tests.directions,), tuple((name,) for name in tests.directions)])
     pairs = product(shared, product(_LENGTHS, _LENGTHS))
-    return [_Error(beside, _Prior.of(beside, groups, lengths)) for groups, lengths in pairs]
+    return [_Error(tests, _Prior.of(tests, groups, lengths)) for groups, lengths in pairs]
 
 
-def told_of(error: Unnamed) -> str:
+def model_error_warning(error: Unnamed) -> str:
     """What is said of a model error, for people."""
     reached = np.ptp(np.concatenate([each.nodes[:, :2] for each in error.patches]), axis=0)
     lengths = zip(error.lengths, reached, strict=True)

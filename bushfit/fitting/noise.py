@@ -13,20 +13,18 @@ from scipy.special import chdtrc, fdtrc
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.repeats import FEWEST_SOUGHT, FLOOR, LineNoise, at_nominal, disturbed, free_of, told_by_line
+from bushfit.fitting.repeats import FEWEST_SOUGHT, FLOOR, LineNoise, at_nominal, disturbed, free_of, line_noise
 from bushfit.fitting.rig_class import class_words, largest_error, of_class, words_of
 from bushfit.reading.measurement import Sweep
 
 #: Degrees of freedom from which on repeats alone tell what a run shares; chosen: those of three repeats at two
 #: levels; with fewer, 95 % intervals were too narrow.
 _ENOUGH = 4
-#: Probability of unequal variances by chance, below which levels get noise of their own.
-_EQUAL_NOISE_P = 1e-3
+#: Probability by chance below which variances count as unequal, and a scatter as one that grows along what is stepped.
+_BY_CHANCE = 1e-3
 #: Degrees of freedom from which on a line may have a scatter of its own, and phase another than gain: fewer tell it no
 #: better than within a quarter, and wrong weights cost a tenth of the accuracy.
 _OWN_SCATTER = 10
-#: Probability by chance of a scatter that grows along what is stepped, below which it counts.
-_LEVEL_SCATTER_P = 1e-3
 #: Exponents of the variance along what is stepped at most, far beyond those of rigs.
 _STEEPEST = 6.0
 #: Shared variance of an outlying pair of repeats over the median of all pairs: noise alone reaches it once in 500
@@ -100,16 +98,16 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     """
     at_levels = [(sweep, at_nominal(sweep)) for sweep in sweeps]
 
-    def told(without: Collection[float]) -> dict[LineKey, LineNoise]:
+    def of_lines(without: Collection[float]) -> dict[LineKey, LineNoise]:
         return {
-            (sweep.name, float(held)): told_by_line(sweep, log_stiffness, held, without)
+            (sweep.name, float(held)): line_noise(sweep, log_stiffness, held, without)
             for sweep, log_stiffness in at_levels
             for held in np.unique(sweep.held)
         }
 
-    lines = told(())
+    lines = of_lines(())
     if apart := disturbed(lines.values()):
-        lines = told(apart)
+        lines = of_lines(apart)
     slopes = _slopes(sweeps, lines)
     for key, line in lines.items():
         if key[0] in slopes and line.steps.size:
@@ -179,7 +177,7 @@ def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
     ratio = np.concatenate(squares)
     scale = float(np.var(ratio)) * centred.size / free_of(centred.size)
     along = float(centred @ (ratio - 1.0)) ** 2 / max(float(centred @ centred) * scale, FLOOR**2)
-    if chdtrc(1, along) > _LEVEL_SCATTER_P:
+    if chdtrc(1, along) > _BY_CHANCE:
         return None
 
     def unlikely(exponent: float) -> float:
@@ -203,7 +201,7 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
     counted = [*alike, *few] if alike else measured
     freedoms = [line.freedom for line in counted]
     pooled, freedom = np.average([line.variance for line in counted], axis=0, weights=freedoms), sum(freedoms)
-    unequal = 2.0 * fdtrc(freedom, freedom, pooled.max() / max(pooled.min(), FLOOR**2)) < _EQUAL_NOISE_P
+    unequal = 2.0 * fdtrc(freedom, freedom, pooled.max() / max(pooled.min(), FLOOR**2)) < _BY_CHANCE
     if freedom < _OWN_SCATTER and not unequal:
         pooled = np.full(2, pooled.mean())
     if alike or not told:
@@ -254,4 +252,4 @@ def _unequal(lines: Sequence[LineNoise]) -> bool:
     pooled = np.average(variance, weights=freedom)
     few = (np.sum(1.0 / freedom) - 1.0 / freedom.sum()) / (3.0 * (variance.size - 1))
     statistic = float(freedom @ np.log(pooled / variance)) / (1.0 + few)
-    return bool(chdtrc(variance.size - 1, statistic) < _EQUAL_NOISE_P)
+    return bool(chdtrc(variance.size - 1, statistic) < _BY_CHANCE)

@@ -19,8 +19,9 @@ from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, median
 _CHANCE = 0.01
 #: Rows over which the median of neighbours is taken; chosen: wider than a burst, narrower than a bend of the motion.
 NEIGHBOURS = 11
-#: Rows of the median that is tried where the motion turns within NEIGHBOURS rows.
-_FEWER_NEIGHBOURS = 5
+#: Rows of the median that is tried where the motion turns within NEIGHBOURS rows; and points of a block that count as
+#: neighbours of one where a model was taken off, since stiffness that the model misses bends with frequency.
+_FEW_NEIGHBOURS = 5
 #: Equal values in a row from which on a channel may be stuck.
 _STUCK = 4
 #: Rows of a burst of outliers at most; longer runs far off are a misfit.
@@ -37,9 +38,6 @@ _MOST_GROSS = 0.1
 _KNOWN = 1e6
 #: Difference of two points from which on they are no repeats, relative to |K|: no noise of a rig goes that far.
 _UNLIKE = 0.1
-#: Points of a block that count as neighbours of one where a model was taken off: few, since stiffness that the model
-#: misses bends with frequency.
-_NEAR_NEIGHBOURS = 5
 #: Least distance relative to the median distance, so that no point takes all the weight.
 _LEAST_DISTANCE = 1e-3
 
@@ -94,7 +92,7 @@ def gross_rows(values: Array) -> Array:
 
     None where these are many, even with a median over few rows: then the motion turns within so few rows.
     """
-    for width in (NEIGHBOURS, _FEWER_NEIGHBOURS):
+    for width in (NEIGHBOURS, _FEW_NEIGHBOURS):
         level = median_filter(values, width, mode="nearest")
         off = np.abs(values - level) > _GROSS / 2.0 * float(np.ptp(level))
         if np.mean(off) < _MOST_GROSS:
@@ -138,7 +136,7 @@ def outlying_points(
     by_noise = outlier_limit(deviation.size, 2, freedom)
     limit = by_noise * misfit_scale(distance, 2)
     far = distance > limit
-    local = _from_neighbours(deviation, starts, _NEAR_NEIGHBOURS)
+    local = _from_neighbours(deviation, starts, _FEW_NEIGHBOURS)
     _, place = np.unique(points, axis=1, return_inverse=True)
     repeats, beside = _from_repeats(local, place)
     alone = np.minimum(apart(local, shared=False), np.where(repeats > 0, apart(beside, shared=False), np.inf))
@@ -153,7 +151,7 @@ def outlying_points(
     )
 
 
-def unlike(stiffness: Array, place: Array) -> list[tuple[float, int, int]]:
+def contradictions(stiffness: Array, place: Array) -> list[tuple[float, int, int]]:
     """The two points of each place, (n,), that lie farthest apart in |K| or in phase, the worst first: how far, as a
     share of |K|, from _UNLIKE on, and their numbers. Points of one `place` repeat each other."""
     value, ends, found = np.log(stiffness), np.cumsum(np.bincount(place)), dict[int, tuple[float, int, int]]()

@@ -20,16 +20,16 @@ from bushfit.fitting.assess import (
     quality,
     unfitted,
 )
+from bushfit.fitting.common_error import Joined
 from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, anderson
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, sources, with_level_errors
 from bushfit.fitting.identify import left_open
-from bushfit.fitting.joined import Joined
 from bushfit.fitting.levels import level_errors
-from bushfit.fitting.model_error import told_of, with_model_error
+from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.profile import limit95, profile95
 from bushfit.fitting.rig_class import largest_error, words_of
-from bushfit.fitting.robust import Estimate, estimate, told
+from bushfit.fitting.robust import Estimate, estimate, outlier_warnings
 from bushfit.geometry import place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -87,7 +87,7 @@ def fit_joint(
         if effect.corrects:
             place_named(effect.corrects, data.campaign.specimens)
     data_sets = data.chosen(directions)
-    left: list[DataSet] = [data_set for data_set in (*data.loops, *data.sweeps) if data_set not in data_sets]
+    left = [data_set for data_set in data.data_sets if data_set not in data_sets]
     effects = data.effects if effects is None else effects
     found = _solve(data, data_sets, effects, {})
     most = largest_error(data.campaign.rig)
@@ -100,7 +100,7 @@ def fit_joint(
         data_sets = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
         found = _solve(data, data_sets, effects, {}, found.solution.model)
     notes = [_LEVELS.format(words_of(errors.error))] if errors.matters and not at_limit and not error else []
-    notes += [*([told_of(error) + _NEXT] if error else []), *unfitted(found.solution.model, left, _NEXT)]
+    notes += [*([model_error_warning(error) + _NEXT] if error else []), *unfitted(found.solution.model, left, _NEXT)]
     result = _result(data, [found], notes=notes, left=left)
     result = replace(result, usable=usable(found.solution, found.minimised, left), model_error=error)
     if profile is None:
@@ -236,7 +236,7 @@ def _result(
         cov,
         quality(model, data_sets, len(fitted)),
         measured_range(model, data_sets),
-        (*notes, *doubts, *told(outliers, robust=data.robust), *odd),
+        (*notes, *doubts, *outlier_warnings(outliers, robust=data.robust), *odd),
         sources(data_sets),
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},

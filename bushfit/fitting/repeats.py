@@ -66,7 +66,7 @@ class LineNoise:
         return np.asarray(np.square(self.scatter).sum(axis=0) / max(self.freedom, 1))
 
 
-def told_by_line(sweep: Sweep, log_stiffness: Array, held: float, disturbed: Collection[float] = ()) -> LineNoise:
+def line_noise(sweep: Sweep, log_stiffness: Array, held: float, disturbed: Collection[float] = ()) -> LineNoise:
     """What one line of a sweep tells, but for disturbed steps: by pairs of repeats, or about a smooth curve where there
     is no pair."""
     chosen = (sweep.held == held) & ~np.isin(sweep.step, [*disturbed])

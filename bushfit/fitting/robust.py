@@ -16,7 +16,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import Bounds, Solution
-from bushfit.fitting.data_set import DataSet
+from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.outliers import misfit_scale
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
@@ -112,7 +112,7 @@ def _efficiency(parts: int) -> float:
     return float(slope**2 * parts / (density @ (weight * z) ** 2))
 
 
-def told(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
+def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
     """A sentence on the outliers that the fit follows and one on those left out, the first of each test by row.
 
     A displacement that is an outlier is never followed, see `drive`.

@@ -71,16 +71,16 @@ class RowNoise:
         """So many rows tell as much as an independent one about what is slow, at least 1."""
         return max(1.0 / float(np.sum(self.filter)) ** 2, 1.0)
 
-    def told(self, weight: Array) -> Array:
+    def counting(self, weight: Array) -> Array:
         """Which whitened rows count, (n,) bool: those that have weight, as all have that their noise is told from."""
         counts = weight > 0.0
-        told = counts.copy()
+        counting = counts.copy()
         for k in range(1, self.order + 1):
-            told[k:] &= counts[:-k]
+            counting[k:] &= counts[:-k]
         for first in (0, *self.breaks):
             begun = slice(first, first + self.order)
-            told[begun] = counts[begun].all()
-        return told
+            counting[begun] = counts[begun].all()
+        return counting
 
     def whiten(self, rows: Array) -> Array:
         """Rows in units of noise, (..., n), as independent numbers of unit variance."""

@@ -13,19 +13,15 @@ from bushfit.effects.contract import Array
 from bushfit.effects.friction import harmonic_shape
 from bushfit.errors import FitError
 from bushfit.fitting.assess import implausible
-from bushfit.fitting.data_sets import DataSet
-from bushfit.geometry import Bushing, stiffness_per_modulus, unit_strain
+from bushfit.fitting.data_sets import DataSet, reached
+from bushfit.geometry import Bushing, stiffness_per_modulus
 
 #: Strain amplitude of the largest test over eps_half, before anything is known; chosen: the fit finds the rest.
 _SCALED_STRAIN = 3.0
 #: Share of a modulus, or of a loss, that a start leaves to a branch, whatever the other branches claim.
 _LEAST_SHARE = 0.1
-#: Least loss relative to |K|, where the measured one is no more than noise.
-_LEAST_LOSS = 1e-3
-#: Least growth of K' with ln omega relative to mu.
-_LEAST_GROWTH = 1e-3
-#: Share of mu that keeps a loss above zero, for its logarithm.
-_ABOVE_ZERO = 1e-9
+#: Least loss relative to |K|, and least growth of K' with ln omega relative to mu, where the tests show no more.
+_LEAST = 1e-3
 #: Frequency over the slowest up to which a test counts as slow.
 _SLOW = 1.5
 #: Strain over the smallest of the sweeps up to which a point counts as of their smallest level: amplitudes that were
@@ -33,10 +29,8 @@ _SLOW = 1.5
 _SMALLEST = 1.2
 #: Range of ln omega from which on it tells a slope.
 _LEAST_RANGE = 0.1
-#: Start of alpha where the data tell no slope: that of a usual filled rubber.
-_USUAL_ALPHA = 0.25
-#: Start of m over mu in that case.
-_USUAL_M = 0.2
+#: m over mu, and alpha, of a usual filled rubber: the start where the data tell no slope.
+_USUAL = (0.2, 0.25)
 #: Start of alpha at least and at most: slopes that filled rubbers have.
 _ALPHA_RANGE = (0.1, 0.6)
 
@@ -55,22 +49,23 @@ def start_values(bushing: Bushing | None, data_sets: Sequence[DataSet], known: M
         - mu from the slope (secant of a loop's fundamental) of the slowest test, less what friction adds;
         - alpha from the slope of ln K'' over ln f, m from the growth of K' over ln f.
     """
-    strain, frequency, modulus = _points(bushing, data_sets)
+    frequency, strain = reached(bushing, data_sets)
+    modulus = np.concatenate([each.measured / stiffness_per_modulus(bushing, each.direction) for each in data_sets])
     slow = frequency <= _SLOW * frequency.min()
     largest = int(np.argmax(np.where(slow, strain, 0.0)))
     eps_half = known.get("eps_half", float(strain.max()) / _SCALED_STRAIN)
     shape = harmonic_shape(strain / eps_half)
-    loss = max(modulus[largest].imag, _LEAST_LOSS * abs(modulus[largest]))
+    loss = max(modulus[largest].imag, _LEAST * abs(modulus[largest]))
     sigma_fmax = known.get("sigma_fmax", loss * eps_half / shape[largest].imag)
     friction = sigma_fmax / eps_half * shape
     mu = known.get("mu", max(modulus[largest].real - friction[largest].real, _LEAST_SHARE * abs(modulus[largest])))
-    m, alpha = _USUAL_M * mu, _USUAL_ALPHA
+    m, alpha = _USUAL[0] * mu, _USUAL[1]
     smallest = strain <= _SMALLEST * strain[~slow].min(initial=np.inf)
     log_omega = np.log(2.0 * np.pi * frequency[smallest])
     if not slow.all() and np.ptp(log_omega) >= _LEAST_RANGE:
-        least = _LEAST_SHARE * modulus.imag.clip(min=0.0) + _ABOVE_ZERO * mu
+        least = _LEAST_SHARE * modulus.imag.clip(min=0.0) + 1e-9 * mu  # above zero, for its logarithm
         viscous_loss = np.maximum(modulus.imag - friction.imag, least)
-        m, alpha = _springpot(log_omega, modulus.real[smallest], viscous_loss[smallest], _LEAST_GROWTH * mu)
+        m, alpha = _springpot(log_omega, modulus.real[smallest], viscous_loss[smallest], _LEAST * mu)
     found = {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half}
     found = {name: value for name, value in found.items() if name not in known}
     inside = {name: float(np.clip(value, *parameter_named(name).bounds)) for name, value in found.items()}
@@ -95,12 +90,3 @@ def _slope(x: Array, y: Array) -> float:
     """Slope of the straight line through points, (n,) each."""
     apart = x - x.mean()
     return float(apart @ y / (apart @ apart))
-
-
-def _points(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Array]:
-    """Strain amplitude, frequency [Hz] and complex modulus [Pa] of every operating point, loops included, (n,) each."""
-    return (
-        np.concatenate([each.amplitude * unit_strain(bushing, each.direction) for each in data_sets]),
-        np.concatenate([each.frequency for each in data_sets]),
-        np.concatenate([each.measured / stiffness_per_modulus(bushing, each.direction) for each in data_sets]),
-    )

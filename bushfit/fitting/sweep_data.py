@@ -9,9 +9,9 @@ import numpy as np
 
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
-from bushfit.fitting.data_set import DataSet, keep, kept, shown_amplitude
+from bushfit.fitting.data_set import MeasuredTest, keep, kept, shown_amplitude
 from bushfit.fitting.noise import SweepNoise
-from bushfit.fitting.outliers import outlying_points, unlike
+from bushfit.fitting.outliers import contradictions, outlying_points
 from bushfit.fitting.repeats import FLOOR, unit
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
@@ -61,7 +61,8 @@ class Line:
     @cached_property
     def smooth(self) -> Array:
         """The part of the misfit that is a polynomial in the logarithm of the step, complex, (n,)."""
-        basis = _polynomials(self.step)
+        x = np.log(self.step)
+        basis = np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))
         return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]
 
 
@@ -72,8 +73,10 @@ _DIGITS = 9
 
 
 @dataclass(frozen=True, eq=False)
-class SweepData(DataSet):
-    """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor; see `DataSet`.
+class SweepData(MeasuredTest):
+    """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor.
+
+    What has no explanation here answers as in `LoopData`.
 
     Points stand sorted by run (what it holds, repeat), then step; a run is a block. The residual
     ln K/K_meas has the gain error in its real and the phase error in its imaginary part.
@@ -90,7 +93,7 @@ class SweepData(DataSet):
     weight: Array | None = None
     part: Array | None = None
     under: Circumstances = UNKNOWN
-    beside: str | None = None
+    contradiction: str | None = None
     kind = "sweep"
     components = ("storage", "loss")
 
@@ -101,7 +104,7 @@ class SweepData(DataSet):
     @cached_property
     def notes(self) -> list[str]:
         place = np.unique([self.frequency, self.amplitude], axis=1, return_inverse=True)[1]
-        apart = unlike(self.measured, place)
+        apart = contradictions(self.measured, place)
         rows = [f"{one} and {other}" for _, *pair in apart for one, other in [sorted(self.order[pair] + 1)]]
         told = [
             f"{self.source.file if self.source else self.name}: points that repeat each other lie up to "
@@ -110,8 +113,9 @@ class SweepData(DataSet):
             * (len(rows) > _MOST_LISTED)
             for share, *_ in apart[:1]
         ]
+        recorded = self.source.notes if self.source else ()
         beyond = (words for name, words in self.noise.beyond.items() if name == self.name)
-        return [*super().notes, *told, *filter(None, [self.beside, self._rounded]), *beyond]
+        return [*recorded, *told, *filter(None, [self.contradiction, self._rounded]), *beyond]
 
     @property
     def _rounded(self) -> str | None:
@@ -139,6 +143,10 @@ class SweepData(DataSet):
         return 2 * int(np.count_nonzero(self.weights))
 
     @property
+    def independent(self) -> float:
+        return float(self.counted)
+
+    @property
     def relative_noise(self) -> float:
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
@@ -146,9 +154,12 @@ class SweepData(DataSet):
         """The part of the sweep at some of its levels, with the same noise."""
         return self._part(np.isin(self.amplitude, amplitudes))
 
-    def standing(self) -> Self:
-        standing = self.weights > 0.0
-        return self if standing.all() else self._part(standing)
+    def with_weight(self) -> Self:
+        counted = self.weights > 0.0
+        return self if counted.all() else self._part(counted)
+
+    def fundamental(self) -> Self:
+        return self
 
     def _part(self, chosen: Array) -> Self:
         return replace(self, weight=self.weights[chosen], part=self.order[chosen])
@@ -206,11 +217,6 @@ class SweepData(DataSet):
         label = np.stack((self.held, self.repeat.astype(float)))
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
-    @cached_property
-    def _line_starts(self) -> Array:
-        """Index of the first point of each line."""
-        return np.concatenate(([0], 1 + np.flatnonzero(np.diff(self.held))))
-
     @kept
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
         """Model stiffness at the points, (..., n); what repeats is computed once."""
@@ -238,12 +244,15 @@ class SweepData(DataSet):
         return np.stack((off.real, off.imag))
 
     def distance(self, model: Model) -> Array:
-        """As of `DataSet`, less what its block shares; of gain and phase the root mean square."""
+        """Less what its block shares; of gain and phase the root mean square."""
         return self.apart(self.deviation(model)) / np.sqrt(2.0)
 
     def apart(self, deviation: Array, *, shared: bool = True) -> Array:
         """Length of deviations, (n,), in units of the random noise, less the likeliest error that a block shares."""
         return np.hypot(*self._whitening.own(deviation, shared=shared))
+
+    def misfit(self, model: Model) -> Array:
+        return self.residual(model)
 
     def shown(self, model: Model) -> Array:
         deviation = self.deviation(model)
@@ -311,7 +320,8 @@ class SweepData(DataSet):
         random = self.noise.scatter(self.name, self.held, self.step)
         if self.sweep.relative_error is not None and self.sweep.noise is None:
             random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)
-        return Whitening(self.block_starts, self._line_starts, random, self.noise, self.weights)
+        line_starts = np.concatenate(([0], 1 + np.flatnonzero(np.diff(self.held))))
+        return Whitening(self.block_starts, line_starts, random, self.noise, self.weights)
 
     @cached_property
     def weights(self) -> Array:
@@ -362,9 +372,3 @@ class SweepData(DataSet):
         unit, factor = self.direction.display.displacement
         amplitude = self.amplitude * factor
         return {"frequency [Hz]": self.frequency, f"amplitude [{unit}]": amplitude, "repeat": self.repeat}
-
-
-def _polynomials(step: Array) -> Array:
-    """Legendre polynomials in the logarithm of steps over their range, (n, degree + 1)."""
-    x = np.log(step)
-    return np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))

@@ -27,7 +27,7 @@ def about(data: Data, command: str, options: Iterable[str] = ()) -> dict[str, An
         "file": campaign.path.name,
         "sha256": campaign.sha256,
         "command": " ".join(words),
-        "tests": [_test(data_set) for data_set in (*data.loops, *data.sweeps)],
+        "tests": [_test(data_set) for data_set in data.data_sets],
         "report": {key: value for key, value in vars(campaign.report).items() if value is not None},
     }
 

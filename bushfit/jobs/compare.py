@@ -248,7 +248,7 @@ class Compare:
             ModelError: an unknown effect, or one that the model has already.
         """
         data = Data.of(campaign)
-        data_sets = [data_set.standing() for data_set in data.chosen(self.asked.directions)]
+        data_sets = [data_set.with_weight() for data_set in data.chosen(self.asked.directions)]
         model = data.started(data.effects, data_sets, {})
         held = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]
         families, left = fit_families(model, data_sets, names, held, data.bounds, progress)

@@ -98,7 +98,7 @@ def _campaign(clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, 
     campaign = replace(measure(clean, settings).campaign(), rig=rig)
     try:
         data = Data.of(campaign)
-        places = list(dict.fromkeys(str(data_set.direction) for data_set in [*data.loops, *data.sweeps]))
+        places = list(dict.fromkeys(str(data_set.direction) for data_set in data.data_sets))
         result = fit_joint(data, effects=truth.effects, directions=places)
     except FitError:
         return None

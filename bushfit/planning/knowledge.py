@@ -71,7 +71,7 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
     found = None if rivals is None else diagnose(data)
     noise = noise_of(data)
     data = Data.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
-    data_sets = [*data.loops, *data.sweeps]
+    data_sets = data.data_sets
     model = data.started(data.effects, data_sets, {})
     held = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
     source = f"the tests of {data.campaign.name}"
@@ -154,7 +154,7 @@ def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:
 
 def noise_of(data: Data) -> Noise:
     """How well the rig of a campaign measures, as its tests show; what they do not show is assumed."""
-    loops, sweeps = parted([*data.loops, *data.sweeps])
+    loops, sweeps = parted(data.data_sets)
     found = replace(Noise(), level=of_class(data.campaign.rig))
     if sweeps:
         noise = sweeps[0].noise

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulateSettings
+from bushfit.fitting.data import Data
 from bushfit.model.model import Model
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
@@ -18,29 +20,31 @@ PAPER_NOISE = SimulateSettings(repeats=3, noise=5e-3, force_noise=3e-3, displace
 #: The same rig with a gain error of 0.4 % and a phase error of 0.2 deg in each block.
 SHARED_NOISE = replace(PAPER_NOISE, gain_error=4e-3, phase_error=3.5e-3)
 
-Rig = Callable[..., Campaign]
-
-
-@pytest.fixture
-def paper_noise() -> SimulateSettings:
-    return PAPER_NOISE
-
-
-@pytest.fixture
-def shared_noise() -> SimulateSettings:
-    return SHARED_NOISE
-
 
 @pytest.fixture(scope="session")
-def rig() -> Rig:
-    """rig(model, noise, seed): the paper's tests of a model; without noise what an ideal rig writes."""
+def rig(paper_model: Model) -> Callable[..., Campaign]:
+    """rig(seed, model, settings=, shared=, ...): the paper's tests of a model, by default with the noise of
+    data/cmp_15961, or what else is set of a simulation."""
     cleaned: dict[tuple[object, ...], Undisturbed] = {}
 
-    def campaign(model: Model, noise: SimulateSettings | None = None, seed: int = 0) -> Campaign:
-        noise = noise or SimulateSettings()
+    def campaign(
+        seed: int = 0,
+        model: Model = paper_model,
+        *,
+        settings: SimulateSettings = PAPER_NOISE,
+        shared: bool = False,
+        **changes: Any,
+    ) -> Campaign:
+        noise = replace(SHARED_NOISE if shared else settings, **changes)
         key = (model.bushing, model.effects, tuple(model.values.items()), noise.loops, noise.sweeps)
         if key not in cleaned:
             cleaned[key] = undisturbed(model, noise)
         return measure(cleaned[key], replace(noise, seed=seed)).campaign()
 
     return campaign
+
+
+@pytest.fixture(scope="session")
+def measured(campaign: Campaign) -> Data:
+    """The paper's bushing as an independent rig simulation measured it; its joint fit is `result`."""
+    return Data.of(campaign)

@@ -4,35 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import Campaign
 from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import LoopData
-from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 
 
-@pytest.fixture(scope="module")
-def measured(root: Path) -> Data:
-    return Data.of(load_campaign(root / "configs/cmp_15961.toml"))
-
-
-@pytest.fixture(scope="module")
-def fitted(measured: Data) -> Result:
-    return fit_joint(measured)
-
-
-def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measured: Data, fitted: Result) -> None:
+def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measured: Data, result: Result) -> None:
     """The noise is estimated too, which can only add to the inverse of J J^T."""
-    model, data_sets = fitted.model, measured.chosen(None)
+    model, data_sets = result.model, measured.chosen(None)
     found = covariance(model, [Stage(FIVE, data_sets)])
     slope = jacobian(model, data_sets, FIVE)
     values = np.array([model.values[name] for name in FIVE])
@@ -44,32 +32,23 @@ def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measu
     np.testing.assert_allclose([certain.stderr(name) for name in FIVE], plain, rtol=0.1)
 
 
-def test_half_the_data_make_wider_errors(measured: Data, fitted: Result) -> None:
-    model, data_sets = fitted.model, measured.chosen(None)
-    names = ("mu", "sigma_fmax", "eps_half")
-    loops = [replace(loop, gain_error=0.0) for loop in measured.loops]
-    every = [*loops, *(each for each in data_sets if not isinstance(each, LoopData))]
-    few, many = (covariance(model, [Stage(names, part)]) for part in (loops, every))
-    assert all(few.stderr(name) > many.stderr(name) for name in names)  # type: ignore[operator]
-
-
-def test_quality_and_reach_are_those_of_the_data(measured: Data, fitted: Result) -> None:
+def test_quality_and_reach_are_those_of_the_data(measured: Data, result: Result) -> None:
     data_sets = measured.chosen(None)
-    found = quality(fitted.model, data_sets, 5)
+    found = quality(result.model, data_sets, 5)
     assert found.points == sum(data_set.counted for data_set in data_sets)
     assert found.reduced_chi_square == pytest.approx(1.0, abs=0.1)
     assert found.nrmse == pytest.approx(found.noise, rel=0.15)
-    reach = measured_range(fitted.model, data_sets)
+    reach = measured_range(result.model, data_sets)
     assert reach.frequency == pytest.approx((0.1, 155.0), rel=1e-3)
     assert reach.strain == pytest.approx((0.0062, 0.062), rel=0.01)
     assert reach.directions == (Direction.AXIAL,)
 
 
-def test_a_model_that_misses_the_data_is_told_and_one_that_does_not_is_not(measured: Data, fitted: Result) -> None:
+def test_a_model_that_misses_the_data_is_told_and_one_that_does_not_is_not(measured: Data, result: Result) -> None:
     data_sets = measured.chosen(None)
-    assert lack_of_fit(fitted.model, data_sets, 5) is None
-    assert misfit(fitted.model, data_sets, 5) == []
-    off = fitted.model.with_values({"mu": 1.05 * fitted.model.values["mu"]})
+    assert lack_of_fit(result.model, data_sets, 5) is None
+    assert misfit(result.model, data_sets, 5) == []
+    off = result.model.with_values({"mu": 1.05 * result.model.values["mu"]})
     reduced = lack_of_fit(off, data_sets, 5)
     assert reduced is not None
     assert reduced > 2.0
@@ -81,8 +60,7 @@ def test_a_model_that_misses_the_data_is_told_and_one_that_does_not_is_not(measu
 def test_a_parameter_that_no_test_sees_has_an_error_beyond_all_bounds(
     rig: Callable[..., Campaign], paper_model: Model
 ) -> None:
-    campaign = rig(paper_model)
-    data_sets = Data.of(replace(campaign, sweeps=())).chosen(None)
+    data_sets = Data.of(replace(rig(), sweeps=())).chosen(None)
     model = paper_model.with_effect("stiffness_factor.radial")
     names = (*FIVE[:1], "stiffness_factor.radial")
     found = covariance(model, [Stage(names, data_sets)])

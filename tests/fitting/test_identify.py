@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
+from typing import Any
 
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep
 from bushfit.effects import BASE
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
@@ -25,6 +27,14 @@ def loop(amplitude: float, rate: float) -> SimulatedLoop:
 
 def sweep(*amplitudes: float, band: tuple[float, ...] = BAND) -> SimulatedSweep:
     return SimulatedSweep(Direction.AXIAL, amplitudes, band)
+
+
+#: Noise that leaves several parameters open, and no loop.
+ROUGH: dict[str, Any] = {"repeats": 1, "noise": 1e-2, "loops": ()}
+
+
+def warnings(campaign: Campaign, **asked: Any) -> tuple[str, ...]:
+    return fit_joint(Data.of(campaign), **asked).warnings
 
 
 #: Tests that lack something: loops, sweeps, what must be said, what is known, the further test.
@@ -45,17 +55,12 @@ LACKING = {
 
 
 @pytest.mark.parametrize("case", LACKING)
-def test_what_is_lacking_is_said_with_what_is_known_and_what_would_help(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, case: str
-) -> None:
+def test_what_is_lacking_is_said_with_what_is_known_and_what_would_help(rig: Rig, case: str) -> None:
     loops, sweeps, reason, known, further = LACKING[case]
-    plan = replace(paper_noise, loops=loops, sweeps=sweeps)
     for seed in (1, 2):
-        lines = fit_joint(Data.of(rig(paper_model, plan, seed))).warnings
-        print(case, *lines, sep="\n  ")
-        said = [line for line in lines if "standard errors:" in line]
-        assert len(said) == 1
-        assert reason in said[0]
+        lines = warnings(rig(seed, loops=loops, sweeps=sweeps))
+        (said,) = [line for line in lines if "standard errors:" in line]
+        assert reason in said
         if known:
             assert any(line.startswith("what is known all the same") and known in line for line in lines)
         assert any(line.startswith("the further test that would help most") and further in line for line in lines)
@@ -70,79 +75,47 @@ def test_what_is_lacking_is_said_with_what_is_known_and_what_would_help(
     ],
 )
 def test_a_span_is_a_reason_only_where_it_is_narrow(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, band: tuple[float, ...], amplitudes: tuple[float, ...],
-    reason: str,
-) -> None:  # fmt: skip
-    plan = replace(paper_noise, repeats=1, noise=1e-2, loops=(), sweeps=(sweep(*amplitudes, band=band),))
-    lines = fit_joint(Data.of(rig(paper_model, plan, 3))).warnings  # noise that leaves several open
-    print(*lines, sep="\n")
-    said = [line for line in lines if "standard errors:" in line]
-    assert said
-    assert said[0].startswith(reason)
-
-
-def test_a_bound_of_the_user_is_named_as_the_user_s(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
+    rig: Rig, band: tuple[float, ...], amplitudes: tuple[float, ...], reason: str
 ) -> None:
+    lines = warnings(rig(3, **ROUGH, sweeps=(sweep(*amplitudes, band=band),)))
+    assert next(line for line in lines if "standard errors:" in line).startswith(reason)
+
+
+def test_a_bound_of_the_user_is_named_as_the_user_s(rig: Rig) -> None:
     bounded = FitSettings(parameters={"mu": ParameterSetting(max=1e6)})
-    campaign = replace(rig(paper_model, paper_noise, 1), fit=bounded)
-    lines = fit_joint(Data.of(campaign)).warnings
-    print(*lines, sep="\n")
+    lines = warnings(replace(rig(1), fit=bounded))
     assert "mu rests on the max given in [fit]" in lines
     assert not any("edge of what is possible" in line for line in lines)
 
 
-def test_an_effect_that_is_not_there_is_said_to_be_no_different_from_zero(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
-) -> None:
-    plan = replace(paper_noise, repeats=1, noise=1e-2, loops=(), sweeps=(sweep(1e-4, 5e-4),))
-    lines = fit_joint(Data.of(rig(paper_model, plan, 1)), effects=(*BASE, "viscous")).warnings
-    print(*lines, sep="\n")
+def test_an_effect_that_is_not_there_is_said_to_be_no_different_from_zero(rig: Rig) -> None:
+    lines = warnings(rig(1, **ROUGH, sweeps=(sweep(1e-4, 5e-4),)), effects=(*BASE, "viscous"))
     assert "viscous.eta is no different from zero: these tests do not show viscous" in lines
     assert not any("standard errors:" in line and "viscous" in line for line in lines)
 
 
-def test_directions_that_share_no_parameter_have_sentences_of_their_own(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
-) -> None:
-    plan = replace(paper_noise, repeats=1, noise=1e-2, loops=(), sweeps=(sweep(1e-4, 5e-4),))
-    result = fit_joint(Data.of(rig(paper_model, plan, 1)))
-    said = [line for line in result.warnings if "standard errors:" in line]
-    print(*result.warnings, sep="\n")
-    assert len(said) == 2
-    assert "sigma_fmax and eps_half are known only as a ratio" in said[0]
-    assert "m and alpha cannot be told from one another" in said[1]
+def test_directions_that_share_no_parameter_have_sentences_of_their_own(rig: Rig) -> None:
+    result = fit_joint(Data.of(rig(1, **ROUGH, sweeps=(sweep(1e-4, 5e-4),))))
+    friction, springpot = [line for line in result.warnings if "standard errors:" in line]
+    assert "sigma_fmax and eps_half are known only as a ratio" in friction
+    assert "m and alpha cannot be told from one another" in springpot
     stderr, value = result.covariance.stderr("sigma_fmax"), result.model.values["sigma_fmax"]
     assert stderr is not None
-    assert f"sigma_fmax {100 * stderr / value:.2g} %" in said[0]
+    assert f"sigma_fmax {100 * stderr / value:.2g} %" in friction
 
 
-def test_complete_tests_leave_nothing_open(
-    rig: Rig,
-    paper_noise: SimulateSettings,
-    shared_noise: SimulateSettings,
-    paper_model: Model,
-    other_models: dict[str, Model],
-) -> None:
-    count = 0
-    for model in (paper_model, *other_models.values()):
-        for noise in (paper_noise, shared_noise):
-            for seed in range(5):
-                assert fit_joint(Data.of(rig(model, noise, seed))).warnings == ()
-                count += 1
-    sweeps_only = replace(paper_noise, sweeps=(sweep(1e-4, 2e-4, 5e-4),))
-    assert fit_joint(Data.of(rig(paper_model, sweeps_only, 1))).warnings == ()
-    print(f"{count + 1} campaigns that lack nothing: none warned of")
+def test_complete_tests_leave_nothing_open(rig: Rig, paper_model: Model, other_models: dict[str, Model]) -> None:
+    for model, shared, seed in product((paper_model, *other_models.values()), (False, True), range(3)):
+        assert warnings(rig(seed, model, shared=shared)) == ()
+    assert warnings(rig(1, sweeps=(sweep(1e-4, 2e-4, 5e-4),))) == ()
 
 
 @pytest.mark.parametrize(("largest", "proposed"), [(1e-4, True), (3e-3, False)])
 def test_no_test_is_proposed_that_would_tear_the_rubber(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, largest: float, proposed: bool
+    rig: Rig, paper_model: Model, largest: float, proposed: bool
 ) -> None:
     """Friction that gives way at strains beyond all reach: what would help is more amplitude, as far as rubber goes."""
     model = paper_model.with_values({"sigma_fmax": 2e6, "eps_half": 2.0})
-    plan = replace(paper_noise, loops=(loop(largest, 0.1),), sweeps=(sweep(0.3 * largest, largest),))
-    lines = fit_joint(Data.of(rig(model, plan, 1))).warnings
-    print(*lines, sep="\n")
+    lines = warnings(rig(1, model, loops=(loop(largest, 0.1),), sweeps=(sweep(0.3 * largest, largest),)))
     assert any("of eps_half: " in line for line in lines)
     assert any("times the largest amplitude" in line for line in lines) is proposed

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import FitSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.schema import FitSettings, SimulatedLoop, SimulatedSweep
 from bushfit.fitting.data import Data
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.outliers import outlier_limit
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, fit_two_step
-from bushfit.fitting.robust import told
+from bushfit.fitting.robust import outlier_warnings
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
@@ -58,6 +59,13 @@ def spoilt_campaign(campaign: Campaign, kind: str, seed: int) -> Campaign:
     return replace(campaign, loops=loops, sweeps=tuple(spoilt_sweep(sweep, kind, rng) for sweep in campaign.sweeps))
 
 
+def with_factor(campaign: Campaign, rows: Sequence[int] | np.ndarray, factor: float | np.ndarray) -> Campaign:
+    """The campaign with some rows of its first sweep off by a factor."""
+    stiffness = campaign.sweeps[0].stiffness.copy()
+    stiffness[rows] *= factor
+    return replace(campaign, sweeps=(replace(campaign.sweeps[0], stiffness=stiffness), *campaign.sweeps[1:]))
+
+
 def robust(campaign: Campaign) -> Result:
     return fit_joint(Data.of(replace(campaign, fit=SOFT)))
 
@@ -70,82 +78,56 @@ def moved(one: Result, other: Result) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("shared", [False, True])
-@pytest.mark.parametrize("seeds", [2, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [1, pytest.param(8, marks=pytest.mark.slow)])
 def test_three_percent_outliers_move_no_parameter_by_a_standard_error(
-    rig: Rig,
-    paper_noise: SimulateSettings,
-    shared_noise: SimulateSettings,
-    paper_model: Model,
-    kind: str,
-    shared: bool,
-    seeds: int,
+    rig: Rig, kind: str, shared: bool, seeds: int
 ) -> None:
-    shifts, found = [], []
+    shifts = []
     for seed in range(seeds):
-        clean = rig(paper_model, shared_noise if shared else paper_noise, seed)
-        before, dirty = fit_joint(Data.of(clean)), spoilt_campaign(clean, kind, seed)
-        after = robust(dirty)
-        shifts.append(moved(after, before))
-        found.append(len(after.outliers))
+        clean = rig(seed, shared=shared)
+        after = robust(spoilt_campaign(clean, kind, seed))
+        shifts.append(moved(after, fit_joint(Data.of(clean))))
         assert (after.quality.reduced_chi_square if after.quality else 0.0) == pytest.approx(1.0, abs=0.1)
     worst = np.max(np.abs(shifts), axis=0)
-    shown = ", ".join(f"{name} {value:.2f}" for name, value in zip(FIVE, worst, strict=True))
-    print(f"{kind}, block errors {shared}: moved by at most {shown} standard errors; {np.mean(found):.0f} points found")
+    print(f"{kind}, block errors {shared}: moved by at most {dict(zip(FIVE, worst.round(2), strict=True))} errors")
     # an error of the levels, told by three a direction, comes out 0 or 0.08 % by one point: this moves weights
     assert np.max(worst) < 1.25
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_outliers_do_not_spoil_the_bins_of_a_long_loop(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, kind: str
-) -> None:
+def test_outliers_do_not_spoil_the_bins_of_a_long_loop(rig: Rig, kind: str) -> None:
     loops = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=12),)
     sweep = SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), tuple(np.arange(5.0, 156.0, 25.0)))
-    clean = rig(paper_model, replace(paper_noise, loops=loops, sweeps=(sweep,)), 3)
+    clean = rig(3, loops=loops, sweeps=(sweep,))
     assert clean.loops[0].force.size > MOST_ROWS
-    shift = moved(robust(spoilt_campaign(clean, kind, 3)), fit_joint(Data.of(clean)))
-    print(f"{kind}, {clean.loops[0].force.size} rows in bins: moved by {np.max(np.abs(shift)):.2f} standard errors")
-    assert np.max(np.abs(shift)) < 1.0
+    assert np.max(np.abs(moved(robust(spoilt_campaign(clean, kind, 3)), fit_joint(Data.of(clean))))) < 1.0
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_outlier_of_the_displacement_does_not_disturb_the_motion(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, kind: str
-) -> None:
+def test_an_outlier_of_the_displacement_does_not_disturb_the_motion(rig: Rig, kind: str) -> None:
     for seed in range(4):
-        (loop,) = rig(paper_model, paper_noise, seed).loops
+        (loop,) = rig(seed).loops
         clean, rng = drive_of(loop), np.random.default_rng(seed)
         drive = drive_of(replace(loop, displacement=spoilt(loop.displacement, kind, rng)))
-        print(f"{kind}: frequency {drive.frequency:.8f} Hz, amplitude {drive.amplitude / clean.amplitude - 1:+.1e}")
         assert drive.frequency == pytest.approx(clean.frequency, rel=1e-4)
         assert drive.amplitude == pytest.approx(clean.amplitude, rel=1e-3)
         assert kind == "stuck" or drive.outliers["displacement"].rows.size > 0.8 * SHARE * loop.force.size
 
 
 @pytest.mark.parametrize("seeds", [1, pytest.param(6, marks=pytest.mark.slow)])
-def test_clean_tests_have_no_outliers_and_the_same_answer(
-    rig: Rig, paper_noise: SimulateSettings, shared_noise: SimulateSettings, other_models: dict[str, Model], seeds: int
-) -> None:
-    found, shifts = [], []
-    for model in other_models.values():
-        for noise in (paper_noise, shared_noise):
-            for seed in range(seeds):
-                campaign = rig(model, noise, seed)
-                before, after = fit_joint(Data.of(campaign)), robust(campaign)
-                found.append(len(before.outliers) + len(after.outliers))
-                shifts.append(moved(after, before))
-    worst = np.max(np.abs(shifts))
-    print(
-        f"{len(found)} clean campaigns: {np.count_nonzero(found)} with outliers; soft_l1 moves by {worst:.2f} at most"
-    )
-    assert np.count_nonzero(found) == 0
-    assert worst < 0.5
+def test_clean_tests_have_no_outliers_and_the_same_answer(rig: Rig, other_models: dict[str, Model], seeds: int) -> None:
+    shifts = []
+    for model, shared, seed in product(other_models.values(), (False, True), range(seeds)):
+        campaign = rig(seed, model, shared=shared)
+        before, after = fit_joint(Data.of(campaign)), robust(campaign)
+        assert before.outliers == after.outliers == ()
+        shifts.append(moved(after, before))
+    print(f"{len(shifts)} clean campaigns: soft_l1 moves a parameter by {np.max(np.abs(shifts)):.2f} errors at most")
+    assert np.max(np.abs(shifts)) < 0.5
 
 
 @pytest.mark.parametrize("effect", ["bump_stop", "clearance", "fixture_resonance", "mullins_softening"])
-def test_physics_that_the_model_lacks_makes_no_outliers(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, effect: str
-) -> None:
+def test_physics_that_the_model_lacks_makes_no_outliers(rig: Rig, paper_model: Model, effect: str) -> None:
     values = {
         "bump_stop": {"bump_stop.gap": 3e-4, "bump_stop.stiffness": 3e5},
         "clearance": {"clearance.delta": 2e-5},
@@ -154,23 +136,16 @@ def test_physics_that_the_model_lacks_makes_no_outliers(
         },
         "mullins_softening": {"mullins_softening.share": 0.2, "mullins_softening.cycles": 1.0},
     }[effect]  # fmt: skip
-    result = fit_joint(Data.of(rig(paper_model.with_effect(effect, values), paper_noise, 1)))
-    print(f"{effect}: reduced chi-square {result.quality and result.quality.reduced_chi_square:.3g}")
-    assert result.outliers == ()
+    assert fit_joint(Data.of(rig(1, paper_model.with_effect(effect, values)))).outliers == ()
 
 
-def test_outliers_are_listed_by_file_and_row_and_told(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
-) -> None:
-    campaign = rig(paper_model, paper_noise, 0)
-    sweep, loop = campaign.sweeps[0], campaign.loops[0]
-    stiffness, force = sweep.stiffness.copy(), loop.force.copy()
-    stiffness[[4, 70]] *= 1.1
+def test_outliers_are_listed_by_file_and_row_and_told(rig: Rig) -> None:
+    campaign = rig()
+    force = campaign.loops[0].force.copy()
     force[123] *= -1.0
-    dirty = replace(campaign, loops=(replace(loop, force=force),), sweeps=(replace(sweep, stiffness=stiffness),))
+    dirty = with_factor(replace(campaign, loops=(replace(campaign.loops[0], force=force),)), [4, 70], 1.1)
     linear, soft = fit_joint(Data.of(dirty)), robust(dirty)
     places = [(entry.test, entry.row, entry.column) for entry in soft.outliers]
-    print(*linear.warnings[:1], *soft.warnings[:1], sep="\n")
     assert places == [("loop_axial_1", 124, "force"), ("sweep_axial", 5, "stiffness"), ("sweep_axial", 71, "stiffness")]
     assert all(entry.distance > 5.0 for entry in soft.outliers)
     assert [(entry.test, entry.row) for entry in linear.outliers] == [place[:2] for place in places]
@@ -179,91 +154,67 @@ def test_outliers_are_listed_by_file_and_row_and_told(
     assert from_document(to_document(soft)).outliers == soft.outliers
 
 
-def test_without_repeats_an_outlier_is_found(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
-    campaign = rig(paper_model, replace(paper_noise, repeats=1), 2)
-    stiffness = campaign.sweeps[0].stiffness.copy()
-    stiffness[[5, 40]] *= np.array([3.0, 0.4])
-    dirty = replace(campaign, sweeps=(replace(campaign.sweeps[0], stiffness=stiffness), *campaign.sweeps[1:]))
-    shift = moved(robust(dirty), fit_joint(Data.of(campaign)))
-    assert [entry.row for entry in robust(dirty).outliers] == [6, 41]
-    assert np.max(np.abs(shift)) < 1.0
+def test_without_repeats_an_outlier_is_found(rig: Rig) -> None:
+    campaign = rig(2, repeats=1)
+    soft = robust(with_factor(campaign, [5, 40], np.array([3.0, 0.4])))
+    assert [entry.row for entry in soft.outliers] == [6, 41]
+    assert np.max(np.abs(moved(soft, fit_joint(Data.of(campaign))))) < 1.0
 
 
 def test_an_outlier_of_the_displacement_is_said_to_be_left_out_whatever_the_loss() -> None:
     both = [Outlier("loop", None, row, column, 9.0) for row, column in ((7, "force"), (9, "displacement"))]
-    followed, left = told(both, robust=False)
+    followed, left = outlier_warnings(both, robust=False)
     assert followed.startswith("1 point lies")
     assert "follows them: loop, force row 7; --loss soft_l1" in followed
     assert left.endswith("left out of the fit: loop, displacement row 9")
-    (line,) = told(both, robust=True)
+    (line,) = outlier_warnings(both, robust=True)
     assert "2 points lie" in line
     assert "follows" not in line
 
 
 @pytest.mark.parametrize(("factor", "missed"), [(0.7, 0), (1.1, 2)])
-@pytest.mark.parametrize("stride", [5, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("stride", [9, pytest.param(1, marks=pytest.mark.slow)])
 def test_one_outlier_of_a_short_sweep_without_repeats_is_found_at_any_row(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, factor: float, missed: int, stride: int
+    rig: Rig, factor: float, missed: int, stride: int
 ) -> None:
     """Nine points a level leave four degrees of freedom beside the smooth curve, which the outlier bends, at an end
     so far that a small one may hide."""
     short = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(np.linspace(5.0, 125.0, 9)))
-    settings = replace(paper_noise, repeats=1, sweeps=(short,))
     found, tried = [], range(0, 27, stride)
     for row in tried:
-        campaign = rig(paper_model, settings, row)
+        campaign = rig(row, repeats=1, sweeps=(short,))
         assert robust(campaign).outliers == ()
-        stiffness = campaign.sweeps[0].stiffness.copy()
-        stiffness[row] *= factor
-        dirty = replace(campaign, sweeps=(replace(campaign.sweeps[0], stiffness=stiffness),))
-        found.append([entry.row - 1 for entry in robust(dirty).outliers])
-    print(f"times {factor}: {sum(map(len, found))} points found of {len(found)}")
+        found.append([entry.row - 1 for entry in robust(with_factor(campaign, [row], factor)).outliers])
     assert all(rows in ([row], []) for row, rows in zip(tried, found, strict=True))
     assert found.count([]) <= missed
 
 
-def test_outliers_side_by_side_do_not_hide_each_other_from_their_repeats(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
-) -> None:
-    for seed in range(4):
-        campaign = rig(paper_model, paper_noise, seed)
-        stiffness = campaign.sweeps[0].stiffness.copy()
+def test_outliers_side_by_side_do_not_hide_each_other_from_their_repeats(rig: Rig) -> None:
+    for seed in range(3):
         rows = 20 + seed + np.arange(3)
-        stiffness[rows] *= 1.1
-        found = robust(replace(campaign, sweeps=(replace(campaign.sweeps[0], stiffness=stiffness),))).outliers
-        print(f"rows {rows} spoilt, found {[entry.row - 1 for entry in found]}")
+        found = robust(with_factor(rig(seed), rows, 1.1)).outliers
         assert [entry.row - 1 for entry in found] == rows.tolist()
 
 
-def test_a_fit_of_one_level_names_the_row_of_the_file(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
-) -> None:
+def test_a_fit_of_one_level_names_the_row_of_the_file(rig: Rig) -> None:
     """A file that begins at its largest amplitude: the smallest, which fit-dynamic takes, stands at its end."""
-    campaign = rig(paper_model, paper_noise, 0)
+    campaign = rig()
     sweep = campaign.sweeps[0]
     down = np.argsort(-sweep.amplitude, kind="stable")
-    spoilt_row = down.size - 7
-    stiffness = sweep.stiffness[down]
-    stiffness[spoilt_row] *= 1.1
-    falling = replace(
-        sweep, frequency=sweep.frequency[down], amplitude=sweep.amplitude[down], stiffness=stiffness,
-        repeat=sweep.repeat[down], reached=None,
-    )  # fmt: skip
-    data = Data.of(replace(campaign, sweeps=(falling, *campaign.sweeps[1:]), fit=SOFT))
+    columns = {name: getattr(sweep, name)[down] for name in ("frequency", "amplitude", "stiffness", "repeat")}
+    falling = replace(campaign, sweeps=(replace(sweep, **columns, reached=None), *campaign.sweeps[1:]), fit=SOFT)
+    data = Data.of(with_factor(falling, [down.size - 7], 1.1))
     dynamic, joint = fit_dynamic(data, fit_static(data)), fit_joint(data)
-    print(f"row {spoilt_row + 1}: fit-dynamic lists {dynamic.outliers}, fit {joint.outliers}")
-    assert [entry.row for entry in dynamic.outliers] == [entry.row for entry in joint.outliers] == [spoilt_row + 1]
+    assert [entry.row for entry in dynamic.outliers] == [entry.row for entry in joint.outliers] == [down.size - 6]
     marked = data.without(dynamic.outliers).sweeps[0]
-    assert marked.order[marked.weights == 0.0].tolist() == [spoilt_row]
+    assert marked.order[marked.weights == 0.0].tolist() == [down.size - 7]
 
 
-def test_the_two_step_procedure_is_robust_too(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
-    campaign = rig(paper_model, paper_noise, 5)
+def test_the_two_step_procedure_is_robust_too(rig: Rig) -> None:
+    campaign = rig(5)
     before = fit_two_step(Data.of(campaign)).result
     after = fit_two_step(Data.of(replace(spoilt_campaign(campaign, "spikes", 5), fit=SOFT))).result
-    shift = moved(after, before)
-    print(f"two-step, spikes: moved by {np.max(np.abs(shift)):.2f} standard errors")
-    assert np.max(np.abs(shift)) < 1.0
+    assert np.max(np.abs(moved(after, before))) < 1.0
 
 
 def test_the_limit_grows_with_the_rows_and_with_what_is_not_known() -> None:
@@ -272,7 +223,7 @@ def test_the_limit_grows_with_the_rows_and_with_what_is_not_known() -> None:
     assert outlier_limit(100, 2, 10) > 1.5 * outlier_limit(100, 2, 1000)
 
 
-def test_a_loop_of_few_rows_keeps_its_corners(paper_model: Model) -> None:
+def test_a_loop_of_few_rows_keeps_its_corners() -> None:
     """Forty rows a cycle of a triangle: its corners stand out from their neighbours, and are no outliers."""
     phase = np.arange(120) / 40.0
     triangle = 1e-3 * (2.0 / np.pi) * np.arcsin(np.sin(2.0 * np.pi * phase))

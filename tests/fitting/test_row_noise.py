@@ -19,6 +19,7 @@ from bushfit.reading.measurement import Loop
 
 Rig = Callable[..., Campaign]
 ROWS = 3000
+IDEAL = SimulateSettings()
 
 
 def filtered(random: np.random.Generator, rows: int, correlation: float) -> np.ndarray:
@@ -51,11 +52,9 @@ def cycles_of(loop: Loop, cycles: int, noise: np.ndarray, rows: int = 1000) -> L
     )
 
 
-def test_a_record_that_misses_its_last_cycle_by_rounding_tells_its_noise_from_all(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
-) -> None:
+def test_a_record_that_misses_its_last_cycle_by_rounding_tells_its_noise_from_all(rig: Rig) -> None:
     """Three cycles, whose frequency the motion's own noise puts off by a part in a million: half end too soon."""
-    clean = rig(paper_model, replace(paper_noise, force_noise=0.0, displacement_noise=0.0), 0).loops[0]
+    clean = rig(force_noise=0.0, displacement_noise=0.0).loops[0]
     loop = cycles_of(clean.at(slice(None, None, 4)), 3, filtered(np.random.default_rng(0), 750, 0.98), rows=250)
     drives = [
         drive_of(replace(loop, displacement=loop.displacement + 2e-7 * random.standard_normal(750)))
@@ -66,17 +65,11 @@ def test_a_record_that_misses_its_last_cycle_by_rounding_tells_its_noise_from_al
     assert max(rows) < 1.01 * min(rows)
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9, 0.98])
-def test_the_rig_s_filter_is_found_and_taken_out(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, correlation: float
-) -> None:
-    noise = replace(paper_noise, force_correlation=correlation)
-    found = [LoopData(drive_of(rig(paper_model, noise, seed).loops[0])) for seed in range(15)]
+@pytest.mark.parametrize("correlation", [0.0, 0.9, 0.98])
+def test_the_rig_s_filter_is_found_and_taken_out(rig: Rig, paper_model: Model, correlation: float) -> None:
+    found = [LoopData(drive_of(rig(seed, force_correlation=correlation).loops[0])) for seed in range(15)]
     rows = np.array([data_set.drive.row_noise.rows_as_one for data_set in found])
     true = (1.0 + correlation) / (1.0 - correlation)
-    print(
-        f"correlation {correlation}: one in {true:.3g} rows counts, found {rows.mean():.3g}, scatter {rows.std():.2g}"
-    )
     assert rows.mean() == pytest.approx(true, rel=0.15)
     assert np.mean([data_set.relative_noise for data_set in found]) == pytest.approx(3e-3, rel=0.06)
     assert found[0].independent == pytest.approx(found[0].counted / rows[0])
@@ -97,23 +90,21 @@ def test_smooth_misfit_is_judged_by_the_noise_it_stands_in(
     rig: Rig, paper_model: Model, kind: str, cycles: int
 ) -> None:
     """The harmonics of pure noise, whitened, scatter by one: of low-passed noise too, and of a lone cycle's."""
-    (clean,), random = rig(paper_model).loops, np.random.default_rng(1)
+    (clean,), random = rig(settings=IDEAL).loops, np.random.default_rng(1)
     squares = []
     for _ in range(25):
         rows = 1000 * cycles
         noise = low_passed(random, rows) if kind == "low-passed" else filtered(random, rows, 0.9)
         data_set = LoopData(drive_of(cycles_of(clean, cycles, noise)))
-        columns = data_set.contrasts()
-        basis = np.linalg.qr(columns.T)[0]
+        basis = np.linalg.qr(data_set.contrasts().T)[0]
         squares.append(np.mean(np.square(data_set.residual(paper_model) @ basis)))
     mean, error = np.mean(squares), np.std(squares) / np.sqrt(len(squares))
     print(f"{kind}, {cycles} cycles: mean square of the harmonics {mean:.2f} +- {1.96 * error:.2f}, 1 if right")
     assert 0.75 < mean < 1.35
 
 
-def test_a_row_left_out_tells_nothing(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
-    (loop,) = rig(paper_model, replace(paper_noise, force_correlation=0.9), 2).loops
-    data_set = LoopData(drive_of(loop))
+def test_a_row_left_out_tells_nothing(rig: Rig, paper_model: Model) -> None:
+    data_set = LoopData(drive_of(rig(2, force_correlation=0.9).loops[0]))
     weight = np.ones(data_set.size)
     weight[400:420] = 0.0
     light = data_set.weighted(weight)
@@ -121,14 +112,6 @@ def test_a_row_left_out_tells_nothing(rig: Rig, paper_noise: SimulateSettings, p
     assert np.array_equal(wild.residual(paper_model), light.residual(paper_model))
     assert np.all(light.residual(paper_model)[400:421] == 0.0)
     assert light.misfit(paper_model)[420] != 0.0
-
-
-def test_derivatives_are_whitened_as_residuals_are(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
-    data_set = LoopData(drive_of(rig(paper_model, replace(paper_noise, force_correlation=0.98), 2).loops[0]))
-    value = paper_model.values["sigma_fmax"]
-    high, low = (data_set.residual(paper_model.with_values({"sigma_fmax": value * (1.0 + s)})) for s in (1e-5, -1e-5))
-    slope = data_set.jacobian(paper_model, ["sigma_fmax"])[0]
-    np.testing.assert_allclose(slope, (high - low) / (2e-5 * value), atol=1e-4 * np.abs(slope).max())
 
 
 def test_whitening_is_exact_from_the_first_row_on() -> None:
@@ -154,10 +137,13 @@ def test_rows_of_other_cycles_are_whitened_anew() -> None:
     np.testing.assert_allclose(white.T @ white, np.eye(sum(lengths)), atol=1e-12)
     weight = np.ones(sum(lengths))
     weight[[3, 11]] = 0.0
-    assert np.flatnonzero(~noise.told(weight)).tolist() == [3, 4, 11]
+    assert np.flatnonzero(~noise.counting(weight)).tolist() == [3, 4, 11]
 
 
-@pytest.mark.parametrize(("cycles", "rows", "correlation"), [(20, 1000, 0.98), (5, 1500, 0.94), (8, 2000, 0.95)])
+@pytest.mark.parametrize(
+    ("cycles", "rows", "correlation"),
+    [(5, 1500, 0.94), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((20, 1000, 0.98), (8, 2000, 0.95)))],
+)
 def test_harmonics_of_a_long_loop_err_as_its_noise_says(cycles: int, rows: int, correlation: float) -> None:
     """Long loops are counted in bins over groups of cycles. Where groups met, or bins held one row and two in turn, the
     filter took the steps between their weights for information: the mean squares here were 4.0, 4.4 and 2.7."""
@@ -206,8 +192,8 @@ def test_how_an_unsure_filter_moves_the_covariance() -> None:
     assert float(by_coefficient[0] @ influence[0]) == pytest.approx(expected, rel=0.03)
 
 
-def test_settling_is_no_noise(rig: Rig, paper_model: Model) -> None:
-    (clean,) = rig(paper_model).loops
+def test_settling_is_no_noise(rig: Rig) -> None:
+    (clean,) = rig(settings=IDEAL).loops
     loop = cycles_of(clean, 3, np.random.default_rng(1).standard_normal(ROWS))
     settled = replace(loop, force=loop.force * (1.0 + 0.02 * np.exp(-loop.time / 10.0)))
     drifting = replace(loop, force=loop.force + 0.06 * np.ptp(loop.force) * loop.time / loop.time[-1])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import FitSettings, SimulateSettings
+from bushfit.campaign.schema import FitSettings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data import Data
@@ -54,17 +54,14 @@ def coupons(paper_model: Model) -> Campaign:
 
 
 @pytest.fixture
-def both(
-    rig: Callable[..., Campaign], paper_model: Model, paper_noise: SimulateSettings, coupons: Campaign
-) -> Campaign:
+def both(rig: Callable[..., Campaign], coupons: Campaign) -> Campaign:
     """The paper's tests, and those of the coupon."""
-    bushing = rig(paper_model, paper_noise, 2)
+    bushing = rig(2)
     return replace(bushing, sweeps=(*bushing.sweeps, *coupons.sweeps), specimens=(DMA,))
 
 
 def test_coupons_alone_are_fitted_and_kept_in_a_file(coupons: Campaign, paper_model: Model) -> None:
     result = fit_joint(Data.of(coupons))
-    print({name: round(result.model.values[name] / paper_model.values[name], 3) for name in FIVE})
     for name in FIVE:
         assert result.model.values[name] == pytest.approx(paper_model.values[name], rel=0.15)
     assert result.model.bushing is None
@@ -87,7 +84,7 @@ def test_coupons_are_fitted_beside_the_axial_tests(both: Campaign) -> None:
     assert {test.place for test in result.tests if not test.fitted} == {"radial"}
 
 
-def test_two_steps_with_a_coupon(coupons: Campaign, paper_model: Model) -> None:
+def test_two_steps_with_a_coupon(coupons: Campaign) -> None:
     """fit-dynamic takes the sweep of the frequency; of one of the amplitude the smallest at each frequency."""
     frequency = Data.of(coupons).smallest_sweep
     assert set(frequency.amplitude) == {1e-3}

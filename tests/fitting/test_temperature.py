@@ -55,9 +55,7 @@ def clean(truth: Model) -> Undisturbed:
 
 def test_all_temperatures_are_fitted_at_once(clean: Undisturbed, truth: Model) -> None:
     """From what is read off the tests: the shift within its interval as often as it claims, and a stiffness between."""
-    off, inside, bands = [], 0, 0
-    warm = CELSIUS + 30.0
-    expected = truth.with_values(VALUES)
+    off, inside, bands, warm = [], 0, 0, CELSIUS + 30.0
     for seed in range(SEEDS):
         data = Data.of(measure(clean, replace(PLAN, seed=seed)).campaign())
         result = fit_joint(data, effects=(*BASE, "temperature"))
@@ -66,7 +64,7 @@ def test_all_temperatures_are_fitted_at_once(clean: Undisturbed, truth: Model) -
         off.append(result.model.values["temperature.shift"] / VALUES["temperature.shift"] - 1.0)
         inside += low < VALUES["temperature.shift"] < high
         found = predict(result, Direction.AXIAL, [30.0], [2e-4], temperature=warm).stiffness
-        true = predict(replace(result, model=expected), Direction.AXIAL, [30.0], [2e-4], temperature=warm).stiffness
+        true = predict(replace(result, model=truth), Direction.AXIAL, [30.0], [2e-4], temperature=warm).stiffness
         bands += bool(found.low[0] < true.value[0] < found.high[0])
         assert found.value[0] == pytest.approx(true.value[0], rel=0.01)
     print(f"shift off by {100 * np.std(off):.1f} %, in its interval {inside}, stiffness at 30 degC {bands} of {SEEDS}")
@@ -80,7 +78,6 @@ def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -
     found = master_curve(result, data.sweeps)
     assert [round(each.temperature - CELSIUS) for each in found] == list(DEGREES)
     off = np.array([(each.own[0] - each.shift[0]) / np.hypot(each.own[1], each.shift[1] + 1e-3) for each in found])
-    print(f"each sweep's own shift factor off the law by {np.round(off, 1)} standard errors")
     assert np.max(np.abs(off)) < 3.5
     for each in found:
         line = result.model.stiffness(Direction.AXIAL, each.reduced_frequency, each.sweep.amplitude)
@@ -96,12 +93,11 @@ def test_a_sweep_off_the_law_says_so(truth: Model) -> None:
     """That at 8 degC as if its chamber had been 8 K warmer than it says."""
     tested = [replace(sweep, temperature=CELSIUS + 16.0) if sweep is SWEEPS[1] else sweep for sweep in SWEEPS]
     simulated = simulate(truth, replace(PLAN, sweeps=tuple(tested))).campaign()
-    sweeps = zip(simulated.sweeps, DEGREES, strict=True)
-    told = replace(simulated, sweeps=tuple(replace(sweep, temperature=CELSIUS + at) for sweep, at in sweeps))
-    data = Data.of(told)
+    pairs = zip(simulated.sweeps, DEGREES, strict=True)
+    stated = tuple(replace(sweep, temperature=CELSIUS + at) for sweep, at in pairs)
+    data = Data.of(replace(simulated, sweeps=stated))
     found = master_curve(fit_joint(data, effects=(*BASE, "temperature")), data.sweeps)
     off = np.array([(each.own[0] - each.shift[0]) / each.own[1] for each in found])
-    print(f"own less law, in standard errors, coldest first: {np.round(off, 1)}")
     assert np.argmax(np.abs(off)) == 1
     assert off[1] < -4.0
 

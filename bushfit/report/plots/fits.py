@@ -102,7 +102,7 @@ def _looks(data_sets: Sequence[SweepData], kind: Kind) -> Iterator[tuple[style.S
             yield look._replace(marker="o"), place, data_sets[place].weights > 0.0
         return
     held = held_beside(kind.axis)
-    levels = np.unique(np.concatenate([getattr(data_set.standing(), held) for data_set in data_sets]))
+    levels = np.unique(np.concatenate([getattr(data_set.with_weight(), held) for data_set in data_sets]))
     for place, data_set in enumerate(data_sets):
         for look, level in zip(style.styles(levels.size, held), levels, strict=True):
             yield look, place, (getattr(data_set, held) == level) & (data_set.weights > 0.0)

@@ -118,7 +118,7 @@ class Repeats:
 
 def means(data_sets: Sequence[SweepData]) -> Points:
     """Mean, least and largest value over the repeats of each operating point; rows without weight do not count."""
-    data_sets = [data_set.standing() for data_set in data_sets]
+    data_sets = [data_set.with_weight() for data_set in data_sets]
     repeats = Repeats.of(data_sets)
     stiffness = np.concatenate([np.empty(0, dtype=complex), *(data_set.measured for data_set in data_sets)])
 
