@@ -9,21 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.fourier import (
-    GRID,
-    as_complex,
-    basis,
-    first_amplitude,
-    least_squares,
-    resolved_order,
-    series,
-    spread_rows,
-)
 from bushfit.fitting.outliers import are_outliers, are_stuck, outlier_limit
 from bushfit.fitting.repeats import FLOOR
 from bushfit.reading.measurement import Loop
+from bushfit.reading.parallel import CHUNK, by_chunks
+from bushfit.reduction.harmonics import as_complex, basis, least_squares, resolved_order, series, spread_rows
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
+#: Samples of one cycle where a series is drawn as a curve and the model answers; chosen: rows between two samples are
+#: interpolated linearly, which is then off by 5e-6 of the amplitude.
+GRID = 1024
 #: Rows of a loop that the harmonics are fitted to at most; longer ones are averaged into as many bins of phase.
 MOST_ROWS = 4 * GRID
 #: Rows of a loop up to which every one is held against the harmonics; of a longer loop only where those fitted to have
@@ -35,12 +30,9 @@ _MOST_HARMONICS = 60
 _SIGNIFICANT = 4.0
 #: Harmonics of one cycle that count as slow change from cycle to cycle, which is settling or drift and no noise.
 _SLOW_HARMONICS = 3
-#: Rows behind each unknown of the slow change, fewer than which leave a cycle as it is.
-_ROWS_PER_UNKNOWN = 4
-#: Residual of a triangle over that of free harmonics up to which a motion counts as a triangle.
-_TRIANGLE_RATIO = 1.02
-#: Distance of the third harmonic from a triangle's [noise of a row] that rules a triangle out, without drawing one.
-_NO_TRIANGLE = 3.0
+#: Residual of a triangle over that of free harmonics up to which a motion counts as one; and distance of the third
+#: harmonic from a triangle's [noise of a row] that rules a triangle out, without drawing one.
+_TRIANGLE_RATIO, _NO_TRIANGLE = 1.02, 3.0
 #: Share of the amplitude, over the number of harmonics, by which these may miss a corner of the motion.
 _CORNER = 0.5
 
@@ -139,7 +131,7 @@ def less_slow(phase: Array, residual: Array) -> tuple[Array, int]:
     left = residual.copy()
     for cycle in np.unique(number):
         rows = np.flatnonzero(number == cycle)
-        if rows.size > _ROWS_PER_UNKNOWN * size:
+        if rows.size > 4 * size:  # fewer leave a cycle as it is
             slow = basis(phase[rows], _SLOW_HARMONICS)
             left[rows] -= slow @ np.linalg.lstsq(slow, left[rows], rcond=None)[0]
             unknowns += size
@@ -151,7 +143,7 @@ def residual_limit(solution: Array, residual: Array, rows: int) -> float:
 
     Noise takes part of it, and the corners of a triangle, which these harmonics, (2 order + 1,), round off, the rest.
     """
-    corner = _CORNER / (solution.size // 2) * first_amplitude(solution)
+    corner = _CORNER / (solution.size // 2) * abs(as_complex(solution)[1])
     return outlier_limit(rows, 1, np.inf) * _spread(residual) + corner
 
 
@@ -194,9 +186,43 @@ def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Ar
 
 def _noise(solution: Array, residual: Array) -> float:
     """Noise of one row: the spread of the residuals, and no less than any rig has."""
-    return max(_spread(residual), FLOOR * first_amplitude(solution))
+    return max(_spread(residual), FLOOR * abs(as_complex(solution)[1]))
 
 
 def _spread(residual: Array) -> float:
     """Standard deviation of residuals about zero, which outliers hardly move."""
     return MEDIAN_TO_SIGMA * float(np.median(np.abs(residual)))
+
+
+def phase_bins(
+    clock: Array, force: Array, frequency: float, cycles: float, *, each_cycle: bool
+) -> tuple[Array, Array, Array]:
+    """Mean phase [cycles], mean force and number of rows of each bin that holds rows, (k,) each.
+
+    A bin is a GRID-th of a cycle. The first few cycles have bins of their own, and later ones share bins in ever larger
+    groups, unless `each_cycle` has its own. The clock [s], (n,), rises from the first row.
+    """
+    number = np.arange(int(cycles) + 2)
+    own, growth = 4, 1.5  # cycles over which a loop settles have bins of their own; later it does ever more slowly
+    later = own * growth ** np.arange(np.log(number.size / own) / np.log(growth))
+    starts = number if each_cycle else np.union1d(np.arange(own), later.astype(np.intp))
+    group = np.searchsorted(starts, number, side="right") - 1
+    middle = np.round(np.bincount(group, weights=number) / np.bincount(group))
+    edges = np.append(np.arange(int(cycles * GRID) + 1) / (frequency * GRID), np.inf)
+
+    def sums(bins: slice) -> Array:
+        """Of some bins the filled ones, (k,), their rows, and sums of phase in bins and of force over these, (4, k)."""
+        start, stop = np.searchsorted(clock, edges[[bins.start, bins.stop]])
+        first = np.searchsorted(clock[start:stop], edges[bins])
+        filled = np.flatnonzero(np.diff(first, append=stop - start))
+        number, first = filled + bins.start, first[filled]
+        count = np.diff(first, append=stop - start)
+        in_bins = np.add.reduceat(clock[start:stop], first) * (frequency * GRID) - count * number
+        return np.stack((number, count, in_bins, np.add.reduceat(force[start:stop], first)))
+
+    chunks = by_chunks(sums, edges.size - 1, 1 + CHUNK * edges.size // clock.size)
+    bins, *parts = np.concatenate(chunks, axis=1)
+    bins = bins.astype(np.intp)
+    filled, place = np.unique(GRID * group[bins // GRID] + bins % GRID, return_inverse=True)
+    rows, inside, total = (np.bincount(place, weights=part) for part in parts)
+    return middle[filled // GRID] + (filled % GRID + inside / rows) / GRID, total / rows, rows

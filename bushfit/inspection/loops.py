@@ -8,8 +8,8 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.effects.mistake import told
 from bushfit.effects.mistakes import MISTAKES
-from bushfit.fitting.clock import waveform
 from bushfit.fitting.drive import TOLD_MEAN, Drive, drive_of
+from bushfit.fitting.loop_cycles import waveform
 from bushfit.geometry import Unit
 from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.outside import wrong_labels

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bushfit.errors import FitError
-from bushfit.fitting.clock import fundamental, thinned
+from bushfit.fitting.loop_cycles import fundamental, thinned
 from bushfit.geometry import Direction
 from bushfit.reading.measurement import Loop
 

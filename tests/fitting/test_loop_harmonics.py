@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bushfit.fitting.fourier import series
 from bushfit.fitting.loop_harmonics import loop_harmonics
 from bushfit.geometry import Direction
 from bushfit.reading.measurement import Loop
+from bushfit.reduction.harmonics import series
 
 PHASE = np.arange(3000) / 1000.0
 

@@ -11,9 +11,9 @@ import pytest
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.errors import FitError
-from bushfit.fitting.clock import steady_part, thinned
 from bushfit.fitting.data_sets import LoopData
 from bushfit.fitting.drive import drive_of
+from bushfit.fitting.loop_cycles import steady_part, thinned
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
