@@ -14,7 +14,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
-from bushfit.fitting.loop_cycles import fundamental, steady_part, thinned, wrong_clock
+from bushfit.fitting.loop_cycles import steady_cycles, wrong_clock
 from bushfit.fitting.loop_harmonics import (
     GRID,
     MOST_ROWS,
@@ -27,7 +27,6 @@ from bushfit.fitting.loop_harmonics import (
 from bushfit.fitting.repeats import FLOOR
 from bushfit.fitting.row_noise import RowNoise, of_a_lone_cycle, row_noise
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.cycles import HOLE
 from bushfit.reduction.harmonics import as_complex, basis, least_squares, series
 from bushfit.units import for_people, number
 
@@ -109,9 +108,8 @@ class Drive:
 
     def first_harmonic(self) -> complex:
         """Complex stiffness of the loop's fundamental, force over displacement [N/m or N m/rad]."""
-        columns = basis(self.phase, 1)
-        _, real, imag = least_squares(columns * np.sqrt(self.weight)[:, None], self.force * np.sqrt(self.weight))
-        return complex(complex(real, imag) / self.coefficients[1])
+        _, force = as_complex(least_squares(basis(self.phase, 1), self.force, self.weight))
+        return complex(force / self.coefficients[1])
 
     def history(self, settles: bool) -> History:
         """One settled cycle, GRID samples long, or the whole record where it begins at rest, or the model `settles`.
@@ -173,18 +171,16 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
         FitError: the displacement is not one whole cycle or more of a periodic motion, rows are missing, or the loop
             gives energy.
     """
-    whole, thin = loop, thinned(loop)
-    loop, left_out = steady_part(whole, *thin)
+    whole = loop
+    loop, frequency, cycles, left_out = steady_cycles(whole)
     first_row = int(np.searchsorted(whole.time, loop.time[0]))
-    thin = thin if loop is whole else thinned(loop)
-    frequency, cycles = fundamental(loop, *thin)
-    _check_no_hole(loop, thin[0], frequency)
     found = loop_harmonics(loop, frequency, cycles)
     outliers = found.outliers["force"].rows
     half_motion = float(np.ptp(series(found.motion, np.arange(GRID) / GRID))) / 2.0
     half_force = float(np.ptp(np.delete(loop.force, outliers))) / 2.0
     noise = loop.noise * half_force if loop.noise is not None else found.force_noise
-    rests = _rests(loop, found, half_motion, half_force, noise, _change(loop, frequency, noise, half_force))
+    change = _change(loop, frequency, noise, half_force)
+    rests = _rests(loop, found, half_motion, half_force, noise, change)
     from_rest = first_row == 0 and any(rests)
     unweighted = outliers if without_outliers else outliers[:0]
     drive = Drive(
@@ -220,21 +216,6 @@ def _of_the_record(loop: Loop) -> Iterator[str]:
         yield f"the first cycle is {number(100 * loop.softening, 2)} % stiffer than the last (Mullins)"
 
 
-def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
-    """Refuse a hole of more than a part of a cycle: nothing tells how many turns the motion made in it."""
-    steps = np.diff(clock)
-    widest = int(np.argmax(steps))
-    if steps[widest] > HOLE / frequency:
-        raise FitError(
-            "rows are missing inside the loop",
-            file=loop.source.file if loop.source else None,
-            found=f"none from {clock[widest]:.4g} to {clock[widest + 1]:.4g} s; how many cycles went by, and so the "
-            "frequency, cannot be told",
-            expected="no gap longer than a third of a cycle",
-            hint="keep the whole cycles before the gap, or those after it",
-        )
-
-
 def _check_loses_energy(drive: Drive) -> None:
     """Refuse a force that lags behind the displacement, beyond noise and what the delay of a rig makes."""
     stiffness = drive.first_harmonic()
@@ -260,25 +241,21 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
     """
     binned = drive.force.size < drive.loop.force.size
     turn = drive.phase.astype(np.intp)
-    turns = np.unique(turn)
-    first, whole = int(drive.from_rest), int(drive.cycles + drive._rounding)
-    rows = (turn >= first) & (turn < whole)
-    cycles = int(np.count_nonzero((turns >= first) & (turns < whole)))
+    rows = (turn >= int(drive.from_rest)) & (turn < int(drive.cycles + drive._rounding))
+    cycles = np.unique(turn[rows]).size
     if not cycles or np.count_nonzero(rows) < 32 * cycles:  # fewer resolve no correlation
         return drive
-    phase, weight = drive.phase[rows], np.sqrt(drive.weight[rows])
-    harmonics = found.force
+    phase, force, weight, harmonics = drive.phase[rows], drive.force[rows], drive.weight[rows], found.force
     if drive.from_rest:
-        columns = basis(phase, harmonics.size - 1)
-        harmonics = as_complex(least_squares(columns * weight[:, None], drive.force[rows] * weight))
+        harmonics = as_complex(least_squares(basis(phase, harmonics.size - 1), force, weight))
     if cycles == 1:
         harmonics = np.where(of_a_lone_cycle(np.arange(harmonics.size)), 0.0, harmonics)
-    off = drive.force[rows] - series(harmonics, phase)
+    off = force - series(harmonics, phase)
     if np.std(off) < FLOOR * drive.half_range:
         return drive
     if not weight.all():
         off = np.interp(phase, phase[weight > 0.0], off[weight > 0.0])
-    scale = np.sqrt(drive.weight[rows]) if binned else 1.0
+    scale = np.sqrt(weight) if binned else 1.0
     model, size = row_noise(off * scale, less_slow(phase, off)[0] * scale, cycles)
     if binned and model.order:
         drive = replace(drive, weight=_evened(drive.weight, turn))
@@ -334,13 +311,15 @@ def _rests(
     A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle: `change`
     is the certain one of its force over the first.
     """
-    near, chance = _AT_REST * half_force, 3.0 * noise
-    unmoved, unloaded = abs(loop.displacement[0]) <= _AT_REST * half_motion, abs(loop.force[0]) <= near + chance
+    if not change:
+        return False, False
+    near, chance, reach = _AT_REST * half_force, 3.0 * noise, _AT_REST * half_motion
+    unmoved, unloaded = abs(loop.displacement[0]) <= reach, abs(loop.force[0]) <= near + chance
     off_mean = abs(loop.displacement[0] - found.motion[0].real), abs(loop.force[0] - found.force_mean)
     # the virgin curve moves the mean by up to 0.3 of the change
-    in_middle = off_mean[0] <= _AT_REST * half_motion and off_mean[1] <= max(near, 0.5 * change) + chance
+    in_middle = off_mean[0] <= reach and off_mean[1] <= max(near, 0.5 * change) + chance
     is_first = loop.part is None or loop.part.first_row == 0
-    return bool(change and unmoved and unloaded), bool(change and in_middle and is_first)
+    return bool(unmoved and unloaded), bool(in_middle and is_first)
 
 
 def _change(loop: Loop, frequency: float, noise: float, half_force: float) -> float:

@@ -5,6 +5,8 @@ does not, nothing is touched, so a record may start and end anywhere in its cycl
 is left out too, because nobody knows how many cycles went by there.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from bushfit.effects.contract import Array
@@ -43,12 +45,58 @@ _LIKE = 0.03
 _OUTER = 0.9
 
 
-def thinned(loop: Loop) -> tuple[Array, Array]:
+class SteadyCycles(NamedTuple):
+    """The steady cycles of a loop.
+
+    Args:
+        loop: without what comes before and after them; the same one where nothing does.
+        frequency: [Hz].
+        cycles: how many there are, whole and broken.
+        left_out: a sentence on what was left out, or None.
+    """
+
+    loop: Loop
+    frequency: float
+    cycles: float
+    left_out: str | None
+
+
+def steady_cycles(loop: Loop) -> SteadyCycles:
+    """The steady cycles of a loop: of one with holes, those of the longest part without.
+
+    Raises:
+        FitError: it does not hold a whole cycle, or it has a hole in which nobody knows how many turns were made.
+    """
+    time, motion = _thinned(loop)
+    part, note = _steady_part(loop, time, motion)
+    if part is not loop:
+        time, motion = _thinned(part)
+    frequency, cycles = _fundamental(part, time, motion)
+    _check_no_hole(part, time, frequency)
+    return SteadyCycles(part, frequency, cycles, note)
+
+
+def _thinned(loop: Loop) -> tuple[Array, Array]:
     """Time [s] and displacement [m or rad] of rows that are enough to find the cycles, gross outliers left out."""
     every = slice(None, None, -(-loop.time.size // ENOUGH_ROWS))
     time, motion = loop.time[every], loop.displacement[every]
     rows = gross_rows(motion)
     return np.delete(time, rows), np.delete(motion, rows)
+
+
+def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
+    """Refuse a hole of more than a part of a cycle: nothing tells how many turns the motion made in it."""
+    steps = np.diff(clock)
+    widest = int(np.argmax(steps))
+    if steps[widest] > HOLE / frequency:
+        raise FitError(
+            "rows are missing inside the loop",
+            file=loop.source.file if loop.source else None,
+            found=f"none from {clock[widest]:.4g} to {clock[widest + 1]:.4g} s; how many cycles went by, and so the "
+            "frequency, cannot be told",
+            expected="no gap longer than a third of a cycle",
+            hint="keep the whole cycles before the gap, or those after it",
+        )
 
 
 def _crossings(motion: Array) -> tuple[Array, Array, Array]:
@@ -62,11 +110,8 @@ def _crossings(motion: Array) -> tuple[Array, Array, Array]:
     return centred, marks[across], marks[across + 1]
 
 
-def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | None]:
-    """A loop without what comes before and after its steady cycles, and a sentence on what was left out or None.
-
-    `time` and `motion` are `thinned`. Of a loop with holes, the longest part without one counts.
-    """
+def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | None]:
+    """A loop without what comes before and after its steady cycles, and a sentence on what was left out or None."""
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
         return loop, None
@@ -75,7 +120,7 @@ def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | Non
         starts, ends = time[np.append(0, holes + 1)], time[np.append(holes, time.size - 1)]
         first, last = max(zip(starts, ends, strict=True), key=lambda part: part[1] - part[0])
         whole = _cut(loop, first, last)
-        part, note = steady_part(whole, *thinned(whole))
+        part, note = _steady_part(whole, *_thinned(whole))
         said = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
         return part, said if note is None else f"{said}, and of these {note}"
     steady = _steady_ends(time, motion, period)
@@ -136,13 +181,10 @@ def _longest_stretch(alike: Array, time: Array, brief: float) -> Array:
     return stretches[np.argmax(np.diff(stretches))]
 
 
-def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
+def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
     """Frequency [Hz] and number of cycles of a loop without run-in.
 
     The clock [s] and the displacement [m or rad], (n,) each, are of rows that are enough to find the cycles.
-
-    Raises:
-        FitError: the loop does not hold a whole cycle.
 
     Notes:
         Several cycles are counted by crossings of the middle in one sense, and their frequency is refined by
@@ -161,7 +203,7 @@ def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, f
 
 
 def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[float, float]:
-    """As `fundamental`, of a loop that crosses its middle but once in either sense, at the times `across` [s]."""
+    """As `_fundamental`, of a loop that crosses its middle but once in either sense, at the times `across` [s]."""
     rows, motion = loop.time.size, loop.displacement
     duration = float(loop.time[-1] - loop.time[0])
     closed = duration * rows / (rows - 1)

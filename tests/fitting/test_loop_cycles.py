@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.data_sets import LoopData
 from bushfit.fitting.drive import drive_of
-from bushfit.fitting.loop_cycles import fundamental, steady_part, thinned
+from bushfit.fitting.loop_cycles import steady_cycles
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
@@ -26,7 +26,7 @@ def frequency_found(waveform: str, phase: Array) -> float:
     noise = 3e-3 * np.random.default_rng(0).standard_normal(phase.size)
     motion = AMPLITUDE * (rig.wave(waveform, phase) + noise)
     loop = Loop("loop", Direction.AXIAL, (phase - phase[0]) * PERIOD, motion, motion)
-    return fundamental(loop, *thinned(loop))[0] * PERIOD
+    return steady_cycles(loop).frequency * PERIOD
 
 
 @pytest.mark.parametrize(("rows", "cycles"), [(50, 1000), (200, 500), (500, 200)])
@@ -101,7 +101,8 @@ def test_a_steady_record_is_left_alone(motion: Array) -> None:
     noisy = motion + 5e-3 * AMPLITUDE * rng.standard_normal(motion.size)
     for one in (motion, noisy, np.where(rng.random(motion.size) < 0.003, 0.0, motion)):
         loop = Loop("loop", Direction.AXIAL, np.arange(motion.size) * PERIOD / 1000, one, one)
-        assert steady_part(loop, *thinned(loop)) == (loop, None)
+        found = steady_cycles(loop)
+        assert (found.loop, found.left_out) == (loop, None)
 
 
 BACKWARDS: dict[str, Callable[[Loop], Loop]] = {
