@@ -202,8 +202,11 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     if from_rest and not rests[0]:
         drive = replace(drive, datum=float(np.average(drive.force, weights=drive.weight)))
     elif not from_rest:
+        # a stiffness that is not the same to either side makes a mean force too, and a second harmonic of its size
+        mean, _, cosine, _, sine = least_squares(basis(drive.phase, 2), drive.force, drive.weight)
+        preload = float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * half_force else None
         unknown = drive.follows or abs(found.motion[0]) > 0.01 * half_motion
-        drive = replace(drive, datum=found.force_mean if unknown else _mean_of_preload(drive))
+        drive = replace(drive, datum=found.force_mean if unknown else preload)
     return replace(drive, notes=(*drive.notes, *_preload(drive)))
 
 
@@ -332,15 +335,6 @@ def _change(loop: Loop, frequency: float, noise: float, half_force: float) -> fl
     # of a difference, and of a median, whose standard error is sqrt(pi/2) of that of a mean
     chance = 1.25 * _CERTAIN * noise * np.sqrt(2.0 / first.size)
     return change if change > max(chance, 5e-3 * half_force) else 0.0
-
-
-def _mean_of_preload(drive: Drive) -> float | None:
-    """The mean force of a preload about which the displacement counts from zero [N or N m]; None where there is none.
-
-    A stiffness that is not the same to either side makes a mean force too, and a second harmonic of its size.
-    """
-    mean, _, cosine, _, sine = least_squares(basis(drive.phase, 2), drive.force, drive.weight)
-    return float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * drive.half_range else None
 
 
 def _preload(drive: Drive) -> Iterator[str]:

@@ -136,7 +136,11 @@ def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, floa
     """First and last time of the steady cycles [s], and whether anything follows; None where all or none are steady."""
     clock = time[time + period <= time[-1]]
     off = change_after(time, motion, period, slice(0, clock.size))
-    start, end = _longest_stretch(off < SAME_MOTION * np.ptp(motion), clock, _BRIEF * period)
+    alike = off < SAME_MOTION * np.ptp(motion)
+    breaks = np.flatnonzero(np.diff(alike, prepend=True, append=True)).reshape(-1, 2)
+    breaks = breaks[clock[breaks[:, 1] - 1] - clock[breaks[:, 0]] > _BRIEF * period]
+    stretches = np.concatenate(([0], breaks.ravel(), [alike.size])).reshape(-1, 2)  # between breaks that count
+    start, end = stretches[np.argmax(np.diff(stretches))]
     before, after = start > 0, end < off.size
     if start == end or not (before or after):
         return None
@@ -171,14 +175,6 @@ def _period(time: Array, motion: Array) -> float | None:
     if not intervals.size:
         intervals = 2.0 * strokes[widest < HOLE * strokes]
     return float(np.median(intervals[intervals.size // 2 :])) if intervals.size else None
-
-
-def _longest_stretch(alike: Array, time: Array, brief: float) -> Array:
-    """Start and end of the longest stretch of rows that are alike; breaks no longer than `brief` [s] count as alike."""
-    breaks = np.flatnonzero(np.diff(alike, prepend=True, append=True)).reshape(-1, 2)
-    breaks = breaks[time[breaks[:, 1] - 1] - time[breaks[:, 0]] > brief]
-    stretches = np.concatenate(([0], breaks.ravel(), [alike.size])).reshape(-1, 2)
-    return stretches[np.argmax(np.diff(stretches))]
 
 
 def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:

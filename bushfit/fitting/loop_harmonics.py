@@ -26,13 +26,10 @@ MOST_ROWS = 4 * GRID
 _MOST_ROWS_CHECKED = 200_000
 #: Harmonics that are fitted at most; chosen: those of a triangle have then fallen to 3e-4 of the first.
 _MOST_HARMONICS = 60
-#: Standard errors from which on a harmonic of the displacement is no noise.
-_SIGNIFICANT = 4.0
 #: Harmonics of one cycle that count as slow change from cycle to cycle, which is settling or drift and no noise.
 _SLOW_HARMONICS = 3
-#: Residual of a triangle over that of free harmonics up to which a motion counts as one; and distance of the third
-#: harmonic from a triangle's [noise of a row] that rules a triangle out, without drawing one.
-_TRIANGLE_RATIO, _NO_TRIANGLE = 1.02, 3.0
+#: Residual of a triangle over that of free harmonics up to which a motion counts as one.
+_TRIANGLE_RATIO = 1.02
 #: Share of the amplitude, over the number of harmonics, by which these may miss a corner of the motion.
 _CORNER = 0.5
 
@@ -44,7 +41,7 @@ class OutlierRows(NamedTuple):
     off: Array
 
 
-NO_OUTLIERS = OutlierRows(np.empty(0, dtype=np.intp), np.empty(0))
+_NO_OUTLIERS = OutlierRows(np.empty(0, dtype=np.intp), np.empty(0))
 
 
 class LoopHarmonics(NamedTuple):
@@ -82,36 +79,33 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
     values = np.column_stack([column[chosen] for column in recorded.values()])
     solution, inliers, outliers = least_squares(columns, values), np.empty(values.shape, dtype=bool), {}
     for which, (name, column) in enumerate(recorded.items()):
-        solution[:, which], inliers[:, which] = fit_without_outliers(columns, values[:, which], solution[:, which])
+        solution[:, which], inliers[:, which] = _fit_without_outliers(columns, values[:, which], solution[:, which])
         residual = values[:, which] - columns @ solution[:, which]
         outliers[name] = (
-            column_outliers(loop, frequency, column, solution[:, which], residual)
+            _column_outliers(loop, frequency, column, solution[:, which], residual)
             if column.size <= _MOST_ROWS_CHECKED or not inliers[:, which].all()
-            else NO_OUTLIERS
+            else _NO_OUTLIERS
         )
     left = values - columns @ solution
     of_motion, of_force = inliers.T
     freedom = np.maximum(np.count_nonzero(inliers, axis=0) - 2 * order - 1, 1)
     motion_noise = float(np.sqrt(np.sum(np.square(left[of_motion, 0])) / freedom[0]))
-    coefficients = as_complex(solution[:, 0])
-    triangle = _triangle(coefficients[0], coefficients[1])
-    alike = _is_triangle(triangle, coefficients, motion_noise, phase[of_motion], values[of_motion, 0])
-    motion = triangle if alike else _significant(coefficients, motion_noise, phase.size)
+    motion = _cleared(as_complex(solution[:, 0]), motion_noise, phase, values[:, 0], of_motion)
     settled, unknowns = less_slow(phase[of_force], left[of_force, 1])
     force_noise = float(np.sqrt(np.sum(np.square(settled)) / max(freedom[1] - unknowns, 1)))
     return LoopHarmonics(motion, as_complex(solution[:, 1]), force_noise, outliers)
 
 
-def _significant(coefficients: Array, noise: float, rows: int) -> Array:
-    """Complex harmonics with those that noise explains set to zero, up to the last that is not."""
-    keep = (np.abs(coefficients) > _SIGNIFICANT * noise * np.sqrt(2.0 / rows)) | (np.arange(coefficients.size) < 2)
+def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:
+    """The harmonics of a motion without those that noise explains; those of a triangle where its rows, (n,), agree
+    with one as well, but for noise, as with its own."""
+    triangle = _triangle(coefficients[0], coefficients[1])
+    other = coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= 3.0 * noise
+    if not other and np.std((displacement - series(triangle, phase))[inliers]) < _TRIANGLE_RATIO * noise:
+        return triangle
+    least = 4.0 * noise * np.sqrt(2.0 / phase.size)  # standard errors
+    keep = (np.abs(coefficients) > least) | (np.arange(coefficients.size) < 2)
     return np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
-
-
-def _is_triangle(triangle: Array, coefficients: Array, noise: float, phase: Array, displacement: Array) -> bool:
-    """Whether the rows of a motion agree with a triangle as well as, but for noise, with its own harmonics."""
-    other = coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= _NO_TRIANGLE * noise
-    return bool(not other and np.std(displacement - series(triangle, phase)) < _TRIANGLE_RATIO * noise)
 
 
 def _triangle(mean: complex, fundamental: complex) -> Array:
@@ -147,7 +141,7 @@ def residual_limit(solution: Array, residual: Array, rows: int) -> float:
     return outlier_limit(rows, 1, np.inf) * _spread(residual) + corner
 
 
-def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
+def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
     """Harmonics of a column fitted without its outliers, and which rows are none, (n,).
 
     Squares let so many harmonics follow a cluster of outliers, as `solution` does. So rows are weighted down by their
@@ -168,7 +162,7 @@ def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tupl
     return solution, inliers
 
 
-def column_outliers(loop: Loop, frequency: float, column: Array, solution: Array, residual: Array) -> OutlierRows:
+def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Array, residual: Array) -> OutlierRows:
     """Outliers among all rows of a column, whose harmonics and residual are of rows that stand for all."""
     grid = np.arange(GRID + 1) / GRID
     cycle = basis(grid, solution.size // 2) @ solution
