@@ -128,11 +128,6 @@ def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
     assert drive.first_harmonic() == pytest.approx(few.first_harmonic(), rel=2e-3)
 
 
-def test_first_harmonic_is_the_stiffness_of_the_loop(paper_model: Model) -> None:
-    found = drive_of(measured(paper_model, noise=0.0, jitter=0.0)).first_harmonic()
-    assert found == pytest.approx(complex(paper_model.stiffness("axial", FREQUENCY, AMPLITUDE)), rel=1e-3)
-
-
 def test_a_wrong_zero_of_the_load_cell_alone_stays_visible(paper_model: Model) -> None:
     """Only where the displacement is off zero too is the mean force taken for unknown."""
     data_set = LoopData(drive_of(measured(paper_model, preload=5.0)))

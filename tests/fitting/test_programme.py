@@ -59,9 +59,7 @@ def slow(*sizes: float) -> list[tuple[float, float]]:
 
 #: Motions, and amplitude [mm] and frequency [Hz] of each part that is to be found in them.
 PROGRAMMES: dict[str, tuple[Sequence[Array], Sequence[tuple[float, float]]]] = {
-    "three amplitudes": ([cycles(5, x) for x in (0.2, 0.5, 1)], slow(0.2, 0.5, 1)),
     "two cycles": ([cycles(2, x) for x in (0.2, 0.5, 1)], slow(0.2, 0.5, 1)),
-    "triangles": ([cycles(4, x, shape="triangle") for x in (0.2, 0.5, 1)], slow(0.2, 0.5, 1)),
     "up and down": ([cycles(3, x) for x in (0.2, 0.5, 1, 0.5, 0.2)], slow(0.2, 0.5, 1, 0.5, 0.2)),
     "pauses": (
         [hold(5), cycles(5, 0.2), hold(10), cycles(5, 0.5), hold(20), cycles(5, 1), hold(5)],
@@ -87,7 +85,6 @@ PROGRAMMES: dict[str, tuple[Sequence[Array], Sequence[tuple[float, float]]]] = {
         [cycles(n, x) for n, x in ((4, 0.2), (1, 0.3), (1, 0.4), (4, 0.5), (1, 0.7), (4, 1))],
         slow(0.2, 0.5, 1),
     ),
-    "very unlike": ([cycles(4, 0.02), cycles(4, 2)], slow(0.02, 2)),
     "close": ([cycles(5, x) for x in (0.8, 0.9, 1)], slow(0.8, 0.9, 1)),
     "one comes again": ([cycles(4, x) for x in (1, 0.3, 1)], slow(1, 0.3, 1)),
     "about a mean": ([ramp(0, 1.5, 20), 1.5e-3 + cycles(4, 0.2), 1.5e-3 + cycles(4, 0.5)], slow(0.2, 0.5)),
@@ -111,7 +108,7 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model: Model, case: str) 
         np.testing.assert_array_equal(loop.force, record.force[rows])
 
 
-@pytest.mark.parametrize("case", ["pauses", "amplitudes at two rates", "one comes again"])
+@pytest.mark.parametrize("case", ["pauses", "amplitudes at two rates"])
 def test_the_true_model_leaves_little_but_noise_of_each_part(paper_model: Model, case: str) -> None:
     largest = 0.0
     for loop in programme(recorded(paper_model, *PROGRAMMES[case][0], noise=1e-4)):
@@ -122,7 +119,7 @@ def test_the_true_model_leaves_little_but_noise_of_each_part(paper_model: Model,
         largest = max(largest, drive.amplitude)
 
 
-@pytest.mark.parametrize("case", ["up and down", "pauses", "one speed"])
+@pytest.mark.parametrize("case", ["pauses", "one speed"])
 def test_without_time_parts_are_the_same(paper_model: Model, case: str) -> None:
     motions, expected = PROGRAMMES[case]
     loops = programme(replace(recorded(paper_model, *motions), timed=False), rate=1e-4)
@@ -154,7 +151,7 @@ def test_one_amplitude_and_rate_is_the_record_itself(paper_model: Model, case: s
 
 
 def test_a_drift_of_the_mean_parts_nothing(paper_model: Model) -> None:
-    record = recorded(paper_model, *PROGRAMMES["three amplitudes"][0])
+    record = recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)])
     drifting = replace(record, displacement=record.displacement + np.linspace(0.0, 2e-5, record.time.size))
     assert len(programme(drifting)) == 3
     one = recorded(paper_model, cycles(15, 0.3))
@@ -209,7 +206,7 @@ def virgin(loop: Loop, share: float) -> Loop:
 
 
 def test_a_softening_is_told_of_each_part(paper_model: Model) -> None:
-    loops = programme(virgin(recorded(paper_model, *PROGRAMMES["three amplitudes"][0]), 0.12))
+    loops = programme(virgin(recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)]), 0.12))
     found = [100.0 * (loop.softening or 0.0) for loop in loops]
     print("first cycle stiffer by", ", ".join(f"{value:.1f} %" for value in found), "of 12 %")
     assert found == pytest.approx([12.0] * 3, abs=4.0)  # with what a springpot and friction make from rest
@@ -232,10 +229,9 @@ def test_a_softening_in_the_virgin_cycles_of_a_programme_is_diagnosed(paper_mode
     assert share == pytest.approx(0.2, abs=0.02)
 
 
-@pytest.mark.parametrize("case", ["pauses", "up and down"])
-def test_what_rubber_remembers_is_no_softening(paper_model: Model, other_models: dict[str, Model], case: str) -> None:
+def test_what_rubber_remembers_is_no_softening(paper_model: Model, other_models: dict[str, Model]) -> None:
     for model in (paper_model, *other_models.values()):
-        assert {loop.softening for loop in programme(recorded(model, *PROGRAMMES[case][0]))} == {None}
+        assert {loop.softening for loop in programme(recorded(model, *PROGRAMMES["up and down"][0]))} == {None}
 
 
 def test_a_preloaded_loop_is_fitted_about_its_mean(paper_model: Model) -> None:
