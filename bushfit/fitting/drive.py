@@ -108,7 +108,8 @@ class Drive:
 
     def first_harmonic(self) -> complex:
         """Complex stiffness of the loop's fundamental, force over displacement [N/m or N m/rad]."""
-        _, force = as_complex(least_squares(basis(self.phase, 1), self.force, self.weight))
+        root = np.sqrt(self.weight)
+        _, force = as_complex(least_squares(basis(self.phase, 1) * root[:, None], self.force * root))
         return complex(force / self.coefficients[1])
 
     def history(self, settles: bool) -> History:

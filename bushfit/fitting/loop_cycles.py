@@ -15,7 +15,7 @@ from bushfit.fitting.loop_harmonics import residual_limit
 from bushfit.fitting.outliers import gross_rows
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE, change_after
-from bushfit.reduction.harmonics import as_complex, basis, least_squares, resolved_order, series, spread_rows
+from bushfit.reduction.harmonics import basis, least_squares, resolved_order, spread_rows
 from bushfit.reduction.programme import ENOUGH_ROWS, SAME_MOTION, THREE_CYCLES, left_out
 
 #: Share of a period up to which a break in the steady motion, or what is left out, is too short to count.
@@ -256,13 +256,13 @@ def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) ->
     chosen = spread_rows(x.size, _ROWS_TO_REFINE)
     time, motion = clock[chosen], x[chosen]
     order = resolved_order(rows_per_cycle * chosen.size / x.size, _MOST_HARMONICS)
-    columns = basis(time * frequency, order)
+    number, columns = np.arange(1, order + 1), basis(time * frequency, order)
     solution = least_squares(columns, motion)
     for _ in range(10):  # of Gauss-Newton; chosen: nearly all frequencies take three to six
         residual = motion - columns @ solution
         kept = np.abs(residual) <= residual_limit(solution, residual, residual.size)
-        slope = series(1j * np.arange(order + 1) * as_complex(solution), time * frequency)  # by phase in radians
-        by_frequency = 2.0 * np.pi * time * slope
+        by_phase = np.concatenate(([0.0], -number * solution[order + 1 :], number * solution[1 : order + 1]))
+        by_frequency = 2.0 * np.pi * time * (columns @ by_phase)
         found = least_squares(np.column_stack((columns, by_frequency)), motion, kept)
         step = float(np.clip(found[-1], -_LARGEST_STEP * frequency, _LARGEST_STEP * frequency))
         frequency += step
