@@ -99,13 +99,13 @@ class Cycles:
 
 
 def stretches(changes: NDArray[np.bool_]) -> list[slice]:
-    """Slices of the entries between changes: whether each but the first is other than the one before it, (n - 1,)."""
+    """Slices of entries that are alike, by whether each but the first is other than the one before it, (n - 1,)."""
     border = np.concatenate(([0], 1 + np.flatnonzero(changes), [changes.size + 1])).tolist()
     return [slice(first, end) for first, end in pairwise(border)]
 
 
-def goes_on(gap: float, *, step: float = 1.0) -> bool:
-    """Whether a sine that begins again after a gap [cycles] goes on in phase: a few cycles later, or steps of one."""
+def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
+    """Whether a sine that begins again after a gap [cycles] of three at most does so whole `step`s of a cycle later."""
     return gap < _LONGEST_INTERRUPTION and abs(gap - step * round(gap / step)) < _SAME_PHASE
 
 

@@ -15,10 +15,10 @@ from bushfit.errors import MeasurementError
 from bushfit.reading.measurement import Floats, Loop, Part, rebuild_time
 from bushfit.reduction.cycles import (
     change_after,
-    goes_on,
     least_prominence,
     lone_outliers,
     middle_crossings,
+    resumes_in_phase,
     stretches,
     turning_points,
 )
@@ -69,9 +69,9 @@ class _Span:
         ranges, periods = np.log(self.range / other.range), np.log(self.period / other.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
-    def goes_on(self, other: "_Span") -> bool:
+    def goes_on_as(self, other: "_Span") -> bool:
         """Whether the part after it is the same one, which a disturbance broke off."""
-        return self.like(other) and goes_on((other.begin - self.end) / self.period, step=0.5)
+        return self.like(other) and resumes_in_phase((other.begin - self.end) / self.period, step=0.5)
 
 
 def programme(loop: Loop, **keywords: Any) -> tuple[Loop, ...]:
@@ -143,7 +143,7 @@ def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_Span]:
         return []
     joined: list[_Span] = []
     for span in found:
-        if joined and joined[-1].goes_on(span):
+        if joined and joined[-1].goes_on_as(span):
             joined[-1] = replace(joined[-1], end=span.end)
         else:
             joined.append(span)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
 from bushfit.reading.measurement import Complex, Floats, Loop
-from bushfit.reduction.cycles import Cycles, goes_on, keeps_changing, lone_outliers, mean_from_steady, pieces
+from bushfit.reduction.cycles import Cycles, keeps_changing, lone_outliers, mean_from_steady, pieces, resumes_in_phase
 from bushfit.reduction.harmonics import HarmonicFit
 from bushfit.reduction.result import Reduction, Skipped, Step
 
@@ -114,7 +114,7 @@ def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
     kept: list[Step] = []
     last_end = -np.inf
     for start, end, step in found:
-        if goes_on((start - last_end) * step.frequency):
+        if resumes_in_phase((start - last_end) * step.frequency):
             counts = sorted((kept[-1].found, step.found))
             reach = _SETTLING_FREQUENCY if 2 * counts[0] < counts[1] else _SAME_FREQUENCY
             same = (
