@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,31 +17,6 @@ from bushfit.reading.measurement import Loop
 Point = tuple[float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class Stepped:
-    """A history without error, and what its steps should be reduced to."""
-
-    history: Loop
-    truth: Array
-
-    def measured(
-        self, random: np.random.Generator, noise: float, drift: float = 0.0, rows: Array | None = None
-    ) -> Loop:
-        """The history with white noise and a wandering zero in both channels, relative to their largest value.
-
-        `rows` are those that are kept, for records that are coarse or uneven.
-        """
-        time = self.history.time
-        turns = time / time[-1]
-        wander = drift * (np.sin(2.3 * np.pi * turns + random.uniform(0, 6)) + turns)
-        channels = [
-            values + np.abs(values).max() * (wander + noise * random.standard_normal(values.size))
-            for values in (self.history.displacement, self.history.force)
-        ]
-        kept = slice(None) if rows is None else rows
-        return Loop("history", self.history.direction, time[kept], *(values[kept] for values in channels))
-
-
 def stepped(
     model: Model,
     points: Sequence[Point],
@@ -49,30 +24,38 @@ def stepped(
     direction: Direction = Direction.AXIAL,
     step: float = 2e-5,
     cycles: int = 16,
-    ramp: int = 2,
     pause: float = 0.2,
     every: int = 10,
-) -> Stepped:
-    """Impose steps of `cycles` full cycles with `ramp` cycles of growth before and decay after them, from rest.
+) -> Loop:
+    """Impose steps of `cycles` full cycles with two cycles of growth before and decay after them, from rest.
 
-    The rubber remembers all of the record. The truth is the closed form at each point, with the springpot as the rig's
-    time step has it: (1 - exp(-i omega step))^alpha/step^alpha in place of (i omega)^alpha.
+    The rubber remembers all of the record. One row is kept of `every` time steps.
     """
     parts = [np.zeros(round(pause / step))]
     for frequency, amplitude in points:
-        count = cycles + 2 * ramp
+        count = cycles + 4
         turns = np.arange(round(count / frequency / step)) * step * frequency
-        envelope = np.clip(np.minimum(turns, count - turns) / ramp, 0.0, 1.0) if ramp else 1.0
+        envelope = np.clip(np.minimum(turns, count - turns) / 2.0, 0.0, 1.0)
         parts += [amplitude * envelope * np.sin(2.0 * np.pi * turns), np.zeros(round(pause / step))]
     motion = np.concatenate(parts)
     force = model.force(direction, History(motion, step, periodic=False, frequency=points[0][0]))
-    rows = slice(None, None, every)
-    history = Loop("history", direction, (np.arange(motion.size) * step)[rows], motion[rows], force[rows])
-    return Stepped(history, settled(model, direction, points, step))
+    return Loop("history", direction, np.arange(motion.size) * step, motion, force).at(slice(None, None, every))
+
+
+def measured(history: Loop, random: np.random.Generator, noise: float, drift: float = 0.0) -> Loop:
+    """A history with white noise and a wandering zero in both channels, relative to their largest value."""
+    turns = history.time / history.time[-1]
+    wander = drift * (np.sin(2.3 * np.pi * turns + random.uniform(0, 6)) + turns)
+    displacement, force = (
+        values + np.abs(values).max() * (wander + noise * random.standard_normal(values.size))
+        for values in (history.displacement, history.force)
+    )
+    return replace(history, displacement=displacement, force=force)
 
 
 def settled(model: Model, direction: Direction, points: Sequence[Point], step: float) -> Array:
-    """Complex stiffness of the steady first harmonic at some points, with the rig's time step in the springpot."""
+    """Complex stiffness of the steady first harmonic at some points, with the springpot as the rig's time step has it:
+    (1 - exp(-i omega step))^alpha/step^alpha in place of (i omega)^alpha."""
     frequency, amplitude = np.array(points).T
     omega, alpha = 2j * np.pi * frequency, model.values["alpha"]
     error = ((1.0 - np.exp(-omega * step)) / step) ** alpha - omega**alpha

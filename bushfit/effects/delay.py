@@ -21,8 +21,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """
     undelayed = below(history)
     if history.periodic:
-        turn = np.expm1(-1j * history.harmonics * p["tau"])
-        return undelayed + np.fft.irfft(turn * np.fft.rfft(undelayed), n=undelayed.shape[-1])
+        return undelayed + history.with_value(undelayed).response(lambda omega: np.expm1(-1j * omega * p["tau"]))
     place = np.arange(undelayed.shape[-1] + 1.0)
     from_zero = np.concatenate([np.zeros_like(undelayed[..., :1]), undelayed], axis=-1)
     row_by_row = np.vectorize(np.interp, signature="(n),(m),(m)->(n)")

@@ -3,6 +3,8 @@
 Such a cell serves the sweeps; the loops, as slow as the leak, go by one that holds its force.
 """
 
+from functools import partial
+
 import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Value, Values
@@ -31,6 +33,5 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     if setting.kind != "sweep":
         return felt
     if history.periodic:
-        leaked = _leak(p, history.harmonics) * np.fft.rfft(felt)
-        return felt + np.fft.irfft(leaked, n=felt.shape[-1])
+        return felt + history.with_value(felt).response(partial(_leak, p))
     return relax(2.0 * np.pi * p["corner"], felt, history.step) if np.any(p["corner"]) else felt

@@ -14,50 +14,37 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
-from bushfit.fitting.clock import fundamental, steady_part, thinned, wrong_clock
-from bushfit.fitting.fourier import GRID, as_complex, basis, least_squares, phase_bins, series
-from bushfit.fitting.loop_harmonics import MOST_ROWS, LoopHarmonics, OutlierRows, less_slow, loop_harmonics
+from bushfit.fitting.loop_cycles import steady_cycles, wrong_clock
+from bushfit.fitting.loop_harmonics import (
+    GRID,
+    MOST_ROWS,
+    LoopHarmonics,
+    OutlierRows,
+    less_slow,
+    loop_harmonics,
+    phase_bins,
+)
 from bushfit.fitting.repeats import FLOOR
 from bushfit.fitting.row_noise import RowNoise, of_a_lone_cycle, row_noise
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.cycles import HOLE
+from bushfit.reduction.harmonics import as_complex, basis, least_squares, series
 from bushfit.units import for_people, number
 
-#: Distance from a turning point up to which rows carry no weight [steps of the grid]: one step, and the half by which
-#: the point may lie beside its sample.
-_JUMP = 1.5
-#: Share of the half range by which first displacement and first force may be off where rest is, for a start from rest.
-_AT_REST = 0.02
-#: Share of the change of the force over the first cycle by which the first force may be off the mean besides; chosen:
-#: the virgin curve moves the mean by up to 0.3 of it, and a settled loop hardly changes.
-_VIRGIN = 0.5
-#: Standard deviations of the noise by which the first force may be off zero besides.
-_FIRST_ROW = 3.0
-#: Share of a cycle at its start that is held against the same a cycle later.
-_START = 0.02
-#: Change of the force over the first cycle, relative to half its range, from which on the loop began at rest.
-_SETTLES = 5e-3
-#: Standard deviations of the noise from which on a change, or energy that a loop gives, is no chance.
-_CERTAIN = 5.0
-#: Standard error of a median over that of a mean: sqrt(pi/2).
-_MEDIAN_OVER_MEAN = 1.25
-#: Loss factor up to which a loop may give energy, for the delay of a rig.
-_NO_LOSS = 2e-3
-#: Share of the amplitude by which a motion may lie off zero before its middle is taken for unknown.
-_CENTRED = 0.01
-#: Share of half the force's range by which the mean force of a motion about zero may exceed its second harmonic before
-#: it is taken for a preload; chosen: wrong zeros of load cells are less, and an uneven stiffness makes both alike.
-_PRELOADED = 0.25
 #: Share of the amplitude, or of half the force's range, from which on a mean is told as a preload; chosen: sensors are
 #: off zero by less.
 TOLD_MEAN = 0.05
-#: Rows of a cycle behind an estimate of how its noise depends from row to row; chosen: fewer resolve no correlation.
-_FEWEST_ROWS = 32
+#: Share of the half range by which first displacement and first force may be off where rest is, for a start from rest.
+_AT_REST = 0.02
+#: Standard deviations of the noise from which on a change, or energy that a loop gives, is no chance.
+_CERTAIN = 5.0
+#: Loss factor up to which a loop may give energy, for the delay of a rig.
+_NO_LOSS = 2e-3
+#: Share of half the force's range by which the mean force of a motion about zero may exceed its second harmonic before
+#: it is taken for a preload; chosen: wrong zeros of load cells are less, and an uneven stiffness makes both alike.
+_PRELOADED = 0.25
 #: How far equations over a loop's motion may be from solved, relative to it: a ten-thousandth of the noise of the best
 #: rigs. Derivatives are resolved apart from that.
 _ACCURACY = 1e-8
-#: Rows by which a record may miss its last whole cycle, or go on after it, and still count as whole.
-_WHOLE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,9 +108,9 @@ class Drive:
 
     def first_harmonic(self) -> complex:
         """Complex stiffness of the loop's fundamental, force over displacement [N/m or N m/rad]."""
-        columns = basis(self.phase, 1)
-        _, real, imag = least_squares(columns * np.sqrt(self.weight)[:, None], self.force * np.sqrt(self.weight))
-        return complex(complex(real, imag) / self.coefficients[1])
+        root = np.sqrt(self.weight)
+        _, force = as_complex(least_squares(basis(self.phase, 1) * root[:, None], self.force * root))
+        return complex(force / self.coefficients[1])
 
     def history(self, settles: bool) -> History:
         """One settled cycle, GRID samples long, or the whole record where it begins at rest, or the model `settles`.
@@ -139,8 +126,8 @@ class Drive:
 
     @property
     def _rounding(self) -> float:
-        """Cycles by which the record may miss a whole number of them."""
-        return _WHOLE * self.cycles / self.loop.time.size
+        """Cycles by which the record may miss a whole number of them: half a row."""
+        return 0.5 * self.cycles / self.loop.time.size
 
     @cached_property
     def _motion(self) -> History:
@@ -185,18 +172,16 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
         FitError: the displacement is not one whole cycle or more of a periodic motion, rows are missing, or the loop
             gives energy.
     """
-    whole, thin = loop, thinned(loop)
-    loop, left_out = steady_part(whole, *thin)
+    whole = loop
+    loop, frequency, cycles, left_out = steady_cycles(whole)
     first_row = int(np.searchsorted(whole.time, loop.time[0]))
-    thin = thin if loop is whole else thinned(loop)
-    frequency, cycles = fundamental(loop, *thin)
-    _check_no_hole(loop, thin[0], frequency)
     found = loop_harmonics(loop, frequency, cycles)
     outliers = found.outliers["force"].rows
     half_motion = float(np.ptp(series(found.motion, np.arange(GRID) / GRID))) / 2.0
-    half_force = float(np.ptp(_without(loop.force, outliers))) / 2.0
+    half_force = float(np.ptp(np.delete(loop.force, outliers))) / 2.0
     noise = loop.noise * half_force if loop.noise is not None else found.force_noise
-    rests = _rests(loop, found, half_motion, half_force, noise, _change(loop, frequency, noise, half_force))
+    change = _change(loop, frequency, noise, half_force)
+    rests = _rests(loop, found, half_motion, half_force, noise, change)
     from_rest = first_row == 0 and any(rests)
     unweighted = outliers if without_outliers else outliers[:0]
     drive = Drive(
@@ -218,8 +203,11 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     if from_rest and not rests[0]:
         drive = replace(drive, datum=float(np.average(drive.force, weights=drive.weight)))
     elif not from_rest:
-        unknown = drive.follows or abs(found.motion[0]) > _CENTRED * half_motion
-        drive = replace(drive, datum=found.force_mean if unknown else _mean_of_preload(drive))
+        # a stiffness that is not the same to either side makes a mean force too, and a second harmonic of its size
+        mean, _, cosine, _, sine = least_squares(basis(drive.phase, 2), drive.force, drive.weight)
+        preload = float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * half_force else None
+        unknown = drive.follows or abs(found.motion[0]) > 0.01 * half_motion
+        drive = replace(drive, datum=found.force_mean if unknown else preload)
     return replace(drive, notes=(*drive.notes, *_preload(drive)))
 
 
@@ -230,21 +218,6 @@ def _of_the_record(loop: Loop) -> Iterator[str]:
         yield loop.part.left_out
     if loop.softening is not None:
         yield f"the first cycle is {number(100 * loop.softening, 2)} % stiffer than the last (Mullins)"
-
-
-def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
-    """Refuse a hole of more than a part of a cycle: nothing tells how many turns the motion made in it."""
-    steps = np.diff(clock)
-    widest = int(np.argmax(steps))
-    if steps[widest] > HOLE / frequency:
-        raise FitError(
-            "rows are missing inside the loop",
-            file=loop.source.file if loop.source else None,
-            found=f"none from {clock[widest]:.4g} to {clock[widest + 1]:.4g} s; how many cycles went by, and so the "
-            "frequency, cannot be told",
-            expected="no gap longer than a third of a cycle",
-            hint="keep the whole cycles before the gap, or those after it",
-        )
 
 
 def _check_loses_energy(drive: Drive) -> None:
@@ -272,25 +245,21 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
     """
     binned = drive.force.size < drive.loop.force.size
     turn = drive.phase.astype(np.intp)
-    turns = np.unique(turn)
-    first, whole = int(drive.from_rest), int(drive.cycles + drive._rounding)
-    rows = (turn >= first) & (turn < whole)
-    cycles = int(np.count_nonzero((turns >= first) & (turns < whole)))
-    if not cycles or np.count_nonzero(rows) < _FEWEST_ROWS * cycles:
+    rows = (turn >= int(drive.from_rest)) & (turn < int(drive.cycles + drive._rounding))
+    cycles = np.unique(turn[rows]).size
+    if not cycles or np.count_nonzero(rows) < 32 * cycles:  # fewer resolve no correlation
         return drive
-    phase, weight = drive.phase[rows], np.sqrt(drive.weight[rows])
-    harmonics = found.force
+    phase, force, weight, harmonics = drive.phase[rows], drive.force[rows], drive.weight[rows], found.force
     if drive.from_rest:
-        columns = basis(phase, harmonics.size - 1)
-        harmonics = as_complex(least_squares(columns * weight[:, None], drive.force[rows] * weight))
+        harmonics = as_complex(least_squares(basis(phase, harmonics.size - 1), force, weight))
     if cycles == 1:
         harmonics = np.where(of_a_lone_cycle(np.arange(harmonics.size)), 0.0, harmonics)
-    off = drive.force[rows] - series(harmonics, phase)
+    off = force - series(harmonics, phase)
     if np.std(off) < FLOOR * drive.half_range:
         return drive
     if not weight.all():
         off = np.interp(phase, phase[weight > 0.0], off[weight > 0.0])
-    scale = np.sqrt(drive.weight[rows]) if binned else 1.0
+    scale = np.sqrt(weight) if binned else 1.0
     model, size = row_noise(off * scale, less_slow(phase, off)[0] * scale, cycles)
     if binned and model.order:
         drive = replace(drive, weight=_evened(drive.weight, turn))
@@ -314,18 +283,13 @@ def _evened(weight: Array, turn: Array) -> Array:
     return np.where(held, mean[turn], 0.0)
 
 
-def _without(values: Array, rows: Array) -> Array:
-    """Values less those of some rows; a long record is not copied in vain."""
-    return np.delete(values, rows) if rows.size else values
-
-
 def _points(
     loop: Loop, frequency: float, cycles: float, unweighted: Array, *, each_cycle: bool
 ) -> tuple[Array, Array, Array]:
     """Phase [cycles], force and weight of each row of a loop, or of each bin of phase where it is long, (n,) each."""
     clock = loop.time - loop.time[0] if loop.time[0] else loop.time
     if loop.force.size > MOST_ROWS:
-        clock, force = _without(clock, unweighted), _without(loop.force, unweighted)
+        clock, force = np.delete(clock, unweighted), np.delete(loop.force, unweighted)
         return phase_bins(clock, force, frequency, cycles, each_cycle=each_cycle)
     return clock * frequency, loop.force, 1.0 - np.isin(np.arange(loop.force.size), unweighted)
 
@@ -339,7 +303,8 @@ def _at_reversal(drive: Drive) -> Array:
         turns, position = np.flatnonzero(reversals(np.tile(motion, 3))) - GRID, position % GRID
     turns = np.concatenate(([-np.inf], turns, [np.inf]))
     after = np.searchsorted(turns, position)
-    return np.minimum(position - turns[after - 1], turns[after] - position) < _JUMP
+    # one step, and the half by which the point may lie beside its sample
+    return np.minimum(position - turns[after - 1], turns[after] - position) < 1.5
 
 
 def _rests(
@@ -350,12 +315,15 @@ def _rests(
     A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle: `change`
     is the certain one of its force over the first.
     """
+    if not change:
+        return False, False
+    near, chance, reach = _AT_REST * half_force, 3.0 * noise, _AT_REST * half_motion
+    unmoved, unloaded = abs(loop.displacement[0]) <= reach, abs(loop.force[0]) <= near + chance
     off_mean = abs(loop.displacement[0] - found.motion[0].real), abs(loop.force[0] - found.force_mean)
-    near, chance = _AT_REST * half_force, _FIRST_ROW * noise
-    unmoved, unloaded = abs(loop.displacement[0]) <= _AT_REST * half_motion, abs(loop.force[0]) <= near + chance
-    in_middle = off_mean[0] <= _AT_REST * half_motion and off_mean[1] <= max(near, _VIRGIN * change) + chance
+    # the virgin curve moves the mean by up to 0.3 of the change
+    in_middle = off_mean[0] <= reach and off_mean[1] <= max(near, 0.5 * change) + chance
     is_first = loop.part is None or loop.part.first_row == 0
-    return bool(change and unmoved and unloaded), bool(change and in_middle and is_first)
+    return bool(unmoved and unloaded), bool(in_middle and is_first)
 
 
 def _change(loop: Loop, frequency: float, noise: float, half_force: float) -> float:
@@ -363,19 +331,11 @@ def _change(loop: Loop, frequency: float, noise: float, half_force: float) -> fl
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
     known = np.searchsorted(clock, clock[-1] - 1.0 / frequency, side="right")  # a cycle later
-    first = clock[: max(min(int(np.searchsorted(clock, _START / frequency)), int(known)), 1)]
+    first = clock[: max(min(int(np.searchsorted(clock, 0.02 / frequency)), int(known)), 1)]
     change = abs(float(np.median(np.interp(first + 1.0 / frequency, clock, force) - force[: first.size])))
-    chance = _CERTAIN * noise * np.sqrt(2.0 / first.size)
-    return change if change > max(_MEDIAN_OVER_MEAN * chance, _SETTLES * half_force) else 0.0
-
-
-def _mean_of_preload(drive: Drive) -> float | None:
-    """The mean force of a preload about which the displacement counts from zero [N or N m]; None where there is none.
-
-    A stiffness that is not the same to either side makes a mean force too, and a second harmonic of its size.
-    """
-    mean, _, cosine, _, sine = least_squares(basis(drive.phase, 2), drive.force, drive.weight)
-    return float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * drive.half_range else None
+    # of a difference, and of a median, whose standard error is sqrt(pi/2) of that of a mean
+    chance = 1.25 * _CERTAIN * noise * np.sqrt(2.0 / first.size)
+    return change if change > max(chance, 5e-3 * half_force) else 0.0
 
 
 def _preload(drive: Drive) -> Iterator[str]:

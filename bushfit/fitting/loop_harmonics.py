@@ -9,21 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.fourier import (
-    GRID,
-    as_complex,
-    basis,
-    first_amplitude,
-    least_squares,
-    resolved_order,
-    series,
-    spread_rows,
-)
 from bushfit.fitting.outliers import are_outliers, are_stuck, outlier_limit
 from bushfit.fitting.repeats import FLOOR
 from bushfit.reading.measurement import Loop
+from bushfit.reading.parallel import CHUNK, by_chunks
+from bushfit.reduction.harmonics import as_complex, basis, least_squares, resolved_order, series, spread_rows
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
+#: Samples of one cycle where a series is drawn as a curve and the model answers; chosen: rows between two samples are
+#: interpolated linearly, which is then off by 5e-6 of the amplitude.
+GRID = 1024
 #: Rows of a loop that the harmonics are fitted to at most; longer ones are averaged into as many bins of phase.
 MOST_ROWS = 4 * GRID
 #: Rows of a loop up to which every one is held against the harmonics; of a longer loop only where those fitted to have
@@ -31,16 +26,10 @@ MOST_ROWS = 4 * GRID
 _MOST_ROWS_CHECKED = 200_000
 #: Harmonics that are fitted at most; chosen: those of a triangle have then fallen to 3e-4 of the first.
 _MOST_HARMONICS = 60
-#: Standard errors from which on a harmonic of the displacement is no noise.
-_SIGNIFICANT = 4.0
 #: Harmonics of one cycle that count as slow change from cycle to cycle, which is settling or drift and no noise.
 _SLOW_HARMONICS = 3
-#: Rows behind each unknown of the slow change, fewer than which leave a cycle as it is.
-_ROWS_PER_UNKNOWN = 4
-#: Residual of a triangle over that of free harmonics up to which a motion counts as a triangle.
+#: Residual of a triangle over that of free harmonics up to which a motion counts as one.
 _TRIANGLE_RATIO = 1.02
-#: Distance of the third harmonic from a triangle's [noise of a row] that rules a triangle out, without drawing one.
-_NO_TRIANGLE = 3.0
 #: Share of the amplitude, over the number of harmonics, by which these may miss a corner of the motion.
 _CORNER = 0.5
 
@@ -52,7 +41,7 @@ class OutlierRows(NamedTuple):
     off: Array
 
 
-NO_OUTLIERS = OutlierRows(np.empty(0, dtype=np.intp), np.empty(0))
+_NO_OUTLIERS = OutlierRows(np.empty(0, dtype=np.intp), np.empty(0))
 
 
 class LoopHarmonics(NamedTuple):
@@ -90,36 +79,33 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
     values = np.column_stack([column[chosen] for column in recorded.values()])
     solution, inliers, outliers = least_squares(columns, values), np.empty(values.shape, dtype=bool), {}
     for which, (name, column) in enumerate(recorded.items()):
-        solution[:, which], inliers[:, which] = fit_without_outliers(columns, values[:, which], solution[:, which])
+        solution[:, which], inliers[:, which] = _fit_without_outliers(columns, values[:, which], solution[:, which])
         residual = values[:, which] - columns @ solution[:, which]
         outliers[name] = (
-            column_outliers(loop, frequency, column, solution[:, which], residual)
+            _column_outliers(loop, frequency, column, solution[:, which], residual)
             if column.size <= _MOST_ROWS_CHECKED or not inliers[:, which].all()
-            else NO_OUTLIERS
+            else _NO_OUTLIERS
         )
     left = values - columns @ solution
     of_motion, of_force = inliers.T
     freedom = np.maximum(np.count_nonzero(inliers, axis=0) - 2 * order - 1, 1)
     motion_noise = float(np.sqrt(np.sum(np.square(left[of_motion, 0])) / freedom[0]))
-    coefficients = as_complex(solution[:, 0])
-    triangle = _triangle(coefficients[0], coefficients[1])
-    alike = _is_triangle(triangle, coefficients, motion_noise, phase[of_motion], values[of_motion, 0])
-    motion = triangle if alike else _significant(coefficients, motion_noise, phase.size)
+    motion = _cleared(as_complex(solution[:, 0]), motion_noise, phase, values[:, 0], of_motion)
     settled, unknowns = less_slow(phase[of_force], left[of_force, 1])
     force_noise = float(np.sqrt(np.sum(np.square(settled)) / max(freedom[1] - unknowns, 1)))
     return LoopHarmonics(motion, as_complex(solution[:, 1]), force_noise, outliers)
 
 
-def _significant(coefficients: Array, noise: float, rows: int) -> Array:
-    """Complex harmonics with those that noise explains set to zero, up to the last that is not."""
-    keep = (np.abs(coefficients) > _SIGNIFICANT * noise * np.sqrt(2.0 / rows)) | (np.arange(coefficients.size) < 2)
+def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:
+    """The harmonics of a motion without those that noise explains; those of a triangle where its rows, (n,), agree
+    with one as well, but for noise, as with its own."""
+    triangle = _triangle(coefficients[0], coefficients[1])
+    other = coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= 3.0 * noise
+    if not other and np.std((displacement - series(triangle, phase))[inliers]) < _TRIANGLE_RATIO * noise:
+        return triangle
+    least = 4.0 * noise * np.sqrt(2.0 / phase.size)  # standard errors
+    keep = (np.abs(coefficients) > least) | (np.arange(coefficients.size) < 2)
     return np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
-
-
-def _is_triangle(triangle: Array, coefficients: Array, noise: float, phase: Array, displacement: Array) -> bool:
-    """Whether the rows of a motion agree with a triangle as well as, but for noise, with its own harmonics."""
-    other = coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= _NO_TRIANGLE * noise
-    return bool(not other and np.std(displacement - series(triangle, phase)) < _TRIANGLE_RATIO * noise)
 
 
 def _triangle(mean: complex, fundamental: complex) -> Array:
@@ -139,7 +125,7 @@ def less_slow(phase: Array, residual: Array) -> tuple[Array, int]:
     left = residual.copy()
     for cycle in np.unique(number):
         rows = np.flatnonzero(number == cycle)
-        if rows.size > _ROWS_PER_UNKNOWN * size:
+        if rows.size > 4 * size:  # fewer leave a cycle as it is
             slow = basis(phase[rows], _SLOW_HARMONICS)
             left[rows] -= slow @ np.linalg.lstsq(slow, left[rows], rcond=None)[0]
             unknowns += size
@@ -151,11 +137,11 @@ def residual_limit(solution: Array, residual: Array, rows: int) -> float:
 
     Noise takes part of it, and the corners of a triangle, which these harmonics, (2 order + 1,), round off, the rest.
     """
-    corner = _CORNER / (solution.size // 2) * first_amplitude(solution)
+    corner = _CORNER / (solution.size // 2) * abs(as_complex(solution)[1])
     return outlier_limit(rows, 1, np.inf) * _spread(residual) + corner
 
 
-def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
+def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
     """Harmonics of a column fitted without its outliers, and which rows are none, (n,).
 
     Squares let so many harmonics follow a cluster of outliers, as `solution` does. So rows are weighted down by their
@@ -176,7 +162,7 @@ def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tupl
     return solution, inliers
 
 
-def column_outliers(loop: Loop, frequency: float, column: Array, solution: Array, residual: Array) -> OutlierRows:
+def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Array, residual: Array) -> OutlierRows:
     """Outliers among all rows of a column, whose harmonics and residual are of rows that stand for all."""
     grid = np.arange(GRID + 1) / GRID
     cycle = basis(grid, solution.size // 2) @ solution
@@ -194,9 +180,43 @@ def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Ar
 
 def _noise(solution: Array, residual: Array) -> float:
     """Noise of one row: the spread of the residuals, and no less than any rig has."""
-    return max(_spread(residual), FLOOR * first_amplitude(solution))
+    return max(_spread(residual), FLOOR * abs(as_complex(solution)[1]))
 
 
 def _spread(residual: Array) -> float:
     """Standard deviation of residuals about zero, which outliers hardly move."""
     return MEDIAN_TO_SIGMA * float(np.median(np.abs(residual)))
+
+
+def phase_bins(
+    clock: Array, force: Array, frequency: float, cycles: float, *, each_cycle: bool
+) -> tuple[Array, Array, Array]:
+    """Mean phase [cycles], mean force and number of rows of each bin that holds rows, (k,) each.
+
+    A bin is a GRID-th of a cycle. The first few cycles have bins of their own, and later ones share bins in ever larger
+    groups, unless `each_cycle` has its own. The clock [s], (n,), rises from the first row.
+    """
+    number = np.arange(int(cycles) + 2)
+    own, growth = 4, 1.5  # cycles over which a loop settles have bins of their own; later it does ever more slowly
+    later = own * growth ** np.arange(np.log(number.size / own) / np.log(growth))
+    starts = number if each_cycle else np.union1d(np.arange(own), later.astype(np.intp))
+    group = np.searchsorted(starts, number, side="right") - 1
+    middle = np.round(np.bincount(group, weights=number) / np.bincount(group))
+    edges = np.append(np.arange(int(cycles * GRID) + 1) / (frequency * GRID), np.inf)
+
+    def sums(bins: slice) -> Array:
+        """Of some bins the filled ones, (k,), their rows, and sums of phase in bins and of force over these, (4, k)."""
+        start, stop = np.searchsorted(clock, edges[[bins.start, bins.stop]])
+        first = np.searchsorted(clock[start:stop], edges[bins])
+        filled = np.flatnonzero(np.diff(first, append=stop - start))
+        number, first = filled + bins.start, first[filled]
+        count = np.diff(first, append=stop - start)
+        in_bins = np.add.reduceat(clock[start:stop], first) * (frequency * GRID) - count * number
+        return np.stack((number, count, in_bins, np.add.reduceat(force[start:stop], first)))
+
+    chunks = by_chunks(sums, edges.size - 1, 1 + CHUNK * edges.size // clock.size)
+    bins, *parts = np.concatenate(chunks, axis=1)
+    bins = bins.astype(np.intp)
+    filled, place = np.unique(GRID * group[bins // GRID] + bins % GRID, return_inverse=True)
+    rows, inside, total = (np.bincount(place, weights=part) for part in parts)
+    return middle[filled // GRID] + (filled % GRID + inside / rows) / GRID, total / rows, rows

@@ -7,8 +7,8 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import MISTAKES
-from bushfit.fitting.clock import waveform
 from bushfit.fitting.drive import TOLD_MEAN, Drive, drive_of
+from bushfit.fitting.loop_cycles import waveform
 from bushfit.geometry import Unit
 from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.outside import wrong_labels
@@ -16,7 +16,7 @@ from bushfit.inspection.record import Looked, told_frequencies
 from bushfit.reading.measurement import Loop
 from bushfit.reading.names import Said
 from bushfit.reduction.cycles import least_prominence
-from bushfit.reduction.harmonics import cycle_harmonics
+from bushfit.reduction.harmonics import cycle_harmonics, resolved_order
 from bushfit.reduction.steps import reduce
 from bushfit.units import alike, for_people, number
 
@@ -28,12 +28,8 @@ _WORTH_TELLING = 2e-3
 _OFF_ZERO = 0.02
 #: Cycles that are looked at from either end of a loop; chosen: what settles shows in them.
 _MOST_END_CYCLES = 6
-#: Harmonics that are fitted to a cycle; chosen: a loop of rubber has next to nothing beyond.
-_HARMONICS = 7
 #: [s] A cycle that takes longer is in doubt; chosen: quasi-static tests take minutes.
 _LONGEST_CYCLE = 3000.0
-#: Rows of a cycle for each harmonic that is fitted; chosen: twice the unknowns and some.
-_ROWS_PER_HARMONIC = 5
 
 
 def look_at_loop(loop: Loop, named: Said) -> Looked:
@@ -123,8 +119,8 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looke
     cycles = [drive.cycles for drive in drives]
     used = sum(drive.loop.displacement.size for drive in drives)
     facts = {
-        "programme": f"{len(loops)} loops in one record: {_told([factor * size for size in amplitudes])} {unit} "
-        f"at {_told(frequencies)} Hz, {_told([min(cycles), max(cycles)], ' to ')} cycles used of each; "
+        "programme": f"{len(loops)} loops in one record: {_each_once([factor * size for size in amplitudes])} {unit} "
+        f"at {_each_once(frequencies)} Hz, {_each_once([min(cycles), max(cycles)], ' to ')} cycles used of each; "
         f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out",
     }
     odd = [*wrong_labels(named, record.direction, amplitudes, frequencies), *odd_channels(record)]
@@ -140,8 +136,8 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looke
     return Looked(facts, tuple(odd))
 
 
-def _told(values: Sequence[float], between: str = ", ") -> str:
-    """Values in their order, each told once: "0.2, 0.5, 1"."""
+def _each_once(values: Sequence[float], between: str = ", ") -> str:
+    """Values in their order, each written once: "0.2, 0.5, 1"."""
     return between.join(dict.fromkeys(f"{value:.3g}" for value in values))
 
 
@@ -167,7 +163,7 @@ def _end_cycles(drive: Drive) -> _EndCycles | None:
     outliers = drive.outliers["force"].rows
     parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), outliers) for n in numbers]
     rows = min(part.size for part in parts)
-    order = int(np.clip(rows // _ROWS_PER_HARMONIC, 1, _HARMONICS))
+    order = resolved_order(rows, 7)  # a loop of rubber has next to nothing beyond
     if rows < 4 * order:
         return None
     fitted = [

@@ -12,60 +12,30 @@ from numpy.typing import NDArray
 
 from bushfit.reading.measurement import Complex, Floats
 from bushfit.reading.parallel import CHUNK
+from bushfit.reduction.harmonics import basis
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, scatter
 
 #: Rows of an array.
 Integers = NDArray[np.intp]
 
-#: Standard deviations of the noise by which a turning point stands out; chosen: noise goes half as far in 10^6 rows.
-_PROMINENCE_NOISE = 10.0
-#: Steps of the analogue-to-digital converter by which a turning point stands out; chosen: it flickers between two.
-_PROMINENCE_STEPS = 4.0
-#: Share of the whole range by which a turning point stands out; chosen: the range of a step is far larger.
-_PROMINENCE_SHARE = 1e-3
-#: Order of the differences that leave noise and no motion; chosen: 0.2 % of a sine of ten rows a cycle stays.
-_DIFFERENCE_ORDER = 6
-#: Standard deviation of such differences over that of a row: the root of the sum of squared binomials.
-_DIFFERENCE_GAIN = comb(2 * _DIFFERENCE_ORDER, _DIFFERENCE_ORDER) ** 0.5
-#: Rows of a window in which noise is measured; chosen: enough for a median.
-_WINDOW_ROWS = 256
-#: Windows in which noise is measured; chosen: more tell nothing new of a long record.
-_MOST_WINDOWS = 2000
-#: Quantile of the windows that gives the noise: those with the least motion.
-_QUIET_QUANTILE = 0.1
-#: Variance of a row less the cubic through two neighbours on either side at even times, over that of a row: their
-#: weights are -1/6, 4/6, 4/6 and -1/6.
-_EVEN_GAIN = 1.0 + (2.0 * 4.0**2 + 2.0) / 36.0
-#: [cycles] Distance from its phase up to which a motion goes on; chosen: another start meets it once in ten times.
-SAME_PHASE = 0.05
-#: [ln of a period] Difference from which neighbouring cycles are not of one run; chosen: far beyond that of a step.
-_SAME_PERIOD = 0.1
-#: [ln of a range] Difference from which neighbouring cycles are not of one run; chosen: far beyond that of a step.
-_SAME_RANGE = 0.25
 #: Share of a cycle that its longest hole may take; chosen: a fundamental needs rows on all sides of it.
 HOLE = 0.34
+#: [cycles] Longest interruption of a sine, beyond which it has stopped: three cycles, give or take a tenth.
+_LONGEST_INTERRUPTION = 3.1
+#: [cycles] Distance from its phase up to which a motion goes on; chosen: another start meets it once in ten times.
+_SAME_PHASE = 0.05
+#: [ln] Difference of period and of range from which neighbouring cycles are not of one run: far beyond that of a step.
+_OTHER_PERIOD, _OTHER_RANGE = 0.1, 0.25
 #: Determinant of the normal equations, relative to its rows, from which a cycle's fundamental can be solved for.
 _LEAST_DETERMINANT = 1e-3
 #: Chi-square that a split has to save; chosen: scatter saves half as much at the best of many places.
 _SPLIT_GAIN = 40.0
-#: Relative difference of two frequencies that are worth a split; chosen: smaller ones are a rig's wander.
-_OTHER_FREQUENCY = 1e-3
-#: Relative difference of two amplitudes that are worth a split; chosen: smaller ones are a rig's wander.
-_OTHER_AMPLITUDE = 0.02
-#: Share of a period to which a crossing is known at best; chosen: no rig is more even.
-_LEAST_JITTER = 5e-4
-#: Share of an amplitude to which it is known at best; chosen: no rig is more even.
+#: Relative difference of frequency and of amplitude that is worth a split; chosen: smaller ones are a rig's wander.
+_SPLIT_FREQUENCY, _SPLIT_AMPLITUDE = 1e-3, 0.02
+#: Share of a period, and of an amplitude, to which they are known at best; chosen: no rig is more even.
 _LEAST_SCATTER = 5e-4
 #: Cycles on either side of a split: two crossings more than a line needs.
 _FEWEST_CYCLES = 2
-#: Pieces of the shortest sweep of frequency; chosen: fewer may be steps.
-_FEWEST_IN_SWEEP = 4
-#: Share of the change between pieces that lies within them in a sweep: 1 in a perfect one, 0 between steps.
-_SWEPT_SHARE = 0.5
-#: Share of a step that may be transient at its start; chosen: half of it has to be steady.
-_MOST_TRANSIENT = 0.5
-#: Share of a step that may be no longer steady at its end; chosen: a rig that stops takes less.
-_MOST_ENDING = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,37 +77,41 @@ class Cycles:
         before = self.first_rows - 1
         gap = np.maximum.reduceat(np.diff(self.time[: before[-1] + 2]), before[:-1])
         hole = gap > HOLE * period
-        other = (np.abs(np.diff(np.log(period))) > _SAME_PERIOD) | (np.abs(np.diff(np.log(self.range))) > _SAME_RANGE)
-        border = np.concatenate(([0], 1 + np.flatnonzero(other | hole[1:] | hole[:-1]), [period.size]))
-        return [slice(int(a), int(b)) for a, b in pairwise(border) if not hole[a]]
+        change = np.abs(np.diff(np.log([period, self.range])))
+        other = (change[0] > _OTHER_PERIOD) | (change[1] > _OTHER_RANGE) | hole[1:] | hole[:-1]
+        return [run for run in stretches(other) if not hole[run.start]]
 
     def fundamentals(self, run: slice, values: Floats) -> Complex:
         """Complex fundamental of a channel, (n,), in each cycle of a run, (k,): least squares, with its mean."""
         edges, first = self.edges[run.start : run.stop + 1], self.first_rows[run.start : run.stop + 1]
-        rows = slice(first[0], first[-1])
-        count = np.diff(first)
+        rows, count = slice(first[0], first[-1]), np.diff(first)
         phase = (self.time[rows] - np.repeat(edges[:-1], count)) / np.repeat(np.diff(edges), count)
-        turn = np.exp(-2j * np.pi * phase)
+        columns, starts = basis(phase, 2).T, first[:-1] - first[0]
+        # the squares of the first harmonic are half the second
+        n, c1, c2, s1, s2 = np.add.reduceat(columns, starts, axis=-1)
+        gram = np.array([[n, c1, s1], [c1, (n + c2) / 2.0, s2 / 2.0], [s1, s2 / 2.0, (n - c2) / 2.0]]).T
+        right = np.add.reduceat(columns[[0, 1, 3]] * values[rows], starts, axis=-1).T[..., None]
+        sound = np.abs(np.linalg.det(gram / np.maximum(count, 1)[:, None, None])) > _LEAST_DETERMINANT
+        solved = np.linalg.solve(gram[sound], right[sound])[..., 0]
+        fundamental = (self.range[run] / 2.0).astype(complex)  # for cycles of too few rows, which make no point
+        fundamental[sound] = solved[:, 1] + 1j * solved[:, 2]
+        return fundamental
 
-        def summed(series: NDArray[np.generic]) -> NDArray[np.generic]:
-            return np.add.reduceat(series, first[:-1] - first[0])
 
-        once, twice, wave = summed(turn), summed(turn * turn), summed(values[rows] * turn)
-        size, total = count.astype(float), summed(values[rows])
-        # unknowns: mean, cosine and negative sine; turn = cosine - i sine
-        rows_of_gram = [
-            [size, once.real, once.imag],
-            [once.real, (size + twice.real) / 2.0, twice.imag / 2.0],
-            [once.imag, twice.imag / 2.0, (size - twice.real) / 2.0],
-        ]
-        gram = np.moveaxis(np.array(rows_of_gram), -1, 0)
-        right = np.stack((total, wave.real, wave.imag), axis=1)
-        solved = np.full((count.size, 3), np.nan)
-        sound = np.abs(np.linalg.det(gram / np.maximum(size, 1.0)[:, None, None])) > _LEAST_DETERMINANT
-        solved[sound] = np.linalg.solve(gram[sound], right[sound][..., None])[..., 0]
-        fundamental = solved[:, 1] + 1j * solved[:, 2]
-        rough = (self.range[run] / 2.0).astype(complex)  # for cycles of too few rows, which make no point
-        return np.where(sound, fundamental, rough)
+def stretches(changes: NDArray[np.bool_]) -> list[slice]:
+    """Slices of entries that are alike, by whether each but the first is other than the one before it, (n - 1,)."""
+    border = np.concatenate(([0], 1 + np.flatnonzero(changes), [changes.size + 1])).tolist()
+    return [slice(first, end) for first, end in pairwise(border)]
+
+
+def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
+    """Whether a sine that begins again after a gap [cycles] of three at most does so whole `step`s of a cycle later."""
+    return gap < _LONGEST_INTERRUPTION and abs(gap - step * round(gap / step)) < _SAME_PHASE
+
+
+def change_after(time: Floats, motion: Floats, shift: float, rows: slice) -> Floats:
+    """How far a motion, at some of its rows, is from where it is a time [s] later, or earlier, [m or rad]."""
+    return np.abs(np.interp(time[rows] + shift, time, motion) - motion[rows])
 
 
 def middle_crossings(time: Floats, motion: Floats, turns: Integers, middle: Floats) -> Floats:
@@ -153,19 +127,25 @@ def middle_crossings(time: Floats, motion: Floats, turns: Integers, middle: Floa
 
 
 def least_prominence(values: Floats) -> float:
-    """How far a turning point of a channel has to stand out to be none of noise, in the units of the values."""
+    """How far a turning point of a channel has to stand out to be none of noise, in the units of the values.
+
+    Notes:
+        By 0.1 % of the range, by ten standard deviations of the noise (which goes half as far in 10^6 rows), and by
+        four steps of the analogue-to-digital converter, which flickers between two. The noise is that of sixth
+        differences, of which a sine of ten rows a cycle leaves 0.2 %, in the windows with the least motion.
+    """
     change = np.abs(np.diff(values))
     converter_step = float(change[change > 0.0].min(initial=np.inf))
-    least = _PROMINENCE_SHARE * float(np.ptp(values))
-    rows = min(_WINDOW_ROWS, values.size)
-    if rows > _DIFFERENCE_ORDER:
-        count = min(_MOST_WINDOWS, values.size // rows)
-        starts = np.linspace(0, values.size - rows, count).astype(np.intp)
+    least = 1e-3 * float(np.ptp(values))
+    rows, order = min(256, values.size), 6
+    if rows > order:
+        starts = np.linspace(0, values.size - rows, min(2000, values.size // rows)).astype(np.intp)
         windows = np.lib.stride_tricks.sliding_window_view(values, rows)[starts]
-        differences = np.abs(np.diff(windows, _DIFFERENCE_ORDER, axis=1))
-        noise = np.median(differences, axis=1) * (MEDIAN_TO_SIGMA / _DIFFERENCE_GAIN)
-        least = max(least, _PROMINENCE_NOISE * float(np.quantile(noise, _QUIET_QUANTILE)))
-    return max(least, _PROMINENCE_STEPS * converter_step if converter_step < least else 0.0)
+        differences = np.median(np.abs(np.diff(windows, order, axis=1)), axis=1)
+        # of white noise, the squared weights of such differences sum up to this binomial
+        noise = differences * (MEDIAN_TO_SIGMA / comb(2 * order, order) ** 0.5)
+        least = max(least, 10.0 * float(np.quantile(noise, 0.1)))
+    return max(least, 4.0 * converter_step if converter_step < least else 0.0)
 
 
 def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
@@ -189,7 +169,8 @@ def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
             weight = prod(other / (other - node) for other in apart if other is not node)
             cubic += weight * value
             gain += weight * weight
-        reach = least * np.sqrt(gain / _EVEN_GAIN)
+        # at even times the weights are -1/6, 4/6, 4/6 and -1/6
+        reach = least * np.sqrt(gain / (1.0 + 34.0 / 36.0))
         outliers[start + 2 : start + 2 + stop] = np.abs(own[2:-2] - cubic) > np.ptp(near, axis=0) + reach
     return outliers
 
@@ -239,10 +220,10 @@ def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
     period = float(np.median(np.diff(edges)))
     phase = (edges - edges[0]) / period - np.arange(edges.size)
     # of white noise, squared weights of second differences sum up to 6, of first ones to 2
-    jitter = spread = 0.0
+    jitter = spread = _LEAST_SCATTER
     if log_amplitude.size > 1:
-        jitter, spread = scatter(np.diff(phase, 2))[1] / 6.0**0.5, scatter(np.diff(log_amplitude))[1] / 2.0**0.5
-    jitter, spread = max(jitter, _LEAST_JITTER), max(spread, _LEAST_SCATTER)
+        jitter = max(jitter, scatter(np.diff(phase, 2))[1] / 6.0**0.5)
+        spread = max(spread, scatter(np.diff(log_amplitude))[1] / 2.0**0.5)
     found, open_parts = [], [slice(0, log_amplitude.size)]
     while open_parts:
         part = open_parts.pop()
@@ -261,7 +242,7 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
         In a sweep the period changes within the pieces as it does between them; in steps it is constant within.
     """
     parts = [part for part in parts if part.stop - part.start > _FEWEST_CYCLES]
-    if len(parts) < _FEWEST_IN_SWEEP:
+    if len(parts) < 4:  # which may be steps
         return False
     middle = np.array([(part.start + part.stop) / 2.0 for part in parts])
     fits = [
@@ -270,7 +251,7 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
     ]
     curve, period, _ = np.array(fits).T
     within, between = 2.0 * curve / period, np.gradient(np.log(period), middle)
-    return bool(np.median(within / np.where(between == 0.0, np.inf, between)) > _SWEPT_SHARE)
+    return bool(np.median(within / np.where(between == 0.0, np.inf, between)) > 0.5)
 
 
 def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
@@ -296,8 +277,8 @@ def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
     if gain[best] < _SPLIT_GAIN:
         return 0
     slopes = [np.polyfit(np.arange(part.size), part, 1)[0] * jitter for part in (phase[: k + 1], phase[k:])]
-    other_frequency = abs(slopes[0] - slopes[1]) > _OTHER_FREQUENCY
-    other_amplitude = abs(first[best] - second[best]) * spread > _OTHER_AMPLITUDE
+    other_frequency = abs(slopes[0] - slopes[1]) > _SPLIT_FREQUENCY
+    other_amplitude = abs(first[best] - second[best]) * spread > _SPLIT_AMPLITUDE
     return k if other_frequency or other_amplitude else 0
 
 
@@ -320,12 +301,13 @@ def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
         fewest: cycles that are kept at least.
 
     Notes:
-        The marginal standard error rule (White 1997), over displacement and stiffness together.
+        The marginal standard error rule (White 1997), over displacement and stiffness together. Up to half of the
+        cycles may be transient, and a quarter no longer steady: a rig that stops takes less.
     """
     series = np.stack((motion / np.median(np.abs(motion)), stiffness / np.median(np.abs(stiffness))))
     count = motion.size
-    start = _truncation(series, min(int(_MOST_TRANSIENT * count), count - fewest))
-    ending = _truncation(series[:, start:][:, ::-1], min(int(_MOST_ENDING * count), count - start - fewest))
+    start = _truncation(series, min(count // 2, count - fewest))
+    ending = _truncation(series[:, start:][:, ::-1], min(count // 4, count - start - fewest))
     return slice(start, count - ending)
 
 

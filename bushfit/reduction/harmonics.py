@@ -1,49 +1,114 @@
-"""The harmonics of displacement and force over whole cycles of one steady sine, fitted by least squares.
+"""The harmonics of displacement and force: Fourier series fitted by least squares to rows anywhere in time.
 
-Rows may lie anywhere in time. Drift and overtones are fitted with the fundamental, so that neither leaks into it.
+A series of order m has real coefficients (mean, m cosines, m negative sines), (2 m + 1,), or complex ones, mean first,
+(m + 1,): c_k stands for Re c_k exp(2 pi i k phase). Phase counts cycles.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
+from numpy.polynomial.polynomial import polyval
+from numpy.typing import NDArray
 from scipy.special import fdtri
 
 from bushfit.reading.measurement import Complex, Floats
 
-#: Harmonics in the fit, as far as the rows can tell them apart; chosen: higher ones of a rig are in the noise.
-_HARMONICS = 15
-#: Harmonics in the fits that search for the frequency; chosen: the strongest ones.
-_FREQUENCY_HARMONICS = 3
+#: Rows of a cycle behind each harmonic; two determine one, and more keep noise from being fitted.
+_ROWS_PER_HARMONIC = 5
+#: Harmonics of a step, as far as its rows tell them apart, and of the fits that search for its frequency.
+_HARMONICS, _FREQUENCY_HARMONICS = 15, 3
 #: Condition number of the scaled normal equations up to which rows tell harmonics apart; chosen: errors grow tenfold.
 _WORST_CONDITION = 100.0
-#: Terms of the drift: mean, slope and curvature.
+#: Terms of the drift of a step: mean, slope and curvature.
 _DRIFT_TERMS = 3
-#: Rows that are fitted at a time; chosen: their harmonics stay in a core's cache.
-_CHUNK_ROWS = 1 << 14
+#: Rows of a step that are fitted at a time, so that their harmonics stay in a core's cache, and that are enough to
+#: search for its frequency.
+_CHUNK_ROWS, _FREQUENCY_ROWS = 1 << 14, 1 << 17
 #: [cycles] Drift of the phase over a whole step with which its frequency is found; chosen: far below its error.
 _SETTLED_DRIFT = 1e-7
-#: Rows that the search for the frequency takes of a long step; chosen: enough for its last digit.
-_FREQUENCY_ROWS = 1 << 17
 #: Probability below which chance alone does not make cycles scatter more than white noise does; chosen.
 _WHITE_P = 0.005
 
 
-@dataclass(frozen=True, eq=False)
-class HarmonicFit:
-    """Drift and harmonics of displacement and force over the whole cycles of one step, and their residuals.
+def basis(phase: Floats, order: int) -> Floats:
+    """Columns 1, cos(2 pi k phase) and -sin(2 pi k phase) for k = 1 ... order, (n, 2 order + 1)."""
+    rows = np.ones((2 * order + 1, phase.size))
+    turn = np.exp(2j * np.pi * phase)
+    power = turn.copy()
+    for k in range(1, order + 1):  # row by row, which stays in the cache: ten times as fast as all powers at once
+        rows[k] = power.real
+        np.negative(power.imag, out=rows[order + k])
+        power *= turn
+    return rows.T
+
+
+def least_squares(columns: Floats, values: Floats, weight: NDArray[Any] | None = None) -> Floats:
+    """Real coefficients that fit `values`, (n,) or (n, channels), by normal equations, each row with its weight, (n,).
+
+    The columns are of `basis`, (n, k): nearly orthogonal over whole cycles, so that normal equations lose no digits.
+    """
+    weighed = columns.T if weight is None or np.all(weight == 1.0) else columns.T * weight
+    return np.linalg.solve(weighed @ columns, weighed @ values)
+
+
+def as_complex(real: Floats) -> Complex:
+    """Complex coefficients of a series, (m + 1,), from its real ones."""
+    order = real.size // 2
+    return np.concatenate((real[:1], real[1 : order + 1] + 1j * real[order + 1 :]))
+
+
+def series(coefficients: Complex, phase: Floats) -> Floats:
+    """Values of a series with complex coefficients at any phase [cycles], (n,)."""
+    return polyval(np.exp(2j * np.pi * phase), coefficients).real
+
+
+def resolved_order(rows_per_cycle: float, most: int) -> int:
+    """As many harmonics as the rows of one cycle carry, from 1 to `most`."""
+    return int(np.clip(rows_per_cycle / _ROWS_PER_HARMONIC, 1, most))
+
+
+def spread_rows(rows: int, most: int) -> NDArray[np.intp]:
+    """Rows that stand for all: every one of few, else `most`, spread by a step that keeps time with no cycle."""
+    count = min(rows, most)
+    number = np.arange(count)
+    golden = 0.6180339887498949  # ratio less 1: its multiples, less whole numbers, spread evenly
+    return (number if count == rows else (number + number * golden % 1.0) * (rows / count)).astype(np.intp)
+
+
+def cycle_harmonics(phase: Floats, values: Floats, order: int, drift: int = 0) -> tuple[Floats, Complex, Floats]:
+    """Mean, complex fundamental and scatter of what is left of each column, (k,) each, by least squares over rows.
 
     Args:
-        solution: of both channels, (p, 2): drift, then cosine and negative sine of each harmonic.
-        covariance: of the solution for unit variance of the values, (p, p).
+        phase: of each row [cycles], (n,).
+        values: (n, k).
+        order: harmonics that are fitted.
+        drift: power of the phase up to which a drift is fitted with them.
+    """
+    columns = np.column_stack((np.vander(phase, 1 + drift, increasing=True), basis(phase, order)[:, 1:]))
+    solution = np.linalg.lstsq(columns, values, rcond=None)[0]
+    fundamental = solution[1 + drift] + 1j * solution[1 + drift + order]
+    return solution[0], fundamental, np.std(values - columns @ solution, axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicFit:
+    """Drift and harmonics of displacement and force over the whole cycles of one steady sine, and their residuals.
+
+    Drift and overtones are fitted with the fundamental, so that neither leaks into it.
+
+    Args:
+        coefficients: complex harmonics of displacement and force, with the mean at 0, (2, order + 1).
+        chance: expected square of each harmonic of white noise of unit variance, (order,).
         freedom: degrees of freedom: rows less unknowns.
         squares: products of the residuals of the channels, summed over the rows, (2, 2).
         left_over: complex fundamental of the residuals in each cycle, (2, cycles).
     """
 
     frequency: float
-    solution: Floats
-    covariance: Floats
+    coefficients: Complex
+    chance: Floats
     freedom: int
     squares: Floats
     left_over: Complex
@@ -56,58 +121,64 @@ class HarmonicFit:
             time, displacement, force: [s], [m or rad] and [N or N m], (n,).
             edges: where the cycles begin and the last one ends [s], (cycles + 1,).
         """
-        middle = (edges[0] + edges[-1]) / 2.0
-        time, values = time - middle, np.stack((displacement, force))
+        time, values = time - (edges[0] + edges[-1]) / 2.0, np.stack((displacement, force))
         count = edges.size - 1
         frequency = count / float(edges[-1] - edges[0])
         thin = slice(None, None, max(1, time.size // _FREQUENCY_ROWS))
         number = np.arange(count) - (count - 1) / 2.0
         for _ in range(4):  # each squares what the frequency is off by, so that fewer do
-            fit = cls._solved(time[thin], values[:, thin], count, frequency, _FREQUENCY_HARMONICS)
+            fit = cls._at(frequency, time[thin], values[:, thin], count, _FREQUENCY_HARMONICS)
             phase = np.unwrap(np.angle(fit.coefficients[0, 1] + fit.left_over[0]))
             drift = float(number @ phase / (number @ number)) / (2.0 * np.pi)
             frequency *= 1.0 + drift
             if abs(drift) * count < _SETTLED_DRIFT:
                 break
-        return cls._solved(time, values, count, frequency, _HARMONICS)
+        return cls._at(frequency, time, values, count, _HARMONICS)
 
     @classmethod
-    def _solved(cls, time: Floats, values: Floats, count: int, frequency: float, order: int) -> "HarmonicFit":
+    def _at(cls, frequency: float, time: Floats, values: Floats, count: int, order: int) -> "HarmonicFit":
         """The fit over `count` cycles about time 0, with `order` harmonics or fewer, at a frequency that is given."""
-        size = _DRIFT_TERMS + 2 * max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
+        order = max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
+        half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
+        chunks = [slice(start, start + _CHUNK_ROWS) for start in range(0, time.size, _CHUNK_ROWS)]
+
+        def columns(rows: slice, order: int) -> Floats:
+            drift = legvander(time[rows] / half, _DRIFT_TERMS - 1)
+            return np.vstack((drift.T, basis(time[rows] * frequency, order).T[1:]))
+
+        size = _DRIFT_TERMS + 2 * order
         gram, moments = np.zeros((size, size)), np.zeros((size, 2))
-        for rows, basis in _bases(time, frequency, size):
-            gram += basis @ basis.T
-            moments += basis @ values[:, rows].T
+        for rows in chunks:
+            own = columns(rows, order)
+            gram += own @ own.T
+            moments += own @ values[:, rows].T
         scale = 1.0 / np.sqrt(np.diag(gram))
         scale[_DRIFT_TERMS:] = np.sqrt(2.0 / time.size)  # by its own norm, a wave all but zero at the rows would pass
-        unit = gram * np.outer(scale, scale)
-        while size > _DRIFT_TERMS + 2 and np.linalg.cond(unit[:size, :size]) > _WORST_CONDITION:
-            size -= 2
-        covariance = np.linalg.inv(unit[:size, :size]) * np.outer(scale[:size], scale[:size])
-        solution = covariance @ moments[:size]
-        squares, sums, rows_in = np.zeros((2, 2)), np.zeros((2, 2, count)), np.zeros(count)
-        for rows, basis in _bases(time, frequency, size):
-            left = values[:, rows] - solution.T @ basis
+        unit, most = gram * np.outer(scale, scale), order
+        kept = np.arange(size)
+        while order > 1 and np.linalg.cond(unit[np.ix_(kept, kept)]) > _WORST_CONDITION:
+            order -= 1
+            kept = np.r_[: _DRIFT_TERMS + order, _DRIFT_TERMS + most : _DRIFT_TERMS + most + order]
+        covariance = np.linalg.inv(unit[np.ix_(kept, kept)]) * np.outer(scale[kept], scale[kept])
+        solution = covariance @ moments[kept]
+
+        squares, sums, rows_in = np.zeros((2, 2)), np.zeros((2, count), dtype=complex), np.zeros(count)
+        for rows in chunks:
+            own = columns(rows, order)
+            left = values[:, rows] - solution.T @ own
             squares += left @ left.T
+            turn = own[_DRIFT_TERMS] + 1j * own[_DRIFT_TERMS + order]  # exp(-i omega t)
             number = np.clip(time[rows] * frequency + count / 2.0, 0, count - 1).astype(np.intp)
             rows_in += np.bincount(number, minlength=count)
-            for channel, part in np.ndindex(2, 2):  # times exp(-i omega t)
-                sums[channel, part] += np.bincount(number, left[channel] * basis[_DRIFT_TERMS + part], count)
+            for channel in range(2):
+                sums[channel] += np.bincount(number, left[channel] * turn.real, count)
+                sums[channel] += 1j * np.bincount(number, left[channel] * turn.imag, count)
         sums *= 2.0 / np.maximum(rows_in, 1.0)
-        left_over = sums[:, 0] + 1j * sums[:, 1]
-        return cls(frequency, solution, covariance, max(time.size - size, 1), squares, left_over)
-
-    @property
-    def coefficients(self) -> Complex:
-        """Complex harmonics of displacement and force, with the mean at 0: (2, order + 1)."""
-        waves = self.solution[_DRIFT_TERMS::2] + 1j * self.solution[_DRIFT_TERMS + 1 :: 2]
-        return np.vstack((self.solution[:1], waves)).T
-
-    @property
-    def chance(self) -> Floats:
-        """Expected square of each harmonic of white noise of unit variance, (order,)."""
-        return np.diag(self.covariance)[_DRIFT_TERMS:].reshape(-1, 2).sum(axis=1)
+        cosines, sines = np.split(np.arange(_DRIFT_TERMS, kept.size), 2)
+        coefficients = np.vstack((solution[:1], solution[cosines] + 1j * solution[sines])).T
+        variance = np.diag(covariance)
+        chance, freedom = variance[cosines] + variance[sines], max(time.size - kept.size, 1)
+        return cls(frequency, coefficients, chance, freedom, squares, sums)
 
     def errors(self) -> Floats:
         """Standard errors of |K|, relative to |K|, and of its phase [rad], (2,).
@@ -137,35 +208,3 @@ class HarmonicFit:
         noise = np.outer(np.diag(self.squares) / self.freedom, self.chance)
         overtones = np.maximum((power - noise)[:, 1:].sum(axis=1), 0.0)
         return np.sqrt(overtones / power[:, 0])
-
-
-def cycle_harmonics(phase: Floats, values: Floats, order: int, drift: int = 0) -> tuple[Floats, Complex, Floats]:
-    """Mean, complex fundamental and scatter of what is left of each column, (k,) each, by least squares over rows.
-
-    Args:
-        phase: of each row [cycles], (n,).
-        values: (n, k).
-        order: harmonics that are fitted.
-        drift: power of the phase up to which a drift is fitted with them.
-    """
-    turn = np.exp(2j * np.pi * np.outer(phase, np.arange(1, order + 1)))
-    basis = np.column_stack((np.vander(phase, 1 + drift, increasing=True), turn.real, -turn.imag))
-    solution = np.linalg.lstsq(basis, values, rcond=None)[0]
-    fundamental = solution[1 + drift] + 1j * solution[1 + drift + order]
-    return solution[0], fundamental, np.std(values - basis @ solution, axis=0)
-
-
-def _bases(time: Floats, frequency: float, size: int) -> Iterator[tuple[slice, Floats]]:
-    """Rows of each chunk, and there the drift, then cosine and negative sine of each harmonic, (size, m)."""
-    half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
-    for start in range(0, time.size, _CHUNK_ROWS):
-        rows = slice(start, min(start + _CHUNK_ROWS, time.size))
-        basis = np.empty((size, rows.stop - start))
-        span = time[rows] / half
-        basis[0], basis[1], basis[2] = 1.0, span, 1.5 * span**2 - 0.5
-        turn = np.exp(2j * np.pi * frequency * time[rows])
-        power = turn.copy()
-        for column in range(_DRIFT_TERMS, size, 2):
-            basis[column], basis[column + 1] = power.real, -power.imag
-            power *= turn
-        yield rows, basis

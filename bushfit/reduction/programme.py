@@ -6,7 +6,6 @@ the crossings of their middles. A run of alike ones is a part; ramps, pauses and
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,57 +13,35 @@ from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.measurement import Floats, Loop, Part, rebuild_time
-from bushfit.reduction.cycles import SAME_PHASE, least_prominence, lone_outliers, middle_crossings, turning_points
+from bushfit.reduction.cycles import (
+    change_after,
+    least_prominence,
+    lone_outliers,
+    middle_crossings,
+    resumes_in_phase,
+    stretches,
+    turning_points,
+)
 from bushfit.reduction.harmonics import cycle_harmonics
 
 #: Rows that are enough to find the cycles.
 ENOUGH_ROWS = 200_000
-#: Relative difference of the ranges of two strokes that are alike; chosen: rigs keep theirs better, and step by more.
-_SAME_RANGE = 0.03
-#: The same beyond noise, as a share of what a turning point stands out by, which is ten standard deviations.
-_NOISE_OF_RANGE = 0.3
-#: Relative difference of two half cycles that are alike; chosen: rigs keep theirs better, and rates differ by more.
-_SAME_RATE = 0.08
-#: Strokes over which range and rate of a part are constant: two cycles.
-_STEADY_STROKES = 4
-#: Change over so many strokes, in units of what two that are alike may differ by, from which on a motion creeps.
-_MOST_CREEP = 1.5
-#: The same for a stroke up and the stroke down after it, which a drift of the mean parts.
-_MOST_DRIFT = 3.0
-#: Half cycles between crossings, fewer than which make no part: a whole cycle.
-_FEWEST_HALVES = 2
-#: Strokes from which on a record without a part is refused; chosen: two cycles show what changes.
-_FEWEST_CHANGING = 4
-#: [ln of a range] Difference between their ranges from which on it is; chosen: no rig misses its amplitude by a third.
-_CHANGING = 0.3
-#: Relative difference of the ranges of two parts up to which they have one amplitude; chosen: rigs step by more.
-_SAME_AMPLITUDE = 0.08
-#: Cycles between two parts alike up to which they are one that was disturbed; chosen: an outlier disturbs no more.
-_DISTURBED = 3.1
-#: Difference from the motion a period on up to which a part goes on at its ends, relative to its range.
-_SAME_MOTION = 0.05
-#: Share of a cycle from either end of the record up to which a part reaches to it.
-_AT_END = 0.1
 #: Cycles from which on the first one, which remembers what came before, goes: three, for what noise may take off them.
 THREE_CYCLES = 2.95
-#: Cycles from which on first and last are held against each other.
-_TWO = 1.95
-#: Softening from which on it is told; chosen: less does not matter to a fit.
-_LEAST_SOFTENING = 0.02
-#: The same over the loss factor, for a part from rest; chosen: memory of springpot and friction makes up to 0.6 of it.
-_MEMORY_FROM_REST = 0.75
-#: The same for a part after other cycles; chosen: there they make up to 0.15 of it.
-_MEMORY = 0.25
-#: Standard errors beyond which a softening is none of noise.
-_CERTAIN = 6.0
-#: Harmonics that are fitted to a cycle of force; chosen: a loop of rubber has next to nothing beyond.
-_HARMONICS = 5
-#: Rows of a cycle that are enough for them.
-_ROWS_OF_CYCLE = 10_000
-#: Unknowns of such a fit: mean, slope, and two for each harmonic.
-_UNKNOWNS = 2 + 2 * _HARMONICS
-#: Keys of a loop in a campaign that settle its time where the file has none.
-_CLOCK = ("rate", "frequency", "waveform")
+#: Relative difference from the motion a period on up to which it comes again, relative to its range.
+SAME_MOTION = 0.05
+#: Relative difference of two half cycles, or two periods, that are alike; chosen: rigs keep theirs better.
+_SAME_RATE = 0.08
+#: Relative difference of the ranges of two parts up to which they have one amplitude; chosen: rigs step by more.
+_SAME_AMPLITUDE = 0.08
+#: Share of a cycle from either end of the record up to which a part reaches to it.
+_AT_END = 0.1
+#: Softening from which on it is told, as it is and over the loss factor of a part after other cycles and of one from
+#: rest; chosen: less does not matter to a fit, and memory of springpot and friction makes up to 0.15 and 0.6 of it.
+_LEAST_SOFTENING, _MEMORY, _MEMORY_FROM_REST = 0.02, 0.25, 0.75
+#: Harmonics that are fitted to a cycle of force (a loop of rubber has next to nothing beyond), and the unknowns then,
+#: with mean and slope.
+_HARMONICS, _UNKNOWNS = 5, 12
 
 
 @dataclass(frozen=True)
@@ -92,10 +69,9 @@ class _Span:
         ranges, periods = np.log(self.range / other.range), np.log(self.period / other.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
-    def goes_on(self, other: "_Span") -> bool:
+    def goes_on_as(self, other: "_Span") -> bool:
         """Whether the part after it is the same one, which a disturbance broke off."""
-        gap = (other.begin - self.end) / self.period
-        return self.like(other) and gap < _DISTURBED and abs(2.0 * gap - round(2.0 * gap)) < 2.0 * SAME_PHASE
+        return self.like(other) and resumes_in_phase((other.begin - self.end) / self.period, step=0.5)
 
 
 def programme(loop: Loop, **keywords: Any) -> tuple[Loop, ...]:
@@ -122,7 +98,7 @@ def programme(loop: Loop, **keywords: Any) -> tuple[Loop, ...]:
         return (loop,)
     if all(span.like(spans[0]) for span in spans[1:]):
         return (replace(loop, softening=_softening(loop, spans[0], from_rest=True)),)
-    clock = {key: keywords[key] for key in _CLOCK if key in keywords}
+    clock = {key: value for key, value in keywords.items() if key in ("rate", "frequency", "waveform")}
     return tuple(_loops(loop, time, spans, clock))
 
 
@@ -147,26 +123,27 @@ def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_Span]:
     """
     least = least_prominence(motion)
     turns = turning_points(motion, least)
-    if turns.size < 2 + _FEWEST_HALVES:
+    if turns.size < 4:
         return []
     height = motion[turns]
     size = np.abs(np.diff(height))
     across = middle_crossings(time, motion, turns, (height[1:] + height[:-1]) / 2.0)
+    # ranges are alike within 3 %, which rigs keep better and step by more, and within three deviations of the noise
+    same_size = 0.03 * size + 0.3 * least
     found: list[_Span] = []
-    for strokes in _alike(size, _SAME_RANGE * size + _NOISE_OF_RANGE * least):
+    for strokes in _alike(size, same_size):
         halves = np.diff(across[strokes])
         for run in _alike(halves, _SAME_RATE * halves):
-            if run.stop - run.start >= _FEWEST_HALVES:
-                first, last = strokes.start + run.start, strokes.start + run.stop
-                period = 2.0 * float(across[last] - across[first]) / (last - first)
-                part = float(np.median(size[first : last + 1]))
-                found.append(_Span(float(across[first]), float(across[last]), period, part))
+            first, last = strokes.start + run.start, strokes.start + run.stop
+            period = 2.0 * float(across[last] - across[first]) / (last - first)
+            part = float(np.median(size[first : last + 1]))
+            found.append(_Span(float(across[first]), float(across[last]), period, part))
     if not found:
         _check_not_changing(loop, size[1:-1])
         return []
     joined: list[_Span] = []
     for span in found:
-        if joined and joined[-1].goes_on(span):
+        if joined and joined[-1].goes_on_as(span):
             joined[-1] = replace(joined[-1], end=span.end)
         else:
             joined.append(span)
@@ -177,7 +154,7 @@ def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_Span]:
 
 def _check_not_changing(loop: Loop, size: Floats) -> None:
     """Refuse a record without a part whose strokes, of ranges [m or rad], go up and down by ever other amounts."""
-    if size.size >= _FEWEST_CHANGING and np.ptp(np.log(size)) > _CHANGING:
+    if size.size >= 4 and np.ptp(np.log(size)) > 0.3:  # no rig misses its amplitude by a third
         unit, factor = loop.direction.display.displacement
         raise MeasurementError(
             "no part of the record is a loop",
@@ -192,25 +169,24 @@ def _check_not_changing(loop: Loop, size: Floats) -> None:
 def _alike(values: Floats, reach: Floats) -> Iterator[slice]:
     """Runs of two or more values, (n,), each within its `reach`, (n,), of its neighbours, and of what comes after.
 
-    Up and down may differ by more, which a drift makes, where each is like the next of its kind.
+    Up and down may differ by three times as much, which a drift makes, where each is like the next of its kind. Over
+    two cycles nothing creeps by more than 1.5 times as much.
     """
-    other = np.abs(np.diff(values)) > np.minimum(reach[1:], reach[:-1])
+    change = np.abs(np.diff(values))
     of_a_kind = np.concatenate(([False], np.abs(values[2:] - values[:-2]) <= reach[2:], [False]))
-    drifts = (of_a_kind[1:] | of_a_kind[:-1]) & (np.abs(np.diff(values)) <= _MOST_DRIFT * reach[1:])
-    for run in _runs(other & ~drifts):
-        own, ahead = values[run], _STEADY_STROKES
-        creeping = np.flatnonzero(np.abs(own[ahead:] - own[:-ahead]) > _MOST_CREEP * reach[run][ahead:])
+    drifts = (of_a_kind[1:] | of_a_kind[:-1]) & (change <= 3.0 * reach[1:])
+    for run in _runs((change > np.minimum(reach[1:], reach[:-1])) & ~drifts):
+        own, ahead = values[run], 4  # strokes
+        creeping = np.flatnonzero(np.abs(own[ahead:] - own[:-ahead]) > 1.5 * reach[run][ahead:])
         changes = np.zeros(own.size - 1, dtype=bool)
-        for step in range(ahead):
-            changes[creeping + step] = True
+        changes[(creeping[:, None] + np.arange(ahead)).ravel()] = True
         for part in _runs(changes):
             yield slice(run.start + part.start, run.start + part.stop)
 
 
 def _runs(changes: NDArray[np.bool_]) -> list[slice]:
-    """Slices of two or more entries between the changes, (n - 1,), of n entries."""
-    border = np.concatenate(([0], 1 + np.flatnonzero(changes), [changes.size + 1]))
-    return [slice(int(a), int(b)) for a, b in pairwise(border) if b - a > 1]
+    """Those stretches between changes, (n - 1,), that have two entries or more."""
+    return [run for run in stretches(changes) if run.stop - run.start > 1]
 
 
 def _to_its_ends(span: _Span, time: Floats, motion: Floats, before: float, after: float) -> _Span:
@@ -222,8 +198,8 @@ def _to_its_ends(span: _Span, time: Floats, motion: Floats, before: float, after
 
     def same(low: float, high: float, shift: float) -> bool:
         rows = slice(*np.searchsorted(time, [low, high]))
-        off = np.abs(motion[rows] - np.interp(time[rows] + shift, time, motion))
-        return float(np.quantile(off, 0.9)) < _SAME_MOTION * span.range if off.size else True
+        off = change_after(time, motion, shift, rows)
+        return float(np.quantile(off, 0.9)) < SAME_MOTION * span.range if off.size else True
 
     begin = begin if same(begin, span.begin, span.period) else span.begin
     end = end if same(span.end, end, -span.period) else span.end
@@ -265,13 +241,13 @@ def left_out(gaps: Iterable[str], cycles: float) -> str:
 def _softening(loop: Loop, span: _Span, *, from_rest: bool) -> float | None:
     """By how much the first cycle of a part is stiffer than its last; None where that is chance or what rubber keeps
     in memory of what came before, which any model has."""
-    if span.cycles < _TWO:
+    if span.cycles < 1.95:  # first and last are one
         return None
     first, first_error = _stiffness(loop, span.begin, span.period)
     last, last_error = _stiffness(loop, span.end - span.period, span.period)
     softening = abs(first / last) - 1.0
     remembered = (_MEMORY_FROM_REST if from_rest else _MEMORY) * abs(last.imag / last.real)
-    least = max(_LEAST_SOFTENING, remembered, _CERTAIN * float(np.hypot(first_error, last_error)))
+    least = max(_LEAST_SOFTENING, remembered, 6.0 * float(np.hypot(first_error, last_error)))
     return softening if softening > least else None
 
 
@@ -279,7 +255,7 @@ def _stiffness(loop: Loop, begin: float, period: float) -> tuple[complex, float]
     """Complex stiffness of the cycle that begins then [N/m or N m/rad], and its relative error."""
     clock = _clock(loop)
     first, last = np.searchsorted(clock, [begin, begin + period])
-    rows = slice(first, last, max(1, (last - first) // _ROWS_OF_CYCLE))
+    rows = slice(first, last, max(1, (last - first) // 10_000))
     phase = (clock[rows] - begin) / period
     if phase.size <= _UNKNOWNS:
         return 1.0, np.inf

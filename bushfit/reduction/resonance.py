@@ -5,7 +5,7 @@ K = M omega^2 T/(T - 1), and its deformation |T - 1| times the base's displaceme
 dK/K = dT/(T (T - 1)): K is known well where |T - 1| is large, from somewhat below the resonance on, and badly below.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,14 +23,8 @@ MOST_POINTS = 100
 LARGEST_ERROR = 0.2
 #: Share of the information in a test that has to lie on one side of zero loss, for the sign of the phases to show.
 _CLEAR_SHARE = 0.8
-#: Points about which a smooth curve is laid, at least; chosen: twice the four terms that it has.
-_FEWEST_POINTS = 8
-#: Neighbours whose scatter gives the error of a point; chosen: enough for a median, few enough to be local.
-_NEIGHBOURS = 15
 #: Median of the magnitude of complex scatter over the standard deviation of its parts, sqrt(2 ln 2).
 _MEDIAN_TO_SIGMA = 1.1774100225154747
-#: Standard deviations from which a point pulls less on the smooth curve (Huber's).
-_PULLS_LESS = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,26 +73,23 @@ class Resonance:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on points left out, the sign of the phases, and a resonance that was not reached."""
-        return tuple(_warnings(self))
-
-
-def _warnings(found: Resonance) -> Iterator[str]:
-    left, total = found.left_out, found.left_out.size + found.frequency.size
-    if left.size:
-        yield (
-            f"{left.size} of {total} points left out, {left.min():.4g} to {left.max():.4g} Hz: the standard error of K "
-            f"is beyond {100 * LARGEST_ERROR:g} % there, because the mass moves almost as the base does"
-        )
-    if found.turned:
-        yield "the phases of this file count the other way: taken with the sign that makes the loss positive"
-    frequency, largest = found.peak
-    if frequency in (found.test.frequency[0], found.test.frequency[-1]):
-        yield f"no resonance: |T| is largest, {largest:.3g}, at the end of the sweep ({frequency:.4g} Hz)"
-
-
-def _refused(test: ResonanceTest, problem: str, expected: str, hint: str, found: str) -> MeasurementError:
-    """The error for a test that cannot be used."""
-    return MeasurementError(problem, file=test.source.file, found=found, expected=expected, hint=hint)
+        sentences = []
+        left, total = self.left_out, self.left_out.size + self.frequency.size
+        if left.size:
+            sentences.append(
+                f"{left.size} of {total} points left out, {left.min():.4g} to {left.max():.4g} Hz: the standard error "
+                f"of K is beyond {100 * LARGEST_ERROR:g} % there, because the mass moves almost as the base does"
+            )
+        if self.turned:
+            sentences.append(
+                "the phases of this file count the other way: taken with the sign that makes the loss positive"
+            )
+        frequency, largest = self.peak
+        if frequency in (self.test.frequency[0], self.test.frequency[-1]):
+            sentences.append(
+                f"no resonance: |T| is largest, {largest:.3g}, at the end of the sweep ({frequency:.4g} Hz)"
+            )
+        return tuple(sentences)
 
 
 def transmissibility(stiffness: Complex, mass: float, frequency: Floats) -> Complex:
@@ -173,17 +164,17 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
     stiffness = np.where(moving, flexibility, 1.0 + 0j) ** -1
     thinned = transmissibility(stiffness, mass, frequency)
     error = np.full(count, np.inf)
-    if np.count_nonzero(moving) >= _FEWEST_POINTS:
+    if np.count_nonzero(moving) >= 8:  # twice the terms of the smooth curve
         around = _scatter(frequency[moving], amplitude[moving], thinned[moving])
         error[moving] = around / np.abs(thinned[moving] - 1.0)
     kept = (error <= LARGEST_ERROR) & (stiffness.real > 0.0)
     if not kept.any():
-        raise _refused(
-            test,
+        raise MeasurementError(
             "no point of this test tells the stiffness",
-            f"a standard error of K of at most {100 * LARGEST_ERROR:g} % somewhere",
-            "sweep through the resonance, or look at the accelerations: they scatter",
+            file=test.source.file,
             found=f"{100 * error.min():.3g} % at best",
+            expected=f"a standard error of K of at most {100 * LARGEST_ERROR:g} % somewhere",
+            hint="sweep through the resonance, or look at the accelerations: they scatter",
         )
     return Resonance(
         test, mass, turned, frequency[kept], amplitude[kept], stiffness[kept], error[kept], rows[kept], frequency[~kept]
@@ -203,21 +194,21 @@ def _is_turned(test: ResonanceTest) -> bool:
     share = float(np.sum(weight[flexibility.imag < 0.0]))
     loss = -float(np.sum(weight * np.sin(np.angle(flexibility))))
     if max(share, 1.0 - share) < _CLEAR_SHARE or abs(loss) < LEAST_LOSS_FACTOR:
-        raise _refused(
-            test,
+        raise MeasurementError(
             "the phases show no loss, whichever way they count",
-            "a mass that lags behind the base through the whole resonance",
-            "check the unit of the phases, deg or rad, and that they are those of base and mass",
+            file=test.source.file,
             found=f"a mean loss factor of {loss:.2g}, above zero in {100 * share:.0f} % of what the test tells",
+            expected="a mass that lags behind the base through the whole resonance",
+            hint="check the unit of the phases, deg or rad, and that they are those of base and mass",
         )
     positive = float(np.sum(weight[flexibility.real > 0.0]))
     if positive < _CLEAR_SHARE:
-        raise _refused(
-            test,
+        raise MeasurementError(
             "the stiffness comes out below zero",
-            "a mass that moves with the base at low frequency, and more around the resonance",
-            "check that base and mass are not swapped, and that no phase is off by 180 deg",
+            file=test.source.file,
             found=f"a stiffness above zero in {100 * positive:.0f} % of what the test tells",
+            expected="a mass that moves with the base at low frequency, and more around the resonance",
+            hint="check that base and mass are not swapped, and that no phase is off by 180 deg",
         )
     return loss < 0.0
 
@@ -227,8 +218,9 @@ def _scatter(frequency: Floats, amplitude: Floats, ratio: Complex) -> Floats:
 
     Notes:
         1/T = 1 - M omega^2/K is linear in the flexibility 1/K. That is fitted over all points by a function linear in
-        ln f and quadratic in ln X, by least squares of dT/T with Huber's weights; the scatter is the median of |dT/T|
-        about it over the nearest _NEIGHBOURS points. Where the true stiffness bends more, this counts as scatter too.
+        ln f and quadratic in ln X, by least squares of dT/T with Huber's weights (a point pulls less from two standard
+        deviations on); the scatter is the median of |dT/T| about it over the nearest 15 points. Where the true
+        stiffness bends more, this counts as scatter too.
     """
     logs = [np.log(values) - np.mean(np.log(values)) for values in (frequency, amplitude)]
     terms = np.stack([np.ones_like(frequency), *logs, logs[1] ** 2], axis=1)
@@ -239,7 +231,7 @@ def _scatter(frequency: Floats, amplitude: Floats, ratio: Complex) -> Floats:
         root = np.sqrt(weight)
         left = np.abs(measured - design @ np.linalg.lstsq(root[:, None] * design, root * measured, rcond=None)[0])
         sigma = np.median(left) / _MEDIAN_TO_SIGMA
-        weight = np.minimum(1.0, _PULLS_LESS * sigma / np.maximum(left, np.finfo(float).tiny))
-    nearest = np.argsort(np.abs(np.log(frequency)[:, None] - np.log(frequency)), axis=1, kind="stable")[:, :_NEIGHBOURS]
+        weight = np.minimum(1.0, 2.0 * sigma / np.maximum(left, np.finfo(float).tiny))
+    nearest = np.argsort(np.abs(logs[0][:, None] - logs[0]), axis=1, kind="stable")[:, :15]
     freedom = frequency.size / (frequency.size - terms.shape[1])
     return np.median(left[nearest], axis=1) / _MEDIAN_TO_SIGMA * np.sqrt(freedom)

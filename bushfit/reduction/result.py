@@ -16,12 +16,8 @@ from bushfit.units import for_people, number
 MISSED_LEVEL = 0.03
 #: Rows a cycle below which a warning is due; chosen: that many tell overtones up to the sixth apart.
 _FEW_ROWS_PER_CYCLE = 12
-#: Harmonic distortion of the displacement from which a warning is due; chosen: rigs in order have less.
-_DISTORTED = 0.02
-#: Mean over the largest amplitude from which on it is told as a preload; chosen: sensors are off zero by less.
-_PRELOADED = 0.5
 #: Stretches without a point that are told one by one; chosen: about as many lines as a screen has room for.
-_MOST_TOLD = 5
+_MOST_LISTED = 5
 
 
 class ReductionDocument(TypedDict, total=False):
@@ -155,7 +151,7 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
             f"({worst.rows_per_cycle:.3g} at {worst.frequency:.4g} Hz): overtones above half the sampling rate may "
             "fold onto the fundamental"
         )
-    bent = [step for step in steps if step.displacement_distortion > _DISTORTED]
+    bent = [step for step in steps if step.displacement_distortion > 0.02]  # rigs in order have less
     if bent:
         worst = max(bent, key=lambda step: step.displacement_distortion)
         yield (
@@ -164,10 +160,10 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
             f"{factor * worst.amplitude:.3g} {unit})"
         )
     rejected = [skip for skip in reduction.skipped if skip.steady]
-    for skip in rejected[:_MOST_TOLD]:
+    for skip in rejected[:_MOST_LISTED]:
         yield f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}"
-    if len(rejected) > _MOST_TOLD:
-        yield f"{len(rejected) - _MOST_TOLD} more stretches make no point"
+    if len(rejected) > _MOST_LISTED:
+        yield f"{len(rejected) - _MOST_LISTED} more stretches make no point"
 
 
 def _preload(reduction: Reduction) -> Iterator[str]:
@@ -178,7 +174,7 @@ def _preload(reduction: Reduction) -> Iterator[str]:
         (motion, units.displacement, [s.mean_displacement for s in steps], max(s.amplitude for s in steps)),
         (force, units.force, [s.mean_force for s in steps], max(abs(s.stiffness) * s.amplitude for s in steps)),
     ):
-        if abs(np.median(found)) > _PRELOADED * largest:
+        if abs(np.median(found)) > 0.5 * largest:  # sensors are off zero by less
             written, factor = for_people(*unit, max(found, key=abs))
             ends = dict.fromkeys(number(factor * end, 3) for end in sorted((min(found), max(found)), key=abs))
             means.append(f"a mean {word} of {' to '.join(ends)} {written}")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
 from bushfit.reading.measurement import Complex, Floats, Loop
-from bushfit.reduction.cycles import SAME_PHASE, Cycles, keeps_changing, lone_outliers, mean_from_steady, pieces
+from bushfit.reduction.cycles import Cycles, keeps_changing, lone_outliers, mean_from_steady, pieces, resumes_in_phase
 from bushfit.reduction.harmonics import HarmonicFit
 from bushfit.reduction.result import Reduction, Skipped, Step
 
@@ -25,12 +25,6 @@ _FEWEST_ROWS_PER_CYCLE = 5.0
 _SAME_FREQUENCY = 2e-3
 #: Relative change or difference up to which a frequency may be one at which a controller settles.
 _SETTLING_FREQUENCY = 0.01
-#: Relative change up to which the amplitude of a step is one; chosen: |K| changes by far less.
-_SAME_AMPLITUDE = 0.03
-#: Standard errors beyond which a change over a step is real; chosen: noise hardly ever goes that far.
-_REAL_CHANGE = 4.0
-#: [cycles] Longest interruption of a sine, beyond which it has stopped: three cycles, give or take a tenth.
-_LONGEST_INTERRUPTION = 3.1
 #: [ln of an amplitude] Gap from which amplitudes are levels of their own; chosen: rigs miss a level by less.
 _LEVEL_GAP = 0.1
 #: Relative distance up to which a step belongs to a level that is stated; chosen: rigs miss a level by less.
@@ -114,28 +108,24 @@ def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[Skipped]]:
 def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
     """The steps of a history, each with start and end of its cycles [s], and only the longest part of a broken one.
 
-    An outlier, or an amplitude that creeps, breaks a step: its sine goes on in phase after a cycle or two.
+    An outlier, or an amplitude that creeps, breaks a step: its sine goes on in phase after a cycle or two. If one of
+    the parts is brief, their frequencies may differ by more.
     """
     kept: list[Step] = []
     last_end = -np.inf
     for start, end, step in found:
-        gap = (start - last_end) * step.frequency
-        goes_on = gap < _LONGEST_INTERRUPTION and abs(gap - round(gap)) < SAME_PHASE
-        if goes_on and _same_point(kept[-1], step):
-            kept[-1] = max(kept[-1], step, key=lambda one: one.found)
-        else:
-            kept.append(step)
+        if resumes_in_phase((start - last_end) * step.frequency):
+            counts = sorted((kept[-1].found, step.found))
+            reach = _SETTLING_FREQUENCY if 2 * counts[0] < counts[1] else _SAME_FREQUENCY
+            same = (
+                abs(np.log(kept[-1].frequency / step.frequency)) < reach
+                and abs(np.log(kept[-1].amplitude / step.amplitude)) < _LEVEL_GAP
+            )
+            if same:
+                step = max(kept.pop(), step, key=lambda one: one.found)
+        kept.append(step)
         last_end = end
     return kept
-
-
-def _same_point(one: Step, other: Step) -> bool:
-    """Whether two steps in a row are one by frequency and amplitude; if one is brief, they may differ by more."""
-    brief = 2 * min(one.found, other.found) < max(one.found, other.found)
-    return (
-        abs(np.log(one.frequency / other.frequency)) < (_SETTLING_FREQUENCY if brief else _SAME_FREQUENCY)
-        and abs(np.log(one.amplitude / other.amplitude)) < _LEVEL_GAP
-    )
 
 
 def _unusable(cycles: Cycles, inside: slice, fewest: int) -> str:
@@ -166,7 +156,7 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
     count = used.stop - used.start
     own = motion[steady]
     starts = edges[:-1] - np.angle(1j * own) / (2.0 * np.pi) * np.diff(edges)  # nearer than single crossings are
-    if _creeps(np.log(np.diff(starts)), _SETTLING_FREQUENCY) or _creeps(np.log(np.abs(own)), _SAME_AMPLITUDE):
+    if _creeps(np.log(np.diff(starts)), _SETTLING_FREQUENCY) or _creeps(np.log(np.abs(own)), 0.03):
         return None
     rows = slice(cycles.first_rows[used.start], cycles.first_rows[used.stop])
     fit = HarmonicFit.of(history.time[rows], history.displacement[rows], history.force[rows], edges)
@@ -186,8 +176,8 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
         phase_error=errors[1],
         displacement_distortion=distortion[0],
         force_distortion=distortion[1],
-        mean_displacement=float(fit.solution[0, 0]),
-        mean_force=float(fit.solution[0, 1]),
+        mean_displacement=float(fit.coefficients[0, 0].real),
+        mean_force=float(fit.coefficients[1, 0].real),
     )
 
 
@@ -200,7 +190,7 @@ def _creeps(values: Floats, least: float) -> bool:
     slope = float(number @ values) / squares
     left = values - values.mean() - slope * number
     error = np.sqrt(float(left @ left) / (values.size - 2) / squares)
-    return bool(abs(slope) * values.size > least and abs(slope) > _REAL_CHANGE * error)
+    return bool(abs(slope) * values.size > least and abs(slope) > 4.0 * error)  # noise hardly ever goes that far
 
 
 def _check_reach(steps: Sequence[Step], levels: Sequence[float], direction: Place) -> None:

@@ -31,17 +31,14 @@ PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
 PAPER_SWEEPS = tuple(
     SimulatedSweep(direction, PAPER_AMPLITUDES, PAPER_FREQUENCIES) for direction in (Direction.AXIAL, Direction.RADIAL)
 )
-#: Rows of a simulated loop in a cycle; chosen: its curve is smooth.
-_ROWS_PER_CYCLE = 1000
-#: Time steps of a simulated loop between two rows; the error of the time steps falls in proportion to them.
-_STEPS_PER_ROW = 2
+#: Rows of a simulated loop in a cycle, so that its curve is smooth, and time steps between two rows, in proportion to
+#: which the error of the time steps falls.
+_ROWS_PER_CYCLE, _STEPS_PER_ROW = 1000, 2
 #: Time steps of a programme at most: they take seconds, and a gigabyte.
 _MOST_STEPS = 10_000_000
 #: Cycles before a loop is recorded, so that it has settled, at least and at most; none where an effect's settling is
 #: what there is to see.
 _LEAST_RUN_IN, _MOST_RUN_IN = 40, 300
-#: Share of the mean stress from the start that friction may keep when a loop is recorded: chosen, no test sees it.
-_KEPT = 1e-3
 #: Cycles before these in which the motion swells and dies out, and its largest strain amplitude over eps_half, where
 #: friction would take longer than both to forget its start: chosen, of a mean force it then keeps next to nothing. Not
 #: where parameters follow the amplitude, which is that of the whole motion.
@@ -117,14 +114,15 @@ def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.
 def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[int, float]]:
     """Cycles until friction forgets where it began; before them those in which a small motion swells, and how far.
 
-    At a tenth of eps_half a cycle keeps 95 % of a mean stress, at a hundredth 99.96 %: thousands of cycles.
+    It may keep a thousandth of the mean stress from the start, which no test sees. At a tenth of eps_half a cycle
+    keeps 95 % of it, at a hundredth 99.96 %: thousands of cycles.
     """
     if any(effect.settles for effect in truth.records):
         return 0, (0, 1.0)
     if "eps_half" not in truth.values:
         return _LEAST_RUN_IN, (0, 1.0)
     strain = np.array(amplitude * truth.unit_strain(place) / truth.values["eps_half"])
-    cycles = -np.log(_KEPT) / np.maximum(friction.mean_stress_decay(strain), np.finfo(float).tiny)
+    cycles = -np.log(1e-3) / np.maximum(friction.mean_stress_decay(strain), np.finfo(float).tiny)
     follows = any(isinstance(effect, Modifier) for effect in truth.records)
     if cycles > _LEAST_RUN_IN + _SWELL_CYCLES and not follows:
         return _LEAST_RUN_IN, (_SWELL_CYCLES, float(_SWELL_TO / strain))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def measured(
     )
 
 
-CASES = {
+CASES: dict[str, dict[str, Any]] = {
     "sine": {},
     "triangle": {"waveform": "triangle"},
     "several": {"cycles": 4.0},
@@ -65,34 +66,19 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_turning_points_are_those_of_the_motion(paper_model: Model, case: str) -> None:
+def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model: Model, case: str) -> None:
     """One peak and one trough a cycle, where the motion has them, although the sensor turns at every other row."""
-    loop = measured(paper_model, **CASES[case])  # type: ignore[arg-type]
-    drive = drive_of(loop)
-    cycle = drive.history(settles=False).value
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(np.append(cycle, cycle[0])))) != 0)
-    noisy = np.count_nonzero(np.diff(np.sign(np.diff(loop.displacement))) != 0)
-    high, low = cycle.max(), cycle.min()
-    print(
-        f"{case}: f {drive.frequency:.6f} Hz, turns {turns.size} of {noisy} in the record, "
-        f"peak {100 * (high / AMPLITUDE - 1):+.2f} %, trough {100 * (-low / AMPLITUDE - 1):+.2f} %"
-    )
-    assert drive.frequency == pytest.approx(FREQUENCY, rel=2e-3)
-    large = [t for t in turns if min(abs(cycle[t] - cycle.max()), abs(cycle[t] - cycle.min())) < 0.05 * AMPLITUDE]
-    assert len(large) >= 1
-    spurious = [t for t in turns if t not in large]
-    assert not spurious
-    assert high == pytest.approx(AMPLITUDE, rel=1.5e-2)
-    assert -low == pytest.approx(AMPLITUDE, rel=1.5e-2)
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_the_true_model_leaves_only_noise(paper_model: Model, case: str) -> None:
-    loop = measured(paper_model, **CASES[case])  # type: ignore[arg-type]
+    loop = measured(paper_model, **CASES[case])
     data_set = LoopData(drive_of(loop))
+    cycle = data_set.drive.history(settles=False).value
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(np.append(cycle, cycle[0])))) != 0)
     residual = data_set.residual(paper_model)
     reduced = float(residual @ residual) / residual.size
-    print(f"{case}: reduced chi-square of the true model {reduced:.3f} over {residual.size} rows")
+    print(f"{case}: f {data_set.drive.frequency:.6f} Hz, turns {turns.size}, reduced chi-square {reduced:.3f}")
+    assert data_set.drive.frequency == pytest.approx(FREQUENCY, rel=2e-3)
+    assert turns.size
+    assert np.all(np.abs(cycle[turns]) > 0.95 * AMPLITUDE)
+    assert (cycle.max(), -cycle.min()) == pytest.approx((AMPLITUDE, AMPLITUDE), rel=1.5e-2)
     assert data_set.relative_noise == pytest.approx(3e-3, rel=0.35)
     assert reduced < 1.0 + 6.0 * np.sqrt(2.0 / residual.size) + 0.1
 
@@ -110,8 +96,7 @@ def test_from_rest_the_virgin_curve_is_followed(paper_model: Model) -> None:
     assert not settled.from_rest
 
 
-@pytest.mark.parametrize("cycles", [1, 2, 4, 3.5])
-@pytest.mark.parametrize("amplitude", [1e-4, 1e-3])
+@pytest.mark.parametrize(("cycles", "amplitude"), [(1, 1e-4), (1, 1e-3), (4, 1e-3), (3.5, 1e-4)])
 def test_rest_may_be_a_preload(paper_model: Model, cycles: float, amplitude: float) -> None:
     whole = rig.record(paper_model, Direction.AXIAL, FREQUENCY, amplitude, cycles=4, steps_per_cycle=1000)
     rows = slice(round(1000 * cycles) + 1)
@@ -143,11 +128,6 @@ def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
     assert drive.first_harmonic() == pytest.approx(few.first_harmonic(), rel=2e-3)
 
 
-def test_first_harmonic_is_the_stiffness_of_the_loop(paper_model: Model) -> None:
-    found = drive_of(measured(paper_model, noise=0.0, jitter=0.0)).first_harmonic()
-    assert found == pytest.approx(complex(paper_model.stiffness("axial", FREQUENCY, AMPLITUDE)), rel=1e-3)
-
-
 def test_a_wrong_zero_of_the_load_cell_alone_stays_visible(paper_model: Model) -> None:
     """Only where the displacement is off zero too is the mean force taken for unknown."""
     data_set = LoopData(drive_of(measured(paper_model, preload=5.0)))
@@ -168,13 +148,6 @@ def test_stated_noise_is_taken(paper_model: Model) -> None:
     assert data_set.relative_noise == pytest.approx(0.02)
 
 
-def test_half_a_cycle_is_refused(paper_model: Model) -> None:
-    loop = measured(paper_model, cycles=0.6)
-    with pytest.raises(FitError, match="does not hold a whole cycle") as caught:
-        drive_of(loop)
-    assert "at least one closed cycle" in str(caught.value)
-
-
 def with_hole(loop: Loop, begin: float, end: float) -> Loop:
     """A loop without the rows from one cycle count to another."""
     kept = (loop.time * FREQUENCY < begin) | (loop.time * FREQUENCY >= end)
@@ -183,11 +156,10 @@ def with_hole(loop: Loop, begin: float, end: float) -> Loop:
 
 @pytest.mark.parametrize("waveform", ["sine", "triangle"])
 @pytest.mark.parametrize("hole", [(1.0, 2.0), (1.3, 2.3), (1.3, 1.8), (1.3, 1.55), (0.5, 1.5), (1.3, 2.9)])
-@pytest.mark.parametrize("cycles", [3.0, 5.0])
 def test_rows_that_are_missing_do_not_change_the_frequency(
-    paper_model: Model, waveform: str, hole: tuple[float, float], cycles: float
+    paper_model: Model, waveform: str, hole: tuple[float, float]
 ) -> None:
-    drive = drive_of(with_hole(measured(paper_model, waveform=waveform, cycles=cycles), *hole))
+    drive = drive_of(with_hole(measured(paper_model, waveform=waveform, cycles=3.0), *hole))
     print(f"{drive.frequency:.6f} Hz, {drive.notes}")
     assert drive.frequency == pytest.approx(FREQUENCY, rel=1e-3)
     assert drive.amplitude == pytest.approx(AMPLITUDE, rel=5e-3)
@@ -200,13 +172,3 @@ def test_where_no_stroke_is_whole_the_hole_is_named(paper_model: Model) -> None:
     loop = with_hole(measured(paper_model, cycles=2.0, start=0.1), 0.3, 1.6)
     with pytest.raises(FitError, match=r"rows are missing inside the loop\n.*none from 2\.99 to 16 s"):
         drive_of(loop)
-
-
-@pytest.mark.parametrize("waveform", ["sine", "triangle"])
-@pytest.mark.parametrize("cycles", [1.12, 1.2, 1.3, 1.5, 1.7])
-def test_a_record_of_one_cycle_and_a_part_is_not_one_longer_cycle(
-    paper_model: Model, waveform: str, cycles: float
-) -> None:
-    starts = np.arange(0.0, 1.0, 0.05)
-    found = [drive_of(measured(paper_model, waveform=waveform, cycles=cycles, start=a)).frequency for a in starts]
-    assert found == pytest.approx([FREQUENCY] * starts.size, rel=2e-3)

@@ -22,7 +22,6 @@ from bushfit.errors import FitError
 from bushfit.fitting.assess import Stage, covariance, linear_errors
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.data import Data
-from bushfit.fitting.fourier import basis
 from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.robust import estimate
@@ -32,6 +31,7 @@ from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 from bushfit.prediction import Prediction, predict
 from bushfit.reading.measurement import Loop
+from bushfit.reduction.harmonics import basis
 
 Rig = Callable[..., Campaign]
 #: Relative error of the stiffness at frequencies [Hz] and amplitudes [m].

@@ -83,8 +83,10 @@ def test_each_point_has_the_rows_that_it_is_the_mean_of(paper_model: Model) -> N
     found = reduce_resonance(test, MASS)
     assert found.left_out.size % 10
     parts = np.split(test.frequency, np.arange(1, MOST_POINTS) * 170 // MOST_POINTS)
-    means = {round(float(part.mean()), 6): part.size for part in parts}
-    assert found.rows.tolist() == [means[round(float(frequency), 6)] for frequency in found.frequency]
+    rows = {round(float(part.mean()), 6): part.size for part in parts}
+    assert found.rows.tolist() == [rows[round(frequency, 6)] for frequency in found.frequency.tolist()]
+    assert found.relative_error.max() <= LARGEST_ERROR
+    assert f"{found.left_out.size} of 100 points left out" in found.warnings[0]
 
 
 def wandering(random: np.random.Generator, sigma: float) -> Callable[[int], Array]:
@@ -92,52 +94,31 @@ def wandering(random: np.random.Generator, sigma: float) -> Callable[[int], Arra
 
     def noise(rows: int) -> Array:
         width = rows // 30
-        return (
-            sigma
-            * np.sqrt(width)
-            * np.convolve(random.standard_normal(rows + width - 1), np.ones(width) / width, "valid")
-        )
+        white = random.standard_normal(rows + width - 1)
+        return sigma / np.sqrt(width) * np.convolve(white, np.ones(width), "valid")
 
     return noise
 
 
 @pytest.mark.parametrize(
     ("rows", "sigma", "shared", "least", "most"),
-    [
-        (40, 0.01, False, 0.92, 0.98),
-        (100, 0.02, False, 0.93, 0.98),
-        (2000, 0.05, False, 0.93, 0.99),
-        (2000, 0.01, True, 0.9, 0.98),
-    ],
+    [(40, 0.01, False, 0.92, 0.98), (2000, 0.05, False, 0.93, 0.99), (2000, 0.01, True, 0.9, 0.98)],
 )
 def test_standard_errors_cover_what_points_miss(
     paper_model: Model, rows: int, sigma: float, shared: bool, least: float, most: float
 ) -> None:
     """Also where neighbouring rows share their errors, as those of a slow sweep do."""
-    off, of_size = [], []
+    off = []
     for seed in range(40):
         random = np.random.default_rng(seed)
         noise = wandering(random, sigma) if shared else lambda n, r=random: sigma * r.standard_normal(n)
         found = reduce_resonance(shaken(paper_model, rows, noise), MASS)
         missed = misses(found, paper_model) / found.relative_error
         off += [missed.real, missed.imag]
-        of_size.append(float(np.median(found.relative_error)))
     covered = float(np.mean(np.abs(np.concatenate(off)) < 1.96))
     kind = "shared by neighbours" if shared else "of each row by itself"
-    print(
-        f"{rows} rows, {100 * sigma:g} % noise {kind}: 95 % intervals cover {100 * covered:.1f} % over 40 seeds, "
-        f"median standard error {100 * np.median(of_size):.2f} % of K"
-    )
+    print(f"{rows} rows, {100 * sigma:g} % noise {kind}: 95 % intervals cover {100 * covered:.1f} % over 40 seeds")
     assert least < covered < most
-
-
-def test_phases_that_count_the_other_way_are_told(paper_model: Model) -> None:
-    test = shaken(paper_model, 60)
-    found = reduce_resonance(test, MASS)
-    turned = reduce_resonance(replace(test, transmissibility=np.conj(test.transmissibility)), MASS)
-    assert np.allclose(turned.stiffness, found.stiffness)
-    assert turned.turned
-    assert ["count the other way" in sentence for sentence in turned.warnings] == [True]
 
 
 @pytest.mark.parametrize(
@@ -156,23 +137,6 @@ def test_what_shows_no_loss_is_refused(paper_model: Model, spoil: Callable[[Arra
         reduce_resonance(replace(test, transmissibility=spoil(test.transmissibility)), MASS)
 
 
-def test_points_that_tell_little_are_left_out_and_counted(paper_model: Model) -> None:
-    """Far below the resonance, 5 % noise of T is many times T - 1."""
-    frequency = np.geomspace(5.0, 300.0, 80)
-    base = np.full(80, 1e-6)
-    _, ratio = response(lambda x: paper_model.stiffness(Direction.AXIAL, frequency, x), MASS, frequency, base)
-    random = np.random.default_rng(2)
-    ratio = ratio * (1.0 + 0.05 * (random.standard_normal(80) + 1j * random.standard_normal(80)))
-    acceleration = base * (2.0 * np.pi * frequency) ** 2
-    test = replace(shaken(paper_model, 80), frequency=frequency, transmissibility=ratio, base_acceleration=acceleration)
-    found = reduce_resonance(test, MASS)
-    print(f"{found.left_out.size} of 80 points left out, up to {found.left_out.max():.0f} Hz")
-    assert found.relative_error.max() <= LARGEST_ERROR
-    assert found.left_out.size + found.frequency.size == 80
-    assert found.left_out.max() < 100.0 < found.frequency.max()
-    assert f"{found.left_out.size} of 80 points left out" in found.warnings[0]
-
-
 def test_a_sweep_without_its_resonance_says_so(paper_model: Model) -> None:
     test = shaken(paper_model, 80)
     above = test.frequency > 250.0
@@ -180,50 +144,33 @@ def test_a_sweep_without_its_resonance_says_so(paper_model: Model) -> None:
     assert any("no resonance" in sentence for sentence in reduce_resonance(replace(test, **cut), MASS).warnings)
 
 
-@pytest.fixture(scope="module")
-def epdm(root: Path) -> dict[tuple[str, int], Resonance]:
-    """The eight measured tests, reduced, by level and mass [g]."""
-    found = {}
-    for level in ("01g", "1g"):
-        for mass in MEASURED:
-            table = Table.open(root / f"data/measured/epdm_70/shaker_{level}_{mass}g.csv", RESONANCE_COLUMNS)
-            found[level, mass] = reduce_resonance(read_resonance(table, Direction.AXIAL), 1e-3 * (mass + DISCS))
-    return found
+def test_the_measured_mount(root: Path) -> None:
+    """Eight tests of a mount of real rubber: it softens with amplitude, and the masses agree on its stiffness.
 
-
-def test_the_measured_mount_softens_with_amplitude(epdm: dict[tuple[str, int], Resonance]) -> None:
-    """Its resonances at 0.1 and 1 g; a hand calculation has -7.4 % for the largest mass."""
-    changes = []
+    Their resonances at 0.1 and 1 g: a hand calculation has -7.4 % for the largest mass. At 0.1 g and 450 Hz, three
+    masses tell the stiffness, at amplitudes below 0.0005 mm.
+    """
+    changes, near = [], []
     for mass in MEASURED:
-        (low, _), (high, _) = epdm["01g", mass].peak, epdm["1g", mass].peak
-        changes.append(high / low - 1.0)
-        print(f"{mass} g: resonance at {low:.1f} Hz (0.1 g) and {high:.1f} Hz (1 g), {100 * changes[-1]:+.1f} %")
+        tables = [f"data/measured/epdm_70/shaker_{level}_{mass}g.csv" for level in ("01g", "1g")]
+        low, high = (
+            reduce_resonance(
+                read_resonance(Table.open(root / table, RESONANCE_COLUMNS), Direction.AXIAL), 1e-3 * (mass + DISCS)
+            )
+            for table in tables
+        )
+        for found in (low, high):
+            known = found.frequency[found.relative_error < 0.02]
+            print(
+                f"{mass} g: {found.frequency.size} points, K within 2 % from {known.min():.0f} to {known.max():.0f} Hz"
+            )
+            assert not found.turned
+            assert known.min() < 0.8 * found.peak[0] < 1.2 * found.peak[0] < known.max()
+            assert 0.05 < np.median(found.stiffness.imag / found.stiffness.real) < 0.2
+        changes.append(high.peak[0] / low.peak[0] - 1.0)
+        near.append(low.stiffness[np.argmin(np.abs(low.frequency - 450.0))])
+    print("resonance from 0.1 to 1 g:", ", ".join(f"{100 * change:+.1f} %" for change in changes))
     assert changes == sorted(changes, reverse=True)
     assert changes[-1] == pytest.approx(-0.074, abs=0.001)
-
-
-def test_the_masses_agree_on_the_measured_mount(epdm: dict[tuple[str, int], Resonance]) -> None:
-    """At 0.1 g and 450 Hz, where three of them tell it, at amplitudes below 0.0005 mm."""
-    told = []
-    for mass in (118, 253, 573):
-        found = epdm["01g", mass]
-        near = int(np.argmin(np.abs(found.frequency - 450.0)))
-        told.append(found.stiffness[near])
-        print(
-            f"{mass} g: {abs(told[-1]) / 1e3:.0f} N/mm, loss factor {told[-1].imag / told[-1].real:.3f} "
-            f"(+-{100 * found.relative_error[near]:.1f} %), {1e6 * found.amplitude[near]:.2f} um"
-        )
-    assert np.ptp(np.abs(told)) < 0.03 * np.mean(np.abs(told))
-    assert np.ptp(np.angle(told)) < 0.03
-
-
-def test_where_the_measured_tests_tell_the_stiffness(epdm: dict[tuple[str, int], Resonance]) -> None:
-    for (level, mass), found in epdm.items():
-        known = found.frequency[found.relative_error < 0.02]
-        print(
-            f"{level}, {mass} g: {found.frequency.size} points, {found.left_out.size} left out; "
-            f"K within 2 % from {known.min():.0f} to {known.max():.0f} Hz"
-        )
-        assert not found.turned
-        assert known.min() < 0.8 * found.peak[0] < 1.2 * found.peak[0] < known.max()
-        assert 0.05 < np.median(found.stiffness.imag / found.stiffness.real) < 0.2
+    assert np.ptp(np.abs(near[:3])) < 0.03 * np.mean(np.abs(near[:3]))
+    assert np.ptp(np.angle(near[:3])) < 0.03

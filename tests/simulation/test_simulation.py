@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,8 +20,6 @@ from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model import rig
 from bushfit.model.file import load_result
 from bushfit.model.model import FIVE, Model
-from bushfit.reading.measurement import Sweep
-from bushfit.reading.rawtable import raw_sweep_table
 from bushfit.simulation.files import to_files
 from bushfit.simulation.measured import Simulated, measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
@@ -41,16 +39,23 @@ def clean(paper_model: Model) -> Undisturbed:
     return undisturbed(paper_model, PLAN)
 
 
-def test_an_ideal_rig_measures_the_closed_form(clean: Undisturbed, paper_model: Model) -> None:
-    (sweep,), (loop,) = measure(clean, PLAN).sweeps, measure(clean, PLAN).loops
-    assert sweep.frequency.size == 6
+@pytest.fixture(scope="module")
+def coupon(paper_model: Model) -> Undisturbed:
+    return undisturbed(Model(None, BASE, paper_model.values), SimulateSettings(sweeps=(STRAIN_SWEEP,)))
+
+
+def test_an_ideal_rig_measures_the_closed_form_at_every_point(clean: Undisturbed, paper_model: Model) -> None:
+    measured = measure(clean, replace(PLAN, repeats=3))
+    (sweep,), (loop,) = measured.sweeps, measured.loops
+    points = {*zip(sweep.amplitude, sweep.repeat, sweep.frequency, strict=True)}
+    assert points == {(a, r, f) for a in SWEEP.amplitudes for r in (1, 2, 3) for f in SWEEP.frequencies}
     closed = paper_model.stiffness(Direction.AXIAL, sweep.frequency, sweep.amplitude)
     np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
     assert loop.time[-1] == pytest.approx(20.0, abs=0.02)
     assert np.ptp(loop.displacement) / 2.0 == pytest.approx(1e-3, rel=1e-5)
 
 
-@pytest.mark.parametrize("amplitude", [2e-5, 2e-6, 5e-7])
+@pytest.mark.parametrize("amplitude", [2e-5, 5e-7])
 def test_a_loop_has_forgotten_where_it_began_however_small_it_is(paper_model: Model, amplitude: float) -> None:
     """At a tenth of eps_half forty cycles from rest leave a mean force of half a per cent of the amplitude, at a
     hundredth thousands would: then the motion swells and dies out first."""
@@ -85,21 +90,6 @@ def test_a_programme_of_one_part_is_a_loop(paper_model: Model) -> None:
     )
     one, other = (undisturbed(paper_model, SimulateSettings(loops=(each,))).loops[0][1] for each in (loop, programme))
     np.testing.assert_array_equal(one.force, other.force)
-
-
-def test_every_repeat_measures_every_point(clean: Undisturbed) -> None:
-    (sweep,) = measure(clean, replace(PLAN, repeats=3)).sweeps
-    points = {*zip(sweep.amplitude, sweep.repeat, sweep.frequency, strict=True)}
-    assert points == {(a, r, f) for a in SWEEP.amplitudes for r in (1, 2, 3) for f in SWEEP.frequencies}
-    assert sweep.frequency.size == 18
-
-
-def test_the_seed_alone_settles_the_noise(clean: Undisturbed) -> None:
-    plan = replace(PLAN, noise=0.01, force_noise=0.01, seed=3)
-    one, same, other = (measure(clean, each) for each in (plan, plan, replace(plan, seed=4)))
-    assert np.array_equal(one.sweeps[0].stiffness, same.sweeps[0].stiffness)
-    assert np.array_equal(one.loops[0].force, same.loops[0].force)
-    assert not np.array_equal(one.sweeps[0].stiffness, other.sweeps[0].stiffness)
 
 
 def test_noise_is_as_large_as_asked_for(clean: Undisturbed) -> None:
@@ -139,25 +129,17 @@ def test_level_errors_are_shared_by_all_repeats_of_a_level(clean: Undisturbed) -
     assert abs(np.corrcoef(off[:, :, 0, 0].real.T)[0, 1]) < 0.2
 
 
-def test_gain_and_phase_errors_are_shared_by_a_run(clean: Undisturbed) -> None:
-    """A run is one repeat at one amplitude: its points are off by one factor, those of other runs by others."""
-    ideal = measure(clean, PLAN).sweeps[0].stiffness.reshape(2, 1, 3)
-    plan = replace(PLAN, repeats=2000, gain_error=0.01, phase_error=0.02)
-    off = np.log(measure(clean, plan).sweeps[0].stiffness.reshape(2, 2000, 3) / ideal)
+@pytest.mark.parametrize("held", ["amplitude", "frequency"])
+def test_gain_and_phase_errors_are_shared_by_a_run(clean: Undisturbed, coupon: Undisturbed, held: str) -> None:
+    """A run is one repeat at one of what is held: its points are off by one factor, those of other runs by others."""
+    test, stiffness = (clean if held == "amplitude" else coupon).sweeps[0]
+    own = replace(clean, sweeps=((replace(test, reached=0.0), stiffness),))
+    plan = SimulateSettings(repeats=2000, gain_error=0.01, phase_error=0.02)
+    off = np.log(measure(own, plan).sweeps[0].stiffness.reshape(len(test.held), 2000, -1) / stiffness[:, None])
     assert np.ptp(off.real, axis=-1).max() < 1e-12
     assert np.ptp(off.imag, axis=-1).max() < 1e-12
     assert np.std(off.real) == pytest.approx(0.01, rel=0.1)
     assert np.std(off.imag) == pytest.approx(0.02, rel=0.1)
-
-
-@pytest.fixture(scope="module")
-def coupon(paper_model: Model) -> Undisturbed:
-    return undisturbed(Model(None, BASE, paper_model.values), SimulateSettings(sweeps=(STRAIN_SWEEP,)))
-
-
-def runs(sweep: Sweep) -> tuple[int, int, int]:
-    """Shape of an amplitude sweep: frequencies, repeats, amplitudes."""
-    return np.unique(sweep.frequency).size, int(sweep.repeat.max()), -1
 
 
 def test_an_amplitude_sweep_has_the_stiffness_at_the_amplitudes_reached(coupon: Undisturbed) -> None:
@@ -178,7 +160,7 @@ def test_amplitudes_are_missed_at_a_frequency_and_at_a_point(coupon: Undisturbed
     off = []
     for seed in range(200):
         (sweep,) = measure(coupon, SimulateSettings(repeats=2, seed=seed)).sweeps
-        off.append(np.log(sweep.amplitude_reached.reshape(runs(sweep)) / STRAINS))
+        off.append(np.log(sweep.amplitude_reached.reshape(3, 2, -1) / STRAINS))
     missed = np.array(off)
     assert np.std(missed) == pytest.approx(0.02, rel=0.05)
     assert np.std(missed.mean(axis=(2, 3))) == pytest.approx(0.02 * np.sqrt(0.5), rel=0.1)
@@ -194,22 +176,6 @@ def test_a_frequency_sweep_that_misses_its_amplitudes_has_levels_and_what_was_re
     assert 0.005 < np.std(missed) < 0.05
     closed = paper_model.stiffness(Direction.AXIAL, sweep.frequency, sweep.reached)
     np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
-
-
-def test_gain_and_phase_errors_are_shared_by_a_run_of_amplitudes(coupon: Undisturbed) -> None:
-    """A run is one repeat at one frequency."""
-    gains, phases = [], []
-    for seed in range(150):
-        (sweep,) = measure(coupon, SimulateSettings(repeats=3, gain_error=0.01, phase_error=0.02, seed=seed)).sweeps
-        ideal = coupon.truth.stiffness(COUPON, sweep.frequency, sweep.amplitude_reached)
-        off = np.log(sweep.stiffness / ideal).reshape(runs(sweep))
-        assert np.ptp(off.real, axis=-1).max() < 1e-3  # the rig is that near to the closed form
-        gains.append(off.real.mean(axis=-1))
-        phases.append(off.imag.mean(axis=-1))
-    assert np.std(gains) == pytest.approx(0.01, rel=0.06)
-    assert np.std(phases) == pytest.approx(0.02, rel=0.06)
-    between = np.corrcoef(np.reshape(gains, (150, 9)), rowvar=False)
-    assert np.abs(between - np.eye(9)).max() < 0.35  # and each run has its own
 
 
 def test_a_resonance_test_reduces_to_the_stiffness_at_the_amplitude_reached(paper_model: Model) -> None:
@@ -238,37 +204,28 @@ def written(simulated: Simulated, folder: Path) -> Campaign:
     return load_campaign(folder / "campaign.toml")
 
 
-TOLERANCE = {"mu": 0.04, "m": 0.15, "alpha": 0.08, "sigma_fmax": 0.12, "eps_half": 0.12}
-AXIAL_SWEEP = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(np.arange(5.0, 156.0, 15.0).tolist()))
-TENSION = Specimen("bar, tension", "modulus", strain="tension")
-TENSOR = Specimen("half strains", "modulus", strain="tensor")
-
-
-@pytest.mark.parametrize(
-    ("sweeps", "loops"),
-    [
-        pytest.param((STRAIN_SWEEP,), (), id="coupon alone"),
-        pytest.param((STRAIN_SWEEP, AXIAL_SWEEP), (), id="coupon and bushing"),
-        pytest.param(
-            (
-                replace(STRAIN_SWEEP, direction=MOUNT, amplitudes=tuple(6e-3 * strain for strain in STRAINS)),
-                replace(STRAIN_SWEEP, direction=TENSION),
-                replace(STRAIN_SWEEP, direction=TENSOR),
-            ),
-            (SimulatedLoop(MOUNT, 5e-4, 0.1), SimulatedLoop(COUPON, 0.05, 0.1)),
-            id="specimens of each kind",
-        ),
-    ],
+TESTS = SimulateSettings(
+    repeats=3,
+    noise=5e-3,
+    force_noise=3e-3,
+    gain_error=3e-3,
+    phase_error=2e-3,
+    seed=4,
+    sweeps=(
+        STRAIN_SWEEP,
+        SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(np.arange(5.0, 156.0, 15.0).tolist())),
+        replace(STRAIN_SWEEP, direction=MOUNT, amplitudes=tuple(6e-3 * strain for strain in STRAINS)),
+        replace(STRAIN_SWEEP, direction=Specimen("bar, tension", "modulus", strain="tension")),
+        replace(STRAIN_SWEEP, direction=Specimen("half strains", "modulus", strain="tensor")),
+    ),
+    loops=(SimulatedLoop(MOUNT, 5e-4, 0.1), SimulatedLoop(COUPON, 0.05, 0.1)),
 )
-def test_what_is_fitted_to_simulated_tests_is_the_truth(
-    sweeps: tuple[SimulatedSweep, ...], loops: tuple[SimulatedLoop, ...], paper_model: Model, tmp_path: Path
-) -> None:
+
+
+def test_tests_are_read_back_and_what_is_fitted_to_them_is_the_truth(paper_model: Model, tmp_path: Path) -> None:
     assert paper_model.bushing is not None
-    bushing = replace(paper_model.bushing, shape="calibrated") if AXIAL_SWEEP in sweeps else None
-    plan = SimulateSettings(
-        repeats=3, noise=5e-3, force_noise=3e-3, gain_error=3e-3, phase_error=2e-3, sweeps=sweeps, loops=loops, seed=4
-    )
-    simulated = simulate(Model(bushing, BASE, paper_model.values), plan)
+    bushing = replace(paper_model.bushing, shape="calibrated")
+    simulated = simulate(Model(bushing, BASE, paper_model.values), TESTS)
     campaign, in_memory = written(simulated, tmp_path), simulated.campaign()
     assert (campaign.name, campaign.bushing) == (in_memory.name, bushing)
     assert campaign.specimens == in_memory.specimens
@@ -281,24 +238,16 @@ def test_what_is_fitted_to_simulated_tests_is_the_truth(
         np.testing.assert_allclose(looped.force, loop.force, atol=1e-5 * np.ptp(loop.force))
     places = [test.direction for test in (*campaign.sweeps, *campaign.loops)]
     fitted = fit_joint(Data.of(campaign), directions=places).model.values
-    assert {name: fitted[name] / paper_model.values[name] - 1.0 for name in FIVE} == {
-        name: pytest.approx(0.0, abs=TOLERANCE[name]) for name in FIVE
-    }
+    largest = {"mu": 0.04, "m": 0.15, "alpha": 0.08, "sigma_fmax": 0.12, "eps_half": 0.12}
+    for name in FIVE:
+        assert fitted[name] == pytest.approx(paper_model.values[name], rel=largest[name])
     truth = load_result(tmp_path / "truth.json")
-    assert truth.model.bushing == bushing
-    assert truth.specimens == in_memory.specimens
-    assert json.loads((tmp_path / "truth.json").read_text())["schema"] == "bushfit/model/2"
+    assert (truth.model.bushing, truth.specimens) == (bushing, in_memory.specimens)
+    text = (tmp_path / "campaign.toml").read_text()
+    assert [name for name in FIVE if f"{name} =" in text] == []
 
 
-def test_strains_are_written_as_files_of_the_specimen_state_them(coupon: Undisturbed) -> None:
-    """Tensor strain is half the engineering strain; the modulus is the same."""
-    (sweep,) = measure(coupon, SimulateSettings()).sweeps
-    tensor = raw_sweep_table(replace(sweep, direction=replace(COUPON, strain="tensor")))
-    np.testing.assert_allclose(tensor["strain amplitude [%]"], 50.0 * sweep.amplitude_reached)
-    np.testing.assert_allclose(tensor["modulus [MPa]"], 1e-6 * np.abs(sweep.stiffness))
-
-
-def test_names_of_specimens_are_names_of_files(paper_model: Model, tmp_path: Path) -> None:
+def test_tests_of_one_thing_have_names_of_their_own_that_files_can_have(paper_model: Model, tmp_path: Path) -> None:
     sweep = SimulatedSweep(Specimen('a/b "c"', "modulus"), STRAINS[:3], (10.0,), stepped="amplitude")
     other = replace(sweep, direction=Specimen("CON", "modulus"))
     campaign = written(simulate(paper_model, SimulateSettings(sweeps=(sweep, sweep, other))), tmp_path)
@@ -313,28 +262,13 @@ def test_specimens_alone_have_no_tests_of_the_paper(coupon: Undisturbed) -> None
         simulate(coupon.truth, PLAN)
 
 
-def test_files_are_a_campaign_that_says_nothing_of_the_truth(
-    clean: Undisturbed, paper_model: Model, tmp_path: Path
-) -> None:
-    simulated = measure(clean, replace(PLAN, noise=0.005, repeats=2))
-    campaign = written(simulated, tmp_path)
-    assert campaign.bushing == paper_model.bushing
-    np.testing.assert_allclose(campaign.sweeps[0].stiffness, simulated.sweeps[0].stiffness, rtol=1e-6)
-    np.testing.assert_allclose(campaign.loops[0].force, simulated.loops[0].force, rtol=1e-5, atol=1e-3)
-    assert load_result(tmp_path / "truth.json").model.values == pytest.approx(paper_model.values, rel=1e-12)
-    text = (tmp_path / "campaign.toml").read_text()
-    assert [name for name in FIVE if f"{name} =" in text] == []
-
-
 def test_a_programme_is_one_file_of_several_loops(paper_model: Model, tmp_path: Path) -> None:
     sizes, rates = (2e-4, 1e-3), (0.1, 0.3)
     loop = SimulatedLoop(Direction.AXIAL, cycles=4, amplitudes=sizes, frequencies=rates, pause=5.0)
     simulated = simulate(paper_model, SimulateSettings(loops=(loop,)))
     (record,) = simulated.loops
     assert record.time[-1] == pytest.approx(2 * 4 / 0.1 + 2 * 4 / 0.3 + 3 * 5.0, abs=0.02)
-    for name, content in to_files(simulated).items():
-        (tmp_path / name).write_bytes(content)
-    read, in_memory = load_campaign(tmp_path / "campaign.toml").loops, simulated.campaign().loops
+    read, in_memory = written(simulated, tmp_path).loops, simulated.campaign().loops
     for loops in (read, in_memory):
         assert [part.name for part in loops] == [f"loop_axial_1_part_{number}" for number in (1, 2, 3, 4)]
         assert [np.ptp(part.displacement) / 2.0 for part in loops] == pytest.approx([*sizes, *sizes], rel=1e-3)
@@ -347,28 +281,21 @@ def test_a_programme_too_long_to_simulate_is_refused(paper_model: Model) -> None
         simulate(paper_model, SimulateSettings(loops=(loop,)))
 
 
-def test_sweeps_of_one_direction_have_names_of_their_own(paper_model: Model) -> None:
-    plan = SimulateSettings(sweeps=(SWEEP, replace(SWEEP, amplitudes=(2e-4,))))
-    assert [sweep.name for sweep in simulate(paper_model, plan).sweeps] == ["sweep_axial_1", "sweep_axial_2"]
-
-
-def test_the_model_is_that_of_the_simulate_table(bushing: Bushing, table_1: dict[str, float]) -> None:
-    settings = SimulateSettings(parameters=table_1, effects={"inertia": {"mass": 0.1}})
-    model = model_of(Campaign("c", Path("c.toml"), bushing, simulate=settings))
-    assert model.values == {**table_1, "inertia.mass": 0.1}
-
-
-def test_what_a_simulate_table_lacks_is_said(bushing: Bushing, table_1: dict[str, float]) -> None:
-    def campaign(settings: SimulateSettings | None) -> Campaign:
-        return Campaign("c", Path("c.toml"), bushing, simulate=settings)
-
-    with pytest.raises(CampaignError, match="nothing says what to simulate"):
-        model_of(campaign(None))
-    lacking = {name: table_1[name] for name in FIVE if name != "alpha"}
-    with pytest.raises(CampaignError, match=r"parameters without a value[\s\S]*no alpha"):
-        model_of(campaign(SimulateSettings(parameters=lacking)))
-    with pytest.raises(ModelError, match=r"c.toml[\s\S]*friktion"):
-        model_of(campaign(SimulateSettings(parameters=table_1, effects={"friktion": {"x": 1.0}})))
+@pytest.mark.parametrize(
+    ("without", "effects", "error", "said"),
+    [
+        ("parameters", {}, CampaignError, "nothing says what to simulate"),
+        ("alpha", {}, CampaignError, r"parameters without a value[\s\S]*no alpha"),
+        ("", {"friktion": {"x": 1.0}}, ModelError, r"c.toml[\s\S]*friktion"),
+    ],
+)
+def test_what_a_simulate_table_lacks_is_said(
+    bushing: Bushing, table_1: dict[str, float], without: str, effects: Any, error: type[Exception], said: str
+) -> None:
+    values = {name: value for name, value in table_1.items() if name != without}
+    settings = None if without == "parameters" else SimulateSettings(parameters=values, effects=effects)
+    with pytest.raises(error, match=said):
+        model_of(Campaign("c", Path("c.toml"), bushing, simulate=settings))
 
 
 def test_the_rig_is_warm_and_drifts_as_planned(paper_model: Model, tmp_path: Path) -> None:
@@ -377,9 +304,7 @@ def test_the_rig_is_warm_and_drifts_as_planned(paper_model: Model, tmp_path: Pat
     truth = paper_model.with_effect("temperature", values).with_effect("drift", values)
     tests = (replace(LOOP, temperature=300.0), replace(SWEEP, temperature=305.0))
     simulated = simulate(truth, SimulateSettings(repeats=2, loops=tests[:1], sweeps=tests[1:]))
-    for name, content in to_files(simulated).items():
-        (tmp_path / name).write_bytes(content)
-    data = Data.of(load_campaign(tmp_path / "campaign.toml"))
+    data = Data.of(written(simulated, tmp_path))
     (loop,), (sweep,) = data.loops, data.sweeps
     assert loop.circumstances.temperature == pytest.approx(300.0)
     assert (loop.circumstances.turn, sweep.circumstances.turn[-1]) == (0.0, 1.0)

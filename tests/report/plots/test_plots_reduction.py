@@ -19,7 +19,7 @@ from bushfit.report.plots.style import to_image
 def test_reduction(paper_model: Model, direction: Direction) -> None:
     turns = direction.is_rotation
     points = [(f, a * (30.0 if turns else 1.0)) for a in (1e-4, 4e-4) for f in (10.0, 30.0)]
-    history = stepped(paper_model, points, direction=direction).history
+    history = stepped(paper_model, points, direction=direction)
     reduction = reduce([history])
     figure = reduction_figure(reduction, [history], "$ raw $.csv")
     assert outside(figure) == []
@@ -41,7 +41,7 @@ def test_reduction(paper_model: Model, direction: Direction) -> None:
 
 
 def test_reduction_of_many_histories_draws_the_first(paper_model: Model) -> None:
-    history = stepped(paper_model, [(10.0, 1e-4)]).history
+    history = stepped(paper_model, [(10.0, 1e-4)])
     histories = [Loop(str(n), history.direction, history.time, history.displacement, history.force) for n in range(6)]
     figure = reduction_figure(reduce(histories), histories, "six")
     assert len(figure.axes) == 4 + 4

@@ -5,68 +5,78 @@ does not, nothing is touched, so a record may start and end anywhere in its cycl
 is left out too, because nobody knows how many cycles went by there.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.fourier import basis, derivative, least_squares, resolved_order, spread_rows
 from bushfit.fitting.loop_harmonics import residual_limit
 from bushfit.fitting.outliers import gross_rows
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.cycles import HOLE
-from bushfit.reduction.programme import ENOUGH_ROWS, THREE_CYCLES, left_out
+from bushfit.reduction.cycles import HOLE, change_after
+from bushfit.reduction.harmonics import basis, least_squares, resolved_order, spread_rows
+from bushfit.reduction.programme import ENOUGH_ROWS, SAME_MOTION, THREE_CYCLES, left_out
 
-#: Difference from the motion a period later up to which it comes again, relative to its range.
-_SAME = 0.05
 #: Share of a period up to which a break in the steady motion, or what is left out, is too short to count.
 _BRIEF = 0.02
-#: Difference from the motion a period later, in units of its median, beyond which an end is drawn in.
-_MOST_OFF = 8.0
-#: The same relative to the range of the motion, which is added for motions without noise.
-_LEAST_OFF = 5e-4
-#: Periods by which an end is drawn in at most.
-_EDGE = 0.5
-#: Share of the range on either side of the middle within which the motion is not yet across: more than any noise.
-_BAND = 0.1
-#: Harmonics by which a frequency is refined at most; chosen: what a triangle has beyond them shifts no phase.
-_MOST_HARMONICS = 15
-#: Step relative to the frequency below which Gauss-Newton has ended: rounding.
-_SETTLED = 1e-12
-#: Step relative to the frequency that Gauss-Newton takes at most: farther off it is not linear.
-_LARGEST_STEP = 0.05
-#: Rows that are enough to refine a frequency.
-_ROWS_TO_REFINE = 2000
+#: Difference from the motion a period later, in units of its median and of its range (for motions without noise),
+#: beyond which an end is drawn in, and by how many periods at most.
+_MOST_OFF, _LEAST_OFF, _EDGE = 8.0, 5e-4, 0.5
+#: Harmonics and rows by which a frequency is refined at most; chosen: what a triangle has beyond them shifts no phase.
+_MOST_HARMONICS, _ROWS_TO_REFINE = 15, 2000
+#: Steps relative to the frequency: below which Gauss-Newton has ended (rounding), and at most (farther off it is not
+#: linear).
+_SETTLED, _LARGEST_STEP = 1e-12, 0.05
 #: Distance between the ends of a record, as a share of its range, from which on it holds no whole cycle: more than
 #: any noise.
 _OPEN = 0.1
 #: Distance between the ends of a closed cycle at most, as a share of it or of its amplitude.
 _CLOSED = 0.04
-#: Share of the record at either end through which a line is drawn.
-_END = 0.02
-#: Cycles, counted by one stroke, from which on a record is no single closed one.
-_MORE_THAN_ONE = 1.01
-#: The same where the ends of the record meet all the same: standing still at an extreme they may, and a motion may
-#: take longer one way than the other.
-_MORE_THAN_ONE_THAT_MEETS = 1.1
-#: Error of an end's line relative to its length from which on the motion stands still there.
-_STANDS_STILL = 0.25
-#: Standard deviations within which a period is taken for that of the record.
-_SAME_PERIOD = 4.0
-#: Root mean square by which what comes after one cycle may differ from its start, relative to the amplitude.
-_REPEATS = 0.02
-#: The same in units of the scatter of neighbouring rows, where that is more.
-_REPEATS_SCATTER = 6.0
-#: Third harmonic of a triangle over its first.
-_TRIANGLE = 1.0 / 9.0
+#: Cycles, counted by one stroke, from which on a record is no single closed one, and where the ends of the record meet
+#: all the same: standing still at an extreme they may, and a motion may take longer one way than the other.
+_MORE_THAN_ONE, _MORE_THAN_ONE_THAT_MEETS = 1.01, 1.1
+#: Root mean square by which what comes after one cycle may differ from its start, relative to the amplitude, or in
+#: units of the scatter of neighbouring rows where that is more.
+_REPEATS, _REPEATS_SCATTER = 0.02, 6.0
 #: Difference of a motion's third harmonic over its first up to which it is called by a name: a rounded triangle has it.
 _LIKE = 0.03
 #: Share of the amplitude beyond which rows are counted.
 _OUTER = 0.9
-#: Share of the rows beyond it that parts a sine from a triangle: evenly in time a triangle has 10 % there, a sine 29 %.
-_CROWDED = 0.2
 
 
-def thinned(loop: Loop) -> tuple[Array, Array]:
+class SteadyCycles(NamedTuple):
+    """The steady cycles of a loop.
+
+    Args:
+        loop: without what comes before and after them; the same one where nothing does.
+        frequency: [Hz].
+        cycles: how many there are, whole and broken.
+        left_out: a sentence on what was left out, or None.
+    """
+
+    loop: Loop
+    frequency: float
+    cycles: float
+    left_out: str | None
+
+
+def steady_cycles(loop: Loop) -> SteadyCycles:
+    """The steady cycles of a loop: of one with holes, those of the longest part without.
+
+    Raises:
+        FitError: it does not hold a whole cycle, or it has a hole in which nobody knows how many turns were made.
+    """
+    time, motion = _thinned(loop)
+    part, note = _steady_part(loop, time, motion)
+    if part is not loop:
+        time, motion = _thinned(part)
+    frequency, cycles = _fundamental(part, time, motion)
+    _check_no_hole(part, time, frequency)
+    return SteadyCycles(part, frequency, cycles, note)
+
+
+def _thinned(loop: Loop) -> tuple[Array, Array]:
     """Time [s] and displacement [m or rad] of rows that are enough to find the cycles, gross outliers left out."""
     every = slice(None, None, -(-loop.time.size // ENOUGH_ROWS))
     time, motion = loop.time[every], loop.displacement[every]
@@ -74,26 +84,49 @@ def thinned(loop: Loop) -> tuple[Array, Array]:
     return np.delete(time, rows), np.delete(motion, rows)
 
 
-def crossings(motion: Array) -> tuple[Array, Array, Array]:
-    """A motion about its middle, (n,), and the last row before and the first after each crossing of it, (k,) each."""
+def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
+    """Refuse a hole of more than a part of a cycle: nothing tells how many turns the motion made in it."""
+    steps = np.diff(clock)
+    widest = int(np.argmax(steps))
+    if steps[widest] > HOLE / frequency:
+        raise FitError(
+            "rows are missing inside the loop",
+            file=loop.source.file if loop.source else None,
+            found=f"none from {clock[widest]:.4g} to {clock[widest + 1]:.4g} s; how many cycles went by, and so the "
+            "frequency, cannot be told",
+            expected="no gap longer than a third of a cycle",
+            hint="keep the whole cycles before the gap, or those after it",
+        )
+
+
+def _crossings(motion: Array) -> tuple[Array, Array, Array]:
+    """A motion about its middle, (n,), and the last row before and the first after each crossing of it, (k,) each.
+
+    A tenth of the range on either side, which is more than any noise, counts as the middle.
+    """
     centred = motion - (motion.max() + motion.min()) / 2.0
-    marks = np.flatnonzero(np.abs(centred) > _BAND * np.ptp(centred))
+    marks = np.flatnonzero(np.abs(centred) > 0.1 * np.ptp(centred))
     across = np.flatnonzero(np.diff(centred[marks] > 0.0))
     return centred, marks[across], marks[across + 1]
 
 
-def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | None]:
+def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | None]:
     """A loop without what comes before and after its steady cycles, and a sentence on what was left out or None."""
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
         return loop, None
     holes = np.flatnonzero(np.diff(time) > HOLE * period)
     if holes.size:
-        return _steady_part_between(loop, time, holes)
-    ends = _steady_ends(time, motion, period)
-    if ends is None:
+        starts, ends = time[np.append(0, holes + 1)], time[np.append(holes, time.size - 1)]
+        first, last = max(zip(starts, ends, strict=True), key=lambda part: part[1] - part[0])
+        whole = _cut(loop, first, last)
+        part, note = _steady_part(whole, *_thinned(whole))
+        said = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
+        return part, said if note is None else f"{said}, and of these {note}"
+    steady = _steady_ends(time, motion, period)
+    if steady is None:
         return loop, None
-    first, last, after = ends
+    first, last, after = steady
     gaps = (f"{gap:.3g} s" if gap > _BRIEF * period else "" for gap in (first - time[0], time[-1] - last))
     note = left_out(gaps, (last - first) / period)
     return _cut(loop, first, last if after else np.inf), note
@@ -102,8 +135,12 @@ def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | Non
 def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, float, bool] | None:
     """First and last time of the steady cycles [s], and whether anything follows; None where all or none are steady."""
     clock = time[time + period <= time[-1]]
-    off = np.abs(np.interp(clock + period, time, motion) - motion[: clock.size])
-    start, end = _longest_stretch(off < _SAME * np.ptp(motion), clock, _BRIEF * period)
+    off = change_after(time, motion, period, slice(0, clock.size))
+    alike = off < SAME_MOTION * np.ptp(motion)
+    breaks = np.flatnonzero(np.diff(alike, prepend=True, append=True)).reshape(-1, 2)
+    breaks = breaks[clock[breaks[:, 1] - 1] - clock[breaks[:, 0]] > _BRIEF * period]
+    stretches = np.concatenate(([0], breaks.ravel(), [alike.size])).reshape(-1, 2)  # between breaks that count
+    start, end = stretches[np.argmax(np.diff(stretches))]
     before, after = start > 0, end < off.size
     if start == end or not (before or after):
         return None
@@ -119,16 +156,6 @@ def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, floa
     return first, last, bool(after)
 
 
-def _steady_part_between(loop: Loop, time: Array, holes: Array) -> tuple[Loop, str]:
-    """As `steady_part`, of the longest part of a loop without a hole; `holes` are the steps of `time` that are one."""
-    starts, ends = time[np.append(0, holes + 1)], time[np.append(holes, time.size - 1)]
-    first, last = max(zip(starts, ends, strict=True), key=lambda part: part[1] - part[0])
-    whole = _cut(loop, first, last)
-    part, note = steady_part(whole, *thinned(whole))
-    said = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
-    return part, said if note is None else f"{said}, and of these {note}"
-
-
 def _cut(loop: Loop, first: float, last: float) -> Loop:
     """The rows between two times [s], both counted in."""
     kept = slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right"))
@@ -140,7 +167,7 @@ def _period(time: Array, motion: Array) -> float | None:
 
     Twice a stroke where there is one cycle. What holds a hole does not count; None where nothing is left.
     """
-    after = crossings(motion)[2]
+    after = _crossings(motion)[2]
     strokes, steps = np.diff(time[after]), np.diff(time)
     widest = np.maximum(np.maximum.reduceat(steps, after - 1)[:-1], steps[after[1:] - 1])
     intervals = strokes[1:] + strokes[:-1]
@@ -150,27 +177,16 @@ def _period(time: Array, motion: Array) -> float | None:
     return float(np.median(intervals[intervals.size // 2 :])) if intervals.size else None
 
 
-def _longest_stretch(alike: Array, time: Array, brief: float) -> Array:
-    """Start and end of the longest stretch of rows that are alike; breaks no longer than `brief` [s] count as alike."""
-    breaks = np.flatnonzero(np.diff(alike, prepend=True, append=True)).reshape(-1, 2)
-    breaks = breaks[time[breaks[:, 1] - 1] - time[breaks[:, 0]] > brief]
-    stretches = np.concatenate(([0], breaks.ravel(), [alike.size])).reshape(-1, 2)
-    return stretches[np.argmax(np.diff(stretches))]
-
-
-def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
+def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
     """Frequency [Hz] and number of cycles of a loop without run-in.
 
     The clock [s] and the displacement [m or rad], (n,) each, are of rows that are enough to find the cycles.
-
-    Raises:
-        FitError: the loop does not hold a whole cycle.
 
     Notes:
         Several cycles are counted by crossings of the middle in one sense, and their frequency is refined by
         Gauss-Newton on the motion. A single one is known by its ends, which meet going the same way.
     """
-    (x, before, after), clock = crossings(displacement), clock - loop.time[0]
+    (x, before, after), clock = _crossings(displacement), clock - loop.time[0]
     times = clock[before] - x[before] * (clock[after] - clock[before]) / (x[after] - x[before])
     rows = loop.time.size
     closed = float(loop.time[-1] - loop.time[0]) * rows / (rows - 1)
@@ -183,7 +199,7 @@ def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, f
 
 
 def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[float, float]:
-    """As `fundamental`, of a loop that crosses its middle but once in either sense, at the times `across` [s]."""
+    """As `_fundamental`, of a loop that crosses its middle but once in either sense, at the times `across` [s]."""
     rows, motion = loop.time.size, loop.displacement
     duration = float(loop.time[-1] - loop.time[0])
     closed = duration * rows / (rows - 1)
@@ -216,17 +232,17 @@ def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> fl
     Both ends are drawn as straight lines. They tell how far beyond one cycle the record goes, or how short of it it
     stops; within their error it is just one cycle, of the period `whole` [s].
     """
-    few = max(3, int(_END * x.size))
+    few = max(3, int(0.02 * x.size))
     first, first_slope, first_scatter = _line(clock[:few] - clock[0], x[:few])
     last, last_slope, last_scatter = _line(clock[-few:] - clock[-1], x[-few:])
     slope, step = (first_slope + last_slope) / 2.0, duration / (x.size - 1)
     if first_slope * last_slope <= 0.0 or abs(last - first) > _CLOSED * duration * abs(slope):
         return None
     error = np.hypot(first_scatter, last_scatter) * np.sqrt(4.0 / few) / abs(slope)
-    if error > _STANDS_STILL * few * step:
+    if error > 0.25 * few * step:
         return None
     period = duration - (last - first) / slope
-    return period if period < whole - max(1.5 * step, _SAME_PERIOD * error) else whole
+    return period if period < whole - max(1.5 * step, 4.0 * error) else whole
 
 
 def _line(time: Array, x: Array) -> tuple[float, float, float]:
@@ -240,12 +256,13 @@ def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) ->
     chosen = spread_rows(x.size, _ROWS_TO_REFINE)
     time, motion = clock[chosen], x[chosen]
     order = resolved_order(rows_per_cycle * chosen.size / x.size, _MOST_HARMONICS)
-    columns = basis(time * frequency, order)
+    number, columns = np.arange(1, order + 1), basis(time * frequency, order)
     solution = least_squares(columns, motion)
     for _ in range(10):  # of Gauss-Newton; chosen: nearly all frequencies take three to six
         residual = motion - columns @ solution
         kept = np.abs(residual) <= residual_limit(solution, residual, residual.size)
-        by_frequency = 2.0 * np.pi * time * (columns @ derivative(solution))
+        by_phase = np.concatenate(([0.0], -number * solution[order + 1 :], number * solution[1 : order + 1]))
+        by_frequency = 2.0 * np.pi * time * (columns @ by_phase)
         found = least_squares(np.column_stack((columns, by_frequency)), motion, kept)
         step = float(np.clip(found[-1], -_LARGEST_STEP * frequency, _LARGEST_STEP * frequency))
         frequency += step
@@ -260,7 +277,7 @@ def _repeats(clock: Array, x: Array, period: float) -> bool:
     begin = int(np.searchsorted(clock, period))
     if x.size - begin < 2:
         return True
-    off = x[begin:] - np.interp(clock[begin:] - period, clock, x)
+    off = change_after(clock, x, -period, slice(begin, None))
     scatter = np.median(np.abs(np.diff(x, 2))) if x.size > 4 else 0.0
     return float(np.sqrt(np.mean(np.square(off)))) < max(_REPEATS * np.ptp(x) / 2.0, _REPEATS_SCATTER * scatter)
 
@@ -268,7 +285,7 @@ def _repeats(clock: Array, x: Array, period: float) -> bool:
 def waveform(coefficients: Array) -> str:
     """The name of a motion, in words, from its complex harmonics, mean first."""
     share = abs(coefficients[3]) / abs(coefficients[1]) if coefficients.size > 3 else 0.0
-    if abs(share - _TRIANGLE) < _LIKE:
+    if abs(share - 1.0 / 9.0) < _LIKE:
         return "a triangle"
     return "a sine" if share < _LIKE else f"neither sine nor triangle (third harmonic {100 * share:.2g} %)"
 
@@ -280,7 +297,8 @@ def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
     motion = loop.displacement
     half = np.ptp(motion) / 2.0
     outer = float(np.mean(np.abs(motion - motion.min() - half) > _OUTER * half))
-    like, other = ("a sine", "a triangle") if outer > _CROWDED else ("a triangle", "a sine")
+    # evenly in time a triangle has 10 % there, a sine 29 %
+    like, other = ("a sine", "a triangle") if outer > 0.2 else ("a triangle", "a sine")
     if waveform(coefficients) != other:
         return None
     return (

@@ -52,28 +52,23 @@ def recorded(model: Model, *motions: Array, seed: int = 0, noise: float = 3e-3) 
     return Loop("loop", Direction.AXIAL, clean.time, motion + jitter, clean.force + scatter)
 
 
+def slow(*sizes: float) -> list[tuple[float, float]]:
+    """Parts of these amplitudes [mm], all at 0.1 Hz."""
+    return [(size, 0.1) for size in sizes]
+
+
 #: Motions, and amplitude [mm] and frequency [Hz] of each part that is to be found in them.
 PROGRAMMES: dict[str, tuple[Sequence[Array], Sequence[tuple[float, float]]]] = {
-    "three amplitudes": ([cycles(5, x) for x in (0.2, 0.5, 1)], [(0.2, 0.1), (0.5, 0.1), (1, 0.1)]),
-    "three cycles": ([cycles(3, x) for x in (0.2, 0.5, 1)], [(0.2, 0.1), (0.5, 0.1), (1, 0.1)]),
-    "two cycles": ([cycles(2, x) for x in (0.2, 0.5, 1)], [(0.2, 0.1), (0.5, 0.1), (1, 0.1)]),
-    "triangles": (
-        [cycles(4, x, shape="triangle") for x in (0.2, 0.5, 1)],
-        [(0.2, 0.1), (0.5, 0.1), (1, 0.1)],
-    ),
-    "up and down": (
-        [cycles(3, x) for x in (0.2, 0.5, 1, 0.5, 0.2)],
-        [(x, 0.1) for x in (0.2, 0.5, 1, 0.5, 0.2)],
-    ),
+    "two cycles": ([cycles(2, x) for x in (0.2, 0.5, 1)], slow(0.2, 0.5, 1)),
+    "up and down": ([cycles(3, x) for x in (0.2, 0.5, 1, 0.5, 0.2)], slow(0.2, 0.5, 1, 0.5, 0.2)),
     "pauses": (
         [hold(5), cycles(5, 0.2), hold(10), cycles(5, 0.5), hold(20), cycles(5, 1), hold(5)],
-        [(0.2, 0.1), (0.5, 0.1), (1, 0.1)],
+        slow(0.2, 0.5, 1),
     ),
     "ramps between peaks": (
         [cycles(4, 0.2, start=0.25), ramp(0.2, 1, 3), cycles(4, 1, start=0.25), ramp(1, 0, 9)],
-        [(0.2, 0.1), (1, 0.1)],
+        slow(0.2, 1),
     ),
-    "rates": ([cycles(5, 0.5, f) for f in (0.1, 0.2, 0.05)], [(0.5, 0.1), (0.5, 0.2), (0.5, 0.05)]),
     "rates changed at the peak": (
         [cycles(5, 0.5, f, start=0.25, shape="triangle") for f in (0.1, 0.2, 0.05)],
         [(0.5, 0.1), (0.5, 0.2), (0.5, 0.05)],
@@ -87,16 +82,12 @@ PROGRAMMES: dict[str, tuple[Sequence[Array], Sequence[tuple[float, float]]]] = {
         [(x, 0.04 / x) for x in (0.2, 0.5, 1)],
     ),
     "growing between": (
-        [*(cycles(n, x) for n, x in ((4, 0.2), (1, 0.3), (1, 0.4), (4, 0.5), (1, 0.7), (4, 1)))],
-        [(0.2, 0.1), (0.5, 0.1), (1, 0.1)],
+        [cycles(n, x) for n, x in ((4, 0.2), (1, 0.3), (1, 0.4), (4, 0.5), (1, 0.7), (4, 1))],
+        slow(0.2, 0.5, 1),
     ),
-    "very unlike": ([cycles(4, 0.02), cycles(4, 2)], [(0.02, 0.1), (2, 0.1)]),
-    "close": ([cycles(5, x) for x in (0.8, 0.9, 1)], [(0.8, 0.1), (0.9, 0.1), (1, 0.1)]),
-    "one comes again": ([cycles(4, x) for x in (1, 0.3, 1)], [(1, 0.1), (0.3, 0.1), (1, 0.1)]),
-    "about a mean": (
-        [ramp(0, 1.5, 20), 1.5e-3 + cycles(4, 0.2), 1.5e-3 + cycles(4, 0.5)],
-        [(0.2, 0.1), (0.5, 0.1)],
-    ),
+    "close": ([cycles(5, x) for x in (0.8, 0.9, 1)], slow(0.8, 0.9, 1)),
+    "one comes again": ([cycles(4, x) for x in (1, 0.3, 1)], slow(1, 0.3, 1)),
+    "about a mean": ([ramp(0, 1.5, 20), 1.5e-3 + cycles(4, 0.2), 1.5e-3 + cycles(4, 0.5)], slow(0.2, 0.5)),
 }
 
 
@@ -117,7 +108,7 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model: Model, case: str) 
         np.testing.assert_array_equal(loop.force, record.force[rows])
 
 
-@pytest.mark.parametrize("case", ["three cycles", "pauses", "amplitudes at two rates", "one comes again"])
+@pytest.mark.parametrize("case", ["pauses", "amplitudes at two rates"])
 def test_the_true_model_leaves_little_but_noise_of_each_part(paper_model: Model, case: str) -> None:
     largest = 0.0
     for loop in programme(recorded(paper_model, *PROGRAMMES[case][0], noise=1e-4)):
@@ -128,7 +119,7 @@ def test_the_true_model_leaves_little_but_noise_of_each_part(paper_model: Model,
         largest = max(largest, drive.amplitude)
 
 
-@pytest.mark.parametrize("case", ["three amplitudes", "up and down", "pauses", "rates", "one speed"])
+@pytest.mark.parametrize("case", ["pauses", "one speed"])
 def test_without_time_parts_are_the_same(paper_model: Model, case: str) -> None:
     motions, expected = PROGRAMMES[case]
     loops = programme(replace(recorded(paper_model, *motions), timed=False), rate=1e-4)
@@ -160,7 +151,7 @@ def test_one_amplitude_and_rate_is_the_record_itself(paper_model: Model, case: s
 
 
 def test_a_drift_of_the_mean_parts_nothing(paper_model: Model) -> None:
-    record = recorded(paper_model, *PROGRAMMES["three amplitudes"][0])
+    record = recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)])
     drifting = replace(record, displacement=record.displacement + np.linspace(0.0, 2e-5, record.time.size))
     assert len(programme(drifting)) == 3
     one = recorded(paper_model, cycles(15, 0.3))
@@ -168,18 +159,18 @@ def test_a_drift_of_the_mean_parts_nothing(paper_model: Model) -> None:
     assert same.part is None
 
 
-@pytest.mark.parametrize("scatter", [0.005, 0.01, 0.02])
-def test_a_rig_that_misses_its_amplitude_makes_no_parts(scatter: float) -> None:
-    counts = []
+def test_a_rig_that_misses_its_amplitude_makes_no_parts() -> None:
+    """By 2 % from cycle to cycle."""
+    rightly = 0
     for seed in range(20):
         random = np.random.default_rng(seed)
         for sizes in ((1.0,), (0.2, 0.5, 1.0)):
-            reached = [x * (1.0 + scatter * random.standard_normal()) for x in sizes for _ in range(8)]
+            reached = [x * (1.0 + 0.02 * random.standard_normal()) for x in sizes for _ in range(8)]
             motion = np.concatenate([cycles(1, x) for x in reached])
             loop = Loop("loop", Direction.AXIAL, STEP * np.arange(motion.size), motion, 5e5 * motion)
-            counts.append(len(programme(loop)) == len(sizes))
-    print(f"cycles that scatter by {100 * scatter:g} %: parted rightly {sum(counts)} times of {len(counts)}")
-    assert sum(counts) >= 39
+            rightly += len(programme(loop)) == len(sizes)
+    print(f"parted rightly {rightly} times of 40")
+    assert rightly >= 39
 
 
 def test_amplitudes_that_change_all_the_time_are_refused(paper_model: Model) -> None:
@@ -215,7 +206,7 @@ def virgin(loop: Loop, share: float) -> Loop:
 
 
 def test_a_softening_is_told_of_each_part(paper_model: Model) -> None:
-    loops = programme(virgin(recorded(paper_model, *PROGRAMMES["three amplitudes"][0]), 0.12))
+    loops = programme(virgin(recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)]), 0.12))
     found = [100.0 * (loop.softening or 0.0) for loop in loops]
     print("first cycle stiffer by", ", ".join(f"{value:.1f} %" for value in found), "of 12 %")
     assert found == pytest.approx([12.0] * 3, abs=4.0)  # with what a springpot and friction make from rest
@@ -238,28 +229,19 @@ def test_a_softening_in_the_virgin_cycles_of_a_programme_is_diagnosed(paper_mode
     assert share == pytest.approx(0.2, abs=0.02)
 
 
-@pytest.mark.parametrize("case", ["three amplitudes", "pauses", "up and down"])
-def test_what_rubber_remembers_is_no_softening(paper_model: Model, other_models: dict[str, Model], case: str) -> None:
+def test_what_rubber_remembers_is_no_softening(paper_model: Model, other_models: dict[str, Model]) -> None:
     for model in (paper_model, *other_models.values()):
-        assert {loop.softening for loop in programme(recorded(model, *PROGRAMMES[case][0]))} == {None}
+        assert {loop.softening for loop in programme(recorded(model, *PROGRAMMES["up and down"][0]))} == {None}
 
 
-@pytest.mark.parametrize(
-    ("motion", "force", "said"),
-    [
-        (1.5e-3, 820.0, "recorded about a mean displacement of 1.5 mm and a mean force of 820 N; the model knows no"),
-        (0.0, 820.0, "recorded about a mean force of 820 N; the model knows no preload"),
-        (-1.5e-3, 0.0, "recorded about a mean displacement of -1.5 mm; the model knows no preload"),
-    ],
-)
-def test_a_preloaded_loop_is_fitted_about_its_mean(paper_model: Model, motion: float, force: float, said: str) -> None:
+def test_a_preloaded_loop_is_fitted_about_its_mean(paper_model: Model) -> None:
     plan = replace(NOISE, loops=tuple(SimulatedLoop(Direction.AXIAL, x, 0.1) for x in (2e-4, 5e-4, 1e-3)))
     campaign = simulate(paper_model, plan).campaign()
-    loaded = [replace(x, displacement=x.displacement + motion, force=x.force + force) for x in campaign.loops]
+    loaded = [replace(x, displacement=x.displacement + 1.5e-3, force=x.force + 820.0) for x in campaign.loops]
     plain, preloaded = (fit_joint(Data.of(replace(campaign, loops=loops))) for loops in (campaign.loops, loaded))
-    told = [line for line in preloaded.warnings if said in line]
-    print(told[0])
-    assert [line.partition(":")[0] for line in told] == [loop.name for loop in loaded]
+    said = "recorded about a mean displacement of 1.5 mm and a mean force of 820 N; the model knows no"
+    found = [line for line in preloaded.warnings if said in line]
+    assert [line.partition(":")[0] for line in found] == [loop.name for loop in loaded]
     assert not any("preload" in line for line in plain.warnings)
     for name in ("mu", "sigma_fmax", "eps_half"):
         assert preloaded.model.values[name] == pytest.approx(plain.model.values[name], rel=5e-3)
