@@ -175,11 +175,11 @@ def _tell_bushing(options: Options, bushing: Bushing) -> None:
 
 def _tell(options: Options, seen: Inspected) -> None:
     """One line of what a file is, what was assumed, and what is odd."""
-    facts = seen.looked.facts
+    facts = seen.facts
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
     place = seen.file.parent / seen.label
     options.say(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
-    options.warn([f"{seen.label}: {sentence}" for sentence in seen.looked.odd])
+    options.warn([f"{seen.label}: {sentence}" for sentence in seen.odd])
     if seen.assumed:
         options.say(f"  {seen.assumed}")

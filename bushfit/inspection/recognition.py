@@ -91,15 +91,14 @@ def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | Non
         MeasurementError: units of torsion where the user states another direction.
         CampaignError, UnitError, ModelError: sizes that make no specimen.
     """
-    sizes = {key: stated[key] for key in BLOCK_KEYS if key in stated}
-    body = {"name": stated.get("specimen", "coupon")}
+    keys: dict[str, Any] = {"kind": "shear"} | {key: stated[key] for key in BLOCK_KEYS if key in stated}
     if table.motion is STRAINING:
-        if any(map(_TENSILE.search, table.layout.written or [column.header for column in table.roles.values()])):
-            body = {"name": stated.get("specimen", "bar"), "strain": "tension"}
-        return Specimen(**vars(check_tables({**body, "kind": "modulus"}, None, SpecimenTable)))
-    if sizes:
-        return Specimen(**vars(check_tables({**body, **sizes, "kind": "shear"}, None, SpecimenTable)))
-    return direction_of(file, table, stated)
+        headers = table.layout.written or [column.header for column in table.roles.values()]
+        keys = {"kind": "modulus"} | ({"strain": "tension"} if any(map(_TENSILE.search, headers)) else {})
+    elif len(keys) == 1:
+        return direction_of(file, table, stated)
+    name = stated.get("specimen", "bar" if "strain" in keys else "coupon")
+    return Specimen(**vars(check_tables({"name": name, **keys}, None, SpecimenTable)))
 
 
 def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Direction | None:

@@ -11,10 +11,10 @@ from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.data_set import shown_amplitude
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.fitting.sweep_data import SweepData
-from bushfit.inspection.outside import wrong_labels
-from bushfit.inspection.record import Looked, told_frequencies
+from bushfit.inspection.labels import wrong_labels
+from bushfit.inspection.record import Findings, told_frequencies
 from bushfit.reading.measurement import Sweep, loss_factor
-from bushfit.reading.names import Said
+from bushfit.reading.names import Labels
 from bushfit.reading.runs import rows_alike
 from bushfit.reduction.result import MISSED_LEVEL
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
@@ -36,16 +36,14 @@ _LEAST_DRIFT = 5e-3
 _SAME_PHASE_P = 0.05
 #: Step in ln X from one level to the next below which they may be repeats of one; chosen: nobody sets finer levels.
 _LEAST_STEP = 0.02
-#: Share of the blocks of which one has to have a frequency for the others to lack it.
-_USUAL = 0.5
 #: Points or frequencies that are told one by one; chosen: they make a sentence.
 _MOST_LISTED = 4
 #: Levels that are listed one by one; chosen: they make a line.
 _MOST_LEVELS = 8
 
 
-def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
-    """Facts and oddities of a sweep; `named` is what the names of its file and sheet say."""
+def look_at_sweep(sweep: Sweep, labels: Labels) -> Findings:
+    """Facts and oddities of a sweep; `labels` are what the names of its file and sheet say."""
     unit, factor = sweep.direction.display.displacement
     frequencies, levels = np.unique(sweep.frequency), np.unique(sweep.amplitude)
     repeats = np.unique(sweep.repeat)
@@ -59,7 +57,7 @@ def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
     }
     odd = [
         *SweepData(sweep, noise).notes,
-        *wrong_labels(named, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
+        *wrong_labels(labels, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
         *_copies(sweep, noise),
         *_untold_repeats(sweep),
         *_missing(sweep),
@@ -69,7 +67,7 @@ def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
         *_negative(sweep),
         *_doubtful_loss(sweep),
     ]
-    return Looked(facts, tuple(odd))
+    return Findings(facts, tuple(odd))
 
 
 def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
@@ -129,7 +127,7 @@ def _missing(sweep: Sweep) -> Iterator[str]:
     frequencies, column = np.unique(sweep.frequency, return_inverse=True)
     there = np.zeros((len(names), frequencies.size), dtype=bool)
     there[block.ravel(), column] = True
-    usual = there.mean(axis=0) > _USUAL
+    usual = there.mean(axis=0) > 0.5
     for (level, repeat), has in zip(names, there, strict=True):
         absent = frequencies[usual & ~has]
         if absent.size and len(names) > 1:

@@ -65,9 +65,9 @@ def runs_of(
         if repeat is not None:
             turns |= np.diff(repeat) != 0
         passes = np.cumsum(np.append(False, turns))
-        if (of_passes := _of_passes(amplitude, passes)) is None:
+        if _spans(np.log(amplitude), passes).max() >= _WIDEST_PASS:
             return Runs(None, amplitude, passes + 1 if repeat is None else repeat)
-        levels = of_passes
+        levels = nominal(_middle(amplitude, passes))  # every pass over the frequencies nearly keeps to one
         kept_frequency, kept_level = 0.0, 1.0
     of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
     counted = repeat if repeat is not None else _occurrence(frequency, levels)
@@ -133,12 +133,6 @@ def _where_apart(amplitude: Floats, rank: NDArray[np.intp]) -> Floats:
     """The median of the points of each rank, (n,), all of as many; no change where one reaches into the next."""
     levels = np.sort(amplitude[np.argsort(rank)].reshape(rank.max() + 1, -1), axis=1)
     return _middle(amplitude, rank) if (levels[:-1, -1] < levels[1:, 0]).all() else amplitude
-
-
-def _of_passes(amplitude: Floats, passes: NDArray[np.intp]) -> Floats | None:
-    """The level of each amplitude where every pass over the frequencies nearly keeps to one, (n,); else None."""
-    widest = _spans(np.log(amplitude), passes).max()
-    return nominal(_middle(amplitude, passes)) if widest < _WIDEST_PASS else None
 
 
 def rows_alike(*keys: Floats) -> list[NDArray[np.intp]]:

@@ -30,10 +30,8 @@ _POSITIVE = ("frequency", "amplitude", "amplitude_reached", "stiffness", "storag
 _FEWEST_SWEEP_ROWS = 3
 #: Above every number of a repeat; chosen: a larger one is another quantity.
 _MOST_REPEATS = 1_000_000
-#: [-] Loss factor below which no point of a bushing lies; noise may push one below zero.
-_LOWEST_LOSS_FACTOR = -0.5
-#: [-] Loss factor above which no point of a bushing lies; chosen: many times that of the softest rubber.
-_HIGHEST_LOSS_FACTOR = 5.0
+#: [-] Loss factors of a bushing; chosen: noise may push one below zero, and the softest rubber has many times less.
+_LOSS_FACTORS = (-0.5, 5.0)
 #: [-] Loss factor that every rubber exceeds somewhere; chosen: a tenth of what little-damping rubber has.
 LEAST_LOSS_FACTOR = 0.005
 #: Share of the points that are clearly below zero where a loss counts the other way; chosen: noise may lift some, and a
@@ -193,11 +191,12 @@ def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
             expected=f"a loss factor above {LEAST_LOSS_FACTOR / column.scale:g} {column.unit} somewhere",
             hint=f'if these are ratios, write "[-]" for "[{column.unit}]" in the header',
         )
+    least, most = _LOSS_FACTORS
     table.refuse(
-        ~((loss_factor >= _LOWEST_LOSS_FACTOR) & (loss_factor <= _HIGHEST_LOSS_FACTOR)),
+        ~((loss_factor >= least) & (loss_factor <= most)),
         column,
         "no bushing has this loss",
-        f"a loss factor (loss over storage stiffness) from {_LOWEST_LOSS_FACTOR:g} to {_HIGHEST_LOSS_FACTOR:g}",
+        f"a loss factor (loss over storage stiffness) from {least:g} to {most:g}",
         "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]; or is it 90 deg less the loss?",
     )
 

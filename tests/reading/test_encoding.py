@@ -5,20 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from dialects import DIALECTS
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.encoding import detect, to_utf8
 
 FILE = Path("x.csv")
-
-
-@pytest.mark.parametrize("name", [name for name, dialect in DIALECTS.items() if not dialect.bytes().isascii()])
-def test_every_dialect_is_decoded(name: str) -> None:
-    dialect = DIALECTS[name]
-    assert dialect.bytes().decode(detect(dialect.bytes())).removeprefix("\ufeff") == dialect.text()
-    data, _ = to_utf8(dialect.bytes(), FILE)
-    assert data[:] == dialect.text().encode()
 
 
 @pytest.mark.parametrize(
