@@ -10,6 +10,7 @@ import pytest
 
 from bushfit.errors import CampaignError, MeasurementError
 from bushfit.geometry import Direction
+from bushfit.reading.encoding import detect, to_utf8
 from bushfit.reading.files import read_utf8, view_bytes
 from bushfit.reading.loops import read_loop
 
@@ -66,3 +67,27 @@ def test_a_file_that_changes_while_it_is_read(then: int, found: str, tmp_path: P
     (tmp_path / "loop.csv").write_text("time_s,displacement_mm,force_N\n" + "\n" * 9_599_969)
     with pytest.raises(MeasurementError, match=f"file changes while it is read\n  found: {found} bytes\n  try: wait"):
         read_loop(Changing(tmp_path / "loop.csv"), Direction.AXIAL)
+
+
+def test_bytes_tell_their_encoding_unless_it_is_stated() -> None:
+    """What the dialects do not show."""
+    assert detect("Prüfweg\x81".encode("latin-1")) == "latin-1"
+    assert detect("time".encode("utf-16-be")) == "utf-16-be"
+    data = "Prüfweg".encode()
+    assert to_utf8(data, Path("x.csv"), "latin-1") == ("PrÃ¼fweg".encode(), "latin-1")
+    with pytest.raises(MeasurementError, match=r'unknown encoding[\s\S]*"utf-9"'):
+        to_utf8(data, Path("x.csv"), "utf-9")
+
+
+@pytest.mark.parametrize(
+    ("data", "stated", "words"),
+    [
+        (b"time\nforce\0c\n", None, r"x.csv, line 2: this is not text[\s\S]*0x00"),
+        (b"a\0b\0\0c", None, "this is not text"),
+        (b"a\n\nb\xfc\n", "utf-8", r"x.csv, line 3: this is not UTF-8 text[\s\S]*0xfc"),
+        ("a\nb".encode("utf-16")[:-1], None, r"this is not UTF-16 text"),
+    ],
+)
+def test_what_is_no_text_is_named_with_its_line(data: bytes, stated: str | None, words: str) -> None:
+    with pytest.raises(MeasurementError, match=words):
+        to_utf8(data, Path("x.csv"), stated)

@@ -20,24 +20,14 @@ from bushfit.geometry import Direction, Specimen
     "text",
     [
         LOOP,
-        LOOP.rstrip("\n"),
-        LOOP.replace(",", ";"),
-        LOOP.replace(",", "\t"),
-        LOOP.replace("\n", "\r\n"),
         LOOP.replace("\n", "\n\n"),
-        "\ufeff" + LOOP,
         "\ufeff\r\n# rig 3\r\n\n" + LOOP,
-        LOOP.replace("force [N]", "force (N)"),
         LOOP.replace("force [N]", "Force_N").replace("displacement [mm]", "DISPLACEMENT_mm"),
-        LOOP.replace("force [N]", "load [N]").replace("time [s]", "t [s]"),
-        LOOP.replace("time [s],displacement [mm],force [N]", "time,displacement,force\ns,mm,N"),
-        LOOP.replace("time [s],displacement [mm],force [N]", "time [s],displacement,force\n,mm,N"),
+        LOOP.replace("time [s],displacement [mm],force [N]", "t [s],displacement,load\n,mm,N"),
         LOOP.replace("\n", ",ok\n").replace("force [N],ok", "force [N],remark"),
-        "\n".join(",".join(f'"{cell}"' for cell in line.split(",")) for line in LOOP.splitlines()),
-        "\n".join(",".join(reversed(line.split(","))) for line in LOOP.splitlines()),
     ],
 )
-def test_loops_in_every_dialect(text: str, tmp_path: Path) -> None:
+def test_loops_in_forms_that_the_dialects_lack(text: str, tmp_path: Path) -> None:
     loop = loop_from(text, tmp_path, noise=0.01)
     np.testing.assert_allclose(loop.time, TIME, rtol=1e-12)
     np.testing.assert_allclose(loop.displacement, 1e-3 * np.sin(3 * TIME), atol=1e-7)
@@ -97,8 +87,6 @@ def test_a_large_file_reads_like_a_small_one(lead: str, tmp_path: Path) -> None:
 
 #: What is wrong, and what the error says besides what tests/cli/spoiled_tables.py has.
 BAD_LOOPS: list[tuple[str | bytes, list[str]]] = [
-    (LOOP.encode().replace(b"0.3,", b"0.3\0,"), ["line 5", "not text", "0x00"]),
-    (LOOP.encode("utf-16")[:-1], ["UTF-16"]),
     ("x" * 200_000 + ",b\n1,2\n", ["line 1", "no column for the displacement", "xxx ..."]),
     (LOOP.replace("time [s]", "force [kN]"), ["line 1", "more than one", "force [kN], force [N]"]),
     (LOOP.replace("[mm]", "[deg]"), ["line 1", "does not fit", "a length"]),

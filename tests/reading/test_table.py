@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -55,11 +56,25 @@ def test_the_symbol_of_a_stiffness_is_one_by_its_unit(header: str, index: int | 
     assert (column and column.index) == index
 
 
+@pytest.mark.parametrize(
+    ("text", "stated", "line", "headers"),
+    [
+        ("time,force\ntime,displacement,force\n1,2,3\n", {}, 2, ("time", "displacement", "force")),
+        ("time,force\nZeit,Kraft\n1,2\n", {"header_line": 1}, 1, ("time", "force")),
+        ("time;force,x\n1;2,3\n", {"delimiter": "comma"}, 1, ("time;force", "x")),
+        ("x,y\n1,2\n2,3\n3,4\n", {}, 1, ("x", "y")),
+    ],
+)
+def test_the_header_names_most_columns_unless_it_is_stated(
+    text: str, stated: dict[str, Any], line: int, headers: tuple[str, ...], tmp_path: Path
+) -> None:
+    found = opened(text, tmp_path, stated=FileFormat(**stated)).layout
+    assert (found.header_line, found.headers) == (line, headers)
+
+
 def test_a_header_line_that_is_stated_has_to_hold_a_header(tmp_path: Path) -> None:
-    text = "time [s],displacement [mm],force [kN]\n" + LOOP
-    assert opened(text, tmp_path, stated=FileFormat(header_line=2)).column("force", "N").scale == 1.0
     with pytest.raises(MeasurementError, match=r"no header on this line[\s\S]*header_line = 99"):
-        opened(text, tmp_path, stated=FileFormat(header_line=99))
+        opened(LOOP, tmp_path, stated=FileFormat(header_line=99))
 
 
 def test_a_column_that_is_not_there_suggests_the_nearest_if_any_and_has_an_error_of_its_own(tmp_path: Path) -> None:
