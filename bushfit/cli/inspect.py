@@ -47,7 +47,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
 
     Writes inspect.png, and inspect_2.png and so on of more than five files.
     """
-    from bushfit.inspection.draft import named_apart, pasted_text
+    from bushfit.inspection.draft import pasted_text, with_specimens_named
     from bushfit.inspection.gathering import gather, with_contradictions
 
     folder = options.folder(files[0].stem)
@@ -69,7 +69,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     for alone, beside in zip(seen, together := with_contradictions(seen), strict=True):
         for sentence in beside.odd[len(alone.odd) :]:
             options.console.print(f"[yellow]odd:[/yellow] {escape(beside.label)}: {escape(sentence)}")
-    seen = named_apart(together)
+    seen = with_specimens_named(together)
     text = pasted_text(seen)
     if not options.as_json:
         click.echo(text, nl=False)

@@ -58,17 +58,17 @@ def campaigns_of_parts(
     return texts
 
 
-def named_apart(files: Sequence[Inspected]) -> list[Inspected]:
+def with_specimens_named(files: Sequence[Inspected]) -> list[Inspected]:
     """Files that were inspected, with specimens that differ under names that differ: coupon, coupon_2 and so on."""
-    apart: dict[Specimen, Specimen] = {}
+    named: dict[Specimen, Specimen] = {}
     for body in (seen.direction for seen in files):
-        if isinstance(body, Specimen) and body not in apart:
-            taken = {other.name for other in apart.values()}
+        if isinstance(body, Specimen) and body not in named:
+            taken = {other.name for other in named.values()}
             names = chain([body.name], (f"{body.name}_{number}" for number in count(2)))
-            apart[body] = replace(body, name=next(name for name in names if name not in taken))
+            named[body] = replace(body, name=next(name for name in names if name not in taken))
     return [
         replace(seen, direction=body, entry={**seen.entry, "specimen": body.name})
-        if isinstance(seen.direction, Specimen) and (body := apart[seen.direction])
+        if isinstance(seen.direction, Specimen) and (body := named[seen.direction])
         else seen
         for seen in files
     ]

@@ -95,9 +95,9 @@ def with_contradictions(files: Sequence[Inspected]) -> list[Inspected]:
     """Files that were inspected, each with a sentence more where another one of the same part, in the same direction,
     contradicts it."""
     beside: dict[int, str] = {}
-    told = [seen for seen in files if seen.direction is not None and seen.kind != "history"]
-    for part in dict.fromkeys(seen.part for seen in told):
-        tests = [seen.measured for seen in told if seen.part == part]
+    placed = [seen for seen in files if seen.direction is not None and seen.kind != "history"]
+    for part in dict.fromkeys(seen.part for seen in placed):
+        tests = [seen.measured for seen in placed if seen.part == part]
         loops = [test for test in tests if isinstance(test, Loop)]
         sweeps = [test for test in tests if isinstance(test, Sweep)]
         data_sets = [*(loop_data(loops) if len(loops) > 1 else ()), *(sweep_data(sweeps) if len(sweeps) > 1 else ())]
@@ -115,7 +115,7 @@ def _by_rows(source: Source) -> tuple[list[Source], list[str]]:
     own = {key: value for key, value in stated.items() if key not in ("direction", "specimen_number")}
     try:
         table, _ = recognised(source.file, own)
-        columns = dict(table.labels)
+        columns = dict(table.row_labels)
         if "run" in columns and "time" in table.roles:
             time = table.read({"time": table.roles["time"]}, fewest_rows=1)["time"]
             if np.all(np.diff(time) > 0.0):

@@ -169,7 +169,7 @@ def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
     wanted = {role: column for role, column in table.roles.items() if role in ranged}
     values = table.read(wanted, fewest_rows=1)  # the scales of `roles` are 1: not in SI
     columns = [ColumnSeen(header, None, None) for header in table.headers]
-    for key, (index, _) in table.labels.items():
+    for key, (index, _) in table.row_labels.items():
         columns[index] = ColumnSeen(table.headers[index], key.replace("_", " "), None)
     for role, column in table.roles.items():
         low, high = (float(values[role].min()), float(values[role].max())) if role in values else (None, None)

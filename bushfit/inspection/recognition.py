@@ -109,15 +109,15 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     headers = table.layout.written or table.headers
-    told = dict.fromkeys(table.labels.get("direction", (0, ()))[1])
+    in_column = dict.fromkeys(table.row_labels.get("direction", (0, ()))[1])
     named = direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
-    found = Direction(*told) if len(told) == 1 else named
+    found = Direction(*in_column) if len(in_column) == 1 else named
     if "direction" not in stated:
-        if len(told) > 1:
+        if len(in_column) > 1:
             problem, hint = "this file holds tests in several directions", "state one: --direction axial"
-            raise table.header_error(problem, found=", ".join(told), expected="one direction", hint=hint)
+            raise table.header_error(problem, found=", ".join(in_column), expected="one direction", hint=hint)
         return found
-    if found and found != stated["direction"] and len(told) < 2:
+    if found and found != stated["direction"] and len(in_column) < 2:
         raise table.header_error(
             f"{'the units say' if turns else 'the file says'} {found}, and --direction {stated['direction']}",
             found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),

@@ -117,9 +117,9 @@ class Inspected:
     def label(self) -> str:
         """The name of the file, with the sheet where it has several, and with what columns tell of the test."""
         direction = self.direction if "direction" in [one.role for one in self.columns] else None
-        told = {"sheet": self.entry.get("sheet"), "direction": direction, "part": self.part}
-        told |= self.entry.get("rows", {})
-        return ", ".join([self.file.name, *(f"{key} {value}" for key, value in told.items() if value)])
+        added = {"sheet": self.entry.get("sheet"), "direction": direction, "part": self.part}
+        added |= self.entry.get("rows", {})
+        return ", ".join([self.file.name, *(f"{key} {value}" for key, value in added.items() if value)])
 
     @property
     def part(self) -> str | None:

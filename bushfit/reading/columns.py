@@ -85,7 +85,7 @@ class Columns:
             raise self.error("the table cannot be read", found=str(error)) from error
 
     @cached_property
-    def labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
+    def row_labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
         """Index and texts, (n,), of columns that tell direction, specimen_number and run; directions by their names."""
         found: dict[str, tuple[int, Sequence[str]]] = {}
         for index, header in enumerate(self.headers):
@@ -104,20 +104,20 @@ class Columns:
             MeasurementError: no such row or column, rows of several parts, or tests that no column tells apart.
         """
         stated = {"direction": wanted.direction, "specimen_number": wanted.specimen_number}
-        told = [(*self.labels[key], text) for key, text in stated.items() if text and key in self.labels]
+        chosen = [(*self.row_labels[key], text) for key, text in stated.items() if text and key in self.row_labels]
         for header, text in wanted.texts.items():
             if header not in self.headers:
                 raise self.header_error(f'there is no column "{header}"', expected="headers, as keys of rows")
-            told.append((self.headers.index(header), self.texts(self.headers.index(header)), text))
-        if wanted.shared and not told:
+            chosen.append((self.headers.index(header), self.texts(self.headers.index(header)), text))
+        if wanted.shared and not chosen:
             expected = "each file once, or a column that tells its tests apart"
             raise self.header_error("a file is listed twice", expected=expected)
-        column, parts = self.labels.get("specimen_number", (0, ()))
-        rows = [line for line, _ in self.rows()] if told or parts else []
-        kept = [n for n in range(len(rows)) if all(same_text(texts[n], text) for _, texts, text in told)]
+        column, parts = self.row_labels.get("specimen_number", (0, ()))
+        rows = [line for line, _ in self.rows()] if chosen or parts else []
+        kept = [n for n in range(len(rows)) if all(same_text(texts[n], text) for _, texts, text in chosen)]
         several = len({parts[n] for n in kept}) > 1 if parts else False
-        if several or (told and not kept):
-            found = [(column, parts, "one part")] if several else told
+        if several or (chosen and not kept):
+            found = [(column, parts, "one part")] if several else chosen
             raise self.header_error(
                 "this file holds tests of several parts" if several else "no row is of this test",
                 found="; ".join(
@@ -135,7 +135,7 @@ class Columns:
         a text that goes with one of them names it. Of a loop, numbers are channels.
         """
         known = {column.index for column in self.roles.values()}
-        known |= {index for key, (index, texts) in self.labels.items() if key != "direction" or len({*texts}) == 1}
+        known |= {index for key, (index, texts) in self.row_labels.items() if key != "direction" or len({*texts}) == 1}
         for index in (index for index in range(len(self.headers)) if index not in known):
             is_number, header = self.holds_numbers(index), self.headers[index]
             if (is_number and not settled) or not (texts := self._parting(index)):

@@ -74,8 +74,8 @@ def runs_of(
     if stepped is None:
         by_order: Stepped = "amplitude" if kept_frequency > kept_level else "frequency"
         in_order = max(kept_frequency, kept_level) >= _IN_ORDER
-        told = in_order and (of_level if by_order == "amplitude" else of_frequency) >= _FEWEST_STEPS
-        stepped = by_order if told else "amplitude" if of_level > of_frequency else "frequency"
+        order_tells = in_order and (of_level if by_order == "amplitude" else of_frequency) >= _FEWEST_STEPS
+        stepped = by_order if order_tells else "amplitude" if of_level > of_frequency else "frequency"
     return Runs(stepped, levels, counted)
 
 

@@ -136,7 +136,7 @@ class Sheet:
 
     sheet: str
     content: Sequence[Sequence[str | float]]
-    lacks_values: Callable[[], bool] = bool
+    lacks_values: Callable[[], bool] = lambda: False
     encoding: None = None
 
     def head(self) -> list[Line]:

@@ -163,9 +163,10 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Ma
     optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
     optional = [role for role in optional if role != "repeat" or table.holds_numbers(table.roles[role].index)]
     optional += ["temperature"] if degrees and degrees.unit else []
-    again = [role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other]
-    again = [role for role in again if units[role] == "1" or table.agrees(role, units[role])]
-    found = {role: table.column(role, units[role], _HINTS.get(role)) for role in (*needed, *pair, *optional, *again)}
+    other_pairs = [role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other]
+    other_pairs = [role for role in other_pairs if units[role] == "1" or table.agrees(role, units[role])]
+    wanted = (*needed, *pair, *optional, *other_pairs)
+    found = {role: table.column(role, units[role], _HINTS.get(role)) for role in wanted}
     for role in ("amplitude", "amplitude_reached"):
         if role in found:
             found[role] = replace(found[role], scale=stated_strain(direction) * found[role].scale)
@@ -206,11 +207,11 @@ def _check_agreement(table: Table, pair: tuple[str, str], values: Mapping[str, F
     for other in STIFFNESS_PAIRS:
         if other == pair or not set(other) <= set(values):
             continue
-        again, _ = _complex_stiffness(other, values)
-        apart = np.hypot(again.real - stiffness.real, np.abs(again.imag) - np.abs(stiffness.imag))
+        said, _ = _complex_stiffness(other, values)
+        distance = np.hypot(said.real - stiffness.real, np.abs(said.imag) - np.abs(stiffness.imag))
         own, others = (" and ".join(f'"{table.roles[role].header}"' for role in both) for both in (pair, other))
         table.refuse(
-            ~(apart <= _AGREEMENT * np.abs(stiffness)),
+            ~(distance <= _AGREEMENT * np.abs(stiffness)),
             table.roles[other[1] if other[0] == pair[0] else other[0]],
             "the columns contradict each other",
             f"the complex stiffness of {own}, within {100 * _AGREEMENT:g} %, in {others}",

@@ -79,7 +79,7 @@ _Row = tuple[int, list[str | float]]
 
 
 @dataclass(frozen=True, eq=False)
-class _Unfolded(Sheet):
+class _LongTable(Sheet):
     """The rows of a wide table as those of a long one, each with the line of the wide one it comes from (`numbers`)."""
 
     numbers: Sequence[int] = ()
@@ -272,7 +272,7 @@ def _as_long_table(
         for points in zip(*(column.points for column in beside), strict=True):
             numbers.append(points[0][0])
             rows.append([points[0][1], level, *(cell for _, _, cell in points)])
-    sheet = _Unfolded(source.sheet or "", rows, numbers=numbers)
+    sheet = _LongTable(source.sheet or "", rows, numbers=numbers)
     return sheet, Layout(delimiter, tuple(headers), min(numbers) - 1, ("",) * len(headers), None)
 
 
