@@ -71,8 +71,8 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
             files = [Source(path)]
         found: list[Source] = []
         for file in files:
-            parts = stated_of_each(_parts(file, stated), stated)
-            tests, others = _tests(parts) if len(parts) > 1 or not file.is_named else (parts, [])
+            parts = stated_of_each(_sheets_of(file, stated), stated)
+            tests, others = _holding_tests(parts) if len(parts) > 1 or not file.is_named else (parts, [])
             if not tests and file.is_named:  # the error of the whole file says why
                 tests, others = stated_of_each([file], stated), []
             found += tests
@@ -86,7 +86,7 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
                 hint="bushfit inspect FILE says what it makes of one",
             )
         sources += found
-    by_rows = [_by_rows(source) for source in stated_of_each(sources, stated)]
+    by_rows = [_tests_by_rows(source) for source in stated_of_each(sources, stated)]
     left_out += [sentence for _, others in by_rows for sentence in others]
     return [test for tests, _ in by_rows for test in tests], tuple(left_out)
 
@@ -106,7 +106,7 @@ def with_contradictions(files: Sequence[Inspected]) -> list[Inspected]:
     return [replace(seen, odd=(*seen.odd, *more)) for seen, more in zip(files, odd, strict=True)]
 
 
-def _by_rows(source: Source) -> tuple[list[Source], list[str]]:
+def _tests_by_rows(source: Source) -> tuple[list[Source], list[str]]:
     """The tests of a file that its columns tell apart, by direction, part and run, and which rows are left out.
 
     The runs of a sweep are repeats; so are tests those of a loop alone, where time does not go on from one to the next.
@@ -181,7 +181,7 @@ def _in_folder(folder: Path) -> tuple[list[Source], list[str]]:
     return files, left_out
 
 
-def _parts(source: Source, stated: Mapping[str, Any]) -> list[Source]:
+def _sheets_of(source: Source, stated: Mapping[str, Any]) -> list[Source]:
     """The sheets of a workbook with several of which the user states none; else the file itself."""
     if stated.get("sheet"):
         return [source]
@@ -192,7 +192,7 @@ def _parts(source: Source, stated: Mapping[str, Any]) -> list[Source]:
     return [replace(source, sheet=name) for name in names] if len(names) > 1 else [source]
 
 
-def _tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
+def _holding_tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
     """Those of some sheets, or of one file, that hold a test or might, and why the others do not."""
     tests: list[Source] = []
     left_out: list[str] = []

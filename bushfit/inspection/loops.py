@@ -67,7 +67,7 @@ def look_at_loop(loop: Loop, labels: Labels) -> Findings:
         *odd_channels(loop),
         *drive.notes,
         *_changing(drive),
-        *_crawling(drive),
+        *_too_slow(drive),
     ]
     if _OFF_ZERO * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and drive.datum is not None:
         odd.append(
@@ -104,7 +104,7 @@ def look_at_history(history: Loop, labels: Labels) -> Findings:
     return Findings(facts, odd)
 
 
-def _crawling(drive: Drive) -> Iterator[str]:
+def _too_slow(drive: Drive) -> Iterator[str]:
     """A sentence on a loop that takes longer than any laboratory waits, and on what the file may say instead."""
     if drive.frequency * _LONGEST_CYCLE < 1.0:
         mistakes = [mistake for mistake in MISTAKES.values() if mistake.time < 1.0]

@@ -19,8 +19,6 @@ from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, of_motion
 from bushfit.validation import check_tables
 
-#: What an error says besides its problem.
-_PARTS = ("file", "place", "found", "expected", "hint")
 #: Sizes of a block in shear, as [[specimens]] has them.
 BLOCK_KEYS = ("area", "thickness", "elements")
 #: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
@@ -51,8 +49,7 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
             return table, is_sweep
     _refuse_resonance(file, stated)
     if not opened:
-        reason = failed[0][1]
-        raise NoTestError(reason.problem, **{key: getattr(reason, key) for key in _PARTS})
+        raise NoTestError(**vars(failed[0][1]))
     best, is_sweep = max(opened, key=lambda one: len(one[0].roles))
     for usual, failure in failed:
         if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):

@@ -60,11 +60,11 @@ def look_at_sweep(sweep: Sweep, labels: Labels) -> Findings:
         *wrong_labels(labels, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
         *_copies(sweep, noise),
         *_untold_repeats(sweep),
-        *_missing(sweep),
+        *_missing_frequencies(sweep),
         *_outliers(sweep, noise),
         *_odd_blocks(sweep),
-        *_missed(sweep),
-        *_negative(sweep),
+        *_missed_level(sweep),
+        *_negative_loss(sweep),
         *_doubtful_loss(sweep),
     ]
     return Findings(facts, tuple(odd))
@@ -120,7 +120,7 @@ def _untold_repeats(sweep: Sweep) -> Iterator[str]:
         )
 
 
-def _missing(sweep: Sweep) -> Iterator[str]:
+def _missing_frequencies(sweep: Sweep) -> Iterator[str]:
     """A sentence for each block, a repeat of a level, that lacks frequencies which most others have."""
     blocks = np.stack((sweep.amplitude, sweep.repeat.astype(float)), axis=1)
     names, block = np.unique(blocks, axis=0, return_inverse=True)
@@ -195,7 +195,7 @@ def _odd_blocks(sweep: Sweep) -> Iterator[str]:
             )
 
 
-def _missed(sweep: Sweep) -> Iterator[str]:
+def _missed_level(sweep: Sweep) -> Iterator[str]:
     """A sentence on the point that missed the amplitude of its level by most."""
     off = sweep.amplitude_reached / sweep.amplitude - 1.0
     row = int(np.argmax(np.abs(off)))
@@ -207,7 +207,7 @@ def _missed(sweep: Sweep) -> Iterator[str]:
         yield f"{reached} was reached where the level is {level} ({sweep.frequency[row]:.4g} Hz)"
 
 
-def _negative(sweep: Sweep) -> Iterator[str]:
+def _negative_loss(sweep: Sweep) -> Iterator[str]:
     """A sentence on points whose loss factor is below zero."""
     bad = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if bad.size:

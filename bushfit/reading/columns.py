@@ -90,7 +90,7 @@ class Columns:
         found: dict[str, tuple[int, Sequence[str]]] = {}
         for index, header in enumerate(self.headers):
             heading = _LABELS.heading(header)
-            if heading and heading.role not in found and (texts := self._parting(index)):
+            if heading and heading.role not in found and (texts := self._texts_that_part_tests(index)):
                 if heading.role == "direction":
                     known = {text: named_direction([text], short=True) for text in set(texts)}
                     texts = [str(known[text] or text) for text in texts] if any(known.values()) else []
@@ -138,7 +138,7 @@ class Columns:
         known |= {index for key, (index, texts) in self.row_labels.items() if key != "direction" or len({*texts}) == 1}
         for index in (index for index in range(len(self.headers)) if index not in known):
             is_number, header = self.holds_numbers(index), self.headers[index]
-            if (is_number and not settled) or not (texts := self._parting(index)):
+            if (is_number and not settled) or not (texts := self._texts_that_part_tests(index)):
                 continue
             own = np.array(texts)[slice(None) if rows is None else rows]
             values, place, counts = np.unique(own, return_inverse=True, return_counts=True)
@@ -165,7 +165,7 @@ class Columns:
             found.append(last)
         return found
 
-    def _parting(self, index: int) -> list[str]:
+    def _texts_that_part_tests(self, index: int) -> list[str]:
         """The texts of a column without a role that may part tests; else none."""
         if self.layout.written or index in {column.index for column in self.roles.values()}:
             return []

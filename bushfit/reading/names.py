@@ -172,13 +172,13 @@ def _label_above(line: Line) -> Labels:
         stated: dict[str, Any] = {key: cells[1]} if len(cells[1]) <= _LONGEST_VALUE else {}
         return Labels(**stated)
     for value in values:
-        if key == "temperature" and _is(value, "K"):
+        if key == "temperature" and _is_quantity(value, "K"):
             return Labels(temperature=value)
-        if key == "preload" and (_is(value, "m") or _is(value, "N")):
+        if key == "preload" and (_is_quantity(value, "m") or _is_quantity(value, "N")):
             return Labels(preload=value)
         heading = _VOCABULARY.heading(cells[0])
         if heading and heading.role in ("frequency", "amplitude") and not key:
-            found = [unit for unit in ("Hz", "m", "rad", "1") if _is(value, unit) and value[0].isdigit()]
+            found = [unit for unit in ("Hz", "m", "rad", "1") if _is_quantity(value, unit) and value[0].isdigit()]
             if found and (found[0] == "Hz") == (heading.role == "frequency"):
                 return Labels((Quantity(value, value.split()[-1], True, heading.convention),))
     return Labels()
@@ -194,7 +194,7 @@ def _cells(line: Line) -> Sequence[str]:
     return [cell.strip(' "') for cell in cells if cell.strip(' "')]
 
 
-def _is(text: str, expected: str) -> bool:
+def _is_quantity(text: str, expected: str) -> bool:
     """Whether a text is a quantity of the dimension of an SI unit."""
     try:
         units.temperature(text) if expected == "K" else units.quantity(text, expected)

@@ -115,8 +115,8 @@ class Text:
 
     def _offset(self, after: int) -> int:
         """Index of the first byte after a line of the head."""
-        ends = [end.end() for end in islice(_LINE_END.finditer(self.data), after)]
-        return 0 if after == 0 else ends[-1] if len(ends) == after else len(self.data)
+        ends = [0, *(end.end() for end in islice(_LINE_END.finditer(self.data), after))]
+        return ends[after] if len(ends) > after else len(self.data)
 
 
 def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:

@@ -189,7 +189,7 @@ def _read_heading(text: str, vocabulary: Vocabulary) -> _WideHeading:
     heading = vocabulary.heading(text)
     glued = _LEVEL.fullmatch((heading and heading.unit) or "")  # "tan delta 1 %" is at a level, and no unit of 1 %
     if heading and not (glued and _stepped_in(glued["unit"])) and units.is_unit(heading.unit or "1"):
-        return _named(heading)
+        return _of_role(heading)
     if text and units.is_unit(bare := whole.strip("[]() ")):
         return _WideHeading(unit=bare, convention=convention)
     if not (found := _LEVEL.search(whole)):
@@ -204,14 +204,14 @@ def _read_heading(text: str, vocabulary: Vocabulary) -> _WideHeading:
     if not rest:
         return level
     if heading := vocabulary.heading(rest):
-        return level.filled_by(_named(heading)._replace(convention=convention))
+        return level.filled_by(_of_role(heading)._replace(convention=convention))
     bare = rest.strip("[]() ")
     if unit or not _stepped_in(bare):
         return _WideHeading()
     return level._replace(level_unit=bare, stepped=_stepped_in(bare))
 
 
-def _named(heading: Heading) -> _WideHeading:
+def _of_role(heading: Heading) -> _WideHeading:
     """What a header says that names a role."""
     if heading.role in _STEPPED:
         return _WideHeading(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
