@@ -94,16 +94,18 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
 def with_contradictions(files: Sequence[Inspected]) -> list[Inspected]:
     """Files that were inspected, each with a sentence more where another one of the same part, in the same direction,
     contradicts it."""
-    beside: dict[int, str] = {}
+    contradictions: dict[int, str] = {}
     placed = [seen for seen in files if seen.direction is not None and seen.kind != "history"]
     for part in dict.fromkeys(seen.part for seen in placed):
         tests = [seen.measured for seen in placed if seen.part == part]
         loops = [test for test in tests if isinstance(test, Loop)]
         sweeps = [test for test in tests if isinstance(test, Sweep)]
         data_sets = [*(loop_data(loops) if len(loops) > 1 else ()), *(sweep_data(sweeps) if len(sweeps) > 1 else ())]
-        beside |= {id(one.test): one.beside for one in data_sets if one.beside}
-    odd = [[beside[id(seen.measured)]] if id(seen.measured) in beside else [] for seen in files]
-    return [replace(seen, odd=(*seen.odd, *more)) for seen, more in zip(files, odd, strict=True)]
+        contradictions |= {id(one.test): one.beside for one in data_sets if one.beside}
+    return [
+        replace(seen, odd=(*seen.odd, said)) if (said := contradictions.get(id(seen.measured))) else seen
+        for seen in files
+    ]
 
 
 def _tests_by_rows(source: Source) -> tuple[list[Source], list[str]]:
