@@ -35,14 +35,6 @@ CELSIUS = 273.15
 _TEMPERATURES: dict[str, tuple[float, float]] = {
     word: (scale, zero) for words, (scale, zero) in _WORDS["temperatures"].items() for word in words.split()
 }
-#: Times below this many seconds are written in milliseconds.
-_LEAST_IN_SECONDS = 0.1
-#: Lengths below this many millimeters are written in micrometers.
-_LEAST_IN_MILLIMETERS = 1e-3
-#: Stresses take a prefix from this many of the larger unit on: 0.2 MPa, not 200 kPa.
-_LEAST_STRESS = 0.1
-#: Forces take a prefix from this many of the larger unit on: 9000 N, but 12 kN.
-_LEAST_FORCE = 10.0
 #: Numbers from this size on are written without an exponent: 0.0001, but 9e-5.
 _LEAST_PLAIN = 1e-4
 #: Numbers below this size are written without an exponent: 9999999, but 1e7.
@@ -157,11 +149,11 @@ def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:
     """Unit and factor from SI in which people read numbers of that size in SI: MPa for 1.09e6 Pa, kPa for 1.46e4 Pa."""
     unit, factor = _WRITTEN.get(unit, (unit, factor))
     number = abs(size) * factor
-    if unit == "mm" and 0.0 < number < _LEAST_IN_MILLIMETERS:
+    if unit == "mm" and 0.0 < number < 1e-3:
         return "um", 1e3 * factor
     if unit == "s":
-        return ("ms", 1e3) if number < _LEAST_IN_SECONDS else (unit, factor)
-    least = _LEAST_STRESS if unit.startswith("Pa") else _LEAST_FORCE
+        return ("ms", 1e3) if number < 0.1 else (unit, factor)
+    least = 0.1 if unit.startswith("Pa") else 10.0  # 0.2 MPa and not 200 kPa, but 9000 N and not 9 kN
     for prefix, power in (("M", 1e6), ("k", 1e3)):
         if unit.startswith(("P", "N")) and number >= least * power:
             return prefix + unit, factor / power

@@ -40,14 +40,14 @@ def command(
     Writes campaign.toml, or -o my_bushing.toml; of several parts a campaign each, and batch.toml, their list.
     """
     from bushfit.geometry import Specimen
-    from bushfit.inspection.draft import campaign_text, campaigns_of_parts, named_apart
+    from bushfit.inspection.draft import campaign_text, campaigns_of_parts, with_specimens_named
 
     name = name or (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
     folder, target = _place(options, name)
     bushing = _bushing(name, sizes) if any(sizes.values()) else None
     options.require_free(folder, [target])
     seen, left_out = _usable(files, stated, is_sized=bushing is not None)
-    seen = named_apart(seen)
+    seen = with_specimens_named(seen)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
         bushing = _bushing(name, sizes)
     table = bushing and bushing[1]
@@ -175,11 +175,11 @@ def _tell_bushing(options: Options, bushing: Bushing) -> None:
 
 def _tell(options: Options, seen: Inspected) -> None:
     """One line of what a file is, what was assumed, and what is odd."""
-    facts = seen.looked.facts
+    facts = seen.facts
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
     place = seen.file.parent / seen.label
     options.say(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
-    options.warn([f"{seen.label}: {sentence}" for sentence in seen.looked.odd])
+    options.warn([f"{seen.label}: {sentence}" for sentence in seen.odd])
     if seen.assumed:
         options.say(f"  {seen.assumed}")

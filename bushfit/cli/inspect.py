@@ -47,7 +47,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
 
     Writes inspect.png, and inspect_2.png and so on of more than five files.
     """
-    from bushfit.inspection.draft import named_apart, pasted_text
+    from bushfit.inspection.draft import pasted_text, with_specimens_named
     from bushfit.inspection.gathering import gather, with_contradictions
 
     folder = options.folder(files[0].stem)
@@ -67,9 +67,9 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         else:
             tell(options, seen[-1])
     for alone, beside in zip(seen, together := with_contradictions(seen), strict=True):
-        for sentence in beside.looked.odd[len(alone.looked.odd) :]:
+        for sentence in beside.odd[len(alone.odd) :]:
             options.console.print(f"[yellow]odd:[/yellow] {escape(beside.label)}: {escape(sentence)}")
-    seen = named_apart(together)
+    seen = with_specimens_named(together)
     text = pasted_text(seen)
     if not options.as_json:
         click.echo(text, nl=False)
@@ -104,13 +104,13 @@ def tell(options: Options, seen: Inspected) -> None:
         ends = ("" if end is None else f"{end:.6g}" for end in (column.low, column.high))
         table.add_row(escape(column.header), column.role or "(not needed)", escape(column.unit or ""), *ends)
     console.print(table)
-    for label, value in {"written with": written, **seen.looked.facts}.items():
+    for label, value in {"written with": written, **seen.facts}.items():
         options.say(f"  {label}: {value}")
     if seen.assumed:
         options.say(f"  {seen.assumed}")
-    for sentence in seen.looked.odd:
+    for sentence in seen.odd:
         console.print(f"  [yellow]odd:[/yellow] {escape(sentence)}")
-    if not seen.looked.odd:
+    if not seen.odd:
         console.print("  nothing odd")
 
 

@@ -13,8 +13,6 @@ from bushfit.units import number
 _GAP_STEPS = 5.0
 #: Widest steps of an uneven clock that make a gap; chosen: rows kept at random leave no such holes.
 _GAP_WIDEST_STEPS = 3.0
-#: Quantile of the steps of a clock that counts as the widest one, gaps aside.
-_WIDEST_QUANTILE = 0.99
 #: Share of its usual step by which the steps of an even clock differ; chosen: times are rounded in files.
 _EVEN_CLOCK = 0.02
 #: Rows that a stuck recorder repeats; chosen: a converter repeats fewer where the motion turns.
@@ -25,18 +23,12 @@ _STUCK_MOTION = 0.02
 _FLAT_ROWS = 8
 #: Such rows to one that lies just below the extreme; chosen: a top that is not cut off has more of the latter.
 _FLAT_RATIO = 5.0
-#: Share of the range within which values are equal: rounding of floats.
-_EQUAL = 1e-9
 #: Share of the range within which values lie just below the extreme, or else one step of the converter.
 _JUST_BELOW = 2e-3
-#: Steps of the converter that count as one: rounding of floats.
-_ONE_STEP = 1.01
-#: Outliers that are told one by one; chosen: they make a sentence.
-_MOST_LISTED = 3
 
 
-def clock(history: Loop) -> str:
-    """How the rows of a record lie in time, in words."""
+def sampling(history: Loop) -> str:
+    """How the rows of a record lie in time, in words: "even, every 0.01 s"."""
     steps = np.diff(history.time)
     usual = float(np.median(steps))
     if np.ptp(steps) < _EVEN_CLOCK * usual:
@@ -72,7 +64,8 @@ def odd_channels(history: Loop) -> Iterator[str]:
 def _gaps(motion: Channel, time: Floats, *, timed: bool) -> Iterator[str]:
     """A sentence on gaps in a recorded time; in a file without it, only the motion tells of them."""
     steps = np.diff(time) if timed else np.abs(np.diff(motion.values))
-    wide = steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * np.quantile(steps, _WIDEST_QUANTILE))
+    widest = np.quantile(steps, 0.99)  # gaps left out
+    wide = steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * widest)
     if not timed:
         outliers = lone_outliers(time, motion.values)
         wide &= (steps > least_prominence(motion.values)) & ~(outliers[1:] | outliers[:-1])
@@ -106,12 +99,13 @@ def _stuck(motion: Channel, force: Channel) -> Iterator[str]:
 def _cut_off(channel: Channel) -> Iterator[str]:
     """A sentence on each end of its range at which a channel is cut off."""
     values, span = channel.values, float(np.ptp(channel.values))
+    rounding = 1e-9 * span
     steps = np.abs(np.diff(values))
-    finest = float(steps[steps > _EQUAL * span].min(initial=span))
-    width = max(_ONE_STEP * finest, _JUST_BELOW * span)
+    finest = float(steps[steps > rounding].min(initial=span))
+    width = max(1.01 * finest, _JUST_BELOW * span)  # one step of the converter, rounded
     for side, row in (("top", int(np.argmax(values))), ("bottom", int(np.argmin(values)))):
         depth = np.abs(values - values[row])
-        same = int(np.count_nonzero(depth <= _EQUAL * span))
+        same = int(np.count_nonzero(depth <= rounding))
         below = int(np.count_nonzero(depth <= width)) - same
         if same >= _FLAT_ROWS and same >= _FLAT_RATIO * below:
             yield (
@@ -127,8 +121,8 @@ def _outliers(channel: Channel, time: Floats) -> Iterator[str]:
         listed = ", ".join(
             f"data row {row + 1} ({channel.shown(row)} {channel.unit} between {channel.shown(row - 1)} and "
             f"{channel.shown(row + 1)})"
-            for row in rows[:_MOST_LISTED]
+            for row in rows[:3]
         )
-        more = f" and {rows.size - _MOST_LISTED} more" if rows.size > _MOST_LISTED else ""
+        more = f" and {rows.size - 3} more" if rows.size > 3 else ""
         outlier = "outliers" if rows.size > 1 else "an outlier"
         yield f"the {channel.name} has {outlier} at {listed}{more}"

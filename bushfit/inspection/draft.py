@@ -24,7 +24,7 @@ def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[
     The name is that of the bushing, too, of which `bushing` has the other keys, quantities as texts; None where
     specimens alone were tested. Loops and sweeps are named from the folder where the campaign will lie.
     """
-    head = _lines({"name": name, **(bushing or {})})
+    head = _key_lines({"name": name, **(bushing or {})})
     order = [seen for kind in _TABLES for seen in files if seen.kind == kind]
     tables = [*_specimens(files), *(file_text(seen, folder) for seen in order)]
     return "\n".join([*(["[bushing]"] if bushing else []), *head, "", *tables])
@@ -53,22 +53,22 @@ def campaigns_of_parts(
         file = f"{number}_{file}" if file.casefold() in map(str.casefold, texts) else file
         tests = [seen for own, seen in zip(of_parts, files, strict=True) if own == part]
         texts[file] = campaign_text(f"{name} {part}", bushing, tests, folder)
-        entry = _lines({"campaign": file, "name": f"{name} {part}"})
+        entry = _key_lines({"campaign": file, "name": f"{name} {part}"})
         texts[listed_in] += "\n".join(["", "[[bushings]]", *entry, ""])
     return texts
 
 
-def named_apart(files: Sequence[Inspected]) -> list[Inspected]:
+def with_specimens_named(files: Sequence[Inspected]) -> list[Inspected]:
     """Files that were inspected, with specimens that differ under names that differ: coupon, coupon_2 and so on."""
-    apart: dict[Specimen, Specimen] = {}
+    named: dict[Specimen, Specimen] = {}
     for body in (seen.direction for seen in files):
-        if isinstance(body, Specimen) and body not in apart:
-            taken = {other.name for other in apart.values()}
+        if isinstance(body, Specimen) and body not in named:
+            taken = {other.name for other in named.values()}
             names = chain([body.name], (f"{body.name}_{number}" for number in count(2)))
-            apart[body] = replace(body, name=next(name for name in names if name not in taken))
+            named[body] = replace(body, name=next(name for name in names if name not in taken))
     return [
         replace(seen, direction=body, entry={**seen.entry, "specimen": body.name})
-        if isinstance(seen.direction, Specimen) and (body := apart[seen.direction])
+        if isinstance(seen.direction, Specimen) and (body := named[seen.direction])
         else seen
         for seen in files
     ]
@@ -80,7 +80,7 @@ def _specimens(files: Sequence[Inspected]) -> Iterator[str]:
         yield "\n".join([*specimen_lines(body), ""])
 
 
-def _lines(keys: Mapping[str, Any]) -> Iterator[str]:
+def _key_lines(keys: Mapping[str, Any]) -> Iterator[str]:
     """Keys and their values, a line each."""
     return (f"{key} = {toml_value(value)}" for key, value in keys.items())
 
@@ -97,7 +97,7 @@ def file_text(seen: Inspected, folder: Path | None = None) -> str:
 
     Without a folder the file is named by its full path.
     """
-    name = _named(seen.file, folder)
+    name = _path_from(seen.file, folder)
     direction = f'"{seen.direction}"' if seen.direction else '"..."  # axial or radial: the file does not say'
     if seen.kind == "history":
         word = f'"{name}"' if " " in name else name
@@ -105,10 +105,10 @@ def file_text(seen: Inspected, folder: Path | None = None) -> str:
         return f"# {name} is a raw history: bushfit reduce {word} --direction {stated} makes a sweep of it\n"
     lines = [f"[[{_TABLES[seen.kind]}]]", f"file = {toml_value(name)}"]
     lines += [] if isinstance(seen.direction, Specimen) else [f"direction = {direction}"]
-    return "\n".join([*lines, *_lines(seen.entry), ""])
+    return "\n".join([*lines, *_key_lines(seen.entry), ""])
 
 
-def _named(file: Path, folder: Path | None) -> str:
+def _path_from(file: Path, folder: Path | None) -> str:
     """The path of a file from a folder, with forward slashes; its full path where none leads there."""
     if folder is not None:
         with suppress(ValueError):  # another drive

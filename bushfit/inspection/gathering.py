@@ -1,7 +1,8 @@
 """The tests among files, the sheets of workbooks, and the files of folders."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,13 @@ from bushfit.campaign.campaign import TEST_FILES
 from bushfit.errors import BushfitError, NoColumnError, NoTestError
 from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.geometry import Direction
+from bushfit.inspection.labels import temperatures_of
 from bushfit.inspection.opening import inspect
-from bushfit.inspection.outside import temperatures_of
 from bushfit.inspection.recognition import open_table, recognised
 from bushfit.inspection.record import Inspected
 from bushfit.reading.columns import same_text
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.names import Said, stated_above
+from bushfit.reading.names import NO_LABELS, Labels, labels_above
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.workbook import sheets
 
@@ -30,25 +31,25 @@ class Source:
         file, sheet: the file, and the sheet; None for a whole file.
         is_named: whether the user named this very file, and not its folder.
         stated: keys of [[loops]] and [[sweeps]] that the user states of it.
-        beside: what the sheets of its workbook without a test say of all its tests.
+        of_book: what the sheets of its workbook without a test say of all its tests.
     """
 
     file: Path
     sheet: str | None = None
     is_named: bool = True
-    stated: Mapping[str, Any] | None = None
-    beside: Said | None = None
+    stated: Mapping[str, Any] = field(default_factory=dict)
+    of_book: Labels = NO_LABELS
 
     def __str__(self) -> str:
         return f"{self.file}, sheet {self.sheet}" if self.sheet else str(self.file)
 
     def without(self, *keys: str) -> "Source":
         """The same of which some keys are not stated."""
-        return replace(self, stated={key: value for key, value in (self.stated or {}).items() if key not in keys})
+        return replace(self, stated={key: value for key, value in self.stated.items() if key not in keys})
 
     def inspect(self) -> Inspected:
         """See `opening.inspect`."""
-        return inspect(self.file, self.stated or {}, self.beside)
+        return inspect(self.file, self.stated, self.of_book)
 
 
 def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Source], tuple[str, ...]]:
@@ -70,8 +71,8 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
             files = [Source(path)]
         found: list[Source] = []
         for file in files:
-            parts = stated_of_each(_parts(file, stated), stated)
-            tests, others = _tests(parts) if len(parts) > 1 or not file.is_named else (parts, [])
+            parts = stated_of_each(_sheets_of(file, stated), stated)
+            tests, others = _holding_tests(parts) if len(parts) > 1 or not file.is_named else (parts, [])
             if not tests and file.is_named:  # the error of the whole file says why
                 tests, others = stated_of_each([file], stated), []
             found += tests
@@ -85,7 +86,7 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
                 hint="bushfit inspect FILE says what it makes of one",
             )
         sources += found
-    by_rows = [_by_rows(source) for source in stated_of_each(sources, stated)]
+    by_rows = [_tests_by_rows(source) for source in stated_of_each(sources, stated)]
     left_out += [sentence for _, others in by_rows for sentence in others]
     return [test for tests, _ in by_rows for test in tests], tuple(left_out)
 
@@ -93,41 +94,41 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
 def with_contradictions(files: Sequence[Inspected]) -> list[Inspected]:
     """Files that were inspected, each with a sentence more where another one of the same part, in the same direction,
     contradicts it."""
-    beside: dict[int, str] = {}
-    told = [seen for seen in files if seen.direction is not None and seen.kind != "history"]
-    for part in dict.fromkeys(seen.part for seen in told):
-        tests = [seen.measured for seen in told if seen.part == part]
+    contradictions: dict[int, str] = {}
+    placed = [seen for seen in files if seen.direction is not None and seen.kind != "history"]
+    for part in dict.fromkeys(seen.part for seen in placed):
+        tests = [seen.measured for seen in placed if seen.part == part]
         loops = [test for test in tests if isinstance(test, Loop)]
         sweeps = [test for test in tests if isinstance(test, Sweep)]
         data_sets = [*(loop_data(loops) if len(loops) > 1 else ()), *(sweep_data(sweeps) if len(sweeps) > 1 else ())]
-        beside |= {id(one.test): one.beside for one in data_sets if one.beside}
-    odd = [[beside[id(seen.measured)]] if id(seen.measured) in beside else [] for seen in files]
+        contradictions |= {id(one.test): one.beside for one in data_sets if one.beside}
     return [
-        replace(seen, looked=replace(seen.looked, odd=(*seen.looked.odd, *more)))
-        for seen, more in zip(files, odd, strict=True)
+        replace(seen, odd=(*seen.odd, said)) if (said := contradictions.get(id(seen.measured))) else seen
+        for seen in files
     ]
 
 
-def _by_rows(source: Source) -> tuple[list[Source], list[str]]:
+def _tests_by_rows(source: Source) -> tuple[list[Source], list[str]]:
     """The tests of a file that its columns tell apart, by direction, part and run, and which rows are left out.
 
     The runs of a sweep are repeats; so are tests those of a loop alone, where time does not go on from one to the next.
     """
-    stated = source.stated or {}
+    stated = source.stated
     own = {key: value for key, value in stated.items() if key not in ("direction", "specimen_number")}
     try:
         table, _ = recognised(source.file, own)
-        told = dict(table.labels)
-        if "run" in told and "time" in table.roles:
+        columns = dict(table.row_labels)
+        if "run" in columns and "time" in table.roles:
             time = table.read({"time": table.roles["time"]}, fewest_rows=1)["time"]
-            told.pop("run" if np.all(np.diff(time) > 0.0) else "", None)
+            if np.all(np.diff(time) > 0.0):
+                del columns["run"]
     except BushfitError:  # which the inspection of the file tells
         return [source], []
     tests: list[Source] = []
     left_out: list[str] = []
-    for texts in dict.fromkeys(zip(*(texts for _, texts in told.values()), strict=True)):
-        keys: dict[str, Any] = dict(zip(told, texts, strict=True))
-        run = {"rows": {table.headers[told["run"][0]]: keys.pop("run")}} if "run" in keys else {}
+    for texts in dict.fromkeys(zip(*(texts for _, texts in columns.values()), strict=True)):
+        keys: dict[str, Any] = dict(zip(columns, texts, strict=True))
+        run = {"rows": {table.headers[columns["run"][0]]: keys.pop("run")}} if "run" in keys else {}
         known = keys.get("direction", "axial") in [*Direction]
         if known and all(same_text(str(stated.get(key, text)), text) for key, text in keys.items()):
             tests.append(replace(source, stated={**stated, **keys, **run}))
@@ -150,18 +151,13 @@ def stated_of_each(sources: Sequence[Source], stated: Mapping[str, Any]) -> list
         for keys in (keys for keys, one in zip(own, has, strict=True) if one is False and True in has):
             keys["columns"] = {other: header for other, header in keys["columns"].items() if other != role}
     if stated.get("temperature") and len(sources) > 1:
-        counts = [_temperatures(source.file, keys) for source, keys in zip(sources, own, strict=True)]
-        for keys in (keys for keys, count in zip(own, counts, strict=True) if count == 0 and 2 in counts):
-            keys["temperature"] = None
+        counts = {}
+        for index, source in enumerate(sources):
+            with suppress(BushfitError):  # which the inspection of the file tells
+                counts[index] = temperatures_of(recognised(source.file, own[index])[0])
+        for index in (index for index, count in counts.items() if count == 0 and 2 in counts.values()):
+            own[index]["temperature"] = None
     return [replace(source, stated=keys) for source, keys in zip(sources, own, strict=True)]
-
-
-def _temperatures(file: Path, stated: Mapping[str, Any]) -> int | None:
-    """See `temperatures_of`; None where it cannot be told."""
-    try:
-        return temperatures_of(recognised(file, stated)[0])
-    except BushfitError:  # which the inspection of the file tells
-        return None
 
 
 def _has_column(file: Path, role: str, stated: Mapping[str, Any]) -> bool | None:
@@ -187,7 +183,7 @@ def _in_folder(folder: Path) -> tuple[list[Source], list[str]]:
     return files, left_out
 
 
-def _parts(source: Source, stated: Mapping[str, Any]) -> list[Source]:
+def _sheets_of(source: Source, stated: Mapping[str, Any]) -> list[Source]:
     """The sheets of a workbook with several of which the user states none; else the file itself."""
     if stated.get("sheet"):
         return [source]
@@ -198,14 +194,14 @@ def _parts(source: Source, stated: Mapping[str, Any]) -> list[Source]:
     return [replace(source, sheet=name) for name in names] if len(names) > 1 else [source]
 
 
-def _tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
+def _holding_tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
     """Those of some sheets, or of one file, that hold a test or might, and why the others do not."""
     tests: list[Source] = []
     left_out: list[str] = []
     without: set[str | None] = set()
     for part in parts:
         try:
-            recognised(part.file, part.stated or {})
+            recognised(part.file, part.stated)
         except NoTestError as error:
             without.add(part.sheet)
             why = f"{error.problem} ({error.found})" if error.found else f"{error.problem}; {error.hint}"
@@ -215,8 +211,8 @@ def _tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
             pass
         tests.append(part)
     if tests and tests[0].sheet and without:
-        beside = stated_above(
+        of_book = labels_above(
             line for sheet in sheets(tests[0].file) if sheet.sheet in without for line in sheet.head()
         )
-        tests = [replace(test, beside=beside) for test in tests]
+        tests = [replace(test, of_book=of_book) for test in tests]
     return tests, left_out

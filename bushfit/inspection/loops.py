@@ -10,11 +10,11 @@ from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.drive import TOLD_MEAN, Drive, drive_of
 from bushfit.fitting.loop_cycles import waveform
 from bushfit.geometry import Unit
-from bushfit.inspection.channels import clock, odd_channels
-from bushfit.inspection.outside import wrong_labels
-from bushfit.inspection.record import Looked, told_frequencies
+from bushfit.inspection.channels import odd_channels, sampling
+from bushfit.inspection.labels import wrong_labels
+from bushfit.inspection.record import Findings, told_frequencies
 from bushfit.reading.measurement import Loop
-from bushfit.reading.names import Said
+from bushfit.reading.names import Labels
 from bushfit.reduction.cycles import least_prominence
 from bushfit.reduction.harmonics import cycle_harmonics, resolved_order
 from bushfit.reduction.steps import reduce
@@ -32,8 +32,8 @@ _MOST_END_CYCLES = 6
 _LONGEST_CYCLE = 3000.0
 
 
-def look_at_loop(loop: Loop, named: Said) -> Looked:
-    """Facts and oddities of a loop; `named` is what the names of its file and sheet say.
+def look_at_loop(loop: Loop, labels: Labels) -> Findings:
+    """Facts and oddities of a loop; `labels` are what the names of its file and sheet say.
 
     Raises:
         FitError: no whole cycle, or a loop that runs the wrong way round.
@@ -48,7 +48,7 @@ def look_at_loop(loop: Loop, named: Said) -> Looked:
     facts = {
         "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'taken as steady'}",
         "frequency": f"{drive.frequency:.4g} Hz, {waveform(drive.coefficients)}",
-        "sampling": f"{clock(loop) if loop.timed else 'no time in the file'}, "
+        "sampling": f"{sampling(loop) if loop.timed else 'no time in the file'}, "
         f"{loop.time.size / drive.cycles:.4g} rows a cycle",
         "amplitude": f"{number(to_length * amplitude, 4)} {length} zero-to-peak",
         # as far down as the amplitude is told: what lies below is noise
@@ -58,22 +58,22 @@ def look_at_loop(loop: Loop, named: Said) -> Looked:
         f"{drive.correlated}",
     }
     odd = [
-        *wrong_labels(named, loop.direction, [amplitude, half_motion], [drive.frequency]),
+        *wrong_labels(labels, loop.direction, [amplitude, half_motion], [drive.frequency]),
         *odd_channels(loop),
         *drive.notes,
         *_changing(drive),
-        *_crawling(drive),
+        *_too_slow(drive),
     ]
     if _OFF_ZERO * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and drive.datum is not None:
         odd.append(
             f"the motion is off zero by {number(to_length * mean_motion, 3)} {length}, "
             f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the loop counts from its own middle"
         )
-    return Looked(facts, tuple(odd))
+    return Findings(facts, tuple(odd))
 
 
-def look_at_history(history: Loop, named: Said) -> Looked:
-    """Facts and oddities of a history; `named` is what the names of its file and sheet say.
+def look_at_history(history: Loop, labels: Labels) -> Findings:
+    """Facts and oddities of a history; `labels` are what the names of its file and sheet say.
 
     Raises:
         MeasurementError: no steady sine in it.
@@ -87,19 +87,19 @@ def look_at_history(history: Loop, named: Said) -> Looked:
         "steps": f"{len(steps)} with steady cycles, {max(step.repeat for step in steps)} at most at one point",
         "frequencies": told_frequencies(frequencies),
         "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels)} {unit} zero-to-peak, as reached",
-        "sampling": f"{clock(history)}, {min(step.rows_per_cycle for step in steps):.3g} rows a cycle at least",
+        "sampling": f"{sampling(history)}, {min(step.rows_per_cycle for step in steps):.3g} rows a cycle at least",
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
     }
     odd = (
         *(history.source.notes if history.source else ()),
-        *wrong_labels(named, history.direction, levels, frequencies),
+        *wrong_labels(labels, history.direction, levels, frequencies),
         *odd_channels(history),
         *reduction.warnings,
     )
-    return Looked(facts, odd)
+    return Findings(facts, odd)
 
 
-def _crawling(drive: Drive) -> Iterator[str]:
+def _too_slow(drive: Drive) -> Iterator[str]:
     """A sentence on a loop that takes longer than any laboratory waits, and on what the file may say instead."""
     if drive.frequency * _LONGEST_CYCLE < 1.0:
         mistakes = [mistake for mistake in MISTAKES.values() if mistake.time < 1.0]
@@ -107,7 +107,7 @@ def _crawling(drive: Drive) -> Iterator[str]:
         yield f"one cycle takes {number(1.0 / drive.frequency / 60.0, 2)} min, as hardly any test does, unless {unless}"
 
 
-def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looked:
+def look_at_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Findings:
     """Facts and oddities of a record that holds several loops, in order.
 
     Raises:
@@ -119,11 +119,11 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looke
     cycles = [drive.cycles for drive in drives]
     used = sum(drive.loop.displacement.size for drive in drives)
     facts = {
-        "programme": f"{len(loops)} loops in one record: {_each_once([factor * size for size in amplitudes])} {unit} "
-        f"at {_each_once(frequencies)} Hz, {_each_once([min(cycles), max(cycles)], ' to ')} cycles used of each; "
+        "programme": f"{len(loops)} loops in one record: {_listed([factor * size for size in amplitudes])} {unit} "
+        f"at {_listed(frequencies)} Hz, {_listed([min(cycles), max(cycles)], ' to ')} cycles used of each; "
         f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out",
     }
-    odd = [*wrong_labels(named, record.direction, amplitudes, frequencies), *odd_channels(record)]
+    odd = [*wrong_labels(labels, record.direction, amplitudes, frequencies), *odd_channels(record)]
     for place, (loop, drive) in enumerate(zip(loops, drives, strict=True), start=1):
         left_out = loop.part.left_out if loop.part else None
         motion = (
@@ -132,12 +132,12 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looke
         noise = f"noise {number(100 * drive.noise / drive.half_range, 2)} % of half the range, a row{drive.correlated}"
         facts[f"loop {place}"] = "; ".join(filter(None, (motion, noise, left_out)))
         odd += [f"loop {place}: {note}" for note in (*drive.notes, *_changing(drive)) if note != left_out]
-    facts["sampling"] = clock(record) if record.timed else "no time in the file"
-    return Looked(facts, tuple(odd))
+    facts["sampling"] = sampling(record) if record.timed else "no time in the file"
+    return Findings(facts, tuple(odd))
 
 
-def _each_once(values: Sequence[float], between: str = ", ") -> str:
-    """Values in their order, each written once: "0.2, 0.5, 1"."""
+def _listed(values: Sequence[float], between: str = ", ") -> str:
+    """Values in their order, each once: "0.2, 0.5, 1"."""
     return between.join(dict.fromkeys(f"{value:.3g}" for value in values))
 
 

@@ -13,15 +13,15 @@ from bushfit.campaign.campaign import reader_keywords
 from bushfit.campaign.files import LoopFile, SweepFile
 from bushfit.errors import BushfitError, MeasurementError, naming
 from bushfit.geometry import Direction, Place, Specimen
+from bushfit.inspection.labels import keys_from_labels, labels_of_file, temperatures_of
 from bushfit.inspection.loops import look_at_history, look_at_loop, look_at_programme
-from bushfit.inspection.outside import keys_outside, names_of, temperatures_of
 from bushfit.inspection.recognition import direction_of, place_of, recognised
-from bushfit.inspection.record import ColumnSeen, Inspected, Kind, Looked
+from bushfit.inspection.record import ColumnSeen, Findings, Inspected, Kind
 from bushfit.inspection.sweeps import look_at_sweep
 from bushfit.reading.layout import DELIMITERS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.names import Said
+from bushfit.reading.names import NO_LABELS, Labels
 from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
@@ -35,11 +35,11 @@ _QUASI_STATIC = 1.0
 _TURNED = {"force_sign": -1}
 
 
-def inspect(file: Path, stated: Mapping[str, Any], beside: Said | None = None) -> Inspected:
+def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) -> Inspected:
     """Recognise a test file, and say what it holds and what is odd about it.
 
     The user states keys of [[loops]] and [[sweeps]], as TOML has them, and sizes of a specimen in shear; each is used
-    where it fits. `beside` is what other sheets of its workbook say of all its tests.
+    where it fits. `of_book` is what other sheets of its workbook say of all its tests.
 
     Raises:
         NoTestError: a file that holds no test.
@@ -50,8 +50,8 @@ def inspect(file: Path, stated: Mapping[str, Any], beside: Said | None = None) -
     # which of two translations it is makes no difference to reading
     read_as = direction or Direction.AXIAL
     entry = _entry(SweepFile if is_sweep else LoopFile, stated, table, direction)
-    by_name = names_of(file, stated)
-    outside = keys_outside(table, read_as, entry, by_name, beside or Said(), is_sweep=is_sweep)
+    by_name = labels_of_file(file, stated)
+    outside = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
     if "at_amplitude" in outside.keys:
         entry.pop("amplitude", None)  # counted already
     entry |= outside.keys
@@ -60,18 +60,18 @@ def inspect(file: Path, stated: Mapping[str, Any], beside: Said | None = None) -
     kind: Kind
     if is_sweep:
         measured = read_sweep(**_keywords(file, read_as, entry, SweepFile))
-        kind, looked = "sweep", look_at_sweep(measured, by_name)
+        kind, found = "sweep", look_at_sweep(measured, by_name)
     else:
         measured, entry, odd = _read_loop(file, read_as, entry, table)
-        kind, looked = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile))
+        kind, found = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile))
     columns = _columns(table, is_sweep=is_sweep)
-    facts, counted = {**looked.facts, **outside.facts}, outside.is_counted
+    facts, counted = {**found.facts, **outside.facts}, outside.is_counted
     if is_sweep and (amplitude := table.roles.get("amplitude")):
         counted = amplitude.convention is not None
         if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):
             facts["amplitudes"] += f', half of "{amplitude.header}", which counts peak-to-peak'
-    looked = Looked(facts, (*odd, *looked.odd))
-    return Inspected(file, kind, direction, _written(table), columns, looked, entry, measured, counted)
+    odd += found.odd
+    return Inspected(file, kind, direction, _written(table), columns, facts, tuple(odd), entry, measured, counted)
 
 
 def read_history(file: Path, stated: Mapping[str, Any]) -> tuple[Loop, Direction | None]:
@@ -141,11 +141,11 @@ def _read_loop(
     return turned, {**entry, **_TURNED}, [odd]
 
 
-def _look(measured: Loop, by_name: Said, keywords: Mapping[str, Any]) -> tuple[Kind, Looked]:
+def _look(measured: Loop, by_name: Labels, keywords: Mapping[str, Any]) -> tuple[Kind, Findings]:
     """The kind of a recorded test, a loop, a programme of loops or a history, with its facts and oddities."""
-    found = sines(measured)
-    points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in found}
-    frequencies = [frequency for frequency, *_ in found] or [0.0]
+    steps = sines(measured)
+    points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in steps}
+    frequencies = [frequency for frequency, *_ in steps] or [0.0]
     fast = max(frequencies) > _QUASI_STATIC
     if len(points) > 1 and fast:
         with suppress(MeasurementError):  # no steady sine after all
@@ -153,12 +153,12 @@ def _look(measured: Loop, by_name: Said, keywords: Mapping[str, Any]) -> tuple[K
     loops = programme(measured, **keywords)
     if len(loops) > 1:
         return "loop", look_at_programme(measured, loops, by_name)
-    looked = look_at_loop(loops[0], by_name)
+    found = look_at_loop(loops[0], by_name)
     if fast or len(points) > 1:
         what = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
         either = f"a motion {what} is taken for a loop; should it be a stepped sine, bushfit reduce makes points of it"
-        looked = Looked(looked.facts, (*looked.odd, either))
-    return "loop", looked
+        found = Findings(found.facts, (*found.odd, either))
+    return "loop", found
 
 
 def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
@@ -169,7 +169,7 @@ def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
     wanted = {role: column for role, column in table.roles.items() if role in ranged}
     values = table.read(wanted, fewest_rows=1)  # the scales of `roles` are 1: not in SI
     columns = [ColumnSeen(header, None, None) for header in table.headers]
-    for key, (index, _) in table.labels.items():
+    for key, (index, _) in table.row_labels.items():
         columns[index] = ColumnSeen(table.headers[index], key.replace("_", " "), None)
     for role, column in table.roles.items():
         low, high = (float(values[role].min()), float(values[role].max())) if role in values else (None, None)

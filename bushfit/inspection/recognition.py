@@ -19,8 +19,6 @@ from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, of_motion
 from bushfit.validation import check_tables
 
-#: What an error says besides its problem.
-_PARTS = ("file", "place", "found", "expected", "hint")
 #: Sizes of a block in shear, as [[specimens]] has them.
 BLOCK_KEYS = ("area", "thickness", "elements")
 #: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
@@ -51,8 +49,7 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
             return table, is_sweep
     _refuse_resonance(file, stated)
     if not opened:
-        reason = failed[0][1]
-        raise NoTestError(reason.problem, **{key: getattr(reason, key) for key in _PARTS})
+        raise NoTestError(**vars(failed[0][1]))
     best, is_sweep = max(opened, key=lambda one: len(one[0].roles))
     for usual, failure in failed:
         if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):
@@ -91,15 +88,14 @@ def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | Non
         MeasurementError: units of torsion where the user states another direction.
         CampaignError, UnitError, ModelError: sizes that make no specimen.
     """
-    sizes = {key: stated[key] for key in BLOCK_KEYS if key in stated}
-    body = {"name": stated.get("specimen", "coupon")}
+    keys: dict[str, Any] = {"kind": "shear"} | {key: stated[key] for key in BLOCK_KEYS if key in stated}
     if table.motion is STRAINING:
-        if any(map(_TENSILE.search, table.layout.written or [column.header for column in table.roles.values()])):
-            body = {"name": stated.get("specimen", "bar"), "strain": "tension"}
-        return Specimen(**vars(check_tables({**body, "kind": "modulus"}, None, SpecimenTable)))
-    if sizes:
-        return Specimen(**vars(check_tables({**body, **sizes, "kind": "shear"}, None, SpecimenTable)))
-    return direction_of(file, table, stated)
+        headers = table.layout.written or [column.header for column in table.roles.values()]
+        keys = {"kind": "modulus"} | ({"strain": "tension"} if any(map(_TENSILE.search, headers)) else {})
+    elif len(keys) == 1:
+        return direction_of(file, table, stated)
+    name = stated.get("specimen", "bar" if "strain" in keys else "coupon")
+    return Specimen(**vars(check_tables({"name": name, **keys}, None, SpecimenTable)))
 
 
 def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Direction | None:
@@ -110,15 +106,15 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     headers = table.layout.written or table.headers
-    told = dict.fromkeys(table.labels.get("direction", (0, ()))[1])
+    in_column = dict.fromkeys(table.row_labels.get("direction", (0, ()))[1])
     named = direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
-    found = Direction(*told) if len(told) == 1 else named
+    found = Direction(*in_column) if len(in_column) == 1 else named
     if "direction" not in stated:
-        if len(told) > 1:
+        if len(in_column) > 1:
             problem, hint = "this file holds tests in several directions", "state one: --direction axial"
-            raise table.header_error(problem, found=", ".join(told), expected="one direction", hint=hint)
+            raise table.header_error(problem, found=", ".join(in_column), expected="one direction", hint=hint)
         return found
-    if found and found != stated["direction"] and len(told) < 2:
+    if found and found != stated["direction"] and len(in_column) < 2:
         raise table.header_error(
             f"{'the units say' if turns else 'the file says'} {found}, and --direction {stated['direction']}",
             found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),

@@ -81,7 +81,7 @@ class InspectionDocument(TypedDict):
 
 
 @dataclass(frozen=True)
-class Looked:
+class Findings:
     """What the content of a file tells: facts in words, by label, and a sentence for each thing that is odd."""
 
     facts: Mapping[str, str]
@@ -96,7 +96,8 @@ class Inspected:
         file, kind, measured: the file, what it holds, and its content in SI.
         direction: of the test; None where neither file nor options say it.
         written: how the file is written, by label: encoding, delimiter, decimal mark and so on.
-        columns, looked: all columns, in order; facts and oddities.
+        columns: all of them, in order.
+        facts, odd: what its content tells, see `Findings`.
         entry: keys of its table in a campaign besides `file` and `direction`, as TOML has them.
         counted: whether the header of a sweep says how amplitudes are counted.
     """
@@ -106,7 +107,8 @@ class Inspected:
     direction: Place | None
     written: Mapping[str, str]
     columns: tuple[ColumnSeen, ...]
-    looked: Looked
+    facts: Mapping[str, str]
+    odd: tuple[str, ...]
     entry: Mapping[str, Any] = field(default_factory=dict)
     measured: Loop | Sweep | None = None
     counted: bool = False
@@ -115,9 +117,9 @@ class Inspected:
     def label(self) -> str:
         """The name of the file, with the sheet where it has several, and with what columns tell of the test."""
         direction = self.direction if "direction" in [one.role for one in self.columns] else None
-        told = {"sheet": self.entry.get("sheet"), "direction": direction, "part": self.part}
-        told |= self.entry.get("rows", {})
-        return ", ".join([self.file.name, *(f"{key} {value}" for key, value in told.items() if value)])
+        added = {"sheet": self.entry.get("sheet"), "direction": direction, "part": self.part}
+        added |= self.entry.get("rows", {})
+        return ", ".join([self.file.name, *(f"{key} {value}" for key, value in added.items() if value)])
 
     @property
     def part(self) -> str | None:
@@ -147,7 +149,7 @@ class Inspected:
             "direction": str(self.direction) if self.direction else None,
             "written": dict(self.written),
             "columns": plain(self.columns, tuple[ColumnSeen, ...]),
-            "facts": dict(self.looked.facts),
+            "facts": dict(self.facts),
             "assumed": self.assumed,
-            "odd": list(self.looked.odd),
+            "odd": list(self.odd),
         }

@@ -10,10 +10,10 @@ from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.data_set import shown_amplitude
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.fitting.sweep_data import SweepData
-from bushfit.inspection.outside import wrong_labels
-from bushfit.inspection.record import Looked, told_frequencies
+from bushfit.inspection.labels import wrong_labels
+from bushfit.inspection.record import Findings, told_frequencies
 from bushfit.reading.measurement import Sweep, loss_factor
-from bushfit.reading.names import Said
+from bushfit.reading.names import Labels
 from bushfit.reading.runs import rows_alike
 from bushfit.reduction.result import MISSED_LEVEL
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
@@ -35,16 +35,14 @@ _LEAST_DRIFT = 5e-3
 _SAME_PHASE_P = 0.05
 #: Step in ln X from one level to the next below which they may be repeats of one; chosen: nobody sets finer levels.
 _LEAST_STEP = 0.02
-#: Share of the blocks of which one has to have a frequency for the others to lack it.
-_USUAL = 0.5
 #: Points or frequencies that are told one by one; chosen: they make a sentence.
 _MOST_LISTED = 4
 #: Levels that are listed one by one; chosen: they make a line.
 _MOST_LEVELS = 8
 
 
-def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
-    """Facts and oddities of a sweep; `named` is what the names of its file and sheet say."""
+def look_at_sweep(sweep: Sweep, labels: Labels) -> Findings:
+    """Facts and oddities of a sweep; `labels` are what the names of its file and sheet say."""
     unit, factor = sweep.direction.display.displacement
     frequencies, levels = np.unique(sweep.frequency), np.unique(sweep.amplitude)
     repeats = np.unique(sweep.repeat)
@@ -58,17 +56,17 @@ def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
     }
     odd = [
         *SweepData(sweep, noise).notes,
-        *wrong_labels(named, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
+        *wrong_labels(labels, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
         *_copies(sweep, noise),
         *_untold_repeats(sweep),
-        *_missing(sweep),
+        *_missing_frequencies(sweep),
         *_outliers(sweep, noise),
         *_odd_blocks(sweep),
-        *_missed(sweep),
-        *_negative(sweep),
+        *_missed_level(sweep),
+        *_negative_loss(sweep),
         *_doubtful_loss(sweep),
     ]
-    return Looked(facts, tuple(odd))
+    return Findings(facts, tuple(odd))
 
 
 def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
@@ -121,14 +119,14 @@ def _untold_repeats(sweep: Sweep) -> Iterator[str]:
         )
 
 
-def _missing(sweep: Sweep) -> Iterator[str]:
+def _missing_frequencies(sweep: Sweep) -> Iterator[str]:
     """A sentence for each block, a repeat of a level, that lacks frequencies which most others have."""
     blocks = np.stack((sweep.amplitude, sweep.repeat.astype(float)), axis=1)
     names, block = np.unique(blocks, axis=0, return_inverse=True)
     frequencies, column = np.unique(sweep.frequency, return_inverse=True)
     there = np.zeros((len(names), frequencies.size), dtype=bool)
     there[block.ravel(), column] = True
-    usual = there.mean(axis=0) > _USUAL
+    usual = there.mean(axis=0) > 0.5
     for (level, repeat), has in zip(names, there, strict=True):
         absent = frequencies[usual & ~has]
         if absent.size and len(names) > 1:
@@ -196,7 +194,7 @@ def _odd_blocks(sweep: Sweep) -> Iterator[str]:
             )
 
 
-def _missed(sweep: Sweep) -> Iterator[str]:
+def _missed_level(sweep: Sweep) -> Iterator[str]:
     """A sentence on the point that missed the amplitude of its level by most."""
     off = sweep.amplitude_reached / sweep.amplitude - 1.0
     row = int(np.argmax(np.abs(off)))
@@ -208,7 +206,7 @@ def _missed(sweep: Sweep) -> Iterator[str]:
         yield f"{reached} was reached where the level is {level} ({sweep.frequency[row]:.4g} Hz)"
 
 
-def _negative(sweep: Sweep) -> Iterator[str]:
+def _negative_loss(sweep: Sweep) -> Iterator[str]:
     """A sentence on points whose loss factor is below zero."""
     bad = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if bad.size:

@@ -18,20 +18,16 @@ from bushfit.reading.measurement import Floats
 from bushfit.reading.names import named_direction
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, is_like_number, weigh
 from bushfit.reading.runs import rows_alike
-from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, rows
+from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, Sheet, Text, rows
 from bushfit.reading.words import ROW_COLUMNS
 
 #: Rows that are taken apart at a time where a library cannot; chosen: their texts fill some MiB.
 _CHUNK_ROWS = 1 << 16
-#: Cells in which the decimal mark has to show for a library to read a file; chosen: those of its first rows.
-_FIRST_CELLS = 1000
-
-#: Characters of what was found that an error quotes; chosen: two lines of a terminal.
-_LONGEST_FOUND = 200
 #: Rows of each value in the mean where a column parts tests; chosen: one that counts its rows parts none.
 _FEWEST_ROWS = 3
-#: Rows that tell whether a column may part tests; chosen: a long record is not read for one that counts its rows.
-_FIRST_ROWS = 1000
+#: Rows that tell whether a column may part tests, and cells that tell the decimal mark; chosen: a long record is not
+#: read whole for either.
+_FIRST = 1000
 #: What a column may say of the test that a row belongs to.
 _LABELS = Vocabulary(ROW_COLUMNS, {})
 
@@ -89,12 +85,12 @@ class Columns:
             raise self.error("the table cannot be read", found=str(error)) from error
 
     @cached_property
-    def labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
+    def row_labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
         """Index and texts, (n,), of columns that tell direction, specimen_number and run; directions by their names."""
         found: dict[str, tuple[int, Sequence[str]]] = {}
         for index, header in enumerate(self.headers):
             heading = _LABELS.heading(header)
-            if heading and heading.role not in found and (texts := self._parting(index)):
+            if heading and heading.role not in found and (texts := self._texts_that_part_tests(index)):
                 if heading.role == "direction":
                     known = {text: named_direction([text], short=True) for text in set(texts)}
                     texts = [str(known[text] or text) for text in texts] if any(known.values()) else []
@@ -108,20 +104,20 @@ class Columns:
             MeasurementError: no such row or column, rows of several parts, or tests that no column tells apart.
         """
         stated = {"direction": wanted.direction, "specimen_number": wanted.specimen_number}
-        told = [(*self.labels[key], text) for key, text in stated.items() if text and key in self.labels]
+        chosen = [(*self.row_labels[key], text) for key, text in stated.items() if text and key in self.row_labels]
         for header, text in wanted.texts.items():
             if header not in self.headers:
                 raise self.header_error(f'there is no column "{header}"', expected="headers, as keys of rows")
-            told.append((self.headers.index(header), self.texts(self.headers.index(header)), text))
-        if wanted.shared and not told:
+            chosen.append((self.headers.index(header), self.texts(self.headers.index(header)), text))
+        if wanted.shared and not chosen:
             expected = "each file once, or a column that tells its tests apart"
             raise self.header_error("a file is listed twice", expected=expected)
-        column, parts = self.labels.get("specimen_number", (0, ()))
-        rows = [line for line, _ in self.rows()] if told or parts else []
-        kept = [n for n in range(len(rows)) if all(same_text(texts[n], text) for _, texts, text in told)]
+        column, parts = self.row_labels.get("specimen_number", (0, ()))
+        rows = [line for line, _ in self.rows()] if chosen or parts else []
+        kept = [n for n in range(len(rows)) if all(same_text(texts[n], text) for _, texts, text in chosen)]
         several = len({parts[n] for n in kept}) > 1 if parts else False
-        if several or (told and not kept):
-            found = [(column, parts, "one part")] if several else told
+        if several or (chosen and not kept):
+            found = [(column, parts, "one part")] if several else chosen
             raise self.header_error(
                 "this file holds tests of several parts" if several else "no row is of this test",
                 found="; ".join(
@@ -139,10 +135,10 @@ class Columns:
         a text that goes with one of them names it. Of a loop, numbers are channels.
         """
         known = {column.index for column in self.roles.values()}
-        known |= {index for key, (index, texts) in self.labels.items() if key != "direction" or len({*texts}) == 1}
+        known |= {index for key, (index, texts) in self.row_labels.items() if key != "direction" or len({*texts}) == 1}
         for index in (index for index in range(len(self.headers)) if index not in known):
             is_number, header = self.holds_numbers(index), self.headers[index]
-            if (is_number and not settled) or not (texts := self._parting(index)):
+            if (is_number and not settled) or not (texts := self._texts_that_part_tests(index)):
                 continue
             own = np.array(texts)[slice(None) if rows is None else rows]
             values, place, counts = np.unique(own, return_inverse=True, return_counts=True)
@@ -169,11 +165,11 @@ class Columns:
             found.append(last)
         return found
 
-    def _parting(self, index: int) -> list[str]:
+    def _texts_that_part_tests(self, index: int) -> list[str]:
         """The texts of a column without a role that may part tests; else none."""
         if self.layout.written or index in {column.index for column in self.roles.values()}:
             return []
-        first = self.texts(index, _FIRST_ROWS)
+        first = self.texts(index, _FIRST)
         return self.texts(index) if _FEWEST_ROWS * len(set(first)) <= len(first) else []
 
     def error(
@@ -187,7 +183,6 @@ class Columns:
         **said: str | None,
     ) -> MeasurementError:
         """An error in this table, at a line (from 1) and column where they are known, with what else is `said`."""
-        found = found if found is None or len(found) <= _LONGEST_FOUND else found[:_LONGEST_FOUND] + "..."
         return kind(problem, file=self.file, place=self.place(line, column), found=found, **said)
 
     def header_error(self, problem: str, *, found: str | None = None, **said: Any) -> MeasurementError:
@@ -214,11 +209,12 @@ class Columns:
         """
         layout, source = self.layout, self.source
         ways = self._open_ways()
-        if layout.delimiter == "," and not source.may_have_comma(layout):
+        if layout.delimiter == "," and isinstance(source, Text) and not source.may_have_comma(layout):
             ways = tuple(way for way in ways if "," not in (way.decimal, way.thousands)) or ways
         evidence = weigh(self._texts(), ways)
         columns = {column.index: column for column in self.roles.values()}
-        if evidence.contrary is None and source.may_group(layout, evidence.ways[0].decimal):
+        may_group = isinstance(source, Sheet) or source.may_group(layout, evidence.ways[0].decimal)
+        if evidence.contrary is None and may_group:
             evidence = weigh(self._texts(), ways, all_cells=True)
         if evidence.contrary:
             (line, index), text = evidence.contrary
@@ -258,7 +254,7 @@ class Columns:
 
     def _empty(self, problem: str, **said: Any) -> MeasurementError:
         """The error for what should be filled, which may be formulas."""
-        if self.source.lacks_values():
+        if isinstance(self.source, Sheet) and self.source.lacks_values():
             problem = "the workbook has formulas whose values were not saved"
             said["hint"] = "open it in a spreadsheet program and save it again"
         return self.error(problem, **said)
@@ -313,9 +309,9 @@ class Columns:
         The library takes no thousands separators. So what it reads as numbers needs no more evidence than that of the
         first cells, as long as these settle the decimal mark.
         """
-        decimals = {way.decimal for way in weigh(islice(self._texts(), _FIRST_CELLS), self._open_ways()).ways}
+        decimals = {way.decimal for way in weigh(islice(self._texts(), _FIRST), self._open_ways()).ways}
         first = next(self.rows(), (0, ()))[1]
-        if len(decimals) > 1 or self.left_out or not fits(first, len(self.headers)):
+        if isinstance(self.source, Sheet) or len(decimals) > 1 or self.left_out or not fits(first, len(self.headers)):
             return None
         numerals = Numerals(decimals.pop())
         cells = [first[column.index] for column in wanted.values()]

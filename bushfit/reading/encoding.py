@@ -13,11 +13,8 @@ import re
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
-
 from bushfit.errors import MeasurementError
 from bushfit.reading.files import CHUNK_BYTES, HEAD_BYTES, line_of, not_utf8
-from bushfit.reading.parallel import by_chunks
 
 #: Byte order marks, and Python's name of the encoding that each tells. UTF-32's begins with UTF-16's.
 _MARKS = (
@@ -42,9 +39,8 @@ def to_utf8(data: bytes, file: Path, stated: str | None = None) -> tuple[bytes, 
     Raises:
         MeasurementError: no text, or not in the encoding stated.
     """
-    codes = np.frombuffer(data, dtype=np.int8)
-    if stated is None and all(by_chunks(lambda part: bool(codes[part].min() > 0), codes.size, CHUNK_BYTES)):
-        return data, "utf-8"  # ASCII: all bytes are from 1 to 127
+    if stated is None and data.isascii() and 0 not in data:
+        return data, "utf-8"
     encoding = stated or detect(data)
     if encoding in ("utf-8", "utf-8-sig"):
         without_mark = data.removeprefix(codecs.BOM_UTF8)

@@ -9,8 +9,8 @@ from bushfit.errors import BushfitError, did_you_mean
 
 #: Bytes of the largest file that is read: three times a loop of 10 million rows.
 _LARGEST_BYTES = 1 << 30
-#: Bytes at the start of a file that are looked at first; chosen: they hold the header and many rows.
-HEAD_BYTES = 1 << 16
+#: Bytes at the start of a file within which its header lies; chosen: far more than preambles have.
+HEAD_BYTES = 1 << 18
 #: Bytes that are checked at a time; chosen: few enough to be held beside the file, enough to be fast.
 CHUNK_BYTES = 1 << 22
 

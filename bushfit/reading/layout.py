@@ -20,8 +20,6 @@ from bushfit.reading.numerals import is_like_number
 
 #: Delimiters by their names in a campaign, in the order in which they are tried.
 DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "blanks": " "}
-#: Bytes at the start of a file within which its header lies; chosen: far more than preambles have.
-HEAD_BYTES = 1 << 18
 #: Filled lines at the start of a file within which its header lies; chosen: far more than preambles have.
 MOST_HEAD_LINES = 500
 #: Columns of a table; chosen: far more than a test has.
@@ -164,7 +162,8 @@ def _candidates(
             for cells in _header_cells(content, delimiter):
                 roles = vocabulary.roles(cells)
                 if len(roles) > 1 and not any(is_like_number(cell) for cell in cells):
-                    followed = _is_followed(lines, index, delimiter, len(cells))
+                    below = (split(line.content, delimiter) for line in _below(lines, index, delimiter))
+                    followed = next((fits(row, len(cells)) for row in below if _is_row(row)), False)
                     yield (followed, len(roles), index, -order), index, delimiter, cells
 
 
@@ -180,12 +179,6 @@ def _header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
             cells.pop()
         if 1 < len(cells) <= _MOST_COLUMNS:
             yield cells
-
-
-def _is_followed(lines: Sequence[Line], header: int, delimiter: str, width: int) -> bool:
-    """Whether the first row of numbers below a header has as many cells."""
-    below = (split(line.content, delimiter) for line in _below(lines, header, delimiter))
-    return next((fits(cells, width) for cells in below if _is_row(cells)), False)
 
 
 def _below(lines: Sequence[Line], header: int, delimiter: str) -> Iterator[Line]:

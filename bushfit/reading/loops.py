@@ -12,7 +12,6 @@ from bushfit.reading.columns import Rows
 from bushfit.reading.headers import Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Loop, Waveform, rebuild_time, source_of
-from bushfit.reading.parallel import by_chunks
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS
@@ -112,12 +111,7 @@ def _loop_columns(table: Table, direction: Place, force_sign: int, *, has_clock:
 
 def _check_sense(table: Table, column: Column, displacement: Floats, force: Floats, force_sign: int) -> None:
     """Refuse a force whose covariance with the displacement is negative."""
-
-    def sums(rows: slice) -> tuple[float, float, float]:
-        return np.einsum("i,i", displacement[rows], force[rows]), displacement[rows].sum(), force[rows].sum()
-
-    product, *each = np.sum(by_chunks(sums, force.size), axis=0)
-    if product < each[0] * each[1] / force.size:
+    if displacement @ force < displacement.sum() * force.sum() / force.size:
         raise table.error(
             "the force falls where the displacement rises",
             column=column,
@@ -130,9 +124,7 @@ def _check_sense(table: Table, column: Column, displacement: Floats, force: Floa
 
 def _check_increases(table: Table, column: Column, time: Floats) -> None:
     """Refuse a time that does not increase from row to row."""
-    after, before = time[1:], time[:-1]
-    if any(by_chunks(lambda rows: bool((after[rows] <= before[rows]).any()), after.size)):
-        expected, hint = "a later time on every row", "if a column tells runs, bushfit init makes a loop of each"
-        table.refuse(np.append(False, after <= before), column, "time does not increase", expected, hint)
+    expected, hint = "a later time on every row", "if a column tells runs, bushfit init makes a loop of each"
+    table.refuse(np.append(False, time[1:] <= time[:-1]), column, "time does not increase", expected, hint)
     if time[-1] - time[0] < LEAST_VALUE:
         raise table.error("the record takes no time", column=column, expected=f"{LEAST_VALUE:g} s or more")

@@ -64,7 +64,7 @@ _SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORS
 _WORD = re.compile(r"(?<![a-z\d.,])(?:[a-z]+)")
 
 
-class Named(NamedTuple):
+class Quantity(NamedTuple):
     """A quantity such as "0.05 mm" as a name has it; `is_marked` where a word or sign says that it is the amplitude."""
 
     text: str
@@ -74,10 +74,10 @@ class Named(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Said:
+class Labels:
     """What is said of a test outside its table: `quantities` that may be its amplitude or frequency, and keys."""
 
-    quantities: tuple[Named, ...] = ()
+    quantities: tuple[Quantity, ...] = ()
     direction: Direction | None = None
     temperature: str | None = None
     preload: str | None = None
@@ -85,31 +85,35 @@ class Said:
     operator: str | None = None
     specimen_number: str | None = None
 
-    def of(self, expected: str) -> list[Named]:
+    def of(self, expected: str) -> list[Quantity]:
         """The quantities of the dimension of a unit, each once; those that are marked alone, if any is."""
         found = [each for each in dict.fromkeys(self.quantities) if units.agrees(each.unit, expected)]
         return [each for each in found if each.is_marked] or found
 
-    def __or__(self, other: "Said") -> "Said":
+    def __or__(self, other: "Labels") -> "Labels":
         """What both say; what this one says goes first."""
         own = {unit for unit in ("m", "rad", "1", "Hz") if self.of(unit)}
         more = tuple(each for each in other.quantities if not any(units.agrees(each.unit, unit) for unit in own))
         either = {field.name: getattr(self, field.name) or getattr(other, field.name) for field in fields(self)}
-        return Said(**{**either, "quantities": self.quantities + more})
+        return Labels(**{**either, "quantities": self.quantities + more})
 
 
-def named(*names: str) -> Said:
+#: Where nothing is said.
+NO_LABELS = Labels()
+
+
+def labels_in_names(*names: str) -> Labels:
     """What names say of a test, such as those of its sheet and its file; what an earlier one says goes first.
 
     Only a number with its unit counts: dates and numbers of parts are no amplitudes.
     """
-    return reduce(lambda said, name: said | _named(unicodedata.normalize("NFC", name)), names, Said())
+    return reduce(lambda labels, name: labels | _labels_in_name(unicodedata.normalize("NFC", name)), names, Labels())
 
 
-def _named(name: str) -> Said:
+def _labels_in_name(name: str) -> Labels:
     date, rest = _DATE.search(name), _DATE.sub(" ", name)
     number = _SPECIMEN_NUMBER.search(rest)
-    quantities: list[Named] = []
+    quantities: list[Quantity] = []
     stated: dict[str, Any] = {"date": date and date[0], "specimen_number": number and number[1]}
     for match in _QUANTITY.finditer(rest):
         word, is_glued = plain(match["word"] or ""), bool(match["word"]) and not match["gap"] and not match["sign"]
@@ -131,52 +135,53 @@ def _named(name: str) -> Said:
                 stated.setdefault("temperature", text)
         elif unit not in ("N", "kN") and float(text.split()[0]) > 0.0:
             quantities += _amplitude_or_frequency(word, match, rest, text, unit, is_glued=is_glued)
-    return Said(tuple(quantities), named_direction([name], short=True), **stated)
+    return Labels(tuple(quantities), named_direction([name], short=True), **stated)
 
 
 def _amplitude_or_frequency(
     word: str, match: re.Match[str], name: str, text: str, unit: str, *, is_glued: bool
-) -> list[Named]:
+) -> list[Quantity]:
     """The quantity of a match, unless a word beside it says that it is another one."""
     if unit in ("Hz", "mHz"):
-        return [Named(text, unit, word in _WORDS["frequency"])] if not is_glued or word in _WORDS["frequency"] else []
+        is_frequency = word in _WORDS["frequency"]
+        return [Quantity(text, unit, is_frequency)] if is_frequency or not is_glued else []
     padded = re.match(r"0\d", match["number"])  # "05mm" may be 5 mm or 0.5 mm
     if padded or word in _WORDS["size"] or (is_glued and word not in _WORDS["amplitude"]):
         return []
     is_peak = match["sign"] in ("+-", "+/-", "±")
     convention = "zero-to-peak" if is_peak else split_convention(name[match.end("unit") :])[1]
-    return [Named(text, unit, is_peak or word in _WORDS["amplitude"], convention)]
+    return [Quantity(text, unit, is_peak or word in _WORDS["amplitude"], convention)]
 
 
-def stated_above(lines: Iterable[Line]) -> Said:
+def labels_above(lines: Iterable[Line]) -> Labels:
     """What lines such as those above a table state of its test: each a name and a value, as "Temperature: 23 degC".
 
     What is not understood is left out; so is a quantity without a unit.
     """
-    return reduce(lambda said, line: said | _stated(line), lines, Said())
+    return reduce(lambda labels, line: labels | _label_above(line), lines, Labels())
 
 
-def _stated(line: Line) -> Said:
+def _label_above(line: Line) -> Labels:
     cells = _cells(line)
     if len(cells) < 2 or len(cells[0]) > _LONGEST_VALUE:
-        return Said()
+        return Labels()
     name, unit = units.split_header(cells[0])
     values = [_COMMA.sub(r"\1.", value) for value in (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}")]
     key = _KEY_OF.get(plain(name))
     if key in ("date", "operator", "specimen_number"):
         stated: dict[str, Any] = {key: cells[1]} if len(cells[1]) <= _LONGEST_VALUE else {}
-        return Said(**stated)
+        return Labels(**stated)
     for value in values:
-        if key == "temperature" and _is(value, "K"):
-            return Said(temperature=value)
-        if key == "preload" and (_is(value, "m") or _is(value, "N")):
-            return Said(preload=value)
+        if key == "temperature" and _is_quantity(value, "K"):
+            return Labels(temperature=value)
+        if key == "preload" and (_is_quantity(value, "m") or _is_quantity(value, "N")):
+            return Labels(preload=value)
         heading = _VOCABULARY.heading(cells[0])
         if heading and heading.role in ("frequency", "amplitude") and not key:
-            found = [unit for unit in ("Hz", "m", "rad", "1") if _is(value, unit) and value[0].isdigit()]
+            found = [unit for unit in ("Hz", "m", "rad", "1") if _is_quantity(value, unit) and value[0].isdigit()]
             if found and (found[0] == "Hz") == (heading.role == "frequency"):
-                return Said((Named(value, value.split()[-1], True, heading.convention),))
-    return Said()
+                return Labels((Quantity(value, value.split()[-1], True, heading.convention),))
+    return Labels()
 
 
 def _cells(line: Line) -> Sequence[str]:
@@ -189,7 +194,7 @@ def _cells(line: Line) -> Sequence[str]:
     return [cell.strip(' "') for cell in cells if cell.strip(' "')]
 
 
-def _is(text: str, expected: str) -> bool:
+def _is_quantity(text: str, expected: str) -> bool:
     """Whether a text is a quantity of the dimension of an SI unit."""
     try:
         units.temperature(text) if expected == "K" else units.quantity(text, expected)

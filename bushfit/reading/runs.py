@@ -65,17 +65,17 @@ def runs_of(
         if repeat is not None:
             turns |= np.diff(repeat) != 0
         passes = np.cumsum(np.append(False, turns))
-        if (of_passes := _of_passes(amplitude, passes)) is None:
+        if _group_spans(np.log(amplitude), passes).max() >= _WIDEST_PASS:
             return Runs(None, amplitude, passes + 1 if repeat is None else repeat)
-        levels = of_passes
+        levels = nominal(_group_medians(amplitude, passes))  # every pass over the frequencies nearly keeps to one
         kept_frequency, kept_level = 0.0, 1.0
     of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
     counted = repeat if repeat is not None else _occurrence(frequency, levels)
     if stepped is None:
         by_order: Stepped = "amplitude" if kept_frequency > kept_level else "frequency"
         in_order = max(kept_frequency, kept_level) >= _IN_ORDER
-        told = in_order and (of_level if by_order == "amplitude" else of_frequency) >= _FEWEST_STEPS
-        stepped = by_order if told else "amplitude" if of_level > of_frequency else "frequency"
+        order_tells = in_order and (of_level if by_order == "amplitude" else of_frequency) >= _FEWEST_STEPS
+        stepped = by_order if order_tells else "amplitude" if of_level > of_frequency else "frequency"
     return Runs(stepped, levels, counted)
 
 
@@ -92,9 +92,9 @@ def nominal(amplitude: Floats) -> Floats:
     parting = (within <= _WIDEST_LEVEL) & (between >= _LEAST_GAP * within)  # a level spans its widest gap or more
     for gap, next_gap in zip(within[parting][::-1], between[parting][::-1], strict=True):
         group = np.append(0, np.cumsum(gaps > gap))
-        span = float(_spans(logs, group).max())
+        span = float(_group_spans(logs, group).max())
         if span <= _WIDEST_LEVEL and next_gap >= _LEAST_GAP * span and np.median(np.bincount(group)) > 1:
-            return _middle(amplitude, group[place])
+            return _group_medians(amplitude, group[place])
     return amplitude
 
 
@@ -110,7 +110,7 @@ def _by_frequency(frequency: Floats, amplitude: Floats) -> Floats:
         shapes.add((levels.size, counts.min(), counts.max()))
         if len(shapes) > 1 or counts.min() != counts.max() or counts.max() < 2 or levels.size < _FEWEST_POINTS:
             return amplitude
-    return _where_apart(amplitude, rank)
+    return _medians_if_separate(amplitude, rank)
 
 
 def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None) -> Floats:
@@ -119,41 +119,35 @@ def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | N
     Amplitudes keep their own values where there is one run alone, or where a level reaches into the next.
     """
     falls = np.append(False, (np.diff(amplitude) < 0.0) | (np.diff(frequency) != 0.0))
-    run = np.cumsum(falls) if repeat is None else _number(frequency, repeat)
+    run = np.cumsum(falls) if repeat is None else _group_numbers(frequency, repeat)
     counts = np.bincount(run)
     if counts.size < 2 or np.ptp(counts[counts > 0]) > 0 or counts.max() < _FEWEST_POINTS:
         return amplitude
     order = np.lexsort((amplitude, run))
     rank = np.empty(order.size, dtype=np.intp)
     rank[order] = np.tile(np.arange(counts.max()), order.size // counts.max())
-    return _where_apart(amplitude, rank)
+    return _medians_if_separate(amplitude, rank)
 
 
-def _where_apart(amplitude: Floats, rank: NDArray[np.intp]) -> Floats:
+def _medians_if_separate(amplitude: Floats, rank: NDArray[np.intp]) -> Floats:
     """The median of the points of each rank, (n,), all of as many; no change where one reaches into the next."""
     levels = np.sort(amplitude[np.argsort(rank)].reshape(rank.max() + 1, -1), axis=1)
-    return _middle(amplitude, rank) if (levels[:-1, -1] < levels[1:, 0]).all() else amplitude
-
-
-def _of_passes(amplitude: Floats, passes: NDArray[np.intp]) -> Floats | None:
-    """The level of each amplitude where every pass over the frequencies nearly keeps to one, (n,); else None."""
-    widest = _spans(np.log(amplitude), passes).max()
-    return nominal(_middle(amplitude, passes)) if widest < _WIDEST_PASS else None
+    return _group_medians(amplitude, rank) if (levels[:-1, -1] < levels[1:, 0]).all() else amplitude
 
 
 def rows_alike(*keys: Floats) -> list[NDArray[np.intp]]:
     """The rows of each group that shares all keys, in order; each key (n,)."""
-    group = _number(*keys)
+    group = _group_numbers(*keys)
     return np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1])
 
 
-def _spans(values: Floats, group: NDArray[np.intp]) -> Floats:
+def _group_spans(values: Floats, group: NDArray[np.intp]) -> Floats:
     """From the least to the largest value of each group, (groups,)."""
     ordered, ends = values[np.lexsort((values, group))], np.cumsum(np.bincount(group))
     return ordered[ends - 1] - ordered[np.append(0, ends[:-1])]
 
 
-def _middle(values: Floats, group: NDArray[np.intp]) -> Floats:
+def _group_medians(values: Floats, group: NDArray[np.intp]) -> Floats:
     """The median of the group of each value, (n,)."""
     ordered, counts = values[np.lexsort((values, group))], np.bincount(group)
     starts = np.cumsum(counts) - counts
@@ -161,7 +155,7 @@ def _middle(values: Floats, group: NDArray[np.intp]) -> Floats:
     return medians[group]
 
 
-def _number(*keys: Floats | NDArray[np.int64]) -> NDArray[np.intp]:
+def _group_numbers(*keys: Floats | NDArray[np.int64]) -> NDArray[np.intp]:
     """A number from 0 for each combination of keys, (n,)."""
     return np.unique(np.stack(keys), axis=1, return_inverse=True)[1].ravel()
 

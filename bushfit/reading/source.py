@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from bushfit.reading.layout import HEAD_BYTES, MOST_HEAD_LINES, Layout, Line, is_comment, split
+from bushfit.reading.files import HEAD_BYTES
+from bushfit.reading.layout import MOST_HEAD_LINES, Layout, Line, is_comment, split
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import Numerals
-from bushfit.reading.parallel import by_chunks
 from bushfit.units import SIZES
 
 if TYPE_CHECKING:
@@ -47,22 +47,17 @@ class Text:
         stream.seek(self._offset(after))
         return _lines(stream, after)
 
-    def lacks_values(self) -> bool:
-        """Whether it has formulas without values, as a sheet may."""
-        return False
-
     def may_have_comma(self, layout: Layout) -> bool:
         """Whether cells below the header may have a comma in them."""
-        return self._has('"' if layout.delimiter == "," else ",", self._offset(layout.lines_before_data))
+        return self._has('"' if layout.delimiter == "," else ",", layout)
 
     def may_group(self, layout: Layout, decimal: str) -> bool:
         """Whether numbers below the header may have thousands separators, if `decimal` is their decimal mark."""
-        offset = self._offset(layout.lines_before_data)
-        return (
-            (self.may_have_comma(layout) if decimal == "." else self._has(".", offset))
-            or any(self._has(sign, offset) for sign in _SEPARATORS)
-            or (layout.delimiter != " " and self._has(" ", offset) and bool(_GROUP_BY_BLANK.search(self.data, offset)))
-        )
+        signs = _SEPARATORS if decimal == "." else (*_SEPARATORS, ".")
+        if any(self._has(sign, layout) for sign in signs) or (decimal == "." and self.may_have_comma(layout)):
+            return True
+        has_blanks = layout.delimiter != " " and self._has(" ", layout)
+        return has_blanks and bool(_GROUP_BY_BLANK.search(self.data, self._offset(layout.lines_before_data)))
 
     def columns(
         self, layout: Layout, width: int, scales: Mapping[int, float], numerals: Numerals
@@ -76,20 +71,13 @@ class Text:
         if frame is None:
             return None
         columns = {index: frame[index].to_numpy() for index in scales}
-        for column in columns.values():
+        for index, column in columns.items():
+            largest = LARGEST_VALUE / abs(scales[index])
+            if not (column.min(initial=0.0) >= -largest and column.max(initial=0.0) <= largest):
+                return None
             column.flags.writeable = True  # the frame is nobody else's
-
-        def scale_rows(rows: slice) -> bool:
-            """Multiply some rows by their scales; False where one holds no number, or one beyond LARGEST_VALUE."""
-            for index, scale in scales.items():
-                part, largest = columns[index][rows], LARGEST_VALUE / abs(scale)
-                if not (part.min() >= -largest and part.max() <= largest):
-                    return False
-                if scale != 1.0:
-                    part *= scale
-            return True
-
-        return columns if all(by_chunks(scale_rows, len(frame))) else None
+            column *= scales[index]
+        return columns
 
     def _frame(self, layout: Layout, width: int, numbers: Set[int], numerals: Numerals) -> pd.DataFrame | None:
         """The rows as pandas reads them, the columns `numbers` as floats; None where it does not read them.
@@ -98,9 +86,8 @@ class Text:
         """
         import pandas as pd
 
-        before = self._offset(layout.lines_before_data)
         rest = io.BytesIO(self.data)
-        rest.seek(before)
+        rest.seek(self._offset(layout.lines_before_data))
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error", pd.errors.ParserWarning)
@@ -118,18 +105,18 @@ class Text:
                 )
         except (ValueError, pd.errors.ParserWarning):
             return None
-        if self._has('"', before) and len(frame) != sum(1 for _ in self.lines(layout.lines_before_data)):
+        if self._has('"', layout) and len(frame) != sum(1 for _ in self.lines(layout.lines_before_data)):
             return None  # a quote left open took lines into its cell
         return frame
 
-    def _has(self, sign: str, offset: int) -> bool:
-        """Whether a sign stands anywhere from a byte on."""
-        return self.data.find(sign.encode(), offset) >= 0
+    def _has(self, sign: str, layout: Layout) -> bool:
+        """Whether a sign stands anywhere below the header."""
+        return self.data.find(sign.encode(), self._offset(layout.lines_before_data)) >= 0
 
     def _offset(self, after: int) -> int:
         """Index of the first byte after a line of the head."""
-        ends = [end.end() for end in islice(_LINE_END.finditer(self.data), after)]
-        return 0 if after == 0 else ends[-1] if len(ends) == after else len(self.data)
+        ends = [0, *(end.end() for end in islice(_LINE_END.finditer(self.data), after))]
+        return ends[after] if len(ends) > after else len(self.data)
 
 
 def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:
@@ -142,14 +129,14 @@ def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A sheet of a workbook as rows of texts and numbers, "" where a cell is empty; it answers what a `Text` does.
+    """A sheet of a workbook as rows of texts and numbers, "" where a cell is empty.
 
     `lacks_values` tells whether the workbook has formulas whose values were not saved, which are empty cells, too.
     """
 
     sheet: str
     content: Sequence[Sequence[str | float]]
-    lacks_values: Callable[[], bool] = bool
+    lacks_values: Callable[[], bool] = lambda: False
     encoding: None = None
 
     def head(self) -> list[Line]:
@@ -161,18 +148,6 @@ class Sheet:
         for number, cells in enumerate(islice(self.content, after, None), start=after + 1):
             if any(cell != "" for cell in cells):
                 yield Line(number, cells)
-
-    def may_have_comma(self, _: Layout) -> bool:
-        """Whether cells may be texts with commas."""
-        return True
-
-    def may_group(self, _: Layout, __: str) -> bool:
-        """Whether cells may be texts with thousands separators."""
-        return True
-
-    def columns(self, *_: object) -> dict[int, Floats] | None:
-        """None: no library is needed where cells come apart by themselves."""
-        return None
 
 
 #: The rows of a test file.

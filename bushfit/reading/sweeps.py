@@ -30,10 +30,8 @@ _POSITIVE = ("frequency", "amplitude", "amplitude_reached", "stiffness", "storag
 _FEWEST_SWEEP_ROWS = 3
 #: Above every number of a repeat; chosen: a larger one is another quantity.
 _MOST_REPEATS = 1_000_000
-#: [-] Loss factor below which no point of a bushing lies; noise may push one below zero.
-_LOWEST_LOSS_FACTOR = -0.5
-#: [-] Loss factor above which no point of a bushing lies; chosen: many times that of the softest rubber.
-_HIGHEST_LOSS_FACTOR = 5.0
+#: [-] Loss factors of a bushing; chosen: noise may push one below zero, and the softest rubber has many times less.
+_LOSS_FACTORS = (-0.5, 5.0)
 #: [-] Loss factor that every rubber exceeds somewhere; chosen: a tenth of what little-damping rubber has.
 LEAST_LOSS_FACTOR = 0.005
 #: Share of the points that are clearly below zero where a loss counts the other way; chosen: noise may lift some, and a
@@ -165,9 +163,10 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Ma
     optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
     optional = [role for role in optional if role != "repeat" or table.holds_numbers(table.roles[role].index)]
     optional += ["temperature"] if degrees and degrees.unit else []
-    again = [role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other]
-    again = [role for role in again if units[role] == "1" or table.agrees(role, units[role])]
-    found = {role: table.column(role, units[role], _HINTS.get(role)) for role in (*needed, *pair, *optional, *again)}
+    other_pairs = [role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other]
+    other_pairs = [role for role in other_pairs if units[role] == "1" or table.agrees(role, units[role])]
+    wanted = (*needed, *pair, *optional, *other_pairs)
+    found = {role: table.column(role, units[role], _HINTS.get(role)) for role in wanted}
     for role in ("amplitude", "amplitude_reached"):
         if role in found:
             found[role] = replace(found[role], scale=stated_strain(direction) * found[role].scale)
@@ -193,11 +192,12 @@ def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
             expected=f"a loss factor above {LEAST_LOSS_FACTOR / column.scale:g} {column.unit} somewhere",
             hint=f'if these are ratios, write "[-]" for "[{column.unit}]" in the header',
         )
+    least, most = _LOSS_FACTORS
     table.refuse(
-        ~((loss_factor >= _LOWEST_LOSS_FACTOR) & (loss_factor <= _HIGHEST_LOSS_FACTOR)),
+        ~((loss_factor >= least) & (loss_factor <= most)),
         column,
         "no bushing has this loss",
-        f"a loss factor (loss over storage stiffness) from {_LOWEST_LOSS_FACTOR:g} to {_HIGHEST_LOSS_FACTOR:g}",
+        f"a loss factor (loss over storage stiffness) from {least:g} to {most:g}",
         "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]; or is it 90 deg less the loss?",
     )
 
@@ -207,11 +207,11 @@ def _check_agreement(table: Table, pair: tuple[str, str], values: Mapping[str, F
     for other in STIFFNESS_PAIRS:
         if other == pair or not set(other) <= set(values):
             continue
-        again, _ = _complex_stiffness(other, values)
-        apart = np.hypot(again.real - stiffness.real, np.abs(again.imag) - np.abs(stiffness.imag))
+        said, _ = _complex_stiffness(other, values)
+        distance = np.hypot(said.real - stiffness.real, np.abs(said.imag) - np.abs(stiffness.imag))
         own, others = (" and ".join(f'"{table.roles[role].header}"' for role in both) for both in (pair, other))
         table.refuse(
-            ~(apart <= _AGREEMENT * np.abs(stiffness)),
+            ~(distance <= _AGREEMENT * np.abs(stiffness)),
             table.roles[other[1] if other[0] == pair[0] else other[0]],
             "the columns contradict each other",
             f"the complex stiffness of {own}, within {100 * _AGREEMENT:g} %, in {others}",

@@ -18,7 +18,7 @@ from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, pla
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import RowSource, Text
-from bushfit.reading.wide import unfolded
+from bushfit.reading.wide import as_long
 from bushfit.reading.words import OF_MOTION, of_motion
 from bushfit.reading.workbook import is_workbook, open_sheet
 
@@ -78,7 +78,7 @@ class Table(Columns):
             if (
                 "amplitude" in names
                 and stated.header_line is None
-                and (wide := unfolded(source, file, vocabulary, layout, delimiter))
+                and (wide := as_long(source, file, vocabulary, layout, delimiter))
             ):
                 return *wide, Vocabulary({role: (role,) for role in names}, {})
             return source, layout, vocabulary

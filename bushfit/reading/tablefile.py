@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -37,16 +38,12 @@ _LINE_ENDS = re.compile("[\\r\\n]+")
 _UNSAFE_IN_SHEETS = re.compile(r"[\[\]:*?/\\\x00-\x1f\ufffe\uffff]")
 #: Characters of the name of a sheet at most, of which rare ones count twice: units of UTF-16.
 _LONGEST_SHEET = 31
-#: The name of a sheet that Excel keeps for itself.
-_RESERVED = "history"
 #: Characters of a cell at most.
 _LONGEST_TEXT = 32_767
 #: When a workbook says it was made: that of its zip archive, so that the same tables are the same bytes.
 _MADE = datetime(1980, 1, 1, tzinfo=UTC)
 #: Widest column [characters].
 _WIDEST = 60
-#: What XlsxWriter gives back for a cell that lies beyond the last row or column of a sheet.
-_BEYOND = -1
 
 
 def ending(form: Form) -> str:
@@ -67,45 +64,51 @@ def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
 def opened(file: Path, form: Form, headers: Iterable[str]) -> Iterator[Callable[[Row], None]]:
     """Give what writes a row of a new file as it comes; in the end the file is whole and on the disk.
 
+    The rows of a workbook are held in a file beside it until its end; its one sheet is named after the file.
+
     Raises:
-        OutputError: more rows than a sheet has.
+        OutputError: more rows or columns than a sheet has.
     """
     if form == "xlsx":
-        with streamed(file, headers) as sheet:
-            yield sheet.add
+        with file.open("wb") as stream, _book(stream, constant_memory=True, tmpdir=str(file.parent)) as book:
+            yield _Sheet(book, _sheet_name(file.stem, set()), headers).add
     else:
-        decimal_comma = form == "decimal-comma"
-        with file.open("w", encoding=encoding(decimal_comma), errors="replace", newline="") as stream:
-            yield Rows(stream, headers, decimal_comma=decimal_comma).add
+        with file.open("w", encoding=_encoding(form), errors="replace", newline="") as text:
+            yield _csv_writer(text, form, headers)
     with file.open("rb") as written:
         os.fsync(written.fileno())
 
 
-class Rows:
-    """Writes rows of texts and numbers to a stream as they come."""
-
-    def __init__(self, stream: TextIO, headers: Iterable[str], *, decimal_comma: bool = False) -> None:
-        self._point = "," if decimal_comma else "."
-        self._writer = csv.writer(stream, delimiter=";" if decimal_comma else ",", lineterminator="\n")
-        self._writer.writerow([defused(header) for header in headers])
-
-    def add(self, cells: Iterable[str | float | None]) -> None:
-        """Write one row; None and nan become empty cells."""
-        self._writer.writerow([_cell(value, self._point) for value in cells])
-
-
-def encoding(decimal_comma: bool) -> str:
-    """The encoding of a file: UTF-8, before decimal commas with a byte order mark."""
-    return "utf-8-sig" if decimal_comma else "utf-8"
-
-
 def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
     """The bytes of a table's file."""
+    form: Form = "decimal-comma" if decimal_comma else "csv"
     text = io.StringIO()
-    rows = Rows(text, map(str, table.columns), decimal_comma=decimal_comma)
-    for cells in zip(*(column.tolist() for _, column in table.items()), strict=True):
-        rows.add(cells)
-    return text.getvalue().encode(encoding(decimal_comma), "replace")
+    write = _csv_writer(text, form, map(str, table.columns))
+    for cells in _rows(table):
+        write(cells)
+    return text.getvalue().encode(_encoding(form), "replace")
+
+
+def _rows(table: pd.DataFrame) -> Iterator[Row]:
+    """The rows of a table, with Python's own numbers."""
+    return zip(*(column.tolist() for _, column in table.items()), strict=True)
+
+
+def _encoding(form: Form) -> str:
+    """UTF-8, before decimal commas with the byte order mark by which Excel knows it."""
+    return "utf-8-sig" if form == "decimal-comma" else "utf-8"
+
+
+def _csv_writer(stream: TextIO, form: Form, headers: Iterable[str]) -> Callable[[Row], None]:
+    """What writes a row to a stream, below these headers; None and nan become empty cells."""
+    point, delimiter = (",", ";") if form == "decimal-comma" else (".", ",")
+    writer = csv.writer(stream, delimiter=delimiter, lineterminator="\n")
+    writer.writerow([defused(header) for header in headers])
+
+    def write(cells: Row) -> None:
+        writer.writerow([_cell(value, point) for value in cells])
+
+    return write
 
 
 def _cell(value: object, point: str) -> str:
@@ -133,7 +136,7 @@ def undefused(text: str) -> str:
     return text[1:] if text.startswith("'") and _FORMULA.match(text[1:]) else text
 
 
-class Sheet:
+class _Sheet:
     """Writes rows of texts and numbers to a sheet as they come, below headers in bold that stay in sight.
 
     Every text is written as a text: nothing is run as a formula or taken for a link or a number. Cells without a value,
@@ -145,26 +148,23 @@ class Sheet:
         self._sheet.freeze_panes(1, 0)
         self._widths: dict[int, int] = {}
         self._count = 0
-        self._add(headers, book.add_format({"bold": True}))
+        self.add(headers, book.add_format({"bold": True}))
 
-    def add(self, cells: Iterable[str | float | None]) -> None:
+    def add(self, cells: Row, look: Format | None = None) -> None:
         """Write one row.
 
         Raises:
             OutputError: more rows or columns than a sheet has.
         """
-        self._add(cells)
-
-    def _add(self, cells: Iterable[str | float | None], look: Format | None = None) -> None:
         for place, cell in enumerate(cells):
             if isinstance(cell, str):
                 self._widen(place, len(cell))
-                beyond = self._sheet.write_string(self._count, place, _text(cell), look) == _BEYOND
-            elif cell is not None and cell - cell == 0:  # neither nan nor infinite, which no cell holds
-                beyond = self._sheet.write_number(self._count, place, cell) == _BEYOND
+                status = self._sheet.write_string(self._count, place, _text(cell), look)
+            elif cell is not None and math.isfinite(cell):
+                status = self._sheet.write_number(self._count, place, cell)
             else:
                 continue
-            if beyond:
+            if status < 0:  # beyond the last row or column of a sheet
                 raise OutputError(
                     "a table is too large for a sheet",
                     place=self._sheet.name,
@@ -190,17 +190,10 @@ def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
     stream, names = io.BytesIO(), set[str]()
     with _book(stream, in_memory=True) as book:
         for title, table in tables.items():
-            sheet = Sheet(book, _sheet_name(title, names), map(str, table.columns))
-            for cells in zip(*(column.tolist() for _, column in table.items()), strict=True):
+            sheet = _Sheet(book, _sheet_name(title, names), map(str, table.columns))
+            for cells in _rows(table):
                 sheet.add(cells)
     return stream.getvalue()
-
-
-@contextmanager
-def streamed(file: Path, headers: Iterable[str]) -> Iterator[Sheet]:
-    """The one sheet of a new workbook, named after its file, whose rows are held in a file beside it until its end."""
-    with file.open("wb") as stream, _book(stream, constant_memory=True, tmpdir=str(file.parent)) as book:
-        yield Sheet(book, _sheet_name(file.stem, set()), headers)
 
 
 @contextmanager
@@ -227,7 +220,7 @@ def _sheet_name(title: str, taken: set[str]) -> str:
     """A name that Excel takes and no other sheet has, its capitals aside; it joins those that are taken."""
     plain = _cut(_UNSAFE_IN_SHEETS.sub("_", _text(title)), _LONGEST_SHEET).strip(" '") or "table"
     name, count = plain, 1
-    while name.lower() in taken or name.lower() == _RESERVED:
+    while name.lower() in {*taken, "history"}:  # which Excel keeps for itself
         count += 1
         end = f"_{count}"
         name = _cut(plain, _LONGEST_SHEET - len(end)) + end

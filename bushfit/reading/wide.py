@@ -48,8 +48,11 @@ _OPEN = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 _CORNER = re.compile(r"\s*[\\|]\s*|\s+/\s+")
 
 
-class _Said(NamedTuple):
-    """What header cells say: what a column holds, in which unit, and at which level of what; None where they do not."""
+class _WideHeading(NamedTuple):
+    """What header cells say of a column: what it holds, in which unit, at which level of frequency or amplitude.
+
+    Of what they do not say, it has None.
+    """
 
     role: str | None = None
     unit: str | None = None
@@ -58,16 +61,16 @@ class _Said(NamedTuple):
     level_unit: str | None = None
     convention: AmplitudeConvention | None = None
 
-    def also(self, other: "_Said") -> "_Said":
+    def filled_by(self, other: "_WideHeading") -> "_WideHeading":
         """What this says, and where it does not, the other."""
-        return other._replace(**{name: said for name, said in self._asdict().items() if said is not None})
+        return other._replace(**{name: value for name, value in self._asdict().items() if value is not None})
 
 
 class _Series(NamedTuple):
     """A column of a wide table: what its header says of it and of the column down; line, value down and cell each."""
 
-    said: _Said
-    down: _Said
+    heading: _WideHeading
+    down: _WideHeading
     points: list[tuple[int, str | float, str | float]]
 
 
@@ -76,7 +79,7 @@ _Row = tuple[int, list[str | float]]
 
 
 @dataclass(frozen=True, eq=False)
-class _Unfolded(Sheet):
+class _LongTable(Sheet):
     """The rows of a wide table as those of a long one, each with the line of the wide one it comes from (`numbers`)."""
 
     numbers: Sequence[int] = ()
@@ -86,7 +89,7 @@ class _Unfolded(Sheet):
         return (Line(number, cells) for number, cells in zip(self.numbers, self.content, strict=True))
 
 
-def unfolded(
+def as_long(
     source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layout, delimiter: str | None
 ) -> tuple[RowSource, Layout] | None:
     """A wide table as a long one, of which the headers are names of roles; None where a file holds no wide table.
@@ -106,9 +109,11 @@ def unfolded(
         ]
         blocks = list(_blocks(rows, vocabulary))
         if series := [one for block in blocks for one in _series(*block, vocabulary)]:
-            long, joined = _joined(series, source, file, mark)
+            long, long_layout = _as_long_table(series, source, file, mark)
             cells = (cell for headers, _ in blocks for row in headers for cell in row)
-            return long, replace(joined, written=tuple(cell for cell in cells if _names_role(cell, vocabulary)))
+            read = ((cell, [_read_heading(part, vocabulary) for part in _CORNER.split(cell)]) for cell in cells)
+            written = tuple(cell for cell, parts in read if any(part.role or part.stepped for part in parts))
+            return long, replace(long_layout, written=written)
     return None
 
 
@@ -143,14 +148,14 @@ def _first_number(cells: Sequence[str | float]) -> int | None:
 def _series(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_Series]:
     """The columns of a block; none where it is no block of a wide table."""
     columns = [index for index in range(1, len(data[0][1])) if any(cells[index] != "" for _, cells in data)]
-    said = dict.fromkeys(columns, _Said())
-    down, across = _Said(), _Said()
+    headings = dict.fromkeys(columns, _WideHeading())
+    down, across = _WideHeading(), _WideHeading()
     for distance, cells in enumerate(reversed(headers)):
         # an empty cell is merged with the one before it
         merged: Iterator[str] = accumulate(cells, lambda before, cell: cell or before)
         texts = list(merged) if distance else cells
-        row = {column: _said(texts[column], vocabulary) for column in columns}
-        if any(texts[column] and row[column] == _Said() for column in columns):
+        row = {column: _read_heading(texts[column], vocabulary) for column in columns}
+        if any(texts[column] and row[column] == _WideHeading() for column in columns):
             break
         levels = {one.stepped for one in row.values() if one.level}
         for corner in _corner(cells[0], vocabulary):
@@ -158,61 +163,59 @@ def _series(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Voca
             if corner.role is not None:
                 continue
             if corner.stepped in levels - {None} or (levels and down.stepped not in (None, corner.stepped)):
-                across = across.also(named)
+                across = across.filled_by(named)
             else:
-                down = down.also(named)
-        said = {column: one.also(row[column]) for column, one in said.items()}
-    stepped = next((one.stepped for one in (*said.values(), across) if one.stepped), None)
+                down = down.filled_by(named)
+        headings = {column: one.filled_by(row[column]) for column, one in headings.items()}
+    stepped = next((one.stepped for one in (*headings.values(), across) if one.stepped), None)
     stepped = stepped or next((role for role in _STEPPED if down.stepped and role != down.stepped), None)
-    said = {column: one.also(across)._replace(stepped=one.stepped or stepped) for column, one in said.items()}
-    if stepped is None or len(columns) < 2 or not all(one.level for one in said.values()):
+    headings = {c: one.filled_by(across)._replace(stepped=one.stepped or stepped) for c, one in headings.items()}
+    if stepped is None or len(columns) < 2 or not all(one.level for one in headings.values()):
         return []
     down = down._replace(stepped=_STEPPED[stepped == _STEPPED[0]])
-    return [_Series(one, down, [(line, cells[0], cells[c]) for line, cells in data]) for c, one in said.items()]
+    return [_Series(one, down, [(line, cells[0], cells[c]) for line, cells in data]) for c, one in headings.items()]
 
 
-def _corner(text: str, vocabulary: Vocabulary) -> list[_Said]:
+def _corner(text: str, vocabulary: Vocabulary) -> list[_WideHeading]:
     """What the cells of a corner say that names one thing or two: "f [Hz]", "f [Hz] \\ A [mm]"; no level."""
-    return [one for part in _CORNER.split(text) if not (one := _said(part, vocabulary)).level]
+    return [one for part in _CORNER.split(text) if not (one := _read_heading(part, vocabulary)).level]
 
 
-def _names_role(text: str, vocabulary: Vocabulary) -> bool:
-    """Whether a header cell names what is measured, or one of frequency and amplitude."""
-    return any(one.role or one.stepped for one in (_said(part, vocabulary) for part in _CORNER.split(text)))
-
-
-def _said(text: str, vocabulary: Vocabulary) -> _Said:
+def _read_heading(text: str, vocabulary: Vocabulary) -> _WideHeading:
     """What a header cell says; nothing where a part of it is not understood."""
     whole, convention = split_convention(text.replace("_", " "))
     if is_like_number(text):
-        return _Said(level=text)
+        return _WideHeading(level=text)
     heading = vocabulary.heading(text)
     glued = _LEVEL.fullmatch((heading and heading.unit) or "")  # "tan delta 1 %" is at a level, and no unit of 1 %
     if heading and not (glued and _stepped_in(glued["unit"])) and units.is_unit(heading.unit or "1"):
-        return _named(heading)
+        return _of_role(heading)
     if text and units.is_unit(bare := whole.strip("[]() ")):
-        return _Said(unit=bare, convention=convention)
+        return _WideHeading(unit=bare, convention=convention)
     if not (found := _LEVEL.search(whole)):
-        return _Said()
+        return _WideHeading()
     unit, end = found["unit"], found.end()
     stepped = _stepped_in(unit)
     if unit and not stepped:
         unit, end = None, found.end("number")
     rest = _JOINTS.sub(" ", whole[: found.start()] + " " + whole[end:]).strip()
-    level = _Said(None, None, found["number"], stepped or _SYMBOLS.get((found["name"] or "").lower()), unit, convention)
+    stepped = stepped or _SYMBOLS.get((found["name"] or "").lower())
+    level = _WideHeading(level=found["number"], stepped=stepped, level_unit=unit, convention=convention)
     if not rest:
         return level
     if heading := vocabulary.heading(rest):
-        return level.also(_named(heading)._replace(convention=convention))
+        return level.filled_by(_of_role(heading)._replace(convention=convention))
     bare = rest.strip("[]() ")
-    return level._replace(level_unit=bare, stepped=_stepped_in(bare)) if not unit and _stepped_in(bare) else _Said()
+    if unit or not _stepped_in(bare):
+        return _WideHeading()
+    return level._replace(level_unit=bare, stepped=_stepped_in(bare))
 
 
-def _named(heading: Heading) -> _Said:
+def _of_role(heading: Heading) -> _WideHeading:
     """What a header says that names a role."""
     if heading.role in _STEPPED:
-        return _Said(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
-    return _Said(heading.role, heading.unit)
+        return _WideHeading(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
+    return _WideHeading(heading.role, heading.unit)
 
 
 def _stepped_in(unit: str | None) -> str | None:
@@ -221,54 +224,56 @@ def _stepped_in(unit: str | None) -> str | None:
     return next((role for si, role in roles.items() if unit and units.agrees(unit, si)), None)
 
 
-def _joined(series: Sequence[_Series], source: RowSource, file: Path, delimiter: str) -> tuple[RowSource, Layout]:
+def _as_long_table(
+    series: Sequence[_Series], source: RowSource, file: Path, delimiter: str
+) -> tuple[RowSource, Layout]:
     """The columns of all blocks as one long table: a row for each value down at each level."""
-
-    def error(problem: str, expected: str) -> MeasurementError:
-        place = f'sheet "{source.sheet}"' if source.sheet else f"line {series[0].points[0][0] - 1}"
-        hint = "correct the wide table, or write it as a long one: a row for each frequency and amplitude"
-        return MeasurementError(problem, file=file, place=place, found=_told(series), expected=expected, hint=hint)
-
-    by_role: dict[str, list[_Series]] = {}
+    by_role: dict[str | None, list[_Series]] = {}
     for one in series:
-        if one.said.role is None:
-            expected = "a quantity such as K* [N/mm] or tan delta above each block, or in each header"
-            raise error("a block of this wide table does not say what it holds", expected)
-        by_role.setdefault(one.said.role, []).append(one)
-    for columns in by_role.values():
-        columns.sort(key=lambda one: _value(one.said.level))
-    first, *others = by_role.values()
-    for other in others:
-        if _points(first) != _points(other):
-            expected = "the same frequencies and amplitudes in all blocks"
-            raise error("the blocks of this wide table differ", expected)
-    down, across = (
-        {(said.stepped, said.level_unit, said.convention) for said in sayings}
-        for sayings in ((one.down for one in series), (one.said for one in series))
-    )
-    quantities = {(one.said.role, one.said.unit, None): None for one in series}
-    if len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role):
-        expected = "one unit for each quantity, and levels of one kind"
-        raise error("this wide table counts one thing in two ways", expected)
+        by_role.setdefault(one.heading.role, []).append(one)
+    blocks = [sorted(columns, key=lambda one: _value(one.heading.level)) for columns in by_role.values()]
+    levels = [
+        [(_value(one.heading.level), [_value(text) for _, text, _ in one.points]) for one in columns]
+        for columns in blocks
+    ]
+    down = {(one.down.stepped, one.down.level_unit, one.down.convention) for one in series}
+    across = {(one.heading.stepped, one.heading.level_unit, one.heading.convention) for one in series}
+    quantities = dict.fromkeys((one.heading.role, one.heading.unit, None) for one in series)
+    faults = {
+        "a block of this wide table does not say what it holds": (
+            None in by_role,
+            "a quantity such as K* [N/mm] or tan delta above each block, or in each header",
+        ),
+        "the blocks of this wide table differ": (
+            any(own != levels[0] for own in levels),
+            "the same frequencies and amplitudes in all blocks",
+        ),
+        "this wide table counts one thing in two ways": (
+            len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role),
+            "one unit for each quantity, and levels of one kind",
+        ),
+    }
+    for problem, (is_so, expected) in faults.items():
+        if is_so:
+            place = f'sheet "{source.sheet}"' if source.sheet else f"line {series[0].points[0][0] - 1}"
+            hint = "correct the wide table, or write it as a long one: a row for each frequency and amplitude"
+            raise MeasurementError(
+                problem, file=file, place=place, found=_described(series), expected=expected, hint=hint
+            )
     headers = [
         f"{role}{_COUNTED[convention]}{f' [{unit}]' if unit else ''}".replace("_", " ")
         for role, unit, convention in (*down, *across, *quantities)
     ]
     numbers: list[int] = []
     rows: list[list[str | float]] = []
-    for beside in zip(*by_role.values(), strict=True):
-        text = beside[0].said.level or ""
+    for beside in zip(*blocks, strict=True):
+        text = beside[0].heading.level or ""
         level = text if _OPEN.fullmatch(text) else _value(text)
         for points in zip(*(column.points for column in beside), strict=True):
             numbers.append(points[0][0])
             rows.append([points[0][1], level, *(cell for _, _, cell in points)])
-    sheet = _Unfolded(source.sheet or "", rows, numbers=numbers)
+    sheet = _LongTable(source.sheet or "", rows, numbers=numbers)
     return sheet, Layout(delimiter, tuple(headers), min(numbers) - 1, ("",) * len(headers), None)
-
-
-def _points(columns: Sequence[_Series]) -> list[tuple[float, list[float]]]:
-    """Level and values down of each column."""
-    return [(_value(one.said.level), [_value(text) for _, text, _ in one.points]) for one in columns]
 
 
 def _value(text: str | float | None) -> float:
@@ -279,9 +284,9 @@ def _value(text: str | float | None) -> float:
         return math.nan
 
 
-def _told(series: Sequence[_Series]) -> str:
+def _described(series: Sequence[_Series]) -> str:
     """The columns of a wide table in words: what each holds, at which level, over how many rows."""
-    counted = Counter((one.said.role, one.said.unit, one.said.stepped, len(one.points)) for one in series)
+    counted = Counter((one.heading.role, one.heading.unit, one.heading.stepped, len(one.points)) for one in series)
     return "; ".join(
         f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of "
         f"{count} {_PLURAL[stepped or 'amplitude']}, {n} rows"

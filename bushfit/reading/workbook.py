@@ -1,7 +1,7 @@
 """The sheets of an xlsx workbook.
 
 python-calamine reads them: exactly, and imported in a millisecond where openpyxl takes 170. It does so in a process of
-its own (`aside`), because an archive of some kilobytes may hold sheets of terabytes.
+its own (`workbook_process`), because an archive of some kilobytes may hold sheets of terabytes.
 """
 
 import json
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.errors import BushfitError, MeasurementError, did_you_mean
-from bushfit.reading import aside
+from bushfit.reading import workbook_process
 from bushfit.reading.files import view_bytes
 from bushfit.reading.source import Sheet
 
@@ -115,7 +115,7 @@ def _known(_: bytes) -> dict[str, Any]:
 
 
 def _asked(data: bytes, file: Path, kind: type[BushfitError], **order: object) -> Mapping[str, Any]:
-    """The answer of `aside` to an order about a workbook.
+    """The answer of `workbook_process` to an order about a workbook.
 
     Raises:
         kind: the workbook is broken, or takes more memory or time than a workbook may.
@@ -123,7 +123,7 @@ def _asked(data: bytes, file: Path, kind: type[BushfitError], **order: object) -
     found = find_spec("python_calamine")
     packages = str(Path(found.origin).parents[1]) if found and found.origin else ""
     order |= {"memory": _MOST_MEMORY, "seconds": _MOST_SECONDS, "packages": packages}
-    command = [sys.executable, "-I", "-S", aside.__file__, json.dumps(order)]
+    command = [sys.executable, "-I", "-S", workbook_process.__file__, json.dumps(order)]
     try:
         done = subprocess.run(command, input=data, capture_output=True, check=False, timeout=_PATIENCE * _MOST_SECONDS)
         status, answer = done.returncode, marshal.loads(done.stdout) if done.returncode == 0 else {}

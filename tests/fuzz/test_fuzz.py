@@ -29,7 +29,6 @@ def kept(name: str) -> list[bytes]:
 @most_targets
 def test_the_corpus(name: str) -> None:
     run, inputs = ready(name), kept(name)
-    print(f"{name}: {len(inputs)} inputs, {sum(map(len, inputs))} bytes")
     assert len(inputs) >= 10
     for data in inputs:
         run(data)
@@ -40,24 +39,6 @@ def test_every_seed_has_a_name(name: str) -> None:
     """Words and an ending, as in `key_twice.json`; the fuzzer itself names inputs by their checksum."""
     names = [file.name for file in (CORPUS / name).iterdir()]
     assert [name for name in names if not re.fullmatch(r"[a-z]\w*\.(csv|toml|json|xml|txt)", name)] == []
-
-
-def tried(name: str) -> settings:
-    """As many tries as elsewhere, and of what takes longer no more than MOST."""
-    return settings(max_examples=min(MOST.get(name, 1000), settings.default.max_examples))
-
-
-@pytest.mark.hypothesis
-@most_targets
-def test_any_bytes(name: str) -> None:
-    run = ready(name)
-
-    @tried(name)
-    @given(st.binary(max_size=300) | st.text(max_size=300).map(lambda text: text.encode("utf-8", "surrogatepass")))
-    def check(data: bytes) -> None:
-        run(data)
-
-    check()
 
 
 @st.composite
@@ -73,13 +54,17 @@ def mutated(draw: st.DrawFn, originals: list[bytes]) -> bytes:
     return data
 
 
+ANY = st.binary(max_size=300) | st.text(max_size=300).map(lambda text: text.encode("utf-8", "surrogatepass"))
+
+
 @pytest.mark.hypothesis
+@pytest.mark.parametrize("mutates", [False, True], ids=["any bytes", "mutated files"])
 @most_targets
-def test_mutated_files(name: str) -> None:
+def test_whatever_the_bytes(name: str, mutates: bool) -> None:
     run = ready(name)
 
-    @tried(name)
-    @given(mutated(kept(name)))
+    @settings(max_examples=min(MOST.get(name, 1000), settings.default.max_examples))
+    @given(mutated(kept(name)) if mutates else ANY)
     def check(data: bytes) -> None:
         run(data)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -38,14 +37,12 @@ def test_every_sheet_with_a_test_is_taken_and_the_others_are_told(loop: Loop, sw
     assert seen[0].label == "7.xlsx, sheet axial"
 
 
-def test_a_book_of_one_sheet_needs_no_name_of_it(sweep: Sweep, tmp_path: Path) -> None:
+def test_a_book_of_one_sheet_needs_no_name_of_it_and_one_without_a_test_is_refused(
+    sweep: Sweep, tmp_path: Path
+) -> None:
     ((source,), left_out) = gather([book(tmp_path / "axial.xlsx", {"Tabelle1": raw_sweep_table(sweep)})], {})
     assert (source.sheet, source.inspect().entry, left_out) == (None, {}, ())
-
-
-def test_a_book_without_a_test_is_refused_as_one(tmp_path: Path) -> None:
-    file = book(tmp_path / "x.xlsx", {"Info": INFO, "more": INFO.assign(more=1)})
-    ((source,), left_out) = gather([file], {})
+    ((source,), left_out) = gather([book(tmp_path / "x.xlsx", {"Info": INFO, "more": INFO.assign(more=1)})], {})
     assert left_out == ()
     with pytest.raises(BushfitError, match="no sheet holds such a table"):
         source.inspect()
@@ -74,11 +71,9 @@ def test_a_folder_is_its_tests(loop: Loop, sweep: Sweep, tmp_path: Path) -> None
     assert set(told) == {"readme.txt", "photo.png", "broken.xlsx", "older"}
     assert told["older"] == "a folder"
     assert told["photo.png"] == "no table, by its ending"
-
-
-def test_a_folder_without_a_test_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "readme.txt").write_text("Tested on Monday.\n", encoding="utf-8")
-    with pytest.raises(NoTestError, match=r"no file of this folder holds a test(.|\n)*readme.txt"):
+    for test in sources:
+        test.file.unlink()
+    with pytest.raises(NoTestError, match=r"no file of this folder holds a test(.|\n)*photo.png: no table"):
         gather([tmp_path], {})
 
 
@@ -104,10 +99,10 @@ def test_an_amplitude_without_a_column_is_read_from_the_name_unless_stated(
     seen = inspect(held(sweep, tmp_path / f"{name}.csv"), stated)
     assert seen.entry == entry
     assert seen.measured.amplitude[0] == pytest.approx(amplitude)
-    assert ("from its name" in seen.looked.facts) == ("at_amplitude" not in stated)
+    assert ("from its name" in seen.facts) == ("at_amplitude" not in stated)
     assert (seen.assumed is not None) == (name == "axial_A0,1mm")
     overruled = name == "axial_0.2mm" and "at_amplitude" in stated
-    assert bool(seen.looked.odd) == overruled
+    assert bool(seen.odd) == overruled
 
 
 def test_an_amplitude_that_nothing_says_or_that_two_numbers_may_be_is_asked_for(sweep: Sweep, tmp_path: Path) -> None:
@@ -118,52 +113,34 @@ def test_an_amplitude_that_nothing_says_or_that_two_numbers_may_be_is_asked_for(
         assert 'at_amplitude = "' in str(raised.value)
 
 
-def test_a_frequency_without_a_column_is_read_from_the_name(sweep: Sweep, tmp_path: Path) -> None:
-    rows = sweep.frequency == sweep.frequency[0]
-    table = raw_sweep_table(sweep)[rows].drop(columns="frequency [Hz]")
-    table.to_csv(tmp_path / "radial_5Hz.csv", index=False)
+def test_a_frequency_is_read_from_the_name_unless_a_column_has_it(sweep: Sweep, tmp_path: Path) -> None:
+    rows = raw_sweep_table(sweep)[sweep.frequency == 5.0]
+    rows.drop(columns="frequency [Hz]").to_csv(tmp_path / "radial_5Hz.csv", index=False)
     seen = inspect(tmp_path / "radial_5Hz.csv", {})
-    assert seen.entry == {"at_frequency": "5 Hz"}
-    assert set(seen.measured.frequency) == {5.0}
-
-
-def test_a_column_goes_before_what_the_name_says(sweep: Sweep, tmp_path: Path) -> None:
-    raw_sweep_table(sweep).to_csv(tmp_path / "axial_0.1mm.csv", index=False)
+    assert (seen.entry, seen.facts["frequencies"]) == ({"at_frequency": "5 Hz"}, "1, at 5 Hz")
+    rows.to_csv(tmp_path / "axial_0.1mm.csv", index=False)
     assert inspect(tmp_path / "axial_0.1mm.csv", {"at_amplitude": "0.3 mm"}).entry == {}
 
 
-def test_moduli_are_those_of_a_specimen(tmp_path: Path) -> None:
-    rows = "\n".join(f"{f},{1.2 + f / 1e3},{0.2 + f / 1e4}" for f in range(5, 60, 5))
-    for symbol, strain in (("G", "engineering"), ("E", "tension")):
-        file = tmp_path / f"{symbol}_0.1%.csv"
-        file.write_text(f"frequency [Hz],{symbol}' [MPa],{symbol}'' [MPa]\n{rows}\n", encoding="utf-8")
-        seen = inspect(file, {"specimen": "DMA"} if symbol == "G" else {})
-        assert isinstance(seen.direction, Specimen)
-        assert (seen.direction.name, seen.direction.strain) == ("DMA" if symbol == "G" else "bar", strain)
-        assert seen.entry == {"specimen": seen.direction.name, "at_amplitude": "0.1 %"}
-        assert "its strain is taken as" in seen.assumed
-
-
-@pytest.mark.parametrize("header", ["Storage Modulus E' [MPa],tan delta [-]", "E' [MPa],Phase angle [deg]"])
-def test_a_storage_modulus_with_a_loss_is_a_coupons(header: str, tmp_path: Path) -> None:
-    file = tmp_path / "dma.csv"
-    loss = 0.1 if "tan" in header else np.degrees(np.arctan(0.1))
-    rows = "\n".join(f"{f},0.1,{1.2 + f / 1e3},{loss}" for f in range(5, 60, 5))
-    file.write_text(f"Frequency [Hz],Strain [%],{header}\n{rows}\n", encoding="utf-8")
-    seen = inspect(file, {"specimen": "C1"})
-    assert seen.direction == Specimen("C1", "modulus", strain="tension")
-    assert seen.entry == {"specimen": "C1"}
-    np.testing.assert_allclose(seen.measured.stiffness, 1e6 * (1.2 + seen.measured.frequency / 1e3) * (1 + 0.1j))
-
-
-@pytest.mark.parametrize("heads", ["E* 0.1 % [MPa],E* 1 % [MPa]", "|E*| 0.1% [MPa],|E*| 1% [MPa]"])
-def test_a_wide_table_of_a_bar_in_tension_is_one(heads: str, tmp_path: Path) -> None:
-    rows = "\n".join(f"{f},{6 + f / 1e3},{4 + f / 1e3},0.1,0.2" for f in range(5, 60, 5))
-    text = f"Frequency [Hz],{heads},tan delta 0.1 %,tan delta 1 %\n{rows}\n"
-    (tmp_path / "wide.csv").write_text(text, encoding="utf-8")
-    (tmp_path / "shear.csv").write_text(text.replace("E*", "G*"), encoding="utf-8")
-    strains = [inspect(tmp_path / name, {}).direction.strain for name in ("wide.csv", "shear.csv")]
-    assert strains == ["tension", "engineering"]
+@pytest.mark.parametrize(
+    ("header", "cells", "name", "strain"),
+    [
+        ("G' [MPa],G'' [MPa]", "{0},0.2", "shear_0.1%", "engineering"),
+        ("E' [MPa],E'' [MPa]", "{0},0.2", "bar_0.1%", "tension"),
+        ("Strain [%],Storage Modulus E' [MPa],tan delta [-]", "0.1,{0},0.1", "x", "tension"),
+        ("Strain [%],E' [MPa],Phase angle [deg]", "0.1,{0},5.7", "x", "tension"),
+        ("E* 0.1 % [MPa],E* 1 % [MPa],tan delta 0.1 %,tan delta 1 %", "{0},0.8,0.1,0.2", "x", "tension"),
+        ("|G*| 0.1% [MPa],|G*| 1% [MPa],tan delta 0.1 %,tan delta 1 %", "{0},0.8,0.1,0.2", "x", "engineering"),
+    ],
+)
+def test_moduli_are_those_of_a_specimen(header: str, cells: str, name: str, strain: str, tmp_path: Path) -> None:
+    rows = "\n".join(f"{f},{cells.format(1.2 + f / 1e3)}" for f in range(5, 60, 5))
+    (tmp_path / f"{name}.csv").write_text(f"frequency [Hz],{header}\n{rows}\n", encoding="utf-8")
+    seen = inspect(tmp_path / f"{name}.csv", {"specimen": "DMA"})
+    assert seen.direction == Specimen("DMA", "modulus", strain=strain)
+    assert seen.entry == {"specimen": "DMA"} | ({"at_amplitude": "0.1 %"} if "%" in name else {})
+    assert "its strain is taken as" in seen.assumed
+    assert inspect(tmp_path / f"{name}.csv", {}).direction.name == ("bar" if strain == "tension" else "coupon")
 
 
 def test_sizes_of_a_block_make_a_specimen_of_it(sweep: Sweep, tmp_path: Path) -> None:
@@ -181,24 +158,25 @@ def test_an_amplitude_that_is_none_is_refused(sweep: Sweep, tmp_path: Path, text
 
 
 def test_a_temperature_is_stated_for_files_with_several(tmp_path: Path) -> None:
-    """Of files with one temperature in a column, and with several."""
-    rows = [f"{f},0.1,{600 + f},0.1,{t}" for t in (10, 25) for f in range(5, 60, 5)]
-    head = "f [Hz],amplitude [mm],K* [N/mm],tan delta,temperature [degC]"
-    for name, kept in (("several", rows), ("one", rows[:11])):
-        (tmp_path / f"axial_{name}.csv").write_text("\n".join([head, *kept]) + "\n", encoding="utf-8")
-    sources, _ = gather([tmp_path], {"temperature": "25 degC"})
-    entries = {source.file.stem: source.inspect().entry for source in sources}
-    assert entries == {"axial_several": {"temperature": "25 degC"}, "axial_one": {}}
+    """Of files with one temperature in a column, with several, and without such a column."""
+    rows = pd.DataFrame(
+        [(f, 0.1, 600 + f, 0.1, t) for t in (10, 25) for f in range(5, 60, 5)],
+        columns=["f [Hz]", "amplitude [mm]", "K* [N/mm]", "tan delta", "temperature [degC]"],
+    )
+    files = {"axial_several": rows, "axial_one": rows[:11], "radial_none": rows[:11].drop(columns="temperature [degC]")}
+    for name, table in files.items():
+        table.to_csv(tmp_path / f"{name}.csv", index=False)
+
+    def entries() -> dict[str, object]:
+        sources, _ = gather([tmp_path], {"temperature": "25 degC"})
+        return {source.file.stem: source.inspect().entry for source in sources}
+
+    # it chooses rows of another file, and tells nothing of the one without
+    assert entries() == {"axial_several": {"temperature": "25 degC"}, "axial_one": {}, "radial_none": {}}
     with pytest.raises(BushfitError, match=r"several temperatures(.|\n)*temperature = "):
         inspect(tmp_path / "axial_several.csv", {})
-    plain = [head.rpartition(",")[0], *(row.rpartition(",")[0] for row in rows[:11])]
-    (tmp_path / "radial_none.csv").write_text("\n".join(plain) + "\n", encoding="utf-8")
-    sources, _ = gather([tmp_path], {"temperature": "25 degC"})
-    entries |= {"radial_none": {}}  # the temperature chooses rows of another file, and tells nothing of this one
-    assert {source.file.stem: source.inspect().entry for source in sources} == entries
     (tmp_path / "axial_several.csv").unlink()
-    sources, _ = gather([tmp_path], {"temperature": "25 degC"})
-    assert sources[1].inspect().entry == {"temperature": "25 degC"}
+    assert entries() == {"axial_one": {}, "radial_none": {"temperature": "25 degC"}}
 
 
 def test_a_resonance_test_is_left_out_with_the_way_on(sweep: Sweep, root: Path, tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from looking import look, without
 
-from bushfit.geometry import Direction
 from bushfit.inspection.draft import file_text
 from bushfit.inspection.opening import inspect
 from bushfit.reading.measurement import Loop, Sweep
@@ -27,60 +26,27 @@ from bushfit.reading.tablefile import to_csv
     ],
 )
 def test_labels_are_held_against_the_content(loop: Loop, tmp_path: Path, name: str, said: tuple[str, ...]) -> None:
-    odd = look(tmp_path, loop, name).looked.odd
+    odd = look(tmp_path, loop, name).odd
     assert len(odd) == len(said)
     assert all(sentence.startswith(start) for sentence, start in zip(odd, said, strict=True))
 
 
 def test_label_of_a_sweep(sweep: Sweep, tmp_path: Path) -> None:
     one = without(sweep, sweep.amplitude != 2e-4)
-    assert look(tmp_path, one, "sweep_axial_0.2mm.csv").looked.odd == ()
-    (said,) = look(tmp_path, one, "sweep_axial_0.4mm.csv").looked.odd
+    assert look(tmp_path, one, "sweep_axial_0.2mm.csv").odd == ()
+    (said,) = look(tmp_path, one, "sweep_axial_0.4mm.csv").odd
     assert "the amplitude is 0.2 mm zero-to-peak: the name may count peak-to-peak" in said
-    assert look(tmp_path, one, "sweep_axial_0.4mm_pp.csv").looked.odd == ()
-
-
-@pytest.mark.parametrize(
-    ("name", "direction"),
-    [
-        ("Schleife_radial_1.csv", Direction.RADIAL),
-        ("bague_axiale.csv", Direction.AXIAL),
-        ("essai_AXIAUX.csv", Direction.AXIAL),
-        ("ensayo torsión.csv", Direction.TORSION),
-        ("Verdrehung_3.csv", Direction.TORSION),
-        ("axial_and_radial.csv", None),
-        ("coaxial_mount.csv", None),
-        ("test_7.csv", None),
-    ],
-)
-def test_direction_from_the_name(loop: Loop, tmp_path: Path, name: str, direction: Direction | None) -> None:
-    if direction and direction.is_rotation:
-        table = raw_loop_table(loop).set_axis(["time [s]", "rotation [deg]", "moment [N m]"], axis=1)
-        (tmp_path / name).write_bytes(to_csv(table))
-        assert inspect(tmp_path / name, {}).direction is direction
-    else:
-        assert look(tmp_path, loop, name).direction is direction
+    assert look(tmp_path, one, "sweep_axial_0.4mm_pp.csv").odd == ()
 
 
 def test_what_the_user_states_goes_into_the_text(loop: Loop, tmp_path: Path) -> None:
     table = raw_loop_table(loop).drop(columns="time [s]").set_axis(["Weg X", "Zelle 2"], axis=1)
     (tmp_path / "loop.csv").write_bytes(to_csv(table))
-    stated = {
-        "direction": "radial",
-        "columns": {"displacement": "Weg X", "force": "Zelle 2", "stiffness": "k"},
-        "units": {"displacement": "mm", "force": "N"},
-        "frequency": "0.1 Hz",
-        "waveform": "sine",
-        "amplitude": "peak-to-peak",
-    }
-    seen = inspect(tmp_path / "loop.csv", stated)
+    kept: dict[str, object] = {"direction": "radial", "units": {"displacement": "mm", "force": "N"}}
+    kept |= {"frequency": "0.1 Hz", "waveform": "sine"}
+    columns = {"displacement": "Weg X", "force": "Zelle 2"}
+    needless = {"columns": {**columns, "stiffness": "k"}, "amplitude": "peak-to-peak"}
+    seen = inspect(tmp_path / "loop.csv", {**kept, **needless})
     (written,) = tomllib.loads(file_text(seen, tmp_path))["loops"]
-    assert written == {
-        "file": "loop.csv",
-        "direction": "radial",
-        "columns": {"displacement": "Weg X", "force": "Zelle 2"},
-        "units": {"displacement": "mm", "force": "N"},
-        "frequency": "0.1 Hz",
-        "waveform": "sine",
-    }
-    assert seen.looked.facts["frequency"].startswith("0.1")
+    assert written == {"file": "loop.csv", "columns": columns, **kept}
+    assert seen.facts["frequency"].startswith("0.1")

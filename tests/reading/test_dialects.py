@@ -81,8 +81,3 @@ def test_errors_name_line_and_column_in_every_dialect(name: str, tmp_path: Path)
     message = str(caught.value)
     assert f'line {line}, column "{dialect.headers[1].strip()}' in message, message
     assert 'found: "bad"' in message, message
-
-
-def test_machines_and_laboratories_are_many() -> None:
-    print(f"{len(ALL)} dialects, {len(MACHINES)} of them of machines and laboratories")
-    assert len(MACHINES) >= 25

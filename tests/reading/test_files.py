@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from pathlib import Path
 from typing import BinaryIO
@@ -11,7 +10,8 @@ import pytest
 
 from bushfit.errors import CampaignError, MeasurementError
 from bushfit.geometry import Direction
-from bushfit.reading.files import read_utf8, sha256, view_bytes
+from bushfit.reading.encoding import detect, to_utf8
+from bushfit.reading.files import read_utf8, view_bytes
 from bushfit.reading.loops import read_loop
 
 
@@ -24,20 +24,12 @@ def test_what_is_no_file(name: str, words: str, tmp_path: Path) -> None:
         read_loop(tmp_path / name, Direction.AXIAL)
 
 
-def test_bytes_come_as_they_are_and_the_error_is_of_the_kind_asked_for(tmp_path: Path) -> None:
+def test_bytes_come_as_they_are_up_to_a_number_and_the_error_is_of_the_kind_asked_for(tmp_path: Path) -> None:
     file = tmp_path / "x.toml"
-    file.write_bytes(b"\xef\xbb\xbfname = 1\r\n")
-    assert view_bytes(file, CampaignError) == read_utf8(file, CampaignError) == b"\xef\xbb\xbfname = 1\r\n"
-    with pytest.raises(CampaignError, match="there is no such file"):
-        view_bytes(tmp_path / "y.toml", CampaignError)
-
-
-def test_a_file_of_more_bytes_than_allowed_is_refused_with_what_to_do(tmp_path: Path) -> None:
-    file = tmp_path / "x.toml"
-    file.write_bytes(b"12345")
-    assert view_bytes(file, CampaignError, largest=5) == b"12345"
-    with pytest.raises(CampaignError, match=r"too large[\s\S]*5 bytes[\s\S]*at most 4 bytes[\s\S]*give another"):
-        view_bytes(file, CampaignError, largest=4, hint="give another")
+    file.write_bytes(b"\xef\xbb\xbf1\r\n")
+    assert view_bytes(file, CampaignError, largest=6) == read_utf8(file, CampaignError) == b"\xef\xbb\xbf1\r\n"
+    with pytest.raises(CampaignError, match=r"too large[\s\S]*6 bytes[\s\S]*at most 5 bytes[\s\S]*give another"):
+        view_bytes(file, CampaignError, largest=5, hint="give another")
 
 
 @pytest.mark.parametrize("content", [b"", b" \r\n\t", b" " * 70_000])
@@ -77,10 +69,25 @@ def test_a_file_that_changes_while_it_is_read(then: int, found: str, tmp_path: P
         read_loop(Changing(tmp_path / "loop.csv"), Direction.AXIAL)
 
 
-@pytest.mark.parametrize("size", [1, (1 << 22) + 1])
-def test_a_checksum_is_that_of_all_bytes(size: int, tmp_path: Path) -> None:
-    """It is summed in a thread."""
-    data = bytes(range(256)) * (size // 256 + 1)
-    file = tmp_path / "x.csv"
-    file.write_bytes(data)
-    assert sha256(view_bytes(file, MeasurementError)).result() == hashlib.sha256(data).hexdigest()
+def test_bytes_tell_their_encoding_unless_it_is_stated() -> None:
+    """What the dialects do not show."""
+    assert detect("Prüfweg\x81".encode("latin-1")) == "latin-1"
+    assert detect("time".encode("utf-16-be")) == "utf-16-be"
+    data = "Prüfweg".encode()
+    assert to_utf8(data, Path("x.csv"), "latin-1") == ("PrÃ¼fweg".encode(), "latin-1")
+    with pytest.raises(MeasurementError, match=r'unknown encoding[\s\S]*"utf-9"'):
+        to_utf8(data, Path("x.csv"), "utf-9")
+
+
+@pytest.mark.parametrize(
+    ("data", "stated", "words"),
+    [
+        (b"time\nforce\0c\n", None, r"x.csv, line 2: this is not text[\s\S]*0x00"),
+        (b"a\0b\0\0c", None, "this is not text"),
+        (b"a\n\nb\xfc\n", "utf-8", r"x.csv, line 3: this is not UTF-8 text[\s\S]*0xfc"),
+        ("a\nb".encode("utf-16")[:-1], None, r"this is not UTF-16 text"),
+    ],
+)
+def test_what_is_no_text_is_named_with_its_line(data: bytes, stated: str | None, words: str) -> None:
+    with pytest.raises(MeasurementError, match=words):
+        to_utf8(data, Path("x.csv"), stated)

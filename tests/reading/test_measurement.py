@@ -24,15 +24,6 @@ def test_columns_of_different_length_are_refused_by_name() -> None:
         Sweep("fast", Direction.AXIAL, np.zeros((2, 1)), np.zeros((2, 1)), np.zeros((2, 1), dtype=complex))
 
 
-def test_a_sweep_is_one_repeat_at_its_level_unless_told() -> None:
-    columns = np.array([5.0, 15.0]), np.array([1e-4, 1e-4]), np.array([1e5 + 1e4j, 2e5 + 2e4j])
-    plain = Sweep("s", Direction.AXIAL, *columns)
-    assert plain.repeat.tolist() == [1, 1]
-    assert np.array_equal(plain.amplitude_reached, columns[1])
-    missed = Sweep("s", Direction.AXIAL, *columns, reached=np.array([0.98e-4, 1.01e-4]))
-    assert missed.amplitude_reached.tolist() == [0.98e-4, 1.01e-4]
-
-
 @pytest.mark.parametrize("waveform", ["sine", "triangle"])
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 def test_time_rebuilt_from_frequency(waveform: Any, noise: float) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,10 +11,10 @@ from hypothesis import strategies as st
 from bushfit import units
 from bushfit.geometry import Direction
 from bushfit.reading.layout import Line
-from bushfit.reading.names import Said, named, stated_above
+from bushfit.reading.names import Labels, direction_of_file, labels_above, labels_in_names, named_direction
 
 
-def amplitudes(said: Said, expected: str = "m") -> list[tuple[str, str | None]]:
+def amplitudes(said: Labels, expected: str = "m") -> list[tuple[str, str | None]]:
     return [(each.text, each.convention) for each in said.of(expected)]
 
 
@@ -40,31 +42,13 @@ def amplitudes(said: Said, expected: str = "m") -> list[tuple[str, str | None]]:
     ],
 )
 def test_the_amplitude_in_a_name(name: str, text: str, convention: str | None) -> None:
-    assert amplitudes(named(name)) == [(text, convention)]
+    assert amplitudes(labels_in_names(name)) == [(text, convention)]
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "CMP15961",
-        "2024-05-03",
-        "20240503_12",
-        "test 7",
-        "axial_05mm",
-        "0.1-1mm",
-        "A0.05",
-        "v2mm",
-        "D 20 mm",
-        "12,5",
-        "",
-    ],
-)
-def test_no_amplitude_where_there_is_no_single_number_with_its_unit(name: str) -> None:
-    assert amplitudes(named(name)) == []
-
-
-def test_two_lengths_of_which_neither_is_marked_are_two() -> None:
-    assert amplitudes(named("axial_18mm_bushing_1mm")) == [("18 mm", None), ("1 mm", None)]
+def test_no_amplitude_where_there_is_no_single_number_with_its_unit() -> None:
+    names = ["CMP15961", "2024-05-03", "20240503_12", "test 7", "axial_05mm", "0.1-1mm", "A0.05", "v2mm", "D 20 mm", ""]
+    assert {name: amplitudes(labels_in_names(name)) for name in names} == {name: [] for name in names}
+    assert amplitudes(labels_in_names("axial_18mm_bushing_1mm")) == [("18 mm", None), ("1 mm", None)]
 
 
 @pytest.mark.parametrize(
@@ -83,23 +67,42 @@ def test_two_lengths_of_which_neither_is_marked_are_two() -> None:
     ],
 )
 def test_what_else_a_name_says(name: str, keys: dict[str, object]) -> None:
-    said = named(name)
+    said = labels_in_names(name)
     assert {key: value for key, value in vars(said).items() if value and key != "quantities"} == keys
 
 
-def test_frequencies_and_strains() -> None:
-    said = named("DMA_10Hz_0,05%")
-    assert [each.text for each in said.of("Hz")] == ["10 Hz"]
-    assert amplitudes(said, "1") == [("0.05 %", None)]
-    assert [each.text for each in named("x_50mHz").of("Hz")] == ["50 mHz"]
-    assert named("5-155Hz").of("Hz") == []
+def test_frequencies_and_strains_and_a_sheet_before_its_file() -> None:
+    assert amplitudes(labels_in_names("DMA_10Hz_0,05%"), "1") == [("0.05 %", None)]
+    assert amplitudes(labels_in_names("x_50mHz"), "Hz") == [("50 mHz", None)]
+    assert amplitudes(labels_in_names("5-155Hz"), "Hz") == []
+    said = labels_in_names("radial 0.3mm", "axial 0.1mm 20Hz")
+    assert (said.direction, amplitudes(said)) == (Direction.RADIAL, [("0.3 mm", None)])
+    assert amplitudes(said, "Hz") == [("20 Hz", None)]
 
 
-def test_a_sheet_goes_before_its_file() -> None:
-    said = named("radial 0.3mm", "axial 0.1mm 20Hz")
-    assert said.direction is Direction.RADIAL
-    assert amplitudes(said) == [("0.3 mm", None)]
-    assert [each.text for each in said.of("Hz")] == ["20 Hz"]
+@pytest.mark.parametrize(
+    ("name", "direction"),
+    [
+        ("sweep_axial_2", Direction.AXIAL),
+        ("bague_axiale", Direction.AXIAL),
+        ("Essais radiaux", Direction.RADIAL),
+        ("Verdrehung-3", Direction.TORSION),
+        ("TORSIÓN", Direction.TORSION),
+        ("axial_and_radial", None),
+        ("coaxial", None),
+        ("loop", None),
+    ],
+)
+def test_one_word_of_four_languages_settles_the_direction(name: str, direction: Direction | None) -> None:
+    assert named_direction([name]) is direction
+
+
+def test_the_name_goes_before_the_headers_and_angles_before_both() -> None:
+    headers = ["Radialweg [mm]", "Kraft [N]"]
+    assert direction_of_file(Path("radial/axial_1.csv"), headers, turns=False) is Direction.AXIAL
+    assert direction_of_file(Path("axial/loop_1.csv"), headers, turns=False) is Direction.RADIAL
+    assert direction_of_file(Path("axial_1.csv"), headers, turns=True) is Direction.TORSION
+    assert direction_of_file(Path("loop_1.csv"), ["Weg [mm]"], turns=False) is None
 
 
 def test_lines_above_a_table() -> None:
@@ -114,7 +117,7 @@ def test_lines_above_a_table() -> None:
         ["Serial number", 17.0],
         "Amplitude: large",
     ]
-    said = stated_above(Line(number, content) for number, content in enumerate(lines, start=1))
+    said = labels_above(Line(number, content) for number, content in enumerate(lines, start=1))
     assert said.temperature == "23.5 °C"
     assert units.temperature(said.temperature) == pytest.approx(296.65)
     assert (said.date, said.operator, said.preload, said.specimen_number) == ("2024-05-03", "3", "2 kN", "17")
@@ -124,7 +127,7 @@ def test_lines_above_a_table() -> None:
 
 @given(st.text())
 def test_any_name_and_any_line_say_something_that_can_be_read(text: str) -> None:
-    for said in (named(text), stated_above([Line(1, text)]), stated_above([Line(1, [text, text])])):
+    for said in (labels_in_names(text), labels_above([Line(1, text)]), labels_above([Line(1, [text, text])])):
         for expected in ("m", "rad", "1", "Hz"):
             for each in said.of(expected):
                 assert units.quantity(each.text, expected) >= 0.0

@@ -11,7 +11,7 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
-from bushfit.reading.numerals import Numerals, is_like_number, weigh
+from bushfit.reading.numerals import Numerals
 from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS
 
@@ -37,24 +37,7 @@ from bushfit.reading.words import LOOP_COLUMNS
 def test_a_cell_is_a_number_in_its_way_or_none(
     decimal: str, thousands: str | None, text: str, number: float | None
 ) -> None:
-    way = Numerals(decimal, thousands)
-    assert way.value(text) == number
-    assert way.allows(text) == (number is not None)
-
-
-@pytest.mark.parametrize(
-    ("text", "like"), [("1.234,5", True), ("-.5", True), ("1 Hz", False), ("1.2.3", False), ("", False)]
-)
-def test_what_is_like_a_number_in_some_way(text: str, like: bool) -> None:
-    assert is_like_number(text) == like
-
-
-def test_cells_leave_the_ways_that_all_of_them_allow() -> None:
-    evidence = weigh([((2, 0), "1.234"), ((3, 0), "0.5"), ((4, 0), "x")])
-    assert {way.decimal for way in evidence.ways} == {"."}
-    assert (evidence.unclear, evidence.contrary) == (None, None)
-    assert weigh([((2, 0), "1.234")]).unclear == ((2, 0), "1.234")
-    assert weigh([((2, 0), "0.5"), ((3, 1), "0,5")], all_cells=True).contrary == ((3, 1), "0,5")
+    assert Numerals(decimal, thousands).value(text) == number
 
 
 UNCLEAR: dict[str, tuple[str, dict[str, str], float | None]] = {

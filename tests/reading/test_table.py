@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from texts import LOOP, LOOP_ROWS, loop_from
+from texts import LOOP
 
 from bushfit.errors import MeasurementError, NoColumnError, UnitError
 from bushfit.reading.layout import FileFormat
@@ -18,16 +19,6 @@ def opened(text: str, folder: Path, **stated: object) -> Table:
     file = folder / "loop.csv"
     file.write_text(text)
     return Table.open(file, LOOP_COLUMNS, **stated)  # type: ignore[arg-type]
-
-
-def test_columns_are_known_by_role_and_scaled_to_si(tmp_path: Path) -> None:
-    table = opened(LOOP.replace("[N]", "[kN]"), tmp_path)
-    assert {role: column.index for role, column in table.roles.items()} == {"time": 0, "displacement": 1, "force": 2}
-    wanted = {"force": table.column("force", "N"), "displacement": table.column("displacement", "m")}
-    values = table.read(wanted, fewest_rows=1)
-    rows = np.array([[float(cell) for cell in row.split(",")] for row in LOOP_ROWS])
-    np.testing.assert_allclose(values["force"], 1e3 * rows[:, 2], rtol=1e-15)
-    np.testing.assert_allclose(values["displacement"], 1e-3 * rows[:, 1], rtol=1e-15)
 
 
 def test_rows_that_a_library_cannot_read_come_out_the_same(tmp_path: Path) -> None:
@@ -44,13 +35,6 @@ def test_a_unit_that_is_not_in_the_file_can_be_stated(tmp_path: Path) -> None:
     with pytest.raises(UnitError, match=r'line 1, column "force"[\s\S]*the force has no unit'):
         opened(text, tmp_path).column("force", "N")
     assert opened(text, tmp_path, stated_units={"force": "kN"}).column("force", "N").scale == 1e3
-
-
-def test_whether_a_column_agrees_with_a_unit(tmp_path: Path) -> None:
-    table = opened(LOOP.replace("time [s]", "remark"), tmp_path)
-    assert table.agrees("force", "N")
-    assert not table.agrees("force", "m")
-    assert not table.agrees("time", "s")
 
 
 @pytest.mark.parametrize(
@@ -72,38 +56,29 @@ def test_the_symbol_of_a_stiffness_is_one_by_its_unit(header: str, index: int | 
     assert (column and column.index) == index
 
 
-def test_too_few_rows_are_counted(tmp_path: Path) -> None:
-    table = opened("\n".join(LOOP.splitlines()[:4]), tmp_path)
-    force = {"force": table.column("force", "N")}
-    assert table.read(force, fewest_rows=3)["force"].size == 3
-    with pytest.raises(MeasurementError, match=r"too few rows[\s\S]*found: 3[\s\S]*at least 4"):
-        table.read(force, fewest_rows=4)
-
-
-def test_a_row_is_refused_with_its_line_and_cell(tmp_path: Path) -> None:
-    header, *rows = LOOP.splitlines()
-    table = opened("\n".join(["# rig 3", "", header, *rows]), tmp_path)
-    time = table.column("time", "s")
-    bad = np.arange(len(rows)) >= 5
-    with pytest.raises(
-        MeasurementError, match=rf'line 9, column "time \[s\]": too late[\s\S]*"{rows[5].split(",")[0]}"'
-    ):
-        table.refuse(bad, time, "too late", "sooner")
-    table.refuse(np.zeros(len(rows), dtype=bool), time, "too late", "sooner")
+@pytest.mark.parametrize(
+    ("text", "stated", "line", "headers"),
+    [
+        ("time,force\ntime,displacement,force\n1,2,3\n", {}, 2, ("time", "displacement", "force")),
+        ("time,force\nZeit,Kraft\n1,2\n", {"header_line": 1}, 1, ("time", "force")),
+        ("time;force,x\n1;2,3\n", {"delimiter": "comma"}, 1, ("time;force", "x")),
+        ("x,y\n1,2\n2,3\n3,4\n", {}, 1, ("x", "y")),
+    ],
+)
+def test_the_header_names_most_columns_unless_it_is_stated(
+    text: str, stated: dict[str, Any], line: int, headers: tuple[str, ...], tmp_path: Path
+) -> None:
+    found = opened(text, tmp_path, stated=FileFormat(**stated)).layout
+    assert (found.header_line, found.headers) == (line, headers)
 
 
 def test_a_header_line_that_is_stated_has_to_hold_a_header(tmp_path: Path) -> None:
-    text = "time [s],displacement [mm],force [kN]\n" + LOOP
-    assert opened(text, tmp_path, stated=FileFormat(header_line=2)).column("force", "N").scale == 1.0
     with pytest.raises(MeasurementError, match=r"no header on this line[\s\S]*header_line = 99"):
-        opened(text, tmp_path, stated=FileFormat(header_line=99))
+        opened(LOOP, tmp_path, stated=FileFormat(header_line=99))
 
 
-def test_missing_column_of_the_campaign_suggests_the_nearest(tmp_path: Path) -> None:
-    with pytest.raises(MeasurementError, match=r'no column "forse"[\s\S]*did you mean "force \[N\]"'):
-        loop_from(LOOP, tmp_path, columns={"force": "forse"})
-
-
-def test_a_column_that_no_header_is_like_has_an_error_of_its_own_kind(tmp_path: Path) -> None:
+def test_a_column_that_is_not_there_suggests_the_nearest_if_any_and_has_an_error_of_its_own(tmp_path: Path) -> None:
+    with pytest.raises(NoColumnError, match=r'no column "forse"[\s\S]*did you mean "force \[N\]"'):
+        opened(LOOP, tmp_path, columns={"force": "forse"})
     with pytest.raises(NoColumnError, match=r'no column "Q"[\s\S]*name one of this file'):
         opened(LOOP, tmp_path, columns={"force": "Q"})

@@ -1,7 +1,8 @@
-"""Tables in every form: what the reader takes back, and what a spreadsheet sees."""
+"""Tables in every form: what the reader takes back, and what a spreadsheet sees, which runs nothing of it."""
 
 from __future__ import annotations
 
+import csv
 import io
 from functools import partial
 from pathlib import Path
@@ -11,6 +12,8 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bushfit.errors import OutputError
 from bushfit.geometry import Direction
@@ -18,7 +21,7 @@ from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.reading.sweeps import read_sweep
-from bushfit.reading.tablefile import Form, ending, opened, streamed, to_bytes
+from bushfit.reading.tablefile import Form, defused, ending, opened, to_bytes, to_csv
 
 FORMS: tuple[Form, ...] = get_args(Form)
 PHASE = np.linspace(0.0, 12.0, 50)
@@ -40,16 +43,36 @@ def test_tests_are_read_back(form: Form, direction: Direction, tmp_path: Path) -
     for column in ("time", "displacement", "force"):
         written = getattr(loop, column)
         np.testing.assert_allclose(getattr(found, column), written, rtol=1e-6, atol=1e-9 * np.abs(written).max())
+    assert np.array_equal(swept.frequency, frequency)
     assert np.array_equal(swept.repeat, repeat)
     np.testing.assert_allclose(swept.amplitude, sweep.amplitude, rtol=1e-6)
     np.testing.assert_allclose(swept.stiffness, sweep.stiffness, rtol=1e-6)
 
 
-def test_decimal_commas_stand_between_semicolons_after_the_mark_of_utf_8() -> None:
-    written = to_bytes("t", TABLE, "decimal-comma")
-    assert written.startswith(b"\xef\xbb\xbfx [mm], low;n;'=text\n0,3333333;1;'=1+1\n;2;\"a; b, c\"\n-1e-12;3;Pr")
-    found = pd.read_csv(io.BytesIO(written), sep=";", decimal=",")
-    np.testing.assert_allclose(found["x [mm], low"], TABLE["x [mm], low"], rtol=1e-6)
+def test_cells_of_a_text_have_seven_digits_and_nothing_stands_for_nothing() -> None:
+    table = pd.DataFrame({"x [mm]": [1.0 / 3.0, np.nan], "n": [-3, 4], "=run": ["\r=1+1", 'a "b", c']})
+    assert to_csv(table) == b'x [mm],n,\'=run\n0.3333333,-3,\' =1+1\n,4,"a ""b"", c"\n'
+    commas = to_bytes("t", TABLE, "decimal-comma")
+    assert commas.startswith(b"\xef\xbb\xbfx [mm], low;n;'=text\n0,3333333;1;'=1+1\n;2;\"a; b, c\"\n-1e-12;3;Pr")
+
+
+RUN = ["=1+1", "+cmd", "-2+3", "@SUM(A1)", "\t=1", "  =1", '=HYPERLINK("http://x")', "\uff1d1", '"=1', "%0A=1", "|x"]
+STAY = ["loop_axial_1", "0.1 mm", "a=b", "A-4", "", "'quoted'", "Prüfling 3"]
+
+
+def test_a_text_that_a_spreadsheet_would_run_is_quoted_and_every_text_is_one_line() -> None:
+    assert [defused(text) for text in RUN] == [f"'{text}" for text in RUN]
+    assert [defused(text) for text in STAY] == STAY
+    assert (defused("a\r\nb"), defused("a\r\n=1")) == ("a b", "a =1")
+
+
+@given(st.lists(st.text(), min_size=1))
+def test_no_cell_runs(texts: list[str]) -> None:
+    written = to_csv(pd.DataFrame({"text": texts, "n": range(len(texts))})).decode()
+    rows = list(csv.reader(io.StringIO(written, newline="")))[1:]
+    assert len(rows) == len(texts)
+    for row in rows:
+        assert not row[0].lstrip().startswith(("=", "+", "-", "@"))
 
 
 def test_a_workbook_has_numbers_in_full_and_texts_that_nothing_runs() -> None:
@@ -65,33 +88,27 @@ def test_a_workbook_has_numbers_in_full_and_texts_that_nothing_runs() -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_rows_as_they_come_are_the_table(form: Form, tmp_path: Path) -> None:
+def test_rows_as_they_come_are_the_table_and_the_same_table_the_same_bytes(form: Form, tmp_path: Path) -> None:
     file = tmp_path / f"t.{ending(form)}"
     with opened(file, form, TABLE.columns) as write:
         for cells in TABLE.itertuples(index=False):
             write(cells)
     assert list(tmp_path.iterdir()) == [file], "nothing is left beside it"
     read = partial(pd.read_excel, engine="openpyxl") if form == "xlsx" else pd.read_csv
-    pd.testing.assert_frame_equal(read(file), read(io.BytesIO(to_bytes("t", TABLE, form))))
+    first, second = (to_bytes("t", TABLE, form) for _ in range(2))
+    pd.testing.assert_frame_equal(read(file), read(io.BytesIO(first)))
+    assert first == second
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_the_same_table_is_the_same_bytes(form: Form) -> None:
-    assert len({to_bytes("t", TABLE, form) for _ in range(2)}) == 1
-
-
-def test_what_a_sheet_does_not_hold_is_refused_and_not_cut(tmp_path: Path) -> None:
+def test_what_a_sheet_does_not_hold_is_an_error_and_leaves_no_file_of_its_rows(tmp_path: Path) -> None:
     wide = pd.DataFrame(np.ones((1, 16_385)), columns=[f"c{n}" for n in range(16_385)])
+    assert to_bytes("t", wide, "csv")
     with pytest.raises(OutputError, match="too large for a sheet"):
         to_bytes("t", wide, "xlsx")
-    assert to_bytes("t", wide, "csv")
-
-
-def test_a_sheet_that_is_full_is_an_error_and_leaves_no_file_of_its_rows(tmp_path: Path) -> None:
-    with streamed(tmp_path / "t.xlsx", ["n"]) as sheet:
-        sheet._count = 1_048_576  # as after so many rows, which take their time
-        with pytest.raises(OutputError, match="too large"):
-            sheet.add([1.0])
-    with pytest.raises(OutputError), streamed(tmp_path / "t.xlsx", map(str, range(16_385))):
+    with pytest.raises(OutputError), opened(tmp_path / "t.xlsx", "xlsx", wide.columns):
         pass
+    with opened(tmp_path / "t.xlsx", "xlsx", ["n"]) as write:
+        write.__self__._count = 1_048_576  # type: ignore[attr-defined]  # as after so many rows, which take their time
+        with pytest.raises(OutputError, match="too large"):
+            write([1.0])
     assert [file.name for file in tmp_path.iterdir()] == ["t.xlsx"]

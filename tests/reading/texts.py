@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
+from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
@@ -30,6 +34,14 @@ def sweep_from(text: str, folder: Path, **options: Any) -> Sweep:
     file = folder / "sweep.csv"
     file.write_text(text)
     return read_sweep(file, options.pop("direction", Direction.AXIAL), **options)
+
+
+@contextmanager
+def refused(*words: str) -> Iterator[None]:
+    """One of bushfit's errors, with all these words in it."""
+    with pytest.raises(BushfitError) as caught:
+        yield
+    assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
 def with_line(text: str, number: int, line: str) -> str:

@@ -33,7 +33,7 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
         name = style.file_name(seen.label, _NAME_LETTERS)
         words = f"{seen.kind}, {seen.direction or 'direction unknown'}"
         words += ", force turned" * (seen.entry.get("force_sign") == -1)
-        title = f"{name}: {words}" + (f", {len(seen.looked.odd)} odd" if seen.looked.odd else "")
+        title = f"{name}: {words}" + (f", {len(seen.odd)} odd" if seen.odd else "")
         if isinstance(seen.measured, Sweep):
             first = _draw_sweep(place, seen.measured)
         elif seen.measured is not None:

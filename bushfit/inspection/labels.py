@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bushfit import units
-from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
-from bushfit.reading.names import Named, Said, named, stated_above
+from bushfit.reading.names import Labels, Quantity, labels_above, labels_in_names
 from bushfit.reading.sweeps import ONE_TEST
 from bushfit.reading.table import Table
 
@@ -21,11 +20,9 @@ _HELD = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
 
 #: Relative difference up to which a file contains what its name states; chosen: rigs miss a level by that much.
 _AGREEMENT = 0.03
-#: Values that are listed one by one; chosen: of more a range says enough.
-_MOST_LISTED = 4
 
 
-class Outside(NamedTuple):
+class KeysFromLabels(NamedTuple):
     """What is said of a test outside its columns: keys of its table in a campaign, and where what was found, by label.
 
     `is_counted` tells whether it is known how an amplitude counts that no column has.
@@ -44,9 +41,9 @@ def temperatures_of(table: Table) -> int:
     return 1 if np.ptp(found) <= ONE_TEST else 2
 
 
-def names_of(file: Path, stated: Mapping[str, Any]) -> Said:
+def labels_of_file(file: Path, stated: Mapping[str, Any]) -> Labels:
     """What the name of a sheet and of its file say of a test; they count amplitudes as is stated, if it is."""
-    said = named(stated.get("sheet", ""), file.stem)
+    said = labels_in_names(stated.get("sheet", ""), file.stem)
     counting = stated.get("amplitude")
     if counting is None:
         return said
@@ -55,19 +52,20 @@ def names_of(file: Path, stated: Mapping[str, Any]) -> Said:
     return replace(said, quantities=counted)
 
 
-def keys_outside(
-    table: Table, place: Place, stated: Mapping[str, Any], by_name: Said, beside: Said, *, is_sweep: bool
-) -> Outside:
+def keys_from_labels(
+    table: Table, place: Place, stated: Mapping[str, Any], by_name: Labels, of_book: Labels, *, is_sweep: bool
+) -> KeysFromLabels:
     """The keys that a test has by what is said outside its columns, and where they were found.
 
-    What is stated goes first, then the table, its names (`by_name`), the lines above it, and what is said `beside` it
-    of all tests of its file. Of a sweep, frequency and amplitude have to be known; the place settles its unit.
+    What is stated goes first, then the table, its names (`by_name`), the lines above it, and what the other sheets say
+    of all tests of their workbook (`of_book`). Of a sweep, frequency and amplitude have to be known; the
+    place settles its unit.
 
     Raises:
         MeasurementError: a sweep of which nothing says the amplitude, or the frequency.
     """
-    above = stated_above(line for line in table.source.head() if line.number < table.layout.header_line)
-    sources = {"from its name": by_name, "from the lines above the table": above, "from the other sheets": beside}
+    above = labels_above(line for line in table.source.head() if line.number < table.layout.header_line)
+    sources = {"from its name": by_name, "from the lines above the table": above, "from the other sheets": of_book}
     keys: dict[str, Any] = {}
     facts: dict[str, list[str]] = {}
     is_counted = True
@@ -88,51 +86,43 @@ def keys_outside(
         if text and key not in table.roles and key not in stated:
             keys[key] = text
             facts.setdefault(label, []).append(f"{word} {text}")
-    return Outside(keys, {label: ", ".join(words) for label, words in facts.items()}, is_counted)
+    return KeysFromLabels(keys, {label: ", ".join(words) for label, words in facts.items()}, is_counted)
 
 
-def _held(table: Table, place: Place, key: str, sources: Mapping[str, Said]) -> tuple[str, Named]:
+def _held(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -> tuple[str, Quantity]:
     """Where the amplitude or frequency is said that a sweep held, and what."""
     role = _HELD[key]
     expected = place.motion.displacement_unit if role == "amplitude" else "Hz"
-    for label, said in sources.items():
-        found = said.of(expected)
-        if len(found) > 1:
-            raise _unsaid(table, key, found[0].text, f"{label}: {' and '.join(each.text for each in found)}")
-        if found:
-            return label, found[0]
+    label, found = next(((label, own) for label, said in sources.items() if (own := said.of(expected))), ("", []))
+    if len(found) == 1:
+        return label, found[0]
     usual = {"m": "0.1 mm", "Hz": "10 Hz", "1": "0.1 %"}
-    raise _unsaid(table, key, usual.get(expected, "1 deg"), None)
-
-
-def _unsaid(table: Table, key: str, example: str, found: str | None) -> MeasurementError:
-    """The error for a sweep without amplitude or frequency, with one that a user may state."""
-    role = _HELD[key]
-    return table.header_error(
+    example = found[0].text if found else usual.get(expected, "1 deg")
+    raise table.header_error(
         f"nothing says at which {role} this was tested",
-        found=found or ", ".join(table.headers),
+        found=f"{label}: {' and '.join(each.text for each in found)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
         hint=f'state {key} = "{example}" in the campaign, or name the column: columns = {{ {role} = "..." }}',
     )
 
 
 def wrong_labels(
-    named: Said, direction: Place, amplitudes: Sequence[float], frequencies: Sequence[float]
+    labels: Labels, direction: Place, amplitudes: Sequence[float], frequencies: Sequence[float]
 ) -> Iterator[str]:
     """A sentence where the name of a file states an amplitude or a frequency that the file does not contain."""
     unit, factor = direction.display.displacement
     expected = direction.motion.displacement_unit
     stated = [
         units.quantity(each.text, expected) / (2.0 if each.convention == "peak-to-peak" else 1.0)
-        for each in named.of(expected)
+        for each in labels.of(expected)
     ]
     if stated and not any(_near(value, x) for value in stated for x in amplitudes):
         double = any(_near(value, 2.0 * x) for value in stated for x in amplitudes)
         found = _listed([factor * x for x in amplitudes])
-        yield f"the name says {_or(named.of(expected))}, the amplitude is {found} {unit} zero-to-peak" + (
+        yield f"the name says {_or(labels.of(expected))}, the amplitude is {found} {unit} zero-to-peak" + (
             ": the name may count peak-to-peak" if double else ""
         )
-    said = named.of("Hz")
+    said = labels.of("Hz")
     if said and not any(_near(units.quantity(each.text, "Hz"), f) for each in said for f in frequencies):
         yield f"the name says {_or(said)}, the frequency is {_listed(frequencies)} Hz"
 
@@ -141,10 +131,11 @@ def _near(one: float, other: float) -> bool:
     return abs(one - other) <= _AGREEMENT * other
 
 
-def _or(stated: Sequence[Named]) -> str:
+def _or(stated: Sequence[Quantity]) -> str:
     return " or ".join(dict.fromkeys(f"{each.text} {each.convention or ''}".rstrip() for each in stated))
 
 
 def _listed(values: Sequence[float]) -> str:
+    """Up to four values, or the range of more."""
     texts = list(dict.fromkeys(f"{value:.4g}" for value in values))
-    return ", ".join(texts) if len(texts) <= _MOST_LISTED else f"{texts[0]} to {texts[-1]}"
+    return ", ".join(texts) if len(texts) <= 4 else f"{texts[0]} to {texts[-1]}"
