@@ -10,8 +10,9 @@ from bushfit.batch.points import Point
 from bushfit.effects import is_parameter, parameter_named, parameter_names
 from bushfit.units import for_people
 
-#: Value, low and high of its 95 % interval, standard error, in SI; None where it is not known.
-Figures = tuple[float, float | None, float | None, float | None]
+#: What is known of a quantity, in order, by the end of its column's header: the value [SI], low and high of its 95 %
+#: interval, and standard error.
+PARTS = {"": 0, ", std error": 3, ", low": 1, ", high": 2}
 
 
 @dataclass(frozen=True)
@@ -58,15 +59,12 @@ def parameter_quantities(names: Collection[str]) -> list[Quantity]:
     return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
 
 
-def figures(record: Mapping[str, Any]) -> Iterator[tuple[str, Figures]]:
-    """All quantities of a row's record that are known, by name."""
+def figures(record: Mapping[str, Any]) -> Iterator[tuple[str, tuple[float | None, ...]]]:
+    """All quantities of a row's record that are known, by name: value, low, high and standard error."""
     for name, (value, low, high, stderr, _) in record.get("parameters", {}).items():
-        if value is not None:
-            yield name, (value, low, high, stderr)
+        yield name, (value, low, high, stderr)
     for key, quantity in OF_FIT.items():
-        if record.get(key) is not None:
-            yield quantity.name, (record[key], None, None, None)
+        yield quantity.name, (record.get(key), None, None, None)
     for point, pair in record.get("points", {}).items():
         for what, (value, low, high) in pair.items():
-            if value is not None:
-                yield f"{what} {point}", (value, low, high, None)
+            yield f"{what} {point}", (value, low, high, None)

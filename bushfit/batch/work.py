@@ -42,8 +42,8 @@ class Orders:
     version: str = __version__
 
 
-def work(rows: Sequence[Row], orders: Orders) -> list[tuple[str, bytes]]:
-    """Status and record, on a line, of some rows; every row's results are kept before the next is begun.
+def work(rows: Sequence[Row], orders: Orders) -> list[Record]:
+    """The records of some rows; every row's results are kept before the next is begun.
 
     Raises:
         BatchError: this process runs another version of bushfit than the one that ordered the work.
@@ -53,16 +53,7 @@ def work(rows: Sequence[Row], orders: Orders) -> list[tuple[str, bytes]]:
             "a worker runs another bushfit", found=__version__, expected=orders.version, hint="install the same on all"
         )
     _one_thread()
-    return [_told(_row(row, orders)) for row in rows]
-
-
-def given_up(why: str) -> tuple[str, bytes]:
-    """The same of a row that no worker survived."""
-    return _told(_failed(why))
-
-
-def _told(record: Record) -> tuple[str, bytes]:
-    return record["status"], ledger.to_line(record)
+    return [_row(row, orders) for row in rows]
 
 
 @cache
@@ -75,8 +66,8 @@ def _one_thread() -> Any:
 
 def _row(row: Row, orders: Orders) -> Record:
     wanted = ledger.key(row, orders.points, orders.formats)
-    if orders.resume and (stands := ledger.standing(orders.output, row, wanted)):
-        return {**stands, "kept": True}
+    if orders.resume and (before := ledger.valid_record(orders.output, row, wanted)):
+        return {**before, "kept": True}
     begin = time.perf_counter()
     files: dict[str, bytes] = {}
     try:
@@ -84,18 +75,18 @@ def _row(row: Row, orders: Orders) -> Record:
         record.update(cast("Record", _worked(row, orders, files)))  # a part of it
     except Exception as error:  # whatever befalls a row, it costs that row and is said
         files.clear()
-        record = _failed(_in_words(error))
+        record = failed(_in_words(error))
     record["seconds"] = round(time.perf_counter() - begin, 4)
     record["files"] = {name: ledger.digest(content) for name, content in files.items()}
     try:
         ledger.keep(orders.output, row, files, record)
     except OSError as error:
-        return _failed(f"the results cannot be written: {error}")
+        return failed(f"the results cannot be written: {error}")
     return record
 
 
-def _failed(error: str) -> Record:
-    """The record of a row that came to nothing."""
+def failed(error: str) -> Record:
+    """The record of a row that came to nothing, such as one that no worker survived."""
     return {"schema": ledger.SCHEMA, "status": "failed", "error": error, "seconds": 0.0}
 
 
@@ -120,7 +111,7 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
     else:
         result, diagnosed = _one_by_one(campaign, settings, orders.formats, files)
     found: Found = _verdict(diagnosed.diagnosis) if diagnosed else {}
-    numbers = _numbers(result, orders.points, found.get("warnings", []))
+    numbers = numbers_of(result, orders.points, found.get("warnings", []))
     return {"campaign_name": campaign.name, "inputs": inputs, **found, **numbers}
 
 
@@ -185,7 +176,7 @@ def _diagnose(settings: Settings) -> Diagnose:
     return Diagnose(how, start.model if start else None)
 
 
-def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> Found:
+def numbers_of(result: Result, points: Sequence[Point], notes: Sequence[str]) -> Found:
     """Parameters, quality, and stiffness and loss factor at the points, each with what is known of its error."""
     parameters: dict[str, list[float | str | None]] = {}
     at_bound: dict[str, End] = {}

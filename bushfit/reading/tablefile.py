@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
-from pathlib import Path
-from typing import IO, TYPE_CHECKING, Literal, TextIO
+from typing import TYPE_CHECKING, Literal, TextIO
 
 from bushfit.errors import OutputError, printable
 
@@ -61,24 +58,6 @@ def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
         OutputError: a table that is too large for a sheet.
     """
     return to_xlsx({name: table}) if form == "xlsx" else to_csv(table, decimal_comma=form == "decimal-comma")
-
-
-@contextmanager
-def opened(file: Path, form: Form, headers: Iterable[str]) -> Iterator[Callable[[Row], None]]:
-    """Give what writes a row of a new file as it comes; in the end the file is whole and on the disk.
-
-    Raises:
-        OutputError: more rows than a sheet has.
-    """
-    if form == "xlsx":
-        with streamed(file, headers) as sheet:
-            yield sheet.add
-    else:
-        decimal_comma = form == "decimal-comma"
-        with file.open("w", encoding=encoding(decimal_comma), errors="replace", newline="") as stream:
-            yield Rows(stream, headers, decimal_comma=decimal_comma).add
-    with file.open("rb") as written:
-        os.fsync(written.fileno())
 
 
 class Rows:
@@ -187,30 +166,16 @@ def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
     Raises:
         OutputError: a table that is too large for a sheet.
     """
+    from xlsxwriter import Workbook
+
     stream, names = io.BytesIO(), set[str]()
-    with _book(stream, in_memory=True) as book:
+    with Workbook(stream, {"in_memory": True}) as book:
+        book.set_properties({"created": _MADE})
         for title, table in tables.items():
             sheet = Sheet(book, _sheet_name(title, names), map(str, table.columns))
             for cells in zip(*(column.tolist() for _, column in table.items()), strict=True):
                 sheet.add(cells)
     return stream.getvalue()
-
-
-@contextmanager
-def streamed(file: Path, headers: Iterable[str]) -> Iterator[Sheet]:
-    """The one sheet of a new workbook, named after its file, whose rows are held in a file beside it until its end."""
-    with file.open("wb") as stream, _book(stream, constant_memory=True, tmpdir=str(file.parent)) as book:
-        yield Sheet(book, _sheet_name(file.stem, set()), headers)
-
-
-@contextmanager
-def _book(stream: IO[bytes], **options: object) -> Iterator[Workbook]:
-    """A workbook that is whole in the end; also after an error, so that no file of its rows stays."""
-    from xlsxwriter import Workbook
-
-    with Workbook(stream, options) as book:
-        book.set_properties({"created": _MADE})
-        yield book
 
 
 def _text(text: str) -> str:

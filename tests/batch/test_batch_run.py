@@ -16,6 +16,7 @@ from junitparser import JUnitXml
 from trees import PATTERN, command, rows, tree
 
 from bushfit.batch import ledger, work
+from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
 
 
@@ -204,12 +205,12 @@ def test_no_process_runs_what_lies_in_the_current_folder(shop: Path) -> None:
     for name in ("bushfit/__init__.py", "numpy.py", "lmfit.py", "signal.py"):
         (shop / name).write_text(f"open({str(shop / 'ran')!r}, 'w').close()\n")
     (shop / "many.csv").write_text("campaign\nbushings/b0/bushing.toml\nbushings/b1/bushing.toml\n")
-    done = subprocess.run(command(Path("all"), "-q"), cwd=shop, capture_output=True, text=True, check=False)
+    done = subprocess.run(command("all", "-q"), cwd=shop, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert not (shop / "ran").exists()
 
 
-def deadly(rows: Sequence[Row], orders: work.Orders) -> list[tuple[str, bytes]]:
+def deadly(rows: Sequence[Row], orders: work.Orders) -> list[Record]:
     """The work, but the bushing b2 kills its process, as a system without memory does."""
     if any(row.name == "b2" for row in rows):
         os.kill(os.getpid(), signal.SIGKILL)
@@ -266,7 +267,7 @@ def test_plain_lines_where_standard_error_is_no_terminal(typed: Callable[..., An
     assert "\x1b" not in done.stderr
     assert "5 done, 0 failed" in done.stderr
     assert not (shop / "all/batch.png").exists()
-    assert not (shop / f"all/{ledger.ASIDE}").exists()
+    assert not (shop / f"all/{ledger.STAGE}").exists()
 
 
 @pytest.mark.parametrize(

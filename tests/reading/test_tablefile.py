@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from functools import partial
 from pathlib import Path
 from typing import get_args
 
@@ -18,7 +17,7 @@ from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.reading.sweeps import read_sweep
-from bushfit.reading.tablefile import Form, ending, opened, streamed, to_bytes
+from bushfit.reading.tablefile import Form, ending, to_bytes
 
 FORMS: tuple[Form, ...] = get_args(Form)
 PHASE = np.linspace(0.0, 12.0, 50)
@@ -65,17 +64,6 @@ def test_a_workbook_has_numbers_in_full_and_texts_that_nothing_runs() -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_rows_as_they_come_are_the_table(form: Form, tmp_path: Path) -> None:
-    file = tmp_path / f"t.{ending(form)}"
-    with opened(file, form, TABLE.columns) as write:
-        for cells in TABLE.itertuples(index=False):
-            write(cells)
-    assert list(tmp_path.iterdir()) == [file], "nothing is left beside it"
-    read = partial(pd.read_excel, engine="openpyxl") if form == "xlsx" else pd.read_csv
-    pd.testing.assert_frame_equal(read(file), read(io.BytesIO(to_bytes("t", TABLE, form))))
-
-
-@pytest.mark.parametrize("form", FORMS)
 def test_the_same_table_is_the_same_bytes(form: Form) -> None:
     assert len({to_bytes("t", TABLE, form) for _ in range(2)}) == 1
 
@@ -85,13 +73,3 @@ def test_what_a_sheet_does_not_hold_is_refused_and_not_cut(tmp_path: Path) -> No
     with pytest.raises(OutputError, match="too large for a sheet"):
         to_bytes("t", wide, "xlsx")
     assert to_bytes("t", wide, "csv")
-
-
-def test_a_sheet_that_is_full_is_an_error_and_leaves_no_file_of_its_rows(tmp_path: Path) -> None:
-    with streamed(tmp_path / "t.xlsx", ["n"]) as sheet:
-        sheet._count = 1_048_576  # as after so many rows, which take their time
-        with pytest.raises(OutputError, match="too large"):
-            sheet.add([1.0])
-    with pytest.raises(OutputError), streamed(tmp_path / "t.xlsx", map(str, range(16_385))):
-        pass
-    assert [file.name for file in tmp_path.iterdir()] == ["t.xlsx"]
