@@ -90,6 +90,11 @@ class Settings:
         return replace(other, **{key: value for key, value in vars(self).items() if value is not None})
 
     @property
+    def settings(self) -> Settings:
+        """The settings alone of a row or of a manifest."""
+        return Settings(**{key: getattr(self, key) for key in _keys(Settings)})
+
+    @property
     def predicted(self) -> bool:
         """Whether the row is predicted, of which the tables are always written."""
         return not {"run", "predict"}.isdisjoint(self.commands or ())
@@ -160,20 +165,17 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
         CampaignError: no such file, no match, or keys and values that are not understood.
     """
     path, points = Path(source), tuple[Point, ...]()
-    if more:
-        if strange := [name for name in (source, *more) if Path(name).suffix.lower() != ".toml"]:
-            expected = "one manifest, or campaign files alone"
-            raise CampaignError("this is no campaign", file=strange[0], expected=expected, hint=_OF_TESTS)
-        stem, base, entries = "batch", Path(), iter([Entry(campaign=name) for name in (source, *more)])
-    elif _PATTERN.search(source) and not path.exists():
-        stem, base, entries = "batch", Path(), _expanded([Entry(campaign=source)], Path(), source)
+    stem, base, entries = path.stem, path.parent, list[Entry]()
+    if strange := [name for name in (source, *more) if more and Path(name).suffix.lower() != ".toml"]:
+        expected = "one manifest, or campaign files alone"
+        raise CampaignError("this is no campaign", file=strange[0], expected=expected, hint=_OF_TESTS)
+    if more or (_PATTERN.search(source) and not path.exists()):
+        stem, base, entries = "batch", Path(), [Entry(campaign=name) for name in (source, *more)]
     elif path.suffix.lower() == ".toml":
         content = _toml(path)
-        given = given.over(Settings(**{key: getattr(content, key) for key in _keys(Settings)}))
-        points = content.at
-        stem, base, entries = path.stem, path.parent, _expanded(content.bushings, path.parent, source)
+        given, points, entries = given.over(content.settings), content.at, list(content.bushings)
     elif path.suffix.lower() in (".csv", ".tsv", ".txt"):
-        stem, base, entries = path.stem, path.parent, _expanded(_csv_entries(path), path.parent, source)
+        entries = list(_csv_entries(path))
     else:
         raise CampaignError(
             "this is no manifest",
@@ -181,7 +183,8 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
             expected='a .toml or .csv file, or a pattern in quotes such as "bushings/*/campaign.toml"',
             hint=f'"{path}/*/campaign.toml" in quotes' if path.is_dir() else _OF_TESTS,
         )
-    return Manifest(stem, _rows(list(entries), base, given, source), points)
+    found = entries if more else list(_expanded(entries, base, source))
+    return Manifest(stem, _rows(found, base, given, source), points)
 
 
 def _toml(path: Path) -> ManifestFile:
@@ -255,9 +258,8 @@ def _rows(entries: Sequence[Entry], base: Path, given: Settings, source: str) ->
         numbered = (f"{first} {number}" for number in count(2))
         folder = next(folder for folder in chain([first], numbered) if folder.casefold() not in taken)
         taken.add(folder.casefold())
-        own = Settings(**{key: getattr(entry, key) for key in _keys(Settings)})
         try:
-            settings = merged(own)
+            settings = merged(entry.settings)
         except CampaignError as error:
             error.place = f"{entry.campaign}, {error.place}"
             raise
