@@ -29,7 +29,8 @@ KINDS = Kinds(("batch",), ("batch",), ("batch",), ("index",))
 FILES = [
     "index.html",
     *(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture))),
-]  #: Keys of a record that are not held in memory: the figures have its numbers, and a later run asks for the files.
+]
+#: Keys of a record that are not held in memory: the figures have its numbers, and a later run asks for the files.
 _NOT_HELD = {"parameters", "points", "inputs", "files"}
 
 

@@ -8,15 +8,15 @@ Source: Autodesk Nastran 2025 reference, PBUSHT; Altair OptiStruct 2021 referenc
 """
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import commented, heading, stated, to_bytes
-from bushfit.export.levels import Level, Table, by_dof, levels
-from bushfit.export.losses import Form, of_tables
+from bushfit.export.deck import Form, Level, by_dof, of_levels, to_bytes
+from bushfit.export.losses import of_tables
 from bushfit.export.systems import MM_T_S_N, UnitSystem
 
 #: Characters of a field in the small and in the large format.
@@ -52,36 +52,29 @@ def export(order: Order) -> Exported:
     """The bulk data of the bushing, without elements, and what it leaves out."""
     dialect, units = _DIALECTS[order.dialect], order.units or MM_T_S_N
     losses = tuple(of_tables(order, dialect.form))
-    about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
-    used = "in frequency response; PBUSH alone, at the lowest frequency, acts elsewhere; PARAM,G is added to the loss"
-    lines = commented("$", [*heading(order, about, losses), f"the tables act {used}"])
-    for rank, level in enumerate(levels(order), start=1):
-        lines += commented("$", [f"property {rank}: {stated(level)}"])
-        lines += _property(rank, level, dialect, units)
+    used = (
+        "the tables act in frequency response; PBUSH alone, at the lowest frequency, acts elsewhere; PARAM,G is added "
+        "to the loss"
+    )
+    lines = of_levels(order, "$", units, losses, used, "property ", partial(_property, dialect, units))
     return Exported({dialect.file: to_bytes(lines)}, losses)
 
 
-def _property(pid: int, level: Level, dialect: _Dialect, units: UnitSystem) -> Iterator[str]:
+def _property(dialect: _Dialect, units: UnitSystem, pid: int, level: Level) -> Iterator[str]:
     """PBUSH, PBUSHT and the tables of one amplitude."""
-    rows = [(dof, table, _in_units(table, dialect, units)) for dof, table in by_dof(level)]
+    rows = [(dof, *dialect.form.in_units(table, units)) for dof, table in by_dof(level)]
     several = level[0].frequency.size > 1
     nominal, numbers = [dict[int, str](), dict[int, str]()], [dict[int, str](), dict[int, str]()]
-    for dof, _, columns in rows:
-        for part, column in enumerate(columns[1:]):
+    for dof, _, *columns in rows:
+        for part, column in enumerate(columns):
             nominal[part][dof] = _real(column[0])
             numbers[part][dof] = str(_TABLES * pid + 10 * part + dof)
     yield from _large("PBUSH*", [str(pid), *_by_dof(dialect.names, nominal)])
     if several:
         yield from _small("PBUSHT", [str(pid), *_by_dof(dialect.names, numbers)])
-        for dof, _, (frequency, *parts) in rows:
+        for dof, frequency, *parts in rows:
             for part, column in enumerate(parts):
                 yield from _tabled(numbers[part][dof], frequency, column)
-
-
-def _in_units(table: Table, dialect: _Dialect, units: UnitSystem) -> tuple[Array, Array, Array]:
-    """Frequency and the two parts of a table, in the units of the deck."""
-    factor = units.display(table.direction.motion).stiffness.factor
-    return table.frequency * units.frequency.factor, *dialect.form.parts(table.frequency, table.stiffness * factor)
 
 
 def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:

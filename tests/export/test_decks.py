@@ -16,7 +16,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.export import abaqus, adams, nastran
 from bushfit.export.contract import Exported, Order
-from bushfit.export.levels import DOFS, levels
+from bushfit.export.deck import DOFS, levels
 from bushfit.export.systems import MM_T_S_N, UnitSystem
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
