@@ -15,8 +15,7 @@ from bushfit.planning.check import Check, check
 from bushfit.planning.contract import Noise, Plan, Points, Test, Wanted
 from bushfit.planning.guess import guess
 from bushfit.planning.plan import plan
-from bushfit.report.contents import Formats
-from bushfit.report.planned import plan_contents, plan_sheet
+from bushfit.report.planned import plan_sheet
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
 RIG = RigSettings(gain_error=0.005, phase_error=0.0044, max_force=5e3, max_frequency=200.0)
@@ -90,9 +89,3 @@ def test_the_sheet_has_every_run_in_its_order(small: Plan) -> None:
     assert sheet["what for"].str.len().min() > 0
     repeats = sheet[sheet["repeat"] != "1 of 1"]
     assert all(int(text.split(" of ")[0]) <= int(text.split(" of ")[1]) for text in repeats["repeat"])
-
-
-def test_contents_are_a_table_and_a_picture(small: Plan) -> None:
-    files = Formats().files(plan_contents(small))
-    assert set(files) == {"plan.csv", "plan.png"}
-    assert files["plan.csv"].decode().splitlines()[0].startswith("order,direction,test,amplitude,frequency [Hz]")
