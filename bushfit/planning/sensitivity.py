@@ -183,7 +183,7 @@ class Grid:
         What depends on the order of the tests or on their temperature is not among them, nor what stands in place of a
         branch: it has no amount that could be small.
         """
-        model, places = self.known.model, {str(test.direction) for test in self.tests}
+        model, places = self.known.model, dict.fromkeys(str(test.direction) for test in self.tests)
         missing = [effect for effect in missing_effects(model, places) if not (effect.replaces or effect.under)]
         of_effects = [(effect, sensitivity(model, self.data_sets, effect)[1]) for effect in missing]
         return [Column(effect, row) for effect, rows in of_effects for row in rows]
