@@ -1,4 +1,4 @@
-"""What shared libraries of three systems export and need, read from their own tables."""
+"""What shared libraries of Windows and macOS export and need, read from their own tables."""
 
 from __future__ import annotations
 
@@ -19,30 +19,6 @@ class Library:
 
 def _text(data: bytes, at: int) -> str:
     return data[at : data.index(b"\0", at)].decode()
-
-
-def elf(data: bytes) -> Library:
-    """ELF of 64 bits, little-endian (System V ABI, gABI 4.1)."""
-    assert data[:7] == b"\x7fELF\x02\x01\x01"
-    kind, machine = struct.unpack_from("<HH", data, 16)
-    assert kind == 3  # ET_DYN
-    (table,) = struct.unpack_from("<Q", data, 40)
-    size, count = struct.unpack_from("<HH", data, 58)
-    sections = [struct.unpack_from("<IIQQQQIIQQ", data, table + size * k) for k in range(count)]
-    exports, needs = set(), []
-    for _, sort, _, _, begin, length, link, _, _, each in sections:
-        strings = sections[link][4]
-        if sort == 11:  # SHT_DYNSYM
-            for at in range(begin, begin + length, each):
-                name, info, _, where = struct.unpack_from("<IBBH", data, at)
-                if where and info >> 4 == 1:  # defined and global
-                    exports.add(_text(data, strings + name))
-        if sort == 6:  # SHT_DYNAMIC
-            for at in range(begin, begin + length, 16):
-                tag, value = struct.unpack_from("<QQ", data, at)
-                if tag == 1:  # DT_NEEDED
-                    needs.append(_text(data, strings + value))
-    return Library("ELF", {62: "x86-64", 183: "arm64"}[machine], frozenset(exports), tuple(needs))
 
 
 def pe(data: bytes) -> Library:
