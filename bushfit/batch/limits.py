@@ -34,9 +34,6 @@ from bushfit.reduction.scatter import scatter
 from bushfit.units import number, quantity
 from bushfit.validation import converted
 
-#: Lowest and highest allowed value where there is no limit.
-_ANY = (-math.inf, math.inf)
-
 
 class Verdict(IntEnum):
     """How a value meets its limits, better before worse."""
@@ -95,10 +92,6 @@ class Bounds:
         if self.sigma is not None and scatter(values)[1] == 0.0:
             return "more than half of the bushings agree to the digit: the batch's own scatter is not judged"
         return None
-
-
-#: Keys of a table of limits that have the unit of the quantity.
-_SIZES = ("min", "max", "nominal")
 
 
 def _stiffness(raw: object, info: ValidationInfo) -> object:
@@ -160,7 +153,9 @@ class Limits:
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 
-    parameters: Annotated[Mapping[str, Bounds], table(partial(with_sizes, keys=_SIZES))] = field(default_factory=dict)
+    parameters: Annotated[Mapping[str, Bounds], table(partial(with_sizes, keys=("min", "max", "nominal")))] = field(
+        default_factory=dict
+    )
     stiffness: tuple[StiffnessBounds, ...] = ()
     loss_factor: tuple[LossFactorBounds, ...] = ()
     nrmse: Ratio | None = None
@@ -175,15 +170,14 @@ class Limits:
                 raise ValueError(problem)
 
     @property
-    def _at_points(self) -> list[tuple[str, Bounds]]:
+    def _at_points(self) -> list[tuple[str, StiffnessBounds | LossFactorBounds]]:
         """Limits at points, by the name of the quantity."""
-        tables: dict[str, Sequence[StiffnessBounds | LossFactorBounds]]
-        tables = {STIFFNESS: self.stiffness, LOSS_FACTOR: self.loss_factor}
-        return [(at_point(bounds.at, what).name, bounds) for what, found in tables.items() for bounds in found]
+        both = ((STIFFNESS, self.stiffness), (LOSS_FACTOR, self.loss_factor))
+        return [(at_point(bounds.at, what).name, bounds) for what, found in both for bounds in found]
 
     @property
     def points(self) -> tuple[Point, ...]:
-        return tuple(dict.fromkeys([*(b.at for b in self.stiffness), *(b.at for b in self.loss_factor)]))
+        return tuple(dict.fromkeys(bounds.at for _, bounds in self._at_points))
 
     @property
     def bounds(self) -> dict[str, Bounds]:
@@ -261,7 +255,7 @@ class Judge:
             if (found := known.get(name)) is None:
                 worst, missed[name] = Verdict.FAIL, f"{name} is not known: fail"
                 continue
-            verdict = judge(found, *self.allowed.get(name, _ANY))
+            verdict = judge(found, *self.allowed.get(name, (-math.inf, math.inf)))
             if name in at_bound:
                 verdict = max(verdict, Verdict.CONDITIONAL_PASS)
             worst = max(worst, verdict)
@@ -275,7 +269,7 @@ class Judge:
         return Judgement(worst, missed, edge)
 
     def _words(self, name: str, found: Sequence[float], verdict: Verdict, bound: str | None) -> str:
-        (low, high), (value, least, most) = self.allowed.get(name, _ANY), found[:3]
+        (low, high), (value, least, most) = self.allowed.get(name, (-math.inf, math.inf)), found[:3]
         quantity = self._quantities[name].for_people(value)
 
         def shown(x: float) -> str:

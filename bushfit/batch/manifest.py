@@ -39,13 +39,8 @@ _READERS: dict[str, tuple[Command, ...]] = {
     **dict.fromkeys(("adopt", "without", "max_effects", "tolerance"), ("diagnose",)),
     "model": ("diagnose", "predict"),
 }
-
-#: Largest manifest that is read, in bytes: some million rows.
-_LARGEST_BYTES = 200_000_000
 #: What makes a path a pattern.
 _PATTERN = re.compile(r"[*?\[]")
-#: Of a CSV manifest: the one that its first line has most of.
-_DELIMITERS = ",;\t"
 
 
 def _known(named: Callable[[str], Effect], raw: object, _: object) -> object:
@@ -189,7 +184,7 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
 
 def _toml(path: Path) -> ManifestFile:
     try:
-        return read_toml(path, ManifestFile, what="a manifest", largest=_LARGEST_BYTES)
+        return read_toml(path, ManifestFile, what="a manifest", largest=200_000_000)  # bytes: some million rows
     except CampaignError as error:
         if error.found == '"bushing"':
             error.hint = "this is one campaign: bushfit run takes it, and a pattern in quotes takes many"
@@ -203,7 +198,7 @@ def _keys(table: type) -> list[str]:
 def _csv_entries(path: Path) -> Iterator[Entry]:
     """The lines of a CSV manifest; a header names the columns."""
     text = read_utf8(path, CampaignError).decode("utf-8-sig")
-    delimiter = max(_DELIMITERS, key=text.lstrip().partition("\n")[0].count)
+    delimiter = max(",;\t", key=text.lstrip().partition("\n")[0].count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
     header = next((cells for line in reader if any(cells := [cell.strip() for cell in line])), [])
     for column in header:

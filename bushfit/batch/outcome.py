@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, product
@@ -30,9 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bushfit.report.plots.batch import Panel
-
-#: Bushings that must have a quantity for it to be drawn: fewer show no scatter.
-_LEAST_DRAWN = 3
 
 
 @dataclass(frozen=True)
@@ -110,11 +107,8 @@ class Outcome:
     @property
     def errors(self) -> list[tuple[str, str]]:
         """The name of each row that failed, and why."""
-        return [(row.name, record["error"]) for row, record in self._pairs if record["status"] != "done"]
-
-    @property
-    def _pairs(self) -> Iterator[tuple[Row, Record]]:
-        return zip(self.plan.rows, self.records, strict=True)
+        pairs = zip(self.plan.rows, self.records, strict=True)
+        return [(row.name, record["error"]) for row, record in pairs if record["status"] != "done"]
 
     @property
     def limits(self) -> Counter[str]:
@@ -269,7 +263,7 @@ class Outcome:
         for name, quantity in self.quantities.items():
             allowed, figures = self._allowed(name), self.figures.get(name, np.full((len(PARTS), 1), np.nan))
             known = np.isfinite(figures[0])
-            if known.sum() >= (1 if allowed else _LEAST_DRAWN):
+            if known.sum() >= (1 if allowed else 3):  # fewer show no scatter
                 shown = quantity.for_people(float(np.median(figures[0, known])))
                 missed = [
                     k for k, judged in enumerate(self.judgements) if judged and name in judged.missed and known[k]

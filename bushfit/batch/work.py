@@ -16,7 +16,6 @@ from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.caveats import warnings_of
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import effect_named
-from bushfit.effects.contract import Parameter
 from bushfit.errors import BatchError, BushfitError
 from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose, Diagnosed
@@ -26,9 +25,6 @@ from bushfit.prediction import Band, predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.contents import Formats
 from bushfit.version import __version__
-
-#: Size below which an effect is as good as none, relative to its parameter's typical size (chosen).
-_NO_EFFECT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -73,9 +69,11 @@ def _row(row: Row, orders: Orders) -> Record:
     try:
         record: Record = {"schema": ledger.SCHEMA, "key": wanted, "status": "done", "seconds": 0.0}
         record.update(cast("Record", _worked(row, orders, files)))  # a part of it
+    except BushfitError as error:
+        files, record = {}, failed(str(error))
     except Exception as error:  # whatever befalls a row, it costs that row and is said
-        files.clear()
-        record = failed(_in_words(error))
+        kind = "out of memory" if isinstance(error, MemoryError) else "a fault in bushfit itself"
+        files, record = {}, failed(f"{kind}: {type(error).__name__}: {error}")
     record["seconds"] = round(time.perf_counter() - begin, 4)
     record["files"] = {name: ledger.digest(content) for name, content in files.items()}
     try:
@@ -88,13 +86,6 @@ def _row(row: Row, orders: Orders) -> Record:
 def failed(error: str) -> Record:
     """The record of a row that came to nothing, such as one that no worker survived."""
     return {"schema": ledger.SCHEMA, "status": "failed", "error": error, "seconds": 0.0}
-
-
-def _in_words(error: Exception) -> str:
-    if isinstance(error, BushfitError):
-        return str(error)
-    kind = "out of memory" if isinstance(error, MemoryError) else "a fault in bushfit itself"
-    return f"{kind}: {type(error).__name__}: {error}"
 
 
 def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
@@ -110,7 +101,7 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
         result, diagnosed = _run(campaign, orders.formats, files)
     else:
         result, diagnosed = _one_by_one(campaign, settings, orders.formats, files)
-    found: Found = _verdict(diagnosed.diagnosis) if diagnosed else {}
+    found = _verdict(diagnosed.diagnosis) if diagnosed else Found()
     numbers = numbers_of(result, orders.points, found.get("warnings", []))
     return {"campaign_name": campaign.name, "inputs": inputs, **found, **numbers}
 
@@ -184,7 +175,9 @@ def numbers_of(result: Result, points: Sequence[Point], notes: Sequence[str]) ->
         interval = result.interval(name)
         value, stderr = result.model.values[name], result.covariance.stderr(name)
         parameters[name] = [*map(_finite, (value, *(interval or (None, None)), stderr)), parameter.unit]
-        if name in result.at_bound and not _vanishes(name, parameter, value):
+        # an added effect whose size rests at zero, within a thousandth of its usual size, is an answer like any other
+        zero = parameter.neutral if "." in name else None
+        if name in result.at_bound and (zero is None or abs(value - zero) > 1e-3 * parameter.typical):
             at_bound[name] = result.at_bound[name]
     said, at = [], {}
     for point in points:
@@ -203,12 +196,6 @@ def numbers_of(result: Result, points: Sequence[Point], notes: Sequence[str]) ->
         "points": at,
         "warnings": warnings_of(result, said, notes),
     }
-
-
-def _vanishes(name: str, parameter: Parameter, value: float) -> bool:
-    """Whether a value on a bound is that of an added effect that is not there, which is an answer like any other."""
-    neutral = parameter.neutral if "." in name else None
-    return neutral is not None and abs(value - neutral) <= _NO_EFFECT * parameter.typical
 
 
 def _band(band: Band) -> list[float | None]:

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, Order
 from bushfit.export.deck import Form, Level, by_dof, of_levels, to_bytes
 from bushfit.export.losses import of_tables
@@ -21,8 +20,6 @@ from bushfit.export.systems import MM_T_S_N, UnitSystem
 
 #: Characters of a field in the small and in the large format.
 _SMALL, _LARGE = 8, 16
-#: Degrees of freedom of an element.
-_DOFS = 6
 #: Distance between the numbers of the tables of two properties: that of K in degree of freedom n ends on n, of the loss
 #: on 10 + n.
 _TABLES = 100
@@ -74,21 +71,16 @@ def _property(dialect: _Dialect, units: UnitSystem, pid: int, level: Level) -> I
         yield from _small("PBUSHT", [str(pid), *_by_dof(dialect.names, numbers)])
         for dof, frequency, *parts in rows:
             for part, column in enumerate(parts):
-                yield from _tabled(numbers[part][dof], frequency, column)
+                pairs = [_real(value) for pair in zip(frequency, column, strict=True) for value in pair]
+                yield from _large("TABLED1*", [numbers[part][dof], "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
 
 
 def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
     """The fields of a property after its number: a name and six values for each part, and so on the next line."""
     fields: list[str] = []
     for name, row in zip(names, rows, strict=True):
-        fields += [*([""] if fields else []), name, *(row.get(dof, "") for dof in range(1, _DOFS + 1))]
+        fields += [*([""] if fields else []), name, *(row.get(dof, "") for dof in range(1, 7))]
     return fields
-
-
-def _tabled(number: str, x: Array, y: Array) -> Iterator[str]:
-    """TABLED1: pairs of x and y, and ENDT."""
-    pairs = [_real(value) for pair in zip(x, y, strict=True) for value in pair]
-    yield from _large("TABLED1*", [number, "LINEAR", "LINEAR", "", "", "", "", "", *pairs, "ENDT"])
 
 
 def _real(value: float) -> str:
