@@ -21,7 +21,7 @@ from typing import Literal
 
 from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
-from bushfit.batch.points import Point
+from bushfit.batch.quantities import Point
 from bushfit.errors import OutputError
 from bushfit.report import disk
 from bushfit.report.contents import Formats

@@ -23,8 +23,7 @@ from pydantic import ConfigDict, Field, ValidationInfo
 
 from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
-from bushfit.batch.points import At, Point
-from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, Quantity, at_point
+from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, At, Point, Quantity, at_point
 from bushfit.campaign.quantities import Share, Size, table, text, with_sizes
 from bushfit.campaign.toml import read_toml
 from bushfit.diagnosis import document

@@ -17,7 +17,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
-from bushfit.batch.points import At, Point
+from bushfit.batch.quantities import At, Point
 from bushfit.campaign.naming import folder_name
 from bushfit.campaign.quantities import Share
 from bushfit.campaign.toml import read_toml

@@ -11,7 +11,7 @@ from typing import Any, cast
 from bushfit.batch import ledger
 from bushfit.batch.document import Found, Record
 from bushfit.batch.manifest import Row, Settings
-from bushfit.batch.points import Point
+from bushfit.batch.quantities import Point
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.caveats import warnings_of
 from bushfit.diagnosis.record import Diagnosis

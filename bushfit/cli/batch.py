@@ -73,7 +73,7 @@ def command(
     from bushfit.batch.limits import check_judged, read_limits
     from bushfit.batch.manifest import read_manifest
     from bushfit.batch.outcome import Plan
-    from bushfit.batch.points import parse_point
+    from bushfit.batch.quantities import parse_point
     from bushfit.batch.run import check_free, run
     from bushfit.batch.work import Orders
 

@@ -18,7 +18,7 @@ from trees import PATTERN, command, kept, list_many, rows, stamps, tree, wait_fo
 
 from bushfit.batch import ledger
 from bushfit.batch.manifest import Settings, read_manifest
-from bushfit.batch.points import parse_point
+from bushfit.batch.quantities import parse_point
 from bushfit.errors import OutputError
 from bushfit.report.contents import Formats
 

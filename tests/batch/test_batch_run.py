@@ -257,14 +257,10 @@ def test_a_pattern_that_the_shell_has_expanded_is_the_pattern(typed: Callable[..
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("absent.toml",), "absent.toml"),
         ((PATTERN, "--at", "axial 25"), "--at"),
         ((PATTERN, "--effect", "inertai"), "did you mean inertia?"),
-        ((PATTERN, "--jobs", "0"), "--jobs"),
         ((PATTERN, "--command", "diagnose", "--effect", "inertia"), "effects: this setting does nothing here"),
-        (("bushings/b0/bushing.toml",), "this is one campaign"),
         (("bushings",), "in quotes"),
-        (("bushings/b0/bushing.toml", "many.csv"), "many.csv: this is no campaign"),
     ],
 )
 def test_wrong_usage(typed: Callable[..., Any], shop: Path, arguments: tuple[str, ...], words: str) -> None:

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.batch.manifest import Manifest, Settings, read_manifest
-from bushfit.batch.points import parse_point
+from bushfit.batch.quantities import parse_point
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 

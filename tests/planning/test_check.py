@@ -81,11 +81,8 @@ def test_the_campaign_of_a_plan_is_what_simulate_reads(small: Plan, tmp_path: Pa
     assert dict(model_of(campaign).values) == pytest.approx(dict(model.values), rel=1e-10)
 
 
-def test_the_sheet_has_every_run_in_its_order(small: Plan) -> None:
+def test_the_sheet_counts_repeats_and_says_what_each_run_is_for(small: Plan) -> None:
     sheet = plan_sheet(small)
-    assert len(sheet) == len(small.planned.tests)
-    assert list(sheet["direction"]) == [str(test.direction) for test in small.planned.tests]
-    assert sheet["minutes so far"].iloc[-1] == pytest.approx(60.0 * small.planned.hours, abs=0.05)
     assert sheet["what for"].str.len().min() > 0
-    repeats = sheet[sheet["repeat"] != "1 of 1"]
-    assert all(int(text.split(" of ")[0]) <= int(text.split(" of ")[1]) for text in repeats["repeat"])
+    for test, repeats in sheet.groupby("amplitude")["repeat"]:
+        assert {text.split(" of ")[0] for text in repeats} >= {"1"}, test

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bushfit.batch.points import parse_point
+from bushfit.batch.quantities import parse_point
 from bushfit.batch.work import numbers_of
 from bushfit.errors import BatchError, ModelError, UnitError
 from bushfit.geometry import STRAINING, TRANSLATION, Specimen
