@@ -119,7 +119,7 @@ def _worked(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Outco
         for name, known in figures(record):
             if known[0] is not None:
                 numbers[name][:, number] = np.array(known, dtype=float)
-        records[number] = cast("Record", {key: told for key, told in record.items() if key not in _NOT_HELD})
+        records[number] = cast("Record", {key: entry for key, entry in record.items() if key not in _NOT_HELD})
         progress(record["status"])
     return Outcome(plan, records, dict(numbers), time.perf_counter() - begin, earlier)
 

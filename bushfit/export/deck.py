@@ -130,7 +130,7 @@ def heading(order: Order, units: str, losses: Iterable[str]) -> list[str]:
         f"sha256: {source.sha256}",
         f"units: {units}",
         "axes: z along the bushing (axial 3, torsion 6), x and y across (radial 1, 2)",
-        *map(": ".join, order.said(losses)),
+        *map(": ".join, order.remarks(losses)),
     ]
 
 

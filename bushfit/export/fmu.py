@@ -51,7 +51,7 @@ def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
         **{f"binaries/{path}": library for path, library in libraries(sources, name, systems).items()},
         **{f"sources/{file}": source for file, source in sources.items()},
     }
-    return Exported({f"{name}.fmu": _archive(content)}, found.losses, found.kinds)
+    return Exported({f"{name}.fmu": _archive(content)}, found.losses, found.arms)
 
 
 def references(found: InTime) -> dict[str, int]:
@@ -66,7 +66,7 @@ def model_h(found: InTime, guid: str) -> str:
         "CONSTANTS": _FIRST + sum(not value.settable for value in found.values),
         "DIRECTIONS": len(found.places),
         "PARTS": max(1, len(found.parts)),
-        "ARMS": max(1, len(found.arms)),
+        "ARMS": max(1, len(found.arm_rows)),
     }
     listed = ", ".join(f"{name} = {size}" for name, size in sizes.items())
     return f'#define GUID "{guid}"\nenum {{ {listed} }};\n'
@@ -92,7 +92,7 @@ def model_c(found: InTime) -> str:
             f"    {{{', '.join(f'.{field} = {place}' for field, place in set_.items())}, .lever = {lever!r}}},"
         )
     lines += ["};", "const Arm arms[ARMS] = {"]
-    arms = found.arms or ((0, 0.0, 1.0),)
+    arms = found.arm_rows or ((0, 0.0, 1.0),)
     lines += [f"    {{{part}, {share!r}, {time!r}}}," for part, share, time in arms]
     return "\n".join([*lines, "};", ""])
 
@@ -100,7 +100,7 @@ def model_c(found: InTime) -> str:
 def description(order: Order, found: InTime, name: str, guid: str) -> bytes:
     """modelDescription.xml: what an importer is told."""
     about = f"Rubber bushing, displacement in and force out, of {order.source.file} (SHA-256 {order.source.sha256})"
-    about = "; ".join([about, *map(": ".join, order.said(found.losses))])
+    about = "; ".join([about, *map(": ".join, order.remarks(found.losses))])
     root = ET.Element("fmiModelDescription", {
         "fmiVersion": "2.0", "modelName": _text(order.result.name), "guid": guid, "description": _text(about),
         "generationTool": f"bushfit {__version__}", "variableNamingConvention": "flat", "numberOfEventIndicators": "0",

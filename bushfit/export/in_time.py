@@ -47,9 +47,9 @@ class InTime:
         fields: of each place, the C field and the name of its value; what is missing is neutral.
         levers: arm of a slip force at each place: 1, or a radius [m].
         parts: what the moduli of each group of arms go with.
-        arms: number of its part, modulus over the size of that, and relaxation time [s] of each.
+        arm_rows: number of its part, modulus over the size of that, and relaxation time [s] of each.
         losses: what is left out or held, and the error of that.
-        kinds: the same arms by what they stand for, with their error.
+        arms: the same by what they stand for, with their error.
     """
 
     places: tuple[Place, ...]
@@ -57,9 +57,9 @@ class InTime:
     fields: tuple[Mapping[str, str], ...]
     levers: tuple[float, ...]
     parts: tuple[str, ...]
-    arms: tuple[tuple[int, float, float], ...]
+    arm_rows: tuple[tuple[int, float, float], ...]
     losses: tuple[str, ...]
-    kinds: tuple[Arms, ...]
+    arms: tuple[Arms, ...]
 
 
 def neutral(field: str) -> int:

@@ -97,18 +97,18 @@ class Criterion:
         else:
             aim = np.log(np.einsum("tij,ij->t", self.views[0].off(found[0]), self.weight))
         asked = self.least > 0.0
-        reached = shown(found[0])[:, asked] / self.least[asked]
+        reached = noncentrality_of(found[0])[:, asked] / self.least[asked]
         return aim - self.penalty * np.sum(np.log(np.clip(reached, 1e-12, 1.0)), axis=1)  # finite
 
 
-def shown(found: Information) -> Array:
+def noncentrality_of(found: Information) -> Array:
     """Noncentrality of each further column beside the parameters, (tests, e): chi-square that a unit of it makes."""
     return np.maximum(found.size - np.sum(found.cross * np.linalg.solve(found.own, found.cross), axis=-2), 0.0)
 
 
 def distances(found: Sequence[Information]) -> Array:
     """Expected chi-square between any two rivals after the best refit of either, (tests, rivals, rivals)."""
-    each = [shown(one) for one in found]
+    each = [noncentrality_of(one) for one in found]
     one_way = np.stack([np.insert(row, place, np.inf, axis=1) for place, row in enumerate(each)], axis=1)
     return np.minimum(one_way, np.swapaxes(one_way, 1, 2))
 
@@ -149,7 +149,7 @@ class Budget:
         return np.where(barred | (self.spent(counts) + more > self.most), np.inf, more)
 
 
-def chosen(criterion: Criterion, budget: Budget, start: Array) -> Array:
+def best_runs(criterion: Criterion, budget: Budget, start: Array) -> Array:
     """So many runs of each test within the budget, (tests,), that the criterion is small.
 
     Notes: greedy from `start` by what the logarithm falls per minute; then exchanges (Fedorov 1972): one run of each

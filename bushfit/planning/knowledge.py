@@ -70,9 +70,9 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
     def known(evidence: Evidence) -> Knowledge:
         result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
         strain = max(float(np.max(each.amplitude)) * model.unit_strain(each.direction) for each in data_sets)
-        told = replace(of_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
+        plain = replace(of_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
         bounded = tuple(evidence.solution.at_bound)
-        return _with_bounded(told, bounded, data_sets) if bounded else told
+        return _with_bounded(plain, bounded, data_sets) if bounded else plain
 
     if found is None or rivals is None:
         return known(fit(model, data_sets, held, data.bounds))
@@ -121,9 +121,9 @@ def _with_bounded(known: Knowledge, bounded: tuple[str, ...], data_sets: Sequenc
     seen = np.linalg.norm(beside, axis=1) > 1e-6 * np.linalg.norm(others, axis=1)  # of rounding
     if not seen.any():
         return known
-    told = own @ own.T
-    live = np.diag(told) > 0.0
-    excess = float(np.mean(np.diag(known.covariance @ told)[live])) if live.any() else 1.0
+    information = own @ own.T
+    live = np.diag(information) > 0.0
+    excess = float(np.mean(np.diag(known.covariance @ information)[live])) if live.any() else 1.0
     answer, beside = answer[:, seen], beside[seen]
     alone = excess * np.linalg.inv(beside @ beside.T)
     shared = answer @ alone

@@ -21,7 +21,7 @@ from bushfit.geometry import Place, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
 from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible, Wanted
-from bushfit.planning.criterion import Budget, Criterion, View, chosen, distances, root_of, shown
+from bushfit.planning.criterion import Budget, Criterion, View, best_runs, distances, noncentrality_of, root_of
 from bushfit.planning.order import Drifting, ordered
 from bushfit.planning.sensitivity import Column, Grid, Information, relative_slopes
 from bushfit.reading.measurement import loss_factor
@@ -155,10 +155,10 @@ class _Planner:
     def _best(self) -> Array:
         """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be."""
         nothing, standard = np.zeros(len(self.tests), dtype=int), self._counts(self.standard_runs)
-        best = chosen(self._criterion(_PENALTY), self.budget, nothing)
+        best = best_runs(self._criterion(_PENALTY), self.budget, nothing)
         if self._lacking(best):
             starts = best, np.minimum(standard, self.budget.runs)
-            best = min((chosen(self.strict, self.budget, start) for start in starts), key=self.strict.together)
+            best = min((best_runs(self.strict, self.budget, start) for start in starts), key=self.strict.together)
         return best
 
     def _with_repeats(self, counts: Array) -> Array:
@@ -252,7 +252,7 @@ class _Planner:
 
     def _lacking(self, counts: Array) -> list[str]:
         """Effects that so many runs of each test show less well than the standard programme."""
-        reached = shown(self.views[0].together(counts))[0]
+        reached = noncentrality_of(self.views[0].together(counts))[0]
         short = np.sqrt(reached) < 0.995 * np.sqrt(self.least)  # what the numbers are good for
         return list(dict.fromkeys(self.columns[i].effect.name for i in np.flatnonzero(short)))
 
@@ -271,7 +271,7 @@ class _Planner:
     @cached_property
     def least(self) -> Array:
         """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
-        reached = shown(self.views[0].together(self._counts(self.standard_runs)))[0]
+        reached = noncentrality_of(self.views[0].together(self._counts(self.standard_runs)))[0]
         seen = [column.reach * np.sqrt(size) >= FOUND for column, size in zip(self.columns, reached, strict=True)]
         return np.where(seen, reached, 0.0)
 
@@ -304,7 +304,7 @@ class _Planner:
             gain,
             phase * (1.0 + np.square(self._loss_factor())),
             float(self._distances(counts, self._tellable).min()) if self.known.rivals else None,
-            tuple(self._visible(shown(found)[0], drifting.noncentrality(runs))),
+            tuple(self._visible(noncentrality_of(found)[0], drifting.noncentrality(runs))),
             0.01 * float(np.abs(moved[:k]).max()),
         )
 

@@ -24,7 +24,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.candidates import candidates, minutes
 from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, Points, Programme, Test, Wanted, motions
-from bushfit.planning.criterion import Budget, Criterion, View, chosen, distances, shown
+from bushfit.planning.criterion import Budget, Criterion, View, best_runs, distances, noncentrality_of
 from bushfit.planning.guess import guess
 from bushfit.planning.knowledge import of_campaign, of_result
 from bushfit.planning.order import Drifting, ordered
@@ -134,7 +134,7 @@ def test_an_effect_shows_as_a_fit_without_it_misses_it(known: Knowledge) -> None
     """Noncentrality against chi-square of the best fit of the model to noise-free tests with a little of the effect."""
     counts = np.array([2, 1, 1, 1, 2, 0, 0])
     view = view_of(replace(known, noise=replace(NOISE, level=(0.0, 0.0)), covariance=1e8 * np.eye(5)), TESTS)
-    expected = shown(view.together(counts))[0, 0]
+    expected = noncentrality_of(view.together(counts))[0, 0]
     truth = known.model.with_effect("delay", {"delay.tau": 2e-6})
     each = np.repeat(np.arange(5), counts[:5])
     sweeps = [_noise_free(known.model, truth, SWEEPS[i]) for i in each]
@@ -184,7 +184,7 @@ def test_no_choice_is_much_better_than_the_one_found(known: Knowledge) -> None:
     criterion = Criterion([view], weight, np.empty((2, 0), dtype=int), np.zeros(view.information.size.shape[1]), 3.0)
     spent = np.array([minutes(test, RigSettings()) for test in SWEEPS])
     budget = Budget(spent, np.array([0, 1, 0, 0, 1]), np.arange(5), np.full(5, 9), 5.0, 32.0)
-    found = chosen(criterion, budget, np.zeros(5, dtype=int))
+    found = best_runs(criterion, budget, np.zeros(5, dtype=int))
     every = (np.array(counts) for counts in product(range(9), repeat=5) if np.dot(counts, spent) <= budget.most)
     values = [criterion.together(counts) for counts in every if budget.spent(counts) <= budget.most]
     print("found", criterion.together(found), "best", min(values), "of", len(values), found)
