@@ -4,7 +4,7 @@ The folder is bushings/<row>/ below that of the batch. A record lists the hashes
 so that a later run can tell whether they still hold.
 
 Notes:
-    A folder is written aside and renamed: a process that is killed leaves a whole one or none. What a crash of the
+    A folder is written staged and renamed: a process that is killed leaves a whole one or none. What a crash of the
     machine leaves torn is found by its hash, so that no write has to wait for the disk.
 """
 
@@ -21,7 +21,7 @@ from typing import Literal
 
 from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
-from bushfit.batch.points import Point
+from bushfit.batch.quantities import Point
 from bushfit.errors import OutputError
 from bushfit.report import disk
 from bushfit.report.contents import Formats
@@ -34,7 +34,7 @@ RECORD = "row.json"
 #: Folder of the rows' folders, in that of the batch.
 ROWS = "bushings"
 #: Folder in which results are made ready, in that of the batch; gone when the batch ends.
-ASIDE = ".aside"
+STAGE = ".aside"
 
 
 def key(row: Row, points: tuple[Point, ...], formats: Formats) -> str:
@@ -49,14 +49,14 @@ def key(row: Row, points: tuple[Point, ...], formats: Formats) -> str:
     return hashlib.sha256(json.dumps([__version__, SCHEMA, asked], sort_keys=True).encode()).hexdigest()
 
 
-def place(output: Path, row: Row) -> Path:
+def folder_of(output: Path, row: Row) -> Path:
     """The folder of a row's results."""
     return output / ROWS / row.folder
 
 
-def standing(output: Path, row: Row, wanted: str) -> Record | None:
+def valid_record(output: Path, row: Row, wanted: str) -> Record | None:
     """The record of a row that was done before with the same inputs and settings, all its files whole; else None."""
-    folder, campaign = place(output, row), Path(row.campaign)
+    folder, campaign = folder_of(output, row), Path(row.campaign)
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):  # torn: as good as absent
         record: Record = json.loads((folder / RECORD).read_bytes())
         if record["key"] != wanted or record["status"] != "done":
@@ -78,33 +78,33 @@ def keep(output: Path, row: Row, files: Mapping[str, bytes], record: Record) -> 
     Raises:
         OSError: the disk is full, or does not let itself be written.
     """
-    folder, aside = place(output, row), output / ASIDE / uuid.uuid4().hex
-    aside.mkdir()
+    folder, staged = folder_of(output, row), output / STAGE / uuid.uuid4().hex
+    staged.mkdir()
     try:
         for name, content in files.items():
-            (aside / name).write_bytes(content)
-        (aside / RECORD).write_bytes(to_line(record))
+            (staged / name).write_bytes(content)
+        (staged / RECORD).write_bytes(to_bytes(record))
         while True:
             try:
-                aside.rename(folder)
+                staged.rename(folder)
                 break
             except OSError:
                 if not folder.exists():
                     raise
-                gone = output / ASIDE / uuid.uuid4().hex
+                gone = output / STAGE / uuid.uuid4().hex
                 with contextlib.suppress(FileNotFoundError):  # a twin on a worker given up for lost may be as fast
                     folder.rename(gone)
                 shutil.rmtree(gone, ignore_errors=True)
     finally:
-        shutil.rmtree(aside, ignore_errors=True)
+        shutil.rmtree(staged, ignore_errors=True)
 
 
-def to_line(record: Record) -> bytes:
-    """A record on one line."""
+def to_bytes(record: Record) -> bytes:
+    """A record as its file has it, on one line."""
     return json.dumps(record, allow_nan=False, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
 
 
-def strays(output: Path, rows: Iterable[Row]) -> list[Path]:
+def left_over(output: Path, rows: Iterable[Row]) -> list[Path]:
     """Folders of rows of an earlier batch, in order, that are none of these."""
     ours = {row.folder for row in rows}
     return sorted(record.parent for record in (output / ROWS).glob(f"*/{RECORD}") if record.parent.name not in ours)
@@ -125,9 +125,9 @@ def held(output: Path) -> Iterator[None]:
             "another batch is at work there", file=output, hint="wait for its end, or name another folder with -o"
         ) from None
     try:
-        shutil.rmtree(output / ASIDE, ignore_errors=True)
-        os.makedirs(output / ASIDE, exist_ok=True)  # noqa: PTH103
+        shutil.rmtree(output / STAGE, ignore_errors=True)
+        os.makedirs(output / STAGE, exist_ok=True)  # noqa: PTH103
         yield
     finally:
-        shutil.rmtree(output / ASIDE, ignore_errors=True)
+        shutil.rmtree(output / STAGE, ignore_errors=True)
         claim.close()

@@ -23,8 +23,7 @@ from pydantic import ConfigDict, Field, ValidationInfo
 
 from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
-from bushfit.batch.points import At, Point
-from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, Figures, Quantity, at_point, figures
+from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, At, Point, Quantity, at_point
 from bushfit.campaign.quantities import Share, Size, table, text, with_sizes
 from bushfit.campaign.toml import read_toml
 from bushfit.diagnosis import document
@@ -33,9 +32,6 @@ from bushfit.errors import CampaignError
 from bushfit.reduction.scatter import scatter
 from bushfit.units import number, quantity
 from bushfit.validation import converted
-
-#: Lowest and highest allowed value where there is no limit.
-_ANY = (-math.inf, math.inf)
 
 
 class Verdict(IntEnum):
@@ -97,10 +93,6 @@ class Bounds:
         return None
 
 
-#: Keys of a table of limits that have the unit of the quantity.
-_SIZES = ("min", "max", "nominal")
-
-
 def _stiffness(raw: object, info: ValidationInfo) -> object:
     point = info.data.get("at")
     return quantity(raw, point.motion.stiffness_unit) if isinstance(point, Point) else 0.0
@@ -160,7 +152,9 @@ class Limits:
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 
-    parameters: Annotated[Mapping[str, Bounds], table(partial(with_sizes, keys=_SIZES))] = field(default_factory=dict)
+    parameters: Annotated[Mapping[str, Bounds], table(partial(with_sizes, keys=("min", "max", "nominal")))] = field(
+        default_factory=dict
+    )
     stiffness: tuple[StiffnessBounds, ...] = ()
     loss_factor: tuple[LossFactorBounds, ...] = ()
     nrmse: Ratio | None = None
@@ -175,15 +169,14 @@ class Limits:
                 raise ValueError(problem)
 
     @property
-    def _at_points(self) -> list[tuple[str, Bounds]]:
+    def _at_points(self) -> list[tuple[str, StiffnessBounds | LossFactorBounds]]:
         """Limits at points, by the name of the quantity."""
-        tables: dict[str, Sequence[StiffnessBounds | LossFactorBounds]]
-        tables = {STIFFNESS: self.stiffness, LOSS_FACTOR: self.loss_factor}
-        return [(at_point(bounds.at, what).name, bounds) for what, found in tables.items() for bounds in found]
+        both = ((STIFFNESS, self.stiffness), (LOSS_FACTOR, self.loss_factor))
+        return [(at_point(bounds.at, what).name, bounds) for what, found in both for bounds in found]
 
     @property
     def points(self) -> tuple[Point, ...]:
-        return tuple(dict.fromkeys([*(b.at for b in self.stiffness), *(b.at for b in self.loss_factor)]))
+        return tuple(dict.fromkeys(bounds.at for _, bounds in self._at_points))
 
     @property
     def bounds(self) -> dict[str, Bounds]:
@@ -253,14 +246,15 @@ class Judge:
             if idle := bounds.idle(values):
                 self.notes.append(f"{name}: {idle}")
 
-    def __call__(self, record: Record) -> Judgement:
+    def __call__(self, known: Mapping[str, Sequence[float]], record: Record) -> Judgement:
+        """On one bushing: value, low and high of the 95 % interval of all that is known of it, and its record."""
         worst, missed, edge = Verdict.PASS, dict[str, str](), dict[str, str]()
-        known, at_bound = dict(figures(record)), record.get("at_bound", {})
+        at_bound = record.get("at_bound", {})
         for name in dict.fromkeys((*self.allowed, *at_bound)):
             if (found := known.get(name)) is None:
                 worst, missed[name] = Verdict.FAIL, f"{name} is not known: fail"
                 continue
-            verdict = judge(found, *self.allowed.get(name, _ANY))
+            verdict = judge(found, *self.allowed.get(name, (-math.inf, math.inf)))
             if name in at_bound:
                 verdict = max(verdict, Verdict.CONDITIONAL_PASS)
             worst = max(worst, verdict)
@@ -273,24 +267,24 @@ class Judge:
             missed["verdict"] = f"verdict {said}, allowed {', '.join(self._limits.verdicts)}"
         return Judgement(worst, missed, edge)
 
-    def _words(self, name: str, found: Figures, verdict: Verdict, bound: str | None) -> str:
-        (low, high), (value, least, most, _) = self.allowed.get(name, _ANY), found
+    def _words(self, name: str, found: Sequence[float], verdict: Verdict, bound: str | None) -> str:
+        (low, high), (value, least, most) = self.allowed.get(name, (-math.inf, math.inf)), found[:3]
         quantity = self._quantities[name].for_people(value)
 
         def shown(x: float) -> str:
             return number(x * quantity.factor, 4)
 
         unit = "" if quantity.unit == "-" else f" {quantity.unit}"
-        span = "" if least is None or most is None else f" ({shown(least)} to {shown(most)})"
+        span = "" if math.isnan(least + most) else f" ({shown(least)} to {shown(most)})"
         ends = [f"{word} {shown(x)}" for word, x in (("min", low), ("max", high)) if math.isfinite(x)]
         said = [" ".join(ends)] * bool(ends) + [f"at the {bound} of its fit"] * bool(bound)
         return f"{name} = {shown(value)}{span}{unit}, {', '.join(said)}: {verdict}"
 
 
-def judge(figures: Figures, low: float, high: float) -> Verdict:
-    """How a value and its 95 % interval lie to the lowest and highest allowed."""
-    value, least, most, _ = figures
-    least, most = (value if least is None else least), (value if most is None else most)
+def judge(figures: Sequence[float], low: float, high: float) -> Verdict:
+    """How a value and its 95 % interval, NaN where it is not known, lie to the lowest and highest allowed."""
+    value, *ends = figures[:3]
+    least, most = (value if math.isnan(end) else end for end in ends)
     if low <= value <= high:
         return Verdict.PASS if low <= least and most <= high else Verdict.CONDITIONAL_PASS
     return Verdict.FAIL if most < low or least > high else Verdict.CONDITIONAL_FAIL

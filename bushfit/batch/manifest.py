@@ -17,7 +17,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
-from bushfit.batch.points import At, Point
+from bushfit.batch.quantities import At, Point
 from bushfit.campaign.naming import folder_name
 from bushfit.campaign.quantities import Share
 from bushfit.campaign.toml import read_toml
@@ -39,13 +39,8 @@ _READERS: dict[str, tuple[Command, ...]] = {
     **dict.fromkeys(("adopt", "without", "max_effects", "tolerance"), ("diagnose",)),
     "model": ("diagnose", "predict"),
 }
-
-#: Largest manifest that is read, in bytes: some million rows.
-_LARGEST_BYTES = 200_000_000
 #: What makes a path a pattern.
 _PATTERN = re.compile(r"[*?\[]")
-#: Of a CSV manifest: the one that its first line has most of.
-_DELIMITERS = ",;\t"
 
 
 def _known(named: Callable[[str], Effect], raw: object, _: object) -> object:
@@ -88,6 +83,11 @@ class Settings:
     def over(self, other: Settings) -> Settings:
         """These, and where they say nothing the other's."""
         return replace(other, **{key: value for key, value in vars(self).items() if value is not None})
+
+    @property
+    def settings(self) -> Settings:
+        """The settings alone of a row or of a manifest."""
+        return Settings(**{key: getattr(self, key) for key in _keys(Settings)})
 
     @property
     def predicted(self) -> bool:
@@ -160,20 +160,17 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
         CampaignError: no such file, no match, or keys and values that are not understood.
     """
     path, points = Path(source), tuple[Point, ...]()
-    if more:
-        if strange := [name for name in (source, *more) if Path(name).suffix.lower() != ".toml"]:
-            expected = "one manifest, or campaign files alone"
-            raise CampaignError("this is no campaign", file=strange[0], expected=expected, hint=_OF_TESTS)
-        stem, base, entries = "batch", Path(), iter([Entry(campaign=name) for name in (source, *more)])
-    elif _PATTERN.search(source) and not path.exists():
-        stem, base, entries = "batch", Path(), _expanded([Entry(campaign=source)], Path(), source)
+    stem, base, entries = path.stem, path.parent, list[Entry]()
+    if strange := [name for name in (source, *more) if more and Path(name).suffix.lower() != ".toml"]:
+        expected = "one manifest, or campaign files alone"
+        raise CampaignError("this is no campaign", file=strange[0], expected=expected, hint=_OF_TESTS)
+    if more or (_PATTERN.search(source) and not path.exists()):
+        stem, base, entries = "batch", Path(), [Entry(campaign=name) for name in (source, *more)]
     elif path.suffix.lower() == ".toml":
         content = _toml(path)
-        given = given.over(Settings(**{key: getattr(content, key) for key in _keys(Settings)}))
-        points = content.at
-        stem, base, entries = path.stem, path.parent, _expanded(content.bushings, path.parent, source)
+        given, points, entries = given.over(content.settings), content.at, list(content.bushings)
     elif path.suffix.lower() in (".csv", ".tsv", ".txt"):
-        stem, base, entries = path.stem, path.parent, _expanded(_csv_entries(path), path.parent, source)
+        entries = list(_csv_entries(path))
     else:
         raise CampaignError(
             "this is no manifest",
@@ -181,12 +178,13 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
             expected='a .toml or .csv file, or a pattern in quotes such as "bushings/*/campaign.toml"',
             hint=f'"{path}/*/campaign.toml" in quotes' if path.is_dir() else _OF_TESTS,
         )
-    return Manifest(stem, _rows(list(entries), base, given, source), points)
+    found = entries if more else list(_expanded(entries, base, source))
+    return Manifest(stem, _rows(found, base, given, source), points)
 
 
 def _toml(path: Path) -> ManifestFile:
     try:
-        return read_toml(path, ManifestFile, what="a manifest", largest=_LARGEST_BYTES)
+        return read_toml(path, ManifestFile, what="a manifest", largest=200_000_000)  # bytes: some million rows
     except CampaignError as error:
         if error.found == '"bushing"':
             error.hint = "this is one campaign: bushfit run takes it, and a pattern in quotes takes many"
@@ -200,7 +198,7 @@ def _keys(table: type) -> list[str]:
 def _csv_entries(path: Path) -> Iterator[Entry]:
     """The lines of a CSV manifest; a header names the columns."""
     text = read_utf8(path, CampaignError).decode("utf-8-sig")
-    delimiter = max(_DELIMITERS, key=text.lstrip().partition("\n")[0].count)
+    delimiter = max(",;\t", key=text.lstrip().partition("\n")[0].count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
     header = next((cells for line in reader if any(cells := [cell.strip() for cell in line])), [])
     for column in header:
@@ -255,9 +253,8 @@ def _rows(entries: Sequence[Entry], base: Path, given: Settings, source: str) ->
         numbered = (f"{first} {number}" for number in count(2))
         folder = next(folder for folder in chain([first], numbered) if folder.casefold() not in taken)
         taken.add(folder.casefold())
-        own = Settings(**{key: getattr(entry, key) for key in _keys(Settings)})
         try:
-            settings = merged(own)
+            settings = merged(entry.settings)
         except CampaignError as error:
             error.place = f"{entry.campaign}, {error.place}"
             raise

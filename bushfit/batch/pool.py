@@ -28,16 +28,11 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 R = TypeVar("R")
 
-#: Time that a chunk should take [s]: far more than handing it over, far less than one would like to lose.
-_CHUNK_SECONDS = 0.5
-#: Rows of a chunk at most (chosen: at 7 ms a row it takes _CHUNK_SECONDS).
-_LARGEST_CHUNK = 64
+#: Time that a chunk should take [s]: far more than handing it over, far less than one would like to lose; and its rows
+#: at most (chosen: at 7 ms a row it takes that time).
+_CHUNK_SECONDS, _LARGEST_CHUNK = 0.5, 64
 #: Chunks handed out per worker: one to do and one to go on with.
 _CHUNKS_PER_WORKER = 2
-#: Pools that are tried for a chunk: the first may have lost a worker just now.
-_MOST_POOLS = 3
-#: Workers that a row alone may take down before it is given up: one may have died by chance.
-_MOST_DEATHS = 2
 #: Environment of the workers. Python puts the current folder before its own on the path of what it starts, unless told
 #: not to. Below so many bytes glibc keeps freed memory for the next row: handing it back takes a tenth of the time.
 _ENVIRONMENT = {
@@ -45,12 +40,6 @@ _ENVIRONMENT = {
     "MALLOC_TRIM_THRESHOLD_": "134217728",
     "MALLOC_MMAP_THRESHOLD_": "33554432",
 }
-#: Time for a Dask scheduler to answer [s] (chosen: a cluster in the same house answers at once).
-_CONNECT_SECONDS = 5.0
-#: Time for a first worker of a Dask cluster to appear [s] (chosen: a queue may have to start it).
-_WORKER_SECONDS = 60.0
-#: Time for which the count of a cluster's workers is taken to hold [s]: they come and go, but asking costs a message.
-_COUNT_SECONDS = 5.0
 
 
 class LocalPool:
@@ -119,8 +108,8 @@ class DaskPool:
         for name in ("distributed", "distributed.client", "distributed.core", "tornado.application", "asyncio"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what goes wrong is told once, in our words
         try:
-            self._client: Client = Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
-            self._client.wait_for_workers(1, timeout=_WORKER_SECONDS)
+            self._client: Client = Client(address, timeout=5.0, set_as_default=False)  # in the same house, at once
+            self._client.wait_for_workers(1, timeout=60.0)  # a queue may have to start them
         except (OSError, TimeoutError, ValueError) as error:
             raise BatchError(
                 "no cluster answers there",
@@ -138,7 +127,7 @@ class DaskPool:
     def workers(self) -> int:
         if time.monotonic() > self._counted:
             self._count = max(1, sum(self._client.nthreads().values()))
-            self._counted = time.monotonic() + _COUNT_SECONDS
+            self._counted = time.monotonic() + 5.0  # they come and go, but asking costs a message
         return self._count
 
     def mend(self, cause: BaseException) -> None:
@@ -207,7 +196,7 @@ def run(
 
 def _submit(pool: Pool, work: Callable[[Sequence[T]], Sequence[R]], rows: Sequence[T]) -> Future[Sequence[R]]:
     """Hand rows to a worker, of a new pool where the old one has lost a worker, or loses it just now."""
-    for _ in range(_MOST_POOLS):
+    for _ in range(3):  # the first pool may have lost a worker just now
         try:
             return pool.executor().submit(work, rows)
         except (futures.BrokenExecutor, OSError, EOFError) as error:
@@ -218,7 +207,7 @@ def _submit(pool: Pool, work: Callable[[Sequence[T]], Sequence[R]], rows: Sequen
 
 def _alone(row: T, work: Callable[[Sequence[T]], Sequence[R]], give_up: Callable[[str], R], pool: Pool) -> R:
     """The result of a row that was with a worker when it died: nothing else is out while it tries again."""
-    for _ in range(_MOST_DEATHS):
+    for _ in range(2):  # the worker may have died by chance
         try:
             return _submit(pool, work, [row]).result()[0]
         except BatchError:

@@ -1,17 +1,72 @@
-"""What is tabled, judged and drawn of a bushing: parameters, quality, stiffness and loss factor at points."""
+"""What is asked of a bushing: operating points in words, and the quantities that are tabled, judged and drawn."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from bushfit.batch.points import Point
 from bushfit.effects import is_parameter, parameter_named, parameter_names
-from bushfit.units import for_people
+from bushfit.errors import UnitError, did_you_mean
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion
+from bushfit.units import agrees, for_people, quantity
+from bushfit.validation import converted
 
-#: Value, low and high of its 95 % interval, standard error, in SI; None where it is not known.
-Figures = tuple[float, float | None, float | None, float | None]
+#: A direction or a specimen, a frequency and an amplitude, each number with its unit.
+_WORDS = re.compile(r"\s*(\S.*?)[\s,]+([-+\d.eE]+\s*[A-Za-z]+)[\s,]+([-+\d.eE]+\s*[^\d\s.]+)\s*")
+#: What is known of a quantity, in order, by the end of its column's header: the value [SI], low and high of its 95 %
+#: interval, and standard error.
+PARTS = {"": 0, ", std error": 3, ", low": 1, ", high": 2}
+
+
+@dataclass(frozen=True)
+class Point:
+    """An operating point at a direction, or at a specimen by its name, which each campaign has to know.
+
+    Args:
+        frequency: [Hz].
+        amplitude, unit: zero-to-peak [m or rad], or strain, and its SI unit.
+    """
+
+    place: str
+    frequency: float
+    amplitude: float
+    unit: str
+
+    @property
+    def motion(self) -> Motion:
+        """That of the direction, or as the unit of the amplitude tells."""
+        return next(motion for motion in (TRANSLATION, ROTATION, STRAINING) if motion.displacement_unit == self.unit)
+
+    def __str__(self) -> str:
+        unit, factor = self.motion.display.displacement
+        return f"{self.place} {self.frequency:.6g} Hz {self.amplitude * factor:.6g} {unit}"
+
+
+def parse_point(text: str) -> Point:
+    """The point of a text such as "axial 25 Hz 0.1 mm"; what is like no direction is the name of a specimen.
+
+    Raises:
+        UnitError: no direction, no numbers, or units that do not fit.
+    """
+    expected = 'direction, frequency and amplitude, such as "axial 25 Hz 0.1 mm" or "torsion 10 Hz 1 deg"'
+    match = _WORDS.fullmatch(text)
+    if not match or (match[1] not in set(Direction) and did_you_mean(match[1].lower(), list(Direction))):
+        hint = "write numbers with a decimal point" if re.search(r"\d,\d", text) else None
+        raise UnitError("this is no operating point", found=repr(text), expected=expected, hint=hint)
+    strain = agrees(match[3].lstrip("+-.0123456789eE "), STRAINING.displacement_unit)
+    of_specimen = STRAINING if strain else TRANSLATION
+    motion = Direction(match[1]).motion if match[1] in set(Direction) else of_specimen
+    frequency, amplitude = quantity(match[2], "Hz"), quantity(match[3], motion.displacement_unit)
+    if not (frequency > 0.0 and amplitude > 0.0):
+        raise UnitError("frequency and amplitude have to be above zero", found=repr(text), expected=expected)
+    return Point(match[1], frequency, amplitude, motion.displacement_unit)
+
+
+_WRITTEN = {"type": "string", "description": 'a place, a frequency and an amplitude: "axial 25 Hz 0.1 mm"'}
+#: A point as a key of a TOML file.
+At = Annotated[Point, converted(lambda raw, _: parse_point(raw) if isinstance(raw, str) else raw, _WRITTEN)]
 
 
 @dataclass(frozen=True)
@@ -58,15 +113,12 @@ def parameter_quantities(names: Collection[str]) -> list[Quantity]:
     return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
 
 
-def figures(record: Mapping[str, Any]) -> Iterator[tuple[str, Figures]]:
-    """All quantities of a row's record that are known, by name."""
+def figures(record: Mapping[str, Any]) -> Iterator[tuple[str, tuple[float | None, ...]]]:
+    """All quantities of a row's record that are known, by name: value, low, high and standard error."""
     for name, (value, low, high, stderr, _) in record.get("parameters", {}).items():
-        if value is not None:
-            yield name, (value, low, high, stderr)
-    for key, quantity in OF_FIT.items():
-        if record.get(key) is not None:
-            yield quantity.name, (record[key], None, None, None)
+        yield name, (value, low, high, stderr)
+    for key, of_fit in OF_FIT.items():
+        yield of_fit.name, (record.get(key), None, None, None)
     for point, pair in record.get("points", {}).items():
         for what, (value, low, high) in pair.items():
-            if value is not None:
-                yield f"{what} {point}", (value, low, high, None)
+            yield f"{what} {point}", (value, low, high, None)

@@ -11,12 +11,11 @@ from typing import Any, cast
 from bushfit.batch import ledger
 from bushfit.batch.document import Found, Record
 from bushfit.batch.manifest import Row, Settings
-from bushfit.batch.points import Point
+from bushfit.batch.quantities import Point
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.caveats import warnings_of
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import effect_named
-from bushfit.effects.contract import Parameter
 from bushfit.errors import BatchError, BushfitError
 from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose, Diagnosed
@@ -26,9 +25,6 @@ from bushfit.prediction import Band, predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.contents import Formats
 from bushfit.version import __version__
-
-#: Size below which an effect is as good as none, relative to its parameter's typical size (chosen).
-_NO_EFFECT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -42,8 +38,8 @@ class Orders:
     version: str = __version__
 
 
-def work(rows: Sequence[Row], orders: Orders) -> list[tuple[str, bytes]]:
-    """Status and record, on a line, of some rows; every row's results are kept before the next is begun.
+def work(rows: Sequence[Row], orders: Orders) -> list[Record]:
+    """The records of some rows; every row's results are kept before the next is begun.
 
     Raises:
         BatchError: this process runs another version of bushfit than the one that ordered the work.
@@ -53,16 +49,7 @@ def work(rows: Sequence[Row], orders: Orders) -> list[tuple[str, bytes]]:
             "a worker runs another bushfit", found=__version__, expected=orders.version, hint="install the same on all"
         )
     _one_thread()
-    return [_told(_row(row, orders)) for row in rows]
-
-
-def given_up(why: str) -> tuple[str, bytes]:
-    """The same of a row that no worker survived."""
-    return _told(_failed(why))
-
-
-def _told(record: Record) -> tuple[str, bytes]:
-    return record["status"], ledger.to_line(record)
+    return [_row(row, orders) for row in rows]
 
 
 @cache
@@ -75,35 +62,30 @@ def _one_thread() -> Any:
 
 def _row(row: Row, orders: Orders) -> Record:
     wanted = ledger.key(row, orders.points, orders.formats)
-    if orders.resume and (stands := ledger.standing(orders.output, row, wanted)):
-        return {**stands, "kept": True}
+    if orders.resume and (before := ledger.valid_record(orders.output, row, wanted)):
+        return {**before, "kept": True}
     begin = time.perf_counter()
     files: dict[str, bytes] = {}
     try:
         record: Record = {"schema": ledger.SCHEMA, "key": wanted, "status": "done", "seconds": 0.0}
         record.update(cast("Record", _worked(row, orders, files)))  # a part of it
+    except BushfitError as error:
+        files, record = {}, failed(str(error))
     except Exception as error:  # whatever befalls a row, it costs that row and is said
-        files.clear()
-        record = _failed(_in_words(error))
+        kind = "out of memory" if isinstance(error, MemoryError) else "a fault in bushfit itself"
+        files, record = {}, failed(f"{kind}: {type(error).__name__}: {error}")
     record["seconds"] = round(time.perf_counter() - begin, 4)
     record["files"] = {name: ledger.digest(content) for name, content in files.items()}
     try:
         ledger.keep(orders.output, row, files, record)
     except OSError as error:
-        return _failed(f"the results cannot be written: {error}")
+        return failed(f"the results cannot be written: {error}")
     return record
 
 
-def _failed(error: str) -> Record:
-    """The record of a row that came to nothing."""
+def failed(error: str) -> Record:
+    """The record of a row that came to nothing, such as one that no worker survived."""
     return {"schema": ledger.SCHEMA, "status": "failed", "error": error, "seconds": 0.0}
-
-
-def _in_words(error: Exception) -> str:
-    if isinstance(error, BushfitError):
-        return str(error)
-    kind = "out of memory" if isinstance(error, MemoryError) else "a fault in bushfit itself"
-    return f"{kind}: {type(error).__name__}: {error}"
 
 
 def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
@@ -119,8 +101,8 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
         result, diagnosed = _run(campaign, orders.formats, files)
     else:
         result, diagnosed = _one_by_one(campaign, settings, orders.formats, files)
-    found: Found = _verdict(diagnosed.diagnosis) if diagnosed else {}
-    numbers = _numbers(result, orders.points, found.get("warnings", []))
+    found = _verdict(diagnosed.diagnosis) if diagnosed else Found()
+    numbers = numbers_of(result, orders.points, found.get("warnings", []))
     return {"campaign_name": campaign.name, "inputs": inputs, **found, **numbers}
 
 
@@ -185,7 +167,7 @@ def _diagnose(settings: Settings) -> Diagnose:
     return Diagnose(how, start.model if start else None)
 
 
-def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> Found:
+def numbers_of(result: Result, points: Sequence[Point], notes: Sequence[str]) -> Found:
     """Parameters, quality, and stiffness and loss factor at the points, each with what is known of its error."""
     parameters: dict[str, list[float | str | None]] = {}
     at_bound: dict[str, End] = {}
@@ -193,7 +175,9 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> F
         interval = result.interval(name)
         value, stderr = result.model.values[name], result.covariance.stderr(name)
         parameters[name] = [*map(_finite, (value, *(interval or (None, None)), stderr)), parameter.unit]
-        if name in result.at_bound and not _vanishes(name, parameter, value):
+        # an added effect whose size rests at zero, within a thousandth of its usual size, is an answer like any other
+        zero = parameter.neutral if "." in name else None
+        if name in result.at_bound and (zero is None or abs(value - zero) > 1e-3 * parameter.typical):
             at_bound[name] = result.at_bound[name]
     said, at = [], {}
     for point in points:
@@ -212,12 +196,6 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> F
         "points": at,
         "warnings": warnings_of(result, said, notes),
     }
-
-
-def _vanishes(name: str, parameter: Parameter, value: float) -> bool:
-    """Whether a value on a bound is that of an added effect that is not there, which is an answer like any other."""
-    neutral = parameter.neutral if "." in name else None
-    return neutral is not None and abs(value - neutral) <= _NO_EFFECT * parameter.typical
 
 
 def _band(band: Band) -> list[float | None]:

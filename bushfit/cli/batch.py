@@ -22,8 +22,8 @@ from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
     from bushfit.batch.manifest import Command, Settings
+    from bushfit.batch.outcome import Outcome
     from bushfit.batch.pool import Pool
-    from bushfit.batch.run import Plan, Summary
 
 #: Bushings of a kind (failed, out of limits, on the edge) that the terminal names; batch.csv has all.
 _MOST_SHOWN = 10
@@ -72,8 +72,9 @@ def command(
     workers: Pool = DaskPool(scheduler) if scheduler else LocalPool(jobs or os.cpu_count() or 1)
     from bushfit.batch.limits import check_judged, read_limits
     from bushfit.batch.manifest import read_manifest
-    from bushfit.batch.points import parse_point
-    from bushfit.batch.run import Plan, check_free, run
+    from bushfit.batch.outcome import Plan
+    from bushfit.batch.quantities import parse_point
+    from bushfit.batch.run import check_free, run
     from bushfit.batch.work import Orders
 
     read = read_manifest(manifest[0], _settings(**asked), *manifest[1:])
@@ -88,9 +89,9 @@ def command(
     plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.formats)
     check_free(plan, force=options.force)
     with _progress(options, len(plan.rows)) as advance:
-        summary = run(plan, workers, advance, lambda summary: options.tell(summary.to_document()))
-    _tell(options, summary, options.folder(read.stem), plan)
-    if summary.status["failed"] or summary.missed:
+        outcome = run(plan, workers, advance, lambda outcome: options.tell(outcome.summary))
+    _tell(options, outcome, options.folder(read.stem))
+    if outcome.status["failed"] or outcome.missed:
         click.get_current_context().exit(1)
 
 
@@ -138,27 +139,27 @@ def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
         yield advance
 
 
-def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
+def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
     """Counts, the batch's own scatter, what failed, what misses limits and what passes on condition."""
     from bushfit.batch.run import KINDS
 
-    console, status = options.console, summary.status
-    if summary.scatter:
+    console, status, plan = options.console, outcome.status, outcome.plan
+    if outcome.scatter:
         table = new_table(f"{plan.title}: {status['done']} bushings", "quantity", "median", "robust std dev", "unit")
-        for quantity, (middle, spread) in summary.scatter.items():
+        for quantity, (middle, spread) in outcome.scatter.items():
             unit, factor = for_people(quantity.unit, 1.0, middle)
             table.add_row(quantity.name, alike([middle * factor], 4)[0], alike([spread * factor], 2)[0], unit)
         console.print(table)
-    rate = status.total() / max(summary.seconds, 1e-9)
-    kept = f", {summary.kept} of them from before" if summary.kept else ""
-    options.say(f"{status['done']} done{kept}, {status['failed']} failed; {summary.seconds:.1f} s, {rate:.1f} a second")
+    rate = status.total() / max(outcome.seconds, 1e-9)
+    kept = f", {outcome.kept} of them from before" if outcome.kept else ""
+    options.say(f"{status['done']} done{kept}, {status['failed']} failed; {outcome.seconds:.1f} s, {rate:.1f} a second")
     if plan.limits:
-        options.say("limits: " + ", ".join(f"{count} {word}" for word, count in summary.limits.items()))
-    options.warn(summary.notes)
+        options.say("limits: " + ", ".join(f"{count} {word}" for word, count in outcome.limits.items()))
+    options.warn(outcome.notes)
     for word, names in (
-        ("failed", [f"{name}: {' '.join(error.split())}" for name, error in summary.errors]),
-        ("out of limits", [f"{name}: {words}" for name, words in summary.missed]),
-        ("conditional pass", [f"{name}: {words}" for name, words in summary.edge]),
+        ("failed", [f"{name}: {' '.join(error.split())}" for name, error in outcome.errors]),
+        ("out of limits", [f"{name}: {words}" for name, words in outcome.missed]),
+        ("conditional pass", [f"{name}: {words}" for name, words in outcome.edge]),
     ):
         for name in names[:_MOST_SHOWN]:
             options.say(f"{word}: {name}")

@@ -12,15 +12,15 @@ Abaqus Analysis User's Guide, "Frequency domain viscoelasticity".
 """
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from bushfit.effects import Level as EffectLevel
 from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import commented, heading, stated, to_bytes
-from bushfit.export.levels import Level, by_dof, directions, levels, tables
-from bushfit.export.losses import Form, of_tables
+from bushfit.export.deck import Form, Level, by_dof, commented, directions, of_levels, stated, tables, to_bytes
+from bushfit.export.losses import of_tables
 from bushfit.export.systems import MM_T_S_N, UnitSystem
 from bushfit.geometry import Specimen
 from bushfit.units import number
@@ -46,26 +46,21 @@ def export(order: Order) -> Exported:
         losses += ("compound: strain is uniform in a material, so the amplitude of each element is that of the table",)
     else:
         losses += ("compound: no elastic branch, so no long-term modulus, and no material",)
-    about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
     used = "behaviors are for CONN3D2 of type BUSHING; they act in *STEADY STATE DYNAMICS, DIRECT"
-    lines = commented("**", [*heading(order, about, losses), used])
-    for rank, level in enumerate(levels(order), start=1):
-        lines += commented("**", [f"BUSHING_{rank}: {stated(level)}"])
-        lines += [f"*CONNECTOR BEHAVIOR, NAME=BUSHING_{rank}", *_behavior(level, units)]
+    lines = of_levels(order, "**", units, losses, used, "BUSHING_", partial(_behavior, units))
     return Exported({"bushing.inp": to_bytes([*lines, *(_materials(order, units) if known else ())])}, losses)
 
 
-def _behavior(level: Level, units: UnitSystem) -> Iterator[str]:
+def _behavior(units: UnitSystem, rank: int, level: Level) -> Iterator[str]:
     """Elasticity and damping of one amplitude."""
-    frequency = level[0].frequency
+    yield f"*CONNECTOR BEHAVIOR, NAME=BUSHING_{rank}"
+    frequency = level[0].frequency * units.frequency.factor
     diagonals = np.zeros((2, 6, frequency.size))
     for dof, table in by_dof(level):
-        factor = units.display(table.direction.motion).stiffness.factor
-        storage, damping = _FORM.parts(frequency, table.stiffness * factor)
-        diagonals[:, dof - 1] = storage, damping * units.time.factor
+        diagonals[:, dof - 1] = _FORM.in_units(table, units)[1:]
     for keyword, diagonal in zip(("ELASTICITY", "DAMPING"), diagonals, strict=True):
         yield f"*CONNECTOR {keyword}, FREQUENCY DEPENDENCE=ON"
-        for f, values in zip(frequency * units.frequency.factor, diagonal.T, strict=True):
+        for f, values in zip(frequency, diagonal.T, strict=True):
             yield from _constants(values, f)
 
 

@@ -18,8 +18,7 @@ import numpy as np
 from bushfit.caveats import percent_off
 from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import commented, heading, stated, to_bytes
-from bushfit.export.levels import DOFS, Table, directions, middle, tables
+from bushfit.export.deck import DOFS, Table, commented, directions, heading, middle, stated, tables, to_bytes
 from bushfit.export.losses import of_all, of_band
 from bushfit.geometry import ROTATION, TRANSLATION, Direction
 from bushfit.reading.measurement import loss_factor
@@ -27,8 +26,6 @@ from bushfit.units import number
 
 #: Names of what moves and what resists in each degree of freedom: x and fx to az and tz.
 _AXES = (("x", "fx"), ("y", "fy"), ("z", "fz"), ("ax", "tx"), ("ay", "ty"), ("az", "tz"))
-#: Displacement [mm, deg] of the curve of a degree of freedom of which nothing is known, whose force is zero.
-_UNKNOWN = 1.0
 #: From SI to the displacement and force of the files: mm and N, deg and N mm.
 _SCALES = {TRANSLATION: (1e3, 1.0), ROTATION: (float(np.degrees(1.0)), 1e3)}
 #: Units of the files.
@@ -62,21 +59,10 @@ class _Element(NamedTuple):
         """At which the damping is right [Hz]."""
         return float(self.reference.frequency[self._row])
 
-    @property
-    def curve(self) -> tuple[Array, Array]:
-        """The points in the units of the file."""
-        displacement, force = _SCALES[self.direction.motion]
-        return self.moved * displacement, self.force * force
-
     def damping(self, kind: str) -> float:
         """A damper's constant [N s/m or N m s/rad], or a loss angle [rad]."""
         stiffness = self.reference.stiffness[self._row]
         return float(stiffness.imag / (2.0 * np.pi * self.frequency) if kind == "car" else np.angle(stiffness))
-
-    def damping_written(self, kind: str) -> float:
-        """The same in the units of the file."""
-        displacement, force = _SCALES[self.direction.motion]
-        return self.damping(kind) * (force / displacement if kind == "car" else float(np.degrees(1.0)))
 
     def stiffness(self, kind: str, table: Table) -> Array:
         """Complex stiffness of the element at the points of a table, (n,)."""
@@ -136,12 +122,17 @@ def _file(order: Order, elements: Sequence[_Element], kind: str, losses: Sequenc
     yield from commented("$", [*heading(order, ", ".join(_UNITS.values()), losses), *about])
     yield from _block("MDI_HEADER", {"FILE_TYPE": "'bus'", "FILE_VERSION": "4.0", "FILE_FORMAT": "'ASCII'"})
     yield from _block("UNITS", {name: f"'{unit}'" for name, unit in _UNITS.items()})
-    known = {dof: element for element in elements for dof in DOFS[element.direction]}
-    damping = [known[dof].damping_written(kind) if dof in known else 0.0 for dof in range(1, 7)]
-    rows = zip(_AXES, damping, strict=True)
-    yield from _block("DAMPING", {f"{resists.upper()}_DAMPING": _real(value) for (_, resists), value in rows})
+    damping, curves = dict[int, float](), dict[int, tuple[Array, Array]]()
+    for element in elements:
+        displacement, force = _SCALES[element.direction.motion]
+        scale = force / displacement if kind == "car" else float(np.degrees(1.0))
+        for dof in DOFS[element.direction]:
+            damping[dof] = scale * element.damping(kind)
+            curves[dof] = element.moved * displacement, element.force * force
+    values = {f"{resists.upper()}_DAMPING": _real(damping.get(dof, 0.0)) for dof, (_, resists) in enumerate(_AXES, 1)}
+    yield from _block("DAMPING", values)
     for dof, (moves, resists) in enumerate(_AXES, start=1):
-        curve = known[dof].curve if dof in known else (_UNKNOWN * np.arange(-2.0, 3.0), np.zeros(5))
+        curve = curves[dof] if dof in curves else (np.arange(-2.0, 3.0), np.zeros(5))  # nothing known
         yield from _block(f"{resists.upper()}_CURVE", {})
         yield f"{{{moves:>16} {resists:>17}}}"
         yield from (f"{_real(moved):>17} {_real(resisting):>17}" for moved, resisting in zip(*curve, strict=True))

@@ -25,11 +25,7 @@ _OPTIONS = (
     *("-shared", "-O2", "-std=c99", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-s"),
     *("-ffreestanding", "-nostdlib", "-DFREESTANDING", "-Wall", "-Wextra", "-Werror"),
 )
-#: Longest time that the compiler may take for one library [s]: it takes one.
-_PATIENCE = 300.0
-#: First word of a file with a library for each of several machines, as macOS has them.
-_FAT = 0xCAFEBABE
-#: Machine in such a file, and its variant: x86-64 and arm64.
+#: Machine in a file with a library for each of several, as macOS has them, and its variant: x86-64 and arm64.
 _MACHINES = {"x86_64-macos": (0x01000007, 3), "aarch64-macos": (0x0100000C, 0)}
 #: Libraries in it begin at multiples of 2 to this power [bytes].
 _ALIGNED = 14
@@ -64,7 +60,7 @@ def _compiled(folder: Path, files: Collection[str], target: str) -> bytes:
     """The library of one machine."""
     made = folder / target
     command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *_OPTIONS, *files, "-o", made.name]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=_PATIENCE, check=False)
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300.0, check=False)
     if done.returncode:
         raise OutputError("the compiler of the FMU failed", place=target, found=(done.stderr or done.stdout).strip())
     return made.read_bytes()
@@ -73,7 +69,7 @@ def _compiled(folder: Path, files: Collection[str], target: str) -> bytes:
 def _joined(parts: Mapping[str, bytes]) -> bytes:
     """One file for several machines, in the format of macOS (mach-o/fat.h: big-endian words)."""
     step = 1 << _ALIGNED
-    head, body, begin = struct.pack(">II", _FAT, len(parts)), b"", step
+    head, body, begin = struct.pack(">II", 0xCAFEBABE, len(parts)), b"", step
     for target, content in parts.items():
         head += struct.pack(">IIIII", *_MACHINES[target], begin, len(content), _ALIGNED)
         body += content + bytes(-len(content) % step)

@@ -38,7 +38,7 @@ class Order:
     dialect: Dialect = "nastran"
     decimal_comma: bool = False
 
-    def said(self, losses: Iterable[str]) -> list[tuple[str, str]]:
+    def remarks(self, losses: Iterable[str]) -> list[tuple[str, str]]:
         """What every format says beside its numbers: what it leaves out, and all warnings."""
         found = warnings_of(self.result, [prediction.warnings for prediction in self.predictions])
         return [*(("left out", loss) for loss in losses), *(("warning", line) for line in found)]

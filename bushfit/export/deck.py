@@ -1,11 +1,18 @@
-"""Texts of solver decks: comments that no foreign text breaks out of, and the heading that every deck has."""
+"""What all solver decks share: tables over frequency for each amplitude, comments, and the heading."""
 
 import re
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple
 
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.errors import ModelError
 from bushfit.export.contract import Order
-from bushfit.export.levels import Table
+from bushfit.export.systems import UnitSystem
+from bushfit.geometry import Direction
+from bushfit.prediction import Prediction
 from bushfit.units import number
 from bushfit.version import __version__
 
@@ -13,6 +20,90 @@ from bushfit.version import __version__
 _WIDTH = 80
 #: Characters that ASCII has no sign for, or that end a line.
 _UNPRINTABLE = re.compile(r"[^\x20-\x7e]")
+#: Degrees of freedom that a direction stands for, the bushing's axis along z: 1 to 3 are x, y and z, 6 turns about z.
+DOFS = {Direction.AXIAL: (3,), Direction.RADIAL: (1, 2), Direction.TORSION: (6,)}
+
+
+class Table(NamedTuple):
+    """Complex stiffness of a direction over frequency at one amplitude [Hz; m or rad; N/m or N m/rad], (n,)."""
+
+    direction: Direction
+    amplitude: float
+    frequency: Array
+    stiffness: Array
+
+
+#: The tables of all directions that one property of a solver holds.
+Level = tuple[Table, ...]
+
+
+def directions(order: Order) -> list[Prediction]:
+    """The predictions of the bushing's directions; specimens are no parts of a car.
+
+    Raises:
+        ModelError: there is none, or their frequencies differ.
+    """
+    found = [prediction for prediction in order.predictions if isinstance(prediction.direction, Direction)]
+    if not found:
+        raise ModelError(
+            "there is no direction of a bushing to export",
+            found=", ".join(map(str, order.places)),
+            expected="axial, radial or torsion",
+            hint="csv and xlsx take specimens, too",
+        )
+    grids = [np.unique(prediction.frequency) for prediction in found]
+    if not all(np.array_equal(grid, grids[0]) for grid in grids):
+        raise ModelError("directions at different frequencies", expected="one list of frequencies for all directions")
+    return found
+
+
+def tables(prediction: Prediction) -> list[Table]:
+    """The tables of one direction, by rising amplitude."""
+    direction = Direction(str(prediction.direction))
+    stiffness = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
+    found = []
+    for amplitude in np.unique(prediction.amplitude):
+        here = prediction.amplitude == amplitude
+        found.append(Table(direction, float(amplitude), prediction.frequency[here], stiffness[here]))
+    return found
+
+
+def levels(order: Order) -> list[Level]:
+    """The tables of all directions, level by level: the first amplitude of each, then the second, and so on.
+
+    A direction with fewer amplitudes than others stays at its last.
+    """
+    each = [tables(prediction) for prediction in directions(order)]
+    count = max(map(len, each))
+    return [tuple(own[min(rank, len(own) - 1)] for own in each) for rank in range(count)]
+
+
+def by_dof(level: Level) -> Iterator[tuple[int, Table]]:
+    """Each degree of freedom, from 1, that a level says something of, and its table."""
+    yield from sorted(((dof, table) for table in level for dof in DOFS[table.direction]), key=lambda pair: pair[0])
+
+
+class Form(NamedTuple):
+    """The two real tables in which a solver takes a complex stiffness.
+
+    Args:
+        parts: (frequency, stiffness) -> the two, (n,) each.
+        joined: (frequency, first, second) -> stiffness.
+    """
+
+    parts: Callable[[Array, Array], tuple[Array, Array]]
+    joined: Callable[[Array, Array, Array], Array]
+
+    def in_units(self, table: Table, units: UnitSystem) -> tuple[Array, Array, Array]:
+        """Frequency and the two parts of a table, in the units of the deck."""
+        frequency = table.frequency * units.frequency.factor
+        factor = units.display(table.direction.motion).stiffness.factor
+        return frequency, *self.parts(frequency, table.stiffness * factor)
+
+
+def middle(rows: Sequence[Table]) -> Table:
+    """The table of the middle amplitude, the lower of two."""
+    return rows[(len(rows) - 1) // 2]
 
 
 def commented(mark: str, lines: Iterable[str]) -> list[str]:
@@ -39,8 +130,25 @@ def heading(order: Order, units: str, losses: Iterable[str]) -> list[str]:
         f"sha256: {source.sha256}",
         f"units: {units}",
         "axes: z along the bushing (axial 3, torsion 6), x and y across (radial 1, 2)",
-        *map(": ".join, order.said(losses)),
+        *map(": ".join, order.remarks(losses)),
     ]
+
+
+def of_levels(
+    order: Order,
+    mark: str,
+    units: UnitSystem,
+    losses: Iterable[str],
+    used: str,
+    name: str,
+    lines_of: Callable[[int, Level], Iterable[str]],
+) -> list[str]:
+    """A deck: its heading and how it is used, then of each level, from 1, its name and amplitudes, and its lines."""
+    about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
+    lines = commented(mark, [*heading(order, about, losses), used])
+    for rank, level in enumerate(levels(order), start=1):
+        lines += [*commented(mark, [f"{name}{rank}: {stated(level)}"]), *lines_of(rank, level)]
+    return lines
 
 
 def stated(level: Iterable[Table]) -> str:

@@ -26,14 +26,8 @@ _SHARED = ("fmu.c", "bushing.c", "bushing.h", "fmi2.h")
 _BASE: Mapping[str, Mapping[str, int]] = TABLES["units"]
 #: What XML cannot hold.
 _NO_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-#: Letters of a library's name at most, less those of "bushfit_".
-_LONGEST = 40
 #: Values 0 and 1 stand first on the list of the C sources.
 _FIRST = 2
-#: Time of all entries of the archive: none, so that the same model gives the same bytes.
-_NO_DATE = (1980, 1, 1, 0, 0, 0)
-#: Step that an importer takes where it is not told [s]: fifteen in a cycle of 70 Hz.
-_STEP = 1e-3
 
 
 def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
@@ -44,7 +38,8 @@ def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
         OutputError: there is no compiler.
     """
     found = in_time(order)
-    name = f"bushfit_{re.sub(r'[^A-Za-z0-9]+', '_', folder_name(order.result.name))[:_LONGEST].strip('_').lower()}"
+    safe = re.sub(r"[^A-Za-z0-9]+", "_", folder_name(order.result.name))
+    name = f"bushfit_{safe[:40].strip('_').lower()}"
     sources = {file: (files("bushfit.export") / "c" / file).read_bytes() for file in _SHARED}
     sources |= {"model.c": model_c(found).encode()}
     plain = description(order, found, name, "")
@@ -56,7 +51,7 @@ def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
         **{f"binaries/{path}": library for path, library in libraries(sources, name, systems).items()},
         **{f"sources/{file}": source for file, source in sources.items()},
     }
-    return Exported({f"{name}.fmu": _archive(content)}, found.losses, found.kinds)
+    return Exported({f"{name}.fmu": _archive(content)}, found.losses, found.arms)
 
 
 def references(found: InTime) -> dict[str, int]:
@@ -71,7 +66,7 @@ def model_h(found: InTime, guid: str) -> str:
         "CONSTANTS": _FIRST + sum(not value.settable for value in found.values),
         "DIRECTIONS": len(found.places),
         "PARTS": max(1, len(found.parts)),
-        "ARMS": max(1, len(found.arms)),
+        "ARMS": max(1, len(found.arm_rows)),
     }
     listed = ", ".join(f"{name} = {size}" for name, size in sizes.items())
     return f'#define GUID "{guid}"\nenum {{ {listed} }};\n'
@@ -97,7 +92,7 @@ def model_c(found: InTime) -> str:
             f"    {{{', '.join(f'.{field} = {place}' for field, place in set_.items())}, .lever = {lever!r}}},"
         )
     lines += ["};", "const Arm arms[ARMS] = {"]
-    arms = found.arms or ((0, 0.0, 1.0),)
+    arms = found.arm_rows or ((0, 0.0, 1.0),)
     lines += [f"    {{{part}, {share!r}, {time!r}}}," for part, share, time in arms]
     return "\n".join([*lines, "};", ""])
 
@@ -105,7 +100,7 @@ def model_c(found: InTime) -> str:
 def description(order: Order, found: InTime, name: str, guid: str) -> bytes:
     """modelDescription.xml: what an importer is told."""
     about = f"Rubber bushing, displacement in and force out, of {order.source.file} (SHA-256 {order.source.sha256})"
-    about = "; ".join([about, *map(": ".join, order.said(found.losses))])
+    about = "; ".join([about, *map(": ".join, order.remarks(found.losses))])
     root = ET.Element("fmiModelDescription", {
         "fmiVersion": "2.0", "modelName": _text(order.result.name), "guid": guid, "description": _text(about),
         "generationTool": f"bushfit {__version__}", "variableNamingConvention": "flat", "numberOfEventIndicators": "0",
@@ -119,7 +114,7 @@ def description(order: Order, found: InTime, name: str, guid: str) -> bytes:
         ET.SubElement(compiled, "File", {"name": file})
     variables = _variables(found)
     _units(ET.SubElement(root, "UnitDefinitions"), found, {str(each["unit"]) for _, each in variables})
-    ET.SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": "1", "stepSize": repr(_STEP)})
+    ET.SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": "1", "stepSize": "0.001"})
     listed = ET.SubElement(root, "ModelVariables")
     for variable, real in variables:
         scalar = ET.SubElement(listed, "ScalarVariable", variable)
@@ -184,9 +179,9 @@ def _text(text: str) -> str:
 
 
 def _archive(content: Mapping[str, bytes]) -> bytes:
-    """A zip archive of the same bytes for the same content."""
+    """A zip archive of the same bytes for the same content: its entries have no date."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in content.items():
-            archive.writestr(zipfile.ZipInfo(name, _NO_DATE), data, zipfile.ZIP_DEFLATED)
+            archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
     return buffer.getvalue()

@@ -2,12 +2,12 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from bushfit.effects import Branch, Effect, Level, Modifier, Parameter, place_of, qualified
+from bushfit.effects import Branch, Effect, Level, Modifier, place_of, qualified
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
@@ -24,14 +24,6 @@ TABLES = tomllib.loads(Path(__file__).with_name("fmu.toml").read_text(encoding="
 FIELDS: Mapping[str, list[str]] = TABLES["fields"]
 #: Of these fields, those that are 1 where a direction has no such effect; the others are 0.
 _ONE = {"eps_half[0]", "eps_half[1]", "e_s", "spread", "scale", "factor", "preload"}
-#: How far below and above the frequencies of model and grid the arms go: loops are slow, and a triangle has overtones.
-_BELOW, _ABOVE = 100.0, 10.0
-#: Bounds of what a shape makes of strain and stiffness, and what these two are.
-_ANY = (1e-12, 1e12)
-_STRAIN = "equivalent strain per displacement, rotation or strain"
-_STIFFNESS = "stiffness per equivalent shear modulus"
-#: Error over the grid from which it is said: below this it is rounding.
-_TOLD = 1e-6
 
 
 @dataclass(frozen=True)
@@ -55,9 +47,9 @@ class InTime:
         fields: of each place, the C field and the name of its value; what is missing is neutral.
         levers: arm of a slip force at each place: 1, or a radius [m].
         parts: what the moduli of each group of arms go with.
-        arms: number of its part, modulus over the size of that, and relaxation time [s] of each.
+        arm_rows: number of its part, modulus over the size of that, and relaxation time [s] of each.
         losses: what is left out or held, and the error of that.
-        kinds: the same arms by what they stand for, with their error.
+        arms: the same by what they stand for, with their error.
     """
 
     places: tuple[Place, ...]
@@ -65,9 +57,9 @@ class InTime:
     fields: tuple[Mapping[str, str], ...]
     levers: tuple[float, ...]
     parts: tuple[str, ...]
-    arms: tuple[tuple[int, float, float], ...]
+    arm_rows: tuple[tuple[int, float, float], ...]
     losses: tuple[str, ...]
-    kinds: tuple[Arms, ...]
+    arms: tuple[Arms, ...]
 
 
 def neutral(field: str) -> int:
@@ -82,7 +74,8 @@ def in_time(order: Order) -> InTime:
         ModelError: an effect that has no law in time, or none in the C sources; or no arms within the accuracy.
     """
     model = order.result.model.without(Level.INSTRUMENT)
-    left = [effect.name for effect in model.records if _is_left(effect)]
+    # what has no name, and what is gone once settled
+    left = [effect.name for effect in model.records if effect.name == UNNAMED or effect.settles]
     kept = model.without(*left)
     held = [effect.name for effect in kept.records if isinstance(effect, Modifier)]
     for effect in kept.records:
@@ -113,12 +106,7 @@ def band(order: Order) -> tuple[float, float]:
     """The band of the arms [Hz]: that of model and grid, and two decades below and one above."""
     known = [prediction.frequency for prediction in order.predictions]
     every = np.concatenate([*known, *([order.result.measured.frequency] if order.result.measured else [])])
-    return float(every.min()) / _BELOW, float(every.max()) * _ABOVE
-
-
-def _is_left(effect: Effect) -> bool:
-    """Whether an effect is left out: what has no name, and what is gone once settled."""
-    return effect.name == UNNAMED or effect.settles
+    return float(every.min()) / 100.0, float(every.max()) * 10.0  # loops are slow, and a triangle has overtones
 
 
 def _kind(effect: Effect) -> str:
@@ -161,33 +149,23 @@ def _values(
                 continue
             shared = len({own[name] for own in middle}) == 1
             for place, own, called in zip(places, middle, names, strict=True):
-                called[name] = name if shared else f"{name}.{place}"
-                value = Value(
-                    called[name],
-                    parameter.unit,
-                    own[name],
-                    _allowed(parameter, own[name]),
-                    parameter.meaning,
-                    settable=not of_arms or name in parts,
-                )
+                called[name], size = name if shared else f"{name}.{place}", own[name]
+                neutral_size = size if parameter.neutral is None else parameter.neutral
+                held = (*parameter.bounds, size, neutral_size)  # what modifiers made of it, and that it is not there
+                bounds, settable_now = (min(held), max(held)), not of_arms or name in parts
+                value = Value(called[name], parameter.unit, size, bounds, parameter.meaning, settable_now)
                 target = settable if value.settable else constants
                 if value not in target:
                     target.append(value)
     for place, called in zip(places, names, strict=True):
-        motion = place.motion.displacement_unit
+        unit = f"1/{place.motion.displacement_unit}" if place.motion.displacement_unit != "1" else "1"
         shape = {
-            "unit_strain": Value("", f"1/{motion}" if motion != "1" else "1", model.unit_strain(place), _ANY, _STRAIN),
-            "stiffness_per_modulus": Value("", "", model.stiffness_per_modulus(place), _ANY, _STIFFNESS),
+            "unit_strain": (unit, model.unit_strain(place), "equivalent strain per displacement, rotation or strain"),
+            "stiffness_per_modulus": ("", model.stiffness_per_modulus(place), "stiffness per equivalent shear modulus"),
         }
         called |= {key: f"{key}.{place}" for key in shape}
-        settable += [replace(value, name=called[key]) for key, value in shape.items()]
+        settable += [Value(called[key], unit, size, (1e-12, 1e12), what) for key, (unit, size, what) in shape.items()]
     return (*constants, *settable), names
-
-
-def _allowed(parameter: Parameter, value: float) -> tuple[float, float]:
-    """The bounds of a parameter, its neutral value and what modifiers made of it included."""
-    held = (*parameter.bounds, value, value if parameter.neutral is None else parameter.neutral)
-    return min(held), max(held)
 
 
 def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Arms, ...]) -> dict[str, str]:
@@ -215,7 +193,7 @@ def _lost(
     found = own.stiffness(prediction.direction, prediction.frequency, prediction.amplitude)
     whole = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
     error = float(np.max(np.abs(found / whole - 1.0)))
-    if error < _TOLD and not left:
+    if error < 1e-6 and not left:  # rounding
         return []
     (length, factor), *_ = prediction.direction.display
     frequency, amplitude = number(_middle(prediction.frequency), 3), number(factor * _middle(prediction.amplitude), 3)

@@ -1,32 +1,18 @@
 """What formats cannot carry, in words, with the error that it costs over the exported grid."""
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from bushfit.caveats import percent_off
 from bushfit.effects import Level
-from bushfit.effects.contract import Array
 from bushfit.export.contract import Order
-from bushfit.export.levels import DOFS, Table, directions, middle, tables
+from bushfit.export.deck import DOFS, Form, Table, directions, middle, tables
 from bushfit.prediction import Prediction
 from bushfit.units import number
 
 #: What every law over frequency leaves out.
 NO_LOOPS = "no law in time: loops, overtones and transients need another format (fmu)"
-
-
-class Form(NamedTuple):
-    """The two real tables in which a solver takes a complex stiffness.
-
-    Args:
-        parts: (frequency [Hz], stiffness) -> the two, (n,) each.
-        joined: (frequency, first, second) -> stiffness.
-    """
-
-    parts: Callable[[Array, Array], tuple[Array, Array]]
-    joined: Callable[[Array, Array, Array], Array]
 
 
 def of_tables(order: Order, form: Form) -> Iterator[str]:

@@ -8,21 +8,18 @@ Source: Autodesk Nastran 2025 reference, PBUSHT; Altair OptiStruct 2021 referenc
 """
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import commented, heading, stated, to_bytes
-from bushfit.export.levels import Level, Table, by_dof, levels
-from bushfit.export.losses import Form, of_tables
+from bushfit.export.deck import Form, Level, by_dof, of_levels, to_bytes
+from bushfit.export.losses import of_tables
 from bushfit.export.systems import MM_T_S_N, UnitSystem
 
 #: Characters of a field in the small and in the large format.
 _SMALL, _LARGE = 8, 16
-#: Degrees of freedom of an element.
-_DOFS = 6
 #: Distance between the numbers of the tables of two properties: that of K in degree of freedom n ends on n, of the loss
 #: on 10 + n.
 _TABLES = 100
@@ -52,50 +49,38 @@ def export(order: Order) -> Exported:
     """The bulk data of the bushing, without elements, and what it leaves out."""
     dialect, units = _DIALECTS[order.dialect], order.units or MM_T_S_N
     losses = tuple(of_tables(order, dialect.form))
-    about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
-    used = "in frequency response; PBUSH alone, at the lowest frequency, acts elsewhere; PARAM,G is added to the loss"
-    lines = commented("$", [*heading(order, about, losses), f"the tables act {used}"])
-    for rank, level in enumerate(levels(order), start=1):
-        lines += commented("$", [f"property {rank}: {stated(level)}"])
-        lines += _property(rank, level, dialect, units)
+    used = (
+        "the tables act in frequency response; PBUSH alone, at the lowest frequency, acts elsewhere; PARAM,G is added "
+        "to the loss"
+    )
+    lines = of_levels(order, "$", units, losses, used, "property ", partial(_property, dialect, units))
     return Exported({dialect.file: to_bytes(lines)}, losses)
 
 
-def _property(pid: int, level: Level, dialect: _Dialect, units: UnitSystem) -> Iterator[str]:
+def _property(dialect: _Dialect, units: UnitSystem, pid: int, level: Level) -> Iterator[str]:
     """PBUSH, PBUSHT and the tables of one amplitude."""
-    rows = [(dof, table, _in_units(table, dialect, units)) for dof, table in by_dof(level)]
+    rows = [(dof, *dialect.form.in_units(table, units)) for dof, table in by_dof(level)]
     several = level[0].frequency.size > 1
     nominal, numbers = [dict[int, str](), dict[int, str]()], [dict[int, str](), dict[int, str]()]
-    for dof, _, columns in rows:
-        for part, column in enumerate(columns[1:]):
+    for dof, _, *columns in rows:
+        for part, column in enumerate(columns):
             nominal[part][dof] = _real(column[0])
             numbers[part][dof] = str(_TABLES * pid + 10 * part + dof)
     yield from _large("PBUSH*", [str(pid), *_by_dof(dialect.names, nominal)])
     if several:
         yield from _small("PBUSHT", [str(pid), *_by_dof(dialect.names, numbers)])
-        for dof, _, (frequency, *parts) in rows:
+        for dof, frequency, *parts in rows:
             for part, column in enumerate(parts):
-                yield from _tabled(numbers[part][dof], frequency, column)
-
-
-def _in_units(table: Table, dialect: _Dialect, units: UnitSystem) -> tuple[Array, Array, Array]:
-    """Frequency and the two parts of a table, in the units of the deck."""
-    factor = units.display(table.direction.motion).stiffness.factor
-    return table.frequency * units.frequency.factor, *dialect.form.parts(table.frequency, table.stiffness * factor)
+                pairs = [_real(value) for pair in zip(frequency, column, strict=True) for value in pair]
+                yield from _large("TABLED1*", [numbers[part][dof], "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
 
 
 def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
     """The fields of a property after its number: a name and six values for each part, and so on the next line."""
     fields: list[str] = []
     for name, row in zip(names, rows, strict=True):
-        fields += [*([""] if fields else []), name, *(row.get(dof, "") for dof in range(1, _DOFS + 1))]
+        fields += [*([""] if fields else []), name, *(row.get(dof, "") for dof in range(1, 7))]
     return fields
-
-
-def _tabled(number: str, x: Array, y: Array) -> Iterator[str]:
-    """TABLED1: pairs of x and y, and ENDT."""
-    pairs = [_real(value) for pair in zip(x, y, strict=True) for value in pair]
-    yield from _large("TABLED1*", [number, "LINEAR", "LINEAR", "", "", "", "", "", *pairs, "ENDT"])
 
 
 def _real(value: float) -> str:

@@ -20,7 +20,7 @@ from bushfit.planning.check import Check
 from bushfit.planning.contract import Aim, Knowledge, Plan, Points, Programme, Test, Wanted, motions
 from bushfit.planning.guess import guess
 from bushfit.planning.knowledge import of_campaign, of_result, rig_of
-from bushfit.planning.plan import TOLD, plan
+from bushfit.planning.plan import RIVALS_APART, plan
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.planned import plan_contents
 
@@ -88,7 +88,7 @@ class Planned:
         if planned.apart is None or standard.apart is None:
             return None
         effects = [rival.model.effects[-1] for rival in self.plan.knowledge.rivals]
-        return {"effects": effects, "planned": planned.apart, "standard": standard.apart, "enough": TOLD}
+        return {"effects": effects, "planned": planned.apart, "standard": standard.apart, "enough": RIVALS_APART}
 
     @property
     def contents(self) -> Contents:

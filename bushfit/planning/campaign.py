@@ -16,15 +16,9 @@ from bushfit.planning.contract import Noise, Plan, Test
 
 #: Settings of [simulate] that are written as they are, in the order of the file.
 _SETTINGS = (
-    "seed",
-    "noise",
-    "force_noise",
-    "force_correlation",
-    "gain_error",
-    "phase_error",
-    "level_gain_error",
-    "level_phase_error",
-)
+    "seed", "noise", "force_noise", "force_correlation",
+    "gain_error", "phase_error", "level_gain_error", "level_phase_error",
+)  # fmt: skip
 #: By key of [simulate] and its tests, the unit that a number is written with; the displacement's stands for None.
 _UNITS: Mapping[str, str | None] = {
     "phase_error": "rad",

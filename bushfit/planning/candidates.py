@@ -12,32 +12,12 @@ from bushfit.geometry import ROTATION, TRANSLATION, Direction, Place
 from bushfit.planning.contract import Knowledge, Test, Wanted
 from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
 
-#: Time of a sweep's point where the rig states none [s]; chosen: some cycles to settle, and some to average.
-POINT_SECONDS = 30.0
 #: Time to bring the rig to another run, for its control to settle [s]; chosen.
-RUN_SECONDS = 120.0
-#: Time to mount the bushing in another direction where the rig states none [s]; chosen.
-SETUP_SECONDS = 1800.0
-#: Strain that a bushing can be asked to bear in a test, unless it has borne more.
-BEARABLE = 0.5
-#: Amplitudes of the runs that are considered in each direction.
-_AMPLITUDES = 6
-#: Largest amplitude considered over the largest of the standard programme.
-_LARGER = 2.0
-#: Frequencies of the runs that are considered, evenly in their logarithm.
-_FREQUENCIES = 7
-#: Further ones over the highest: what masses, delays and resonances do shows there, in fewer points than a whole sweep.
-_NEAR_TOP = (0.7, 0.8, 0.9)
-#: Lowest frequency considered over the lowest of the standard programme.
-_LOWER = 0.2
-#: Highest frequency considered over the highest of the standard programme, where [rig] says that the rig can.
-_FASTER = 2.0
-#: Rates of the loops that are considered [Hz]: quasi-static, and as fast as most rigs still record a loop.
-_LOOP_RATES = (0.1, 1.0)
-#: Cycles of these loops: few, and so many that the noise of the rows hardly counts.
+_RUN_SECONDS = 120.0
+#: Cycles of the loops that are considered: few, and so many that the noise of the rows hardly counts.
 _LOOP_CYCLES = (3, 20)
-#: Which of the ten frequencies a run steps through, from the lowest, the highest last: all of the seven, few, the ends,
-#: either end more densely, and those near the top with none, one or two of the lowest.
+#: Which of ten frequencies, evenly spaced below three near the top and the top, a run steps through: all of the seven,
+#: few, the ends, either end more densely, and those near the top with none, one or two of the lowest.
 _CHOICES = (
     (0, 1, 2, 3, 4, 5, 9),
     (0, 2, 4, 9),
@@ -49,22 +29,21 @@ _CHOICES = (
     (0, 7, 8, 9),
     (0, 1, 6, 7, 8, 9),
 )
-#: Which of them a run holds that steps through all amplitudes.
-_HELD = (0, 2, 4, 9)
-#: Largest stated force, motion or speed of a test over the limit of the rig: rounding.
-_ROUNDING = 1.0 + 1e-9
+#: Axial strain per displacement of the paper's bushing [1/m]: 1/sqrt(2 (b^2 - a^2) ln(b/a)), a = 10 mm, b = 18 mm.
+_PAPER_STRAIN = float(1.0 / np.sqrt(2.0 * (0.018**2 - 0.010**2) * np.log(1.8)))
 
 
 def minutes(test: Test, rig: RigSettings) -> float:
     """Time that one run takes, without a change of direction before it."""
     if isinstance(test, SimulatedLoop):
-        return (RUN_SECONDS + test.cycles / test.frequency) / 60.0
-    return (RUN_SECONDS + (rig.minutes_per_point or POINT_SECONDS) * test.points[0].size) / 60.0
+        return (_RUN_SECONDS + test.cycles / test.frequency) / 60.0
+    per_point = rig.minutes_per_point or 30.0  # [s], chosen: some cycles to settle, and some to average
+    return (_RUN_SECONDS + per_point * test.points[0].size) / 60.0
 
 
 def setup_minutes(rig: RigSettings) -> float:
-    """Time of a change of direction."""
-    return (SETUP_SECONDS if rig.minutes_per_setup is None else rig.minutes_per_setup) / 60.0
+    """Time of a change of direction; half an hour where the rig states none (chosen)."""
+    return 30.0 if rig.minutes_per_setup is None else rig.minutes_per_setup / 60.0
 
 
 def standard_tests(known: Knowledge, wanted: Wanted) -> list[Test]:
@@ -91,12 +70,8 @@ def candidates(known: Knowledge, wanted: Wanted) -> list[Test]:
         wished = [points for points in wanted.points if points.place == place]
         usual = [test for test in _of_paper(known, wanted.rig, place) if isinstance(test, SimulatedSweep)]
         if usual:
-            sizes = np.concatenate(
-                [*(each.amplitude for each in wished), *(np.array(each.amplitudes) for each in usual)]
-            )
-            rates = np.concatenate(
-                [*(each.frequency for each in wished), *(np.array(each.frequencies) for each in usual)]
-            )
+            sizes = np.concatenate([*(each.amplitude for each in wished), *(each.amplitudes for each in usual)])
+            rates = np.concatenate([*(each.frequency for each in wished), *(each.frequencies for each in usual)])
             found += _runs(known, wanted.rig, place, sizes, rates)
     if not found:
         places = " and ".join(map(str, wanted.places))
@@ -111,9 +86,7 @@ def candidates(known: Knowledge, wanted: Wanted) -> list[Test]:
 
 def _of_paper(known: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
     """The paper's loop and axial sweeps at a place, as far as the rig can make them; a run for each amplitude."""
-    of_strain = (
-        Direction.AXIAL if place is Direction.RADIAL else place
-    )  # the paper's radial displacements are its axial
+    of_strain = Direction.AXIAL if place is Direction.RADIAL else place  # the paper's radial displacements are axial
     scale = _PAPER_STRAIN / known.model.unit_strain(of_strain)
     loops = [replace(loop, direction=place, amplitude=_rounded(loop.amplitude * scale)) for loop in PAPER_LOOPS]
     sweep = PAPER_SWEEPS[0]
@@ -123,15 +96,20 @@ def _of_paper(known: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
 
 
 def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates: Array) -> Iterator[Test]:
-    """Sweeps and loops at one place over amplitudes [m or rad] and frequencies [Hz], and beyond."""
-    amplitudes = [_rounded(x) for x in np.geomspace(sizes.min(), _LARGER * sizes.max(), _AMPLITUDES)]
-    top = min(_FASTER * float(rates.max()), rig.max_frequency or float(rates.max()))
-    even = np.geomspace(_LOWER * rates.min(), top, _FREQUENCIES)
-    frequencies = [min(_rounded(f), top) for f in (*even[:-1], *(share * top for share in _NEAR_TOP), top)]
+    """Sweeps and loops at one place over amplitudes [m or rad] and frequencies [Hz], and beyond.
+
+    Frequencies go to twice those of the standard programme, where [rig] says that the rig can; those near the top show
+    masses, delays and resonances in fewer points than a whole sweep.
+    """
+    amplitudes = [_rounded(x) for x in np.geomspace(sizes.min(), 2.0 * sizes.max(), 6)]
+    top = min(2.0 * float(rates.max()), rig.max_frequency or float(rates.max()))
+    even = np.geomspace(0.2 * rates.min(), top, 7)
+    frequencies = [min(_rounded(f), top) for f in (*even[:-1], 0.7 * top, 0.8 * top, 0.9 * top, top)]
     steps = [tuple(sorted({frequencies[i] for i in chosen})) for chosen in _CHOICES]
     runs: list[Test] = [SimulatedSweep(place, (x,), stepped) for x in amplitudes for stepped in steps]
-    runs += [SimulatedSweep(place, tuple(amplitudes), (frequencies[i],), "amplitude") for i in _HELD]
-    runs += [SimulatedLoop(place, x, f, n) for x in amplitudes for f in _LOOP_RATES for n in _LOOP_CYCLES]
+    runs += [SimulatedSweep(place, tuple(amplitudes), (frequencies[i],), "amplitude") for i in (0, 2, 4, 9)]
+    # quasi-static loops, and as fast as most rigs still record
+    runs += [SimulatedLoop(place, x, f, n) for x in amplitudes for f in (0.1, 1.0) for n in _LOOP_CYCLES]
     yield from (kept for run in runs if (kept := _within(known, rig, run)) is not None)
 
 
@@ -149,24 +127,20 @@ def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
 
 
 def _bearable(known: Knowledge, rig: RigSettings, place: Place, frequency: Array, size: Array) -> Array:
-    """Which operating points the rig and the rubber can do, (n,) bool."""
-    strain = size * known.model.unit_strain(place)
-    fine = strain <= max(BEARABLE, known.strain or 0.0)
-    fine &= frequency <= (rig.max_frequency or np.inf) * _ROUNDING
+    """Which operating points the rig and the rubber can do, (n,) bool; a strain of 1/2, or what it has borne."""
     force = np.abs(known.model.stiffness(place, frequency, size)) * size
+    limits = [(frequency, rig.max_frequency)]
     if place.motion is TRANSLATION:
-        fine &= force <= (rig.max_force or np.inf) * _ROUNDING
-        fine &= size <= (rig.max_displacement or np.inf) * _ROUNDING
-        fine &= 2.0 * np.pi * frequency * size <= (rig.max_velocity or np.inf) * _ROUNDING
+        speed = 2.0 * np.pi * frequency * size
+        limits += [(force, rig.max_force), (size, rig.max_displacement), (speed, rig.max_velocity)]
     elif place.motion is ROTATION:
-        fine &= (force <= (rig.max_moment or np.inf) * _ROUNDING) & (size <= (rig.max_rotation or np.inf) * _ROUNDING)
+        limits += [(force, rig.max_moment), (size, rig.max_rotation)]
+    fine = size * known.model.unit_strain(place) <= max(0.5, known.strain or 0.0)
+    for reached, limit in limits:
+        fine &= reached <= (limit or np.inf) * (1.0 + 1e-9)  # rounding
     return fine
 
 
 def _rounded(value: float) -> float:
     """To two digits, as a set point is typed."""
     return float(f"{value:.2g}")
-
-
-#: Axial strain per displacement of the paper's bushing [1/m]: 1/sqrt(2 (b^2 - a^2) ln(b/a)), a = 10 mm, b = 18 mm.
-_PAPER_STRAIN = float(1.0 / np.sqrt(2.0 * (0.018**2 - 0.010**2) * np.log(1.8)))

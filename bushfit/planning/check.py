@@ -6,6 +6,7 @@ Notes:
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -89,18 +90,16 @@ def _several(
     clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str], seeds: Sequence[int]
 ) -> list[Found]:
     """Of each seed the parameters found less the true ones, relative; None without a fit."""
-    with threadpool_limits(1):
-        return [_campaign(clean, replace(settings, seed=seed), rig, names) for seed in seeds]
-
-
-def _campaign(clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str]) -> Found:
-    truth = clean.truth
-    campaign = replace(measure(clean, settings).campaign(), rig=rig)
-    try:
-        data = Data.of(campaign)
-        places = list(dict.fromkeys(str(data_set.direction) for data_set in data.data_sets))
-        result = fit_joint(data, effects=truth.effects, directions=places)
-    except FitError:
-        return None
+    truth, found = clean.truth, list[Found]()
     coordinates, sizes = Coordinates.of(truth, names), relative_sizes(truth, names)
-    return (coordinates.point(result.model.values) - coordinates.point(truth.values)) / sizes
+    with threadpool_limits(1):
+        for seed in seeds:
+            campaign = replace(measure(clean, replace(settings, seed=seed)).campaign(), rig=rig)
+            with suppress(FitError):
+                data = Data.of(campaign)
+                places = list(dict.fromkeys(str(data_set.direction) for data_set in data.data_sets))
+                model = fit_joint(data, effects=truth.effects, directions=places).model
+                found.append((coordinates.point(model.values) - coordinates.point(truth.values)) / sizes)
+                continue
+            found.append(None)
+    return found

@@ -23,14 +23,6 @@ Aim = Literal["parameters", "predictions", "rivals"]
 #: One run of the rig: a sweep has one amplitude and several frequencies, or one frequency and several amplitudes.
 Test = SimulatedLoop | SimulatedSweep
 
-#: Standard deviation of a loop's force from row to row, over half its range, where nothing is known; chosen: that of
-#: most force sensors.
-ASSUMED_FORCE = 5e-3
-#: Rows of a loop that tell as much as an independent one, of 1000 a cycle, where nothing is known; chosen: an amplifier
-#: that passes sixteen harmonics of the cycle, as loops are smoothed, makes 20. Rows that are taken as independent
-#: promise more of a loop than most rigs keep.
-ASSUMED_ROWS = 20.0
-
 
 def operating_points(test: Test) -> tuple[Array, Array]:
     """Frequency [Hz] and amplitude, zero-to-peak [m or rad, or strain], of each point of a run, (n,) each."""
@@ -48,12 +40,6 @@ def motions(test: Test) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return test.amplitudes, test.frequencies
 
 
-#: Standard error of the relative change of a parameter of which no test tells anything: a factor of 20.
-_OPEN = 3.0
-#: Least eigenvalue of a correlation that is more than rounding.
-_ROUNDING = 1e-14
-
-
 @dataclass(frozen=True)
 class Noise:
     """How well the rig measures, standard deviations; gain and phase [rad] are those of ln K.
@@ -64,14 +50,16 @@ class Noise:
         level: of all runs of one test, and the gain of a loop's record, (gain, phase): the class of the rig. In a fit
             [rig] states it, so that loops and repeated sweeps count it as noise.
         force: of a row of a loop, over half the force range; there are 1000 rows a cycle, as `simulate` has them.
-        rows_as_one: so many rows of a loop tell as much as an independent one.
+            Chosen: that of most force sensors.
+        rows_as_one: so many rows of a loop tell as much as an independent one. Chosen: an amplifier that passes sixteen
+            harmonics of the cycle, as loops are smoothed; rows taken as independent promise more than most rigs keep.
     """
 
     scatter: tuple[float, float] = (ASSUMED[0], ASSUMED[0])
     shared: tuple[float, float] = ASSUMED
     level: tuple[float, float] = ASSUMED
-    force: float = ASSUMED_FORCE
-    rows_as_one: float = ASSUMED_ROWS
+    force: float = 5e-3
+    rows_as_one: float = 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +106,7 @@ class Knowledge:
         size = np.sqrt(np.diag(self.covariance))
         values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
         scaled = vectors / size[:, None]
-        return (scaled / np.maximum(values, _ROUNDING)) @ scaled.T + np.eye(size.size) / _OPEN**2
+        return (scaled / np.maximum(values, 1e-14)) @ scaled.T + np.eye(size.size) / 3.0**2  # e^3 is 20
 
 
 @dataclass(frozen=True, eq=False)

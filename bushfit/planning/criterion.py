@@ -1,4 +1,6 @@
-"""How good a choice of tests is: one number for its aim, and what it falls short of the standard programme."""
+"""Which tests: how good a choice is, in one number for its aim, and the search for the best within the hours."""
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.planning.sensitivity import Told
+from bushfit.planning.contract import Knowledge
+from bushfit.planning.sensitivity import Grid, Information, relative_slopes
 
-#: Noncentrality relative to the one asked for below which a lack counts no further: logarithms stay finite.
-_LEAST = 1e-12
+#: Fall of the logarithm of the variance that a run, or an exchange, is worth; chosen: a quarter per cent of the error.
+_WORTH = 5e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,41 +20,48 @@ class View:
     """What tests tell about the parameters of one model, and how well further columns show beside these.
 
     Args:
-        told: by every candidate test, made once.
+        information: of every candidate test, made once.
         prior: information on relative changes of the parameters before, (k, k).
         level: error that all runs of a test share, gain and phase, (tests, 2).
         bounded: so many of the parameters, the last, are at rest on a bound.
     """
 
-    told: Told
+    information: Information
     prior: Array
     level: Array
     bounded: int = 0
 
-    def together(self, counts: Array) -> Told:
+    @classmethod
+    def of(cls, grid: Grid, known: Knowledge, further: Array | None = None) -> View:
+        """Of the tests of a grid about what is known of a model, and of further columns of residuals, (e, n)."""
+        slopes = relative_slopes(known, grid.data_sets)
+        columns = np.empty((0, slopes.shape[-1])) if further is None else further
+        return cls(grid.information(slopes, columns), known.precision, grid.level, len(known.bounded))
+
+    def together(self, counts: Array) -> Information:
         """What so many runs of each test, (tests,), tell together with what is known, (1, ...)."""
         total = self._each(counts).total()
         return replace(total, own=total.own + self.prior)
 
-    def one_more(self, counts: Array) -> Told:
+    def one_more(self, counts: Array) -> Information:
         """The same with one run more of each test in turn, (tests, ...)."""
         return self.together(counts) + (self._each(counts + 1) - self._each(counts))
 
-    def off(self, told: Told) -> Array:
+    def off(self, found: Information) -> Array:
         """Expected squares and products of what a fit to such tests finds less the truth, (..., k, k).
 
         Notes:
             Of a parameter whose true value is on its bound, noise would take half of the fits beyond it. There it stays
             on the bound, and the others are found as if it were held: so half of what it adds to their squares is gone.
         """
-        free = np.linalg.inv(told.own)
+        free = np.linalg.inv(found.own)
         first = free.shape[-1] - self.bounded
         own = free[..., first:]
         return free - 0.5 * own @ np.linalg.inv(own[..., first:, :]) @ own.mT
 
-    def _each(self, counts: Array) -> Told:
+    def _each(self, counts: Array) -> Information:
         """What so many runs of each test tell about the parameters, test by test."""
-        return self.told.times(counts).beside(self.level)
+        return self.information.times(counts).beside(self.level)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,24 +91,24 @@ class Criterion:
         """The same with one run more of each test in turn, (tests,)."""
         return self._of([view.one_more(counts) for view in self.views])
 
-    def _of(self, told: Sequence[Told]) -> Array:
+    def _of(self, found: Sequence[Information]) -> Array:
         if self.weight is None:
-            aim = -np.log(np.maximum(distances(told[1:])[:, *self.pairs].min(axis=1), np.finfo(float).tiny))
+            aim = -np.log(np.maximum(distances(found[1:])[:, *self.pairs].min(axis=1), np.finfo(float).tiny))
         else:
-            aim = np.log(np.einsum("tij,ij->t", self.views[0].off(told[0]), self.weight))
+            aim = np.log(np.einsum("tij,ij->t", self.views[0].off(found[0]), self.weight))
         asked = self.least > 0.0
-        reached = shown(told[0])[:, asked] / self.least[asked]
-        return aim - self.penalty * np.sum(np.log(np.clip(reached, _LEAST, 1.0)), axis=1)
+        reached = noncentrality_of(found[0])[:, asked] / self.least[asked]
+        return aim - self.penalty * np.sum(np.log(np.clip(reached, 1e-12, 1.0)), axis=1)  # finite
 
 
-def shown(told: Told) -> Array:
+def noncentrality_of(found: Information) -> Array:
     """Noncentrality of each further column beside the parameters, (tests, e): chi-square that a unit of it makes."""
-    return np.maximum(told.size - np.sum(told.cross * np.linalg.solve(told.own, told.cross), axis=-2), 0.0)
+    return np.maximum(found.size - np.sum(found.cross * np.linalg.solve(found.own, found.cross), axis=-2), 0.0)
 
 
-def distances(told: Sequence[Told]) -> Array:
+def distances(found: Sequence[Information]) -> Array:
     """Expected chi-square between any two rivals after the best refit of either, (tests, rivals, rivals)."""
-    each = [shown(one) for one in told]
+    each = [noncentrality_of(one) for one in found]
     one_way = np.stack([np.insert(row, place, np.inf, axis=1) for place, row in enumerate(each)], axis=1)
     return np.minimum(one_way, np.swapaxes(one_way, 1, 2))
 
@@ -106,3 +116,71 @@ def distances(told: Sequence[Told]) -> Array:
 def root_of(information: Array) -> Array:
     """A root of the covariance that an information leaves, R R^T, (k, k)."""
     return np.linalg.inv(np.linalg.cholesky(information)).T
+
+
+@dataclass(frozen=True, eq=False)
+class Budget:
+    """What tests cost.
+
+    Args:
+        minutes: of each test, (tests,).
+        place: number of the place of each test, (tests,).
+        line: number of what each test holds, (tests,): of tests that hold the same, one is chosen.
+        runs: of each test at most, (tests,); 0 where it may not be chosen.
+        setup: minutes to mount the bushing at a place, once for each place that is tested.
+        most: minutes in all.
+    """
+
+    minutes: Array
+    place: Array
+    line: Array
+    runs: Array
+    setup: float
+    most: float
+
+    def spent(self, counts: Array) -> float:
+        """Minutes of so many runs of each test, (tests,)."""
+        return float(self.minutes @ counts) + self.setup * np.unique(self.place[counts > 0]).size
+
+    def further(self, counts: Array) -> Array:
+        """Minutes that one run more of each test adds, (tests,); beyond all limits where it may not be chosen."""
+        more = self.minutes + self.setup * ~np.isin(self.place, self.place[counts > 0])
+        barred = np.isin(self.line, self.line[counts > 0]) & (counts == 0) | (counts >= self.runs)
+        return np.where(barred | (self.spent(counts) + more > self.most), np.inf, more)
+
+
+def best_runs(criterion: Criterion, budget: Budget, start: Array) -> Array:
+    """So many runs of each test within the budget, (tests,), that the criterion is small.
+
+    Notes: greedy from `start` by what the logarithm falls per minute; then exchanges (Fedorov 1972): one run of each
+    test, and all of them, are given up for the best that can be had in their time, as long as that helps.
+    """
+    counts = _filled(criterion, budget, start)
+    best = criterion.together(counts)
+    for _ in range(8):  # nearly all plans take three
+        before = best
+        for test in np.flatnonzero(counts):
+            for fewer in {1, int(counts[test])}:
+                less = counts - fewer * (np.arange(counts.size) == test)
+                other = _filled(criterion, budget, less)
+                value = criterion.together(other)
+                if value < best - _WORTH:
+                    counts, best = other, value
+                    break
+        if before - best < _WORTH:
+            break
+    return counts
+
+
+def _filled(criterion: Criterion, budget: Budget, counts: Array) -> Array:
+    """Runs added one after the other, each the best per minute, as long as time is left."""
+    counts, so_far = counts.copy(), criterion.together(counts)
+    while np.isfinite(further := budget.further(counts)).any():
+        values = criterion.one_more(counts)
+        fall = (so_far - values) / further
+        best = int(np.argmax(np.where(np.isfinite(further), fall, -np.inf)))
+        if so_far - values[best] <= _WORTH:
+            break
+        counts[best] += 1
+        so_far = values[best]
+    return counts

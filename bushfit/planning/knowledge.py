@@ -22,30 +22,21 @@ from bushfit.model.result import Result
 from bushfit.planning.contract import Knowledge, Noise, Test
 from bushfit.planning.sensitivity import ROWS_PER_CYCLE, relative_slopes
 
-#: Standard error of the relative change of a parameter that is given without one; chosen: a value given by hand is
-#: right within a factor of 2.7.
-_BY_HAND = 0.5
-#: Share of a bounded parameter's slopes that the others have to leave for the tests to tell it: above rounding.
-_SEEN = 1e-6
-
 
 def of_result(result: Result, noise: Noise | None = None, source: str = "") -> Knowledge:
     """What a fitted model tells; of one that was not fitted, the values within a factor of 2.7."""
     model, fitted = result.model, result.covariance
     names = tuple(name for name in fitted.names if fitted.stderr(name)) or tuple(model.parameters)
-    size = Coordinates.of(model, names).slopes(model.values) * relative_sizes(model, names)
-    matrix = (
-        fitted.restricted(names).matrix / np.outer(size, size) if fitted.names else _BY_HAND**2 * np.eye(len(names))
-    )
-    words = source or (
-        "a fitted model" if fitted.names else "values given by hand, taken as right within a factor of 2.7"
-    )
+    covariance, words = np.eye(len(names)) / 4.0, "values given by hand, taken as right within a factor of 2.7"
+    if fitted.names:
+        size = Coordinates.of(model, names).slopes(model.values) * relative_sizes(model, names)
+        covariance, words = fitted.restricted(names).matrix / np.outer(size, size), "a fitted model"
     strain = result.measured.strain[1] if result.measured else None
     return Knowledge(
         model,
         names,
-        matrix,
-        words,
+        covariance,
+        source or words,
         noise or Noise(),
         strain=strain,
         specimens=result.specimens,
@@ -79,9 +70,9 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
     def known(evidence: Evidence) -> Knowledge:
         result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
         strain = max(float(np.max(each.amplitude)) * model.unit_strain(each.direction) for each in data_sets)
-        told = replace(of_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
+        plain = replace(of_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
         bounded = tuple(evidence.solution.at_bound)
-        return _with_bounded(told, bounded, data_sets) if bounded else told
+        return _with_bounded(plain, bounded, data_sets) if bounded else plain
 
     if found is None or rivals is None:
         return known(fit(model, data_sets, held, data.bounds))
@@ -127,12 +118,12 @@ def _with_bounded(known: Knowledge, bounded: tuple[str, ...], data_sets: Sequenc
     own, others = slopes[:k], slopes[k:]
     answer = -np.linalg.lstsq(own.T, others.T)[0]
     beside = others + answer.T @ own
-    seen = np.linalg.norm(beside, axis=1) > _SEEN * np.linalg.norm(others, axis=1)
+    seen = np.linalg.norm(beside, axis=1) > 1e-6 * np.linalg.norm(others, axis=1)  # of rounding
     if not seen.any():
         return known
-    told = own @ own.T
-    live = np.diag(told) > 0.0
-    excess = float(np.mean(np.diag(known.covariance @ told)[live])) if live.any() else 1.0
+    information = own @ own.T
+    live = np.diag(information) > 0.0
+    excess = float(np.mean(np.diag(known.covariance @ information)[live])) if live.any() else 1.0
     answer, beside = answer[:, seen], beside[seen]
     alone = excess * np.linalg.inv(beside @ beside.T)
     shared = answer @ alone

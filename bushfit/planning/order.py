@@ -7,10 +7,6 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 
-#: Rounds of exchanges at most; nearly all orders take twenty.
-_ROUNDS = 100
-#: Relative gain of an exchange below which there is none: rounding.
-_LEAST = 1e-9
 #: Weight of what the parameters take of a drift, beside what shows of it; chosen: orders then keep it below a fifth of
 #: a standard error for 1 % over the session.
 _STEADY = 100.0
@@ -88,11 +84,11 @@ def ordered(counts: Array, places: Array, drifting: Drifting) -> list[int]:
             held += [len(order), len(order) + len(inner) + 1]
         order += [*ends, *inner[::2], *inner[1::2][::-1], *ends]
     runs, free = np.array(order), ~np.isin(np.arange(len(order)), held)
-    for _ in range(_ROUNDS):
+    for _ in range(100):  # nearly all orders take twenty
         together = (places[runs][:, None] == places[runs]) & free[:, None] & free
         gain = np.where(together, drifting.exchanged(runs), 0.0)
         one, other = np.unravel_index(int(np.argmax(gain)), gain.shape)
-        if gain[one, other] <= _LEAST * abs(drifting.noncentrality(runs.tolist())):
+        if gain[one, other] <= 1e-9 * abs(drifting.noncentrality(runs.tolist())):
             break
         runs[[one, other]] = runs[[other, one]]
     return runs.tolist()

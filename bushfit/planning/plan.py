@@ -2,7 +2,7 @@
 
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,10 +21,9 @@ from bushfit.geometry import Place, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
 from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible, Wanted
-from bushfit.planning.criterion import Criterion, View, distances, root_of, shown
+from bushfit.planning.criterion import Budget, Criterion, View, best_runs, distances, noncentrality_of, root_of
 from bushfit.planning.order import Drifting, ordered
-from bushfit.planning.search import Budget, chosen
-from bushfit.planning.sensitivity import Column, Grid, Told, relative_slopes
+from bushfit.planning.sensitivity import Column, Grid, Information, relative_slopes
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import number
 
@@ -35,31 +34,14 @@ _NINE_OF_TEN = 1.2815515655446004
 FOUND = Z95 + _NINE_OF_TEN
 #: Expected chi-square between rivals from which on `diagnose` tells them apart in nine of ten cases: of d it finds d
 #: with a standard deviation of 2 sqrt(d), and it takes those for one set that are within TELLS.
-TOLD = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + TELLS))) ** 2
-#: Expected chi-square over that, from which on no more hours are planned; chosen: rivals may be smaller than they seem.
-_SURELY = 2.0
+RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + TELLS))) ** 2
 #: Shares of the hours that are tried for rivals, before all of them.
 _SHARES = (0.125, 0.1875, 0.25, 0.375, 0.5)
-#: Weight of the logarithm of each lack of power, beside the logarithm of the variance that is wanted small; chosen.
-_PENALTY = 3.0
-#: The same where that leaves a lack.
-_STRICT = 30.0
-#: Power relative to that of the standard programme that counts as the same: what the numbers are good for.
-_AS_WELL = 0.995
-#: Drift of the gain over a session whose harm is told.
-_DRIFT = 0.01
-#: Runs of a test at most: more than fit into any session.
-_MOST_RUNS = 1000
+#: Weight of the logarithm of each lack of power, beside the logarithm of the variance that is wanted small, and the
+#: weight where the first leaves a lack; chosen.
+_PENALTY, _STRICT = 3.0, 30.0
 #: Degrees of freedom behind the scatter of sweeps at least; chosen: with five, errors are a tenth larger than planned.
-_SCATTER_TOLD = 10
-#: What the logarithm of the variance that is wanted small may rise for that: a twentieth of the error.
-_LITTLE = 0.1
-#: Tests of a place that are considered for its repeat, the quickest first; chosen for time.
-_REPEATED = 4
-#: Information, relative to the largest, below which tests alone leave a combination of parameters open.
-_OPEN = 1e-14
-#: The same where there are no tests: errors are then beyond all use.
-_LEAST = 1e-12
+_SCATTER_FREEDOM = 10
 
 
 def plan(known: Knowledge, wanted: Wanted) -> Plan:
@@ -70,13 +52,13 @@ def plan(known: Knowledge, wanted: Wanted) -> Plan:
     """
     found: dict[float, Plan] = {}
 
-    def told(share: float) -> bool:
+    def surely_apart(share: float) -> bool:
         with suppress(ModelError):  # too few hours for any test
             found[share] = _Planner(known, replace(wanted, hours=share * wanted.hours)).plan()
-            return (found[share].planned.apart or 0.0) >= _SURELY * TOLD
+            return (found[share].planned.apart or 0.0) >= 2.0 * RIVALS_APART  # rivals may be smaller than they seem
         return False
 
-    enough = bisect_left(_SHARES, True, key=told) if wanted.aim == "rivals" else len(_SHARES)
+    enough = bisect_left(_SHARES, True, key=surely_apart) if wanted.aim == "rivals" else len(_SHARES)
     return found[_SHARES[enough]] if enough < len(_SHARES) else _Planner(known, wanted).plan()
 
 
@@ -86,13 +68,10 @@ class _Planner:
     wanted: Wanted
 
     @cached_property
-    def standard(self) -> list[Test]:
-        return standard_tests(self.known, self.wanted)
-
-    @cached_property
     def tests(self) -> tuple[Test, ...]:
         """The candidates first, then what only the standard programme has."""
-        return tuple(dict.fromkeys([*candidates(self.known, self.wanted), *self.standard]))
+        every = [*candidates(self.known, self.wanted), *standard_tests(self.known, self.wanted)]
+        return tuple(dict.fromkeys(every))
 
     @cached_property
     def grid(self) -> Grid:
@@ -107,15 +86,12 @@ class _Planner:
         """The likeliest model's, beside the effects that it lacks; each rival's, beside what the others differ by."""
         data_sets = self.grid.data_sets
         effects = np.array([column.values for column in self.columns])
-        views = [self._view(self.known, effects)]
+        views = [View.of(self.grid, self.known, effects)]
         left = [residual(rival.model, data_sets) for rival in self.known.rivals]
         for i, rival in enumerate(self.known.rivals):
-            views.append(self._view(rival, np.array([other - left[i] for j, other in enumerate(left) if j != i])))
+            others = np.array([other - left[i] for j, other in enumerate(left) if j != i])
+            views.append(View.of(self.grid, rival, others))
         return views
-
-    def _view(self, known: Knowledge, further: Array) -> View:
-        told = self.grid.told(relative_slopes(known, self.grid.data_sets), further)
-        return View(told, known.precision, self.grid.level, len(known.bounded))
 
     @cached_property
     def slopes(self) -> Array:
@@ -139,13 +115,18 @@ class _Planner:
     @cached_property
     def budget(self) -> Budget:
         places = list(dict.fromkeys([*self.wanted.places, *(test.direction for test in self.tests)]))
-        lines = [_line(test) for test in self.tests]
+        lines = [
+            (test.direction, test.amplitude, test.frequency)
+            if isinstance(test, SimulatedLoop)
+            else (test.direction, test.stepped, test.held)
+            for test in self.tests
+        ]
         known = list(dict.fromkeys(lines))
         return Budget(
             np.array([minutes(test, self.wanted.rig) for test in self.tests]),
             np.array([places.index(test.direction) for test in self.tests]),
             np.array([known.index(line) for line in lines]),
-            np.array([_MOST_RUNS * (test.direction in self.wanted.places) for test in self.tests]),
+            np.array([1000 * (test.direction in self.wanted.places) for test in self.tests]),
             setup_minutes(self.wanted.rig),
             60.0 * self.wanted.hours,
         )
@@ -174,76 +155,79 @@ class _Planner:
     def _best(self) -> Array:
         """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be."""
         nothing, standard = np.zeros(len(self.tests), dtype=int), self._counts(self.standard_runs)
-        best = chosen(self._criterion(_PENALTY), self.budget, nothing)
+        best = best_runs(self._criterion(_PENALTY), self.budget, nothing)
         if self._lacking(best):
-            strict = self._criterion(_STRICT)
             starts = best, np.minimum(standard, self.budget.runs)
-            best = min((chosen(strict, self.budget, start) for start in starts), key=strict.together)
+            best = min((best_runs(self.strict, self.budget, start) for start in starts), key=self.strict.together)
         return best
 
     def _with_repeats(self, counts: Array) -> Array:
         """The runs with a test of each place made twice, that a drift shows as in the standard programme, in place of
         what is least useful."""
-        one, strict = np.eye(len(self.tests), dtype=int), self._criterion(_STRICT)
         standard = self._drifting(self._counts(self.standard_runs)).noncentrality(self.standard_runs)
         for place in np.unique(self.budget.place[counts > 0]):
             mine = np.flatnonzero((counts > 0) & (self.budget.place == place))
             again = mine[self.budget.runs[mine] > 1]
-            if mine.size > 2 and (counts[mine].max() < 2 or self._of_drift(counts) < standard):
-                few = again[np.argsort(self.budget.minutes[again])][:_REPEATED]
-                made = [fits for twice in few if (fits := self._fitting(counts + one[twice])) is not None]
-                counts = min(made, key=strict.together, default=counts)
-        return self._telling_noise(counts)
+            if mine.size > 2 and (counts[mine].max() < 2 or self._drift_shown(counts) < standard):
+                quickest = again[np.argsort(self.budget.minutes[again])][:4]
+                counts = min(self._once_more(counts, quickest), key=self.strict.together, default=counts)
+        return self._with_scatter(counts)
 
-    def _telling_noise(self, counts: Array) -> Array:
+    def _drift_shown(self, counts: Array) -> float:
+        """Noncentrality of a drift by so many runs of each test, in their best order."""
+        drifting = self._drifting(counts)
+        return drifting.noncentrality(ordered(counts, self.budget.place, drifting))
+
+    def _with_scatter(self, counts: Array) -> Array:
         """The runs with further repeats of sweeps, until a fit can tell their scatter from what repeats differ by, as
         far as that costs next to nothing of the aim."""
-        one, strict = np.eye(len(self.tests), dtype=int), self._criterion(_STRICT)
-        most, told = strict.together(counts) + _LITTLE, self._scatter_told(counts)
-        while told < _SCATTER_TOLD:
-            again = [place for place in np.flatnonzero(counts) if _differences(self.tests[place])]
-            made = [fits for test in again if (fits := self._fitting(counts + one[test])) is not None]
-            more = [runs for runs in made if self._scatter_told(runs) > told and strict.together(runs) <= most]
+        most = self.strict.together(counts) + 0.1  # of the logarithm of a variance: a twentieth of the error
+        while (freedom := self._scatter_freedom(counts)) < _SCATTER_FREEDOM:
+            again = [test for test in np.flatnonzero(counts).tolist() if _differences(self.tests[test])]
+            more = [
+                runs
+                for runs in self._once_more(counts, again)
+                if self._scatter_freedom(runs) > freedom and self.strict.together(runs) <= most
+            ]
             if not more:
                 break
-            counts = min(more, key=strict.together)
-            told = self._scatter_told(counts)
+            counts = min(more, key=self.strict.together)
         return counts
 
-    def _scatter_told(self, counts: Array) -> int:
+    def _once_more(self, counts: Array, tests: Iterable[int]) -> Iterator[Array]:
+        """The runs with one more of each test in turn, so far as they fit into the hours.
+
+        Of tests that are made once, the least useful are left out in turn; what takes longer without them is left out.
+        """
+        one = np.eye(len(self.tests), dtype=int)
+        for test in tests:
+            runs = counts + one[test]
+            while self.budget.spent(runs) > self.budget.most and (runs == 1).any():
+                runs = min((runs - one[single] for single in np.flatnonzero(runs == 1)), key=self.strict.together)
+            if self.budget.spent(runs) <= self.budget.most:
+                yield runs
+
+    def _scatter_freedom(self, counts: Array) -> int:
         """Degrees of freedom of the scatter of sweeps that repeats tell, those before and so many runs of each test.
 
         Of several rigs, the bushing's and each specimen's, the fewest.
         """
         runs = Counter(self.known.tests)
         runs.update({test: int(n) for test, n in zip(self.tests, counts, strict=True) if n})
-        told = Counter[Place | None]()
+        freedom = Counter[Place | None]()
         for test, times in runs.items():
             if isinstance(test, SimulatedSweep):
                 rig = test.direction if isinstance(test.direction, Specimen) else None
-                told[rig] += _differences(test) * (times - 1)
-        return min(told.values(), default=0)
-
-    def _of_drift(self, counts: Array) -> float:
-        """Noncentrality of a drift by so many runs of each test, in their best order."""
-        drifting = self._drifting(counts)
-        return drifting.noncentrality(ordered(counts, self.budget.place, drifting))
-
-    def _fitting(self, counts: Array) -> Array | None:
-        """The runs that fit into the hours: of tests that are made once, the least useful are left out in turn.
-
-        None where the others alone take longer.
-        """
-        one, strict = np.eye(len(self.tests), dtype=int), self._criterion(_STRICT)
-        while self.budget.spent(counts) > self.budget.most:
-            fewer = [counts - one[test] for test in np.flatnonzero(counts == 1)]
-            if not fewer:
-                return None
-            counts = min(fewer, key=strict.together)
-        return counts
+                freedom[rig] += _differences(test) * (times - 1)
+        return min(freedom.values(), default=0)
 
     def _criterion(self, penalty: float) -> Criterion:
         return Criterion(self.views, self.weight, self._tellable, self.least, penalty)
+
+    @cached_property
+    def strict(self) -> Criterion:
+        """With more weight on what effects show less than in the standard programme."""
+        return self._criterion(_STRICT)
 
     @cached_property
     def _pairs(self) -> Array:
@@ -255,15 +239,12 @@ class _Planner:
         """Those that all tests together would tell apart, (2, pairs); all where none are."""
         if not self.known.rivals:
             return self._pairs
-        every = np.ones(len(self.tests), dtype=int)
-        told = distances([view.together(every) for view in self.views[1:]])[0, *self._pairs] >= TOLD
-        return self._pairs[:, told] if told.any() else self._pairs
+        apart = self._distances(np.ones(len(self.tests), dtype=int), self._pairs) >= RIVALS_APART
+        return self._pairs[:, apart] if apart.any() else self._pairs
 
-    def _apart(self, counts: Array) -> float | None:
-        """Expected chi-square between the nearest rivals that tests could tell apart; None without rivals."""
-        if not self.known.rivals:
-            return None
-        return float(distances([view.together(counts) for view in self.views[1:]])[0, *self._tellable].min())
+    def _distances(self, counts: Array, pairs: Array) -> Array:
+        """Expected chi-square between the rivals of each pair by so many runs of each test, (pairs,)."""
+        return distances([view.together(counts) for view in self.views[1:]])[0, *pairs]
 
     def _counts(self, runs: Sequence[int]) -> Array:
         """How often each test stands among the runs, (tests,)."""
@@ -271,14 +252,14 @@ class _Planner:
 
     def _lacking(self, counts: Array) -> list[str]:
         """Effects that so many runs of each test show less well than the standard programme."""
-        reached = shown(self.views[0].together(counts))[0]
-        short = np.sqrt(reached) < _AS_WELL * np.sqrt(self.least)
+        reached = noncentrality_of(self.views[0].together(counts))[0]
+        short = np.sqrt(reached) < 0.995 * np.sqrt(self.least)  # what the numbers are good for
         return list(dict.fromkeys(self.columns[i].effect.name for i in np.flatnonzero(short)))
 
     @cached_property
     def standard_runs(self) -> list[int]:
         """The standard programme over and over, as long as it fits into the hours; by direction, as labs do."""
-        places = [self.tests.index(test) for test in self.standard]
+        places = [self.tests.index(test) for test in standard_tests(self.known, self.wanted)]
         counts, runs = np.zeros(len(self.tests), dtype=int), list[int]()
         while places:
             counts[test := places[len(runs) % len(places)]] += 1
@@ -290,15 +271,15 @@ class _Planner:
     @cached_property
     def least(self) -> Array:
         """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
-        reached = shown(self.views[0].together(self._counts(self.standard_runs)))[0]
+        reached = noncentrality_of(self.views[0].together(self._counts(self.standard_runs)))[0]
         seen = [column.reach * np.sqrt(size) >= FOUND for column, size in zip(self.columns, reached, strict=True)]
         return np.where(seen, reached, 0.0)
 
     def _drifting(self, counts: Array) -> Drifting:
         """What a drift does to so many runs of each test."""
         view, k = self.views[0], len(self.known.names) + len(self.known.bounded)
-        own, seen = view.told.own, view.told.own[:, k, k]
-        one = Told(own * counts[:, None, None], own[..., k : k + 1], seen[:, None])  # by the gain of one run
+        own, seen = view.information.own, view.information.own[:, k, k]
+        one = Information(own * counts[:, None, None], own[..., k : k + 1], seen[:, None])  # by the gain of one run
         level = np.square(view.level[:, 0])
         root = root_of(view.together(counts).own[0])
         pull = one.beside(view.level).cross[..., 0] @ root
@@ -306,27 +287,27 @@ class _Planner:
 
     def _programme(self, runs: Sequence[int]) -> Programme:
         """What runs in their order tell."""
-        counts = self._counts(runs)
-        view, phase_per_loss, k = self.views[0], 1.0 / (1.0 + np.square(self._loss_factor)), len(self.known.names)
-        told, drifting = view.together(counts), self._drifting(counts)
-        off, covariance = view.off(told)[0], np.linalg.inv(told.own[0])
+        counts, places = self._counts(runs), self.budget.place[list(runs)]
+        view, k, drifting = self.views[0], len(self.known.names), self._drifting(counts)
+        found = view.together(counts)
+        off, covariance = view.off(found)[0], np.linalg.inv(found.own[0])
         gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.slopes, off, self.slopes))
-        moved = root_of(told.own[0]) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
-        places = self.budget.place[list(runs)]
-        mounted = np.diff(places, prepend=-1) != 0
+        moved = root_of(found.own[0]) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
+        # tests alone leave open what they tell less of than rounding; without tests errors are beyond all use
+        values, vectors = np.linalg.eigh(found.own[0] - view.prior)
+        alone = vectors / np.sqrt(np.maximum(values, max(1e-14 * float(values.max()), 1e-12)))
         return Programme(
             tuple(self.tests[run] for run in runs),
-            self.budget.minutes[list(runs)] + self.budget.setup * mounted,
+            self.budget.minutes[list(runs)] + self.budget.setup * (np.diff(places, prepend=-1) != 0),
             np.sqrt(np.diag(off))[:k],
-            _alone(told.own[0] - view.prior)[:k],
+            np.linalg.norm(alone, axis=1)[:k],
             gain,
-            phase / phase_per_loss,
-            self._apart(counts),
-            tuple(self._visible(shown(told)[0], drifting.noncentrality(runs))),
-            _DRIFT * float(np.abs(moved[:k]).max()),
+            phase * (1.0 + np.square(self._loss_factor())),
+            float(self._distances(counts, self._tellable).min()) if self.known.rivals else None,
+            tuple(self._visible(noncentrality_of(found)[0], drifting.noncentrality(runs))),
+            0.01 * float(np.abs(moved[:k]).max()),
         )
 
-    @cached_property
     def _loss_factor(self) -> Array:
         """Of the model at the points wanted, (n,)."""
         model = self.known.model
@@ -365,10 +346,10 @@ class _Planner:
             if (one, other) not in tellable:
                 names = (self.known.rivals[place].model.effects[-1] for place in (one, other))
                 yield f"no test of this rig would tell {' from '.join(names)}: they are left out"
-        if planned.apart is not None and planned.apart < TOLD:
+        if planned.apart is not None and planned.apart < RIVALS_APART:
             yield (
                 f"the nearest rivals are {number(planned.apart, 2)} apart in expected chi-square, less than the "
-                f"{number(TOLD, 3)} that tell them in nine of ten cases"
+                f"{number(RIVALS_APART, 3)} that tell them in nine of ten cases"
             )
 
 
@@ -383,15 +364,23 @@ def _differences(test: Test) -> int:
     return steps - 1 if steps >= FEWEST_STEPS else 0
 
 
-def _line(test: Test) -> tuple[object, ...]:
-    """What a test holds; a loop all of it."""
-    if isinstance(test, SimulatedLoop):
-        return test.direction, test.amplitude, test.frequency
-    return test.direction, test.stepped, test.held
+def purposes(plan: Plan) -> dict[Test, str]:
+    """In words, of each test with all its repeats, what would be lost without it."""
+    known, counts = plan.knowledge, Counter(plan.planned.tests)
+    view = View.of(Grid(known, tuple(counts)), known)
+    runs = np.array(list(counts.values()))
+    whole = _errors(view, runs)[: len(known.names)]
+    rest = "tells the rivals apart" if plan.wanted.aim == "rivals" else "shows effects that the model lacks"
+    found = {}
+    for at, test in enumerate(counts):
+        without = np.where(np.arange(runs.size) == at, 0, runs)
+        growth = _errors(view, without)[: whole.size] / whole
+        worst = int(np.argmax(growth))
+        lost = f"{known.names[worst]}: error {number(100.0 * float(growth[worst] - 1.0), 2)} % larger without it"
+        found[test] = lost if growth[worst] >= 1.005 else rest  # chosen
+    return found
 
 
-def _alone(information: Array) -> Array:
-    """Standard errors by tests alone, (k,)."""
-    values, vectors = np.linalg.eigh(information)
-    least = max(_OPEN * float(values.max()), _LEAST)
-    return np.linalg.norm(vectors / np.sqrt(np.maximum(values, least)), axis=1)
+def _errors(view: View, runs: Array) -> Array:
+    """Standard error of each parameter's relative change, after so many runs of each test."""
+    return np.sqrt(np.diag(view.off(view.together(runs))[0]))

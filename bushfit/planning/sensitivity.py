@@ -24,7 +24,7 @@ from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
-from bushfit.planning.contract import Knowledge, Noise, Test
+from bushfit.planning.contract import Knowledge, Test, operating_points
 
 #: Rows of a loop's cycle that its sensitivities are taken at; chosen: its force is smooth over them.
 _ROWS = 128
@@ -33,7 +33,7 @@ ROWS_PER_CYCLE = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class Information:
     """Inner products of the whitened columns of tests: k parameters, gain and phase of a line, and e further columns.
 
     They add up over tests, along the first axis.
@@ -48,28 +48,23 @@ class Told:
     cross: Array
     size: Array
 
-    @classmethod
-    def of(cls, columns: Sequence[Array], count: int) -> Told:
-        """Of the whitened columns of each test, (k + 2 + e, n), of which the first k + 2 = `count` are its own."""
-        products = np.array([rows[:count] @ rows.T for rows in columns])
-        size = np.array([np.square(rows[count:]).sum(axis=1) for rows in columns])
-        return cls(products[..., :count], products[..., count:], size)
+    def __add__(self, other: Information) -> Information:
+        return Information(self.own + other.own, self.cross + other.cross, self.size + other.size)
 
-    def __add__(self, other: Told) -> Told:
-        return Told(self.own + other.own, self.cross + other.cross, self.size + other.size)
+    def __sub__(self, other: Information) -> Information:
+        return Information(self.own - other.own, self.cross - other.cross, self.size - other.size)
 
-    def __sub__(self, other: Told) -> Told:
-        return Told(self.own - other.own, self.cross - other.cross, self.size - other.size)
-
-    def times(self, counts: Array) -> Told:
+    def times(self, counts: Array) -> Information:
         """Each test so many times, (tests,)."""
-        return Told(self.own * counts[:, None, None], self.cross * counts[:, None, None], self.size * counts[:, None])
+        return Information(
+            self.own * counts[:, None, None], self.cross * counts[:, None, None], self.size * counts[:, None]
+        )
 
-    def total(self) -> Told:
+    def total(self) -> Information:
         """All tests together, (1, ...)."""
-        return Told(*(part.sum(axis=0, keepdims=True) for part in (self.own, self.cross, self.size)))
+        return Information(*(part.sum(axis=0, keepdims=True) for part in (self.own, self.cross, self.size)))
 
-    def beside(self, level: Array) -> Told:
+    def beside(self, level: Array) -> Information:
         """Less what an error of the line, gain and phase of these standard deviations, takes away; parameters alone.
 
         Args:
@@ -82,7 +77,7 @@ class Told:
         line = level[..., None] * np.concatenate((self.own[..., k:, :], self.cross[..., k:, :]), axis=-1)
         solved = np.linalg.solve(np.eye(2) + line[..., k : k + 2] * level[..., None, :], line)
         mine = np.swapaxes(line[..., :k], -1, -2)
-        return Told(
+        return Information(
             self.own[..., :k, :k] - mine @ solved[..., :k],
             self.cross[..., :k, :] - mine @ solved[..., k + 2 :],
             self.size - np.sum(line[..., k + 2 :] * solved[..., k + 2 :], axis=-2),
@@ -144,30 +139,36 @@ class Grid:
                 of_place.setdefault(test.direction, []).append(_points_of(test))
         return {place: np.unique(np.concatenate(points), axis=0) for place, points in of_place.items()}
 
-    def told(self, own: Array, further: Array) -> Told:
+    def information(self, own: Array, further: Array) -> Information:
         """What each test tells by columns of all data sets' residuals: of parameters, (k, n), and others, (e, n)."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets])
         parts = np.split(np.concatenate((own, further)), ends[:-1], axis=-1)
         of_loops = dict(zip(self._loops, zip(parted(self.data_sets)[0], parts, strict=False), strict=True))
         of_places = dict(zip(self._points, parts[len(self._loops) :], strict=True))
-        columns = []
+        k, products, size = len(own), [], []
         for test in self.tests:
             if isinstance(test, SimulatedLoop):
                 loop, rows = of_loops[test.direction, test.frequency, test.amplitude]
                 cycles = float(np.sqrt(test.cycles))
-                rows, unit = cycles * rows, cycles * np.array([loop.unit_gain, np.zeros(loop.size)])
+                rows, line = cycles * rows, cycles * np.array([loop.unit_gain, np.zeros(loop.size)])
             else:
-                known = {tuple(point): place for place, point in enumerate(self._points[test.direction].tolist())}
-                chosen = [known[tuple(point)] for point in _points_of(test).tolist()]
-                whitening = _of_run(self.known.noise, len(chosen))
-                rows, unit = (
-                    of_places[test.direction],
-                    whitening.whiten(np.array([[1.0], [1.0j]]) * np.ones(len(chosen))),
-                )
-                gain, phase = np.split(rows, 2, axis=-1)
-                rows = whitening.whiten(gain[:, chosen] + 1j * phase[:, chosen])
-            columns.append(np.concatenate((rows[: len(own)], unit, rows[len(own) :])))
-        return Told.of(columns, len(own) + 2)
+                rows, line = self._whitened(test, of_places[test.direction])
+            mine = np.concatenate((rows[:k], line))
+            products.append(mine @ np.concatenate((mine, rows[k:])).T)
+            size.append(np.square(rows[k:]).sum(axis=1))
+        both = np.array(products)
+        return Information(both[..., : k + 2], both[..., k + 2 :], np.array(size))
+
+    def _whitened(self, test: SimulatedSweep, rows: Array) -> tuple[Array, Array]:
+        """The columns of a place, and those of gain and phase of the line, at the points of one run; whitened."""
+        known = {tuple(point): number for number, point in enumerate(self._points[test.direction].tolist())}
+        chosen = [known[tuple(point)] for point in _points_of(test).tolist()]
+        first, random = np.array([0]), np.repeat(np.array(self.known.noise.scatter)[:, None], len(chosen), axis=1)
+        noise = SweepNoise({}, self.known.noise.shared, "stated", 0)
+        whitening = Whitening(first, first, random, noise, np.ones(len(chosen)))
+        gain, phase = np.split(rows, 2, axis=-1)
+        line = np.array([[1.0], [1.0j]]) * np.ones(len(chosen))
+        return whitening.whiten(gain[:, chosen] + 1j * phase[:, chosen]), whitening.whiten(line)
 
     @cached_property
     def level(self) -> Array:
@@ -182,7 +183,7 @@ class Grid:
         What depends on the order of the tests or on their temperature is not among them, nor what stands in place of a
         branch: it has no amount that could be small.
         """
-        model, places = self.known.model, {str(test.direction) for test in self.tests}
+        model, places = self.known.model, dict.fromkeys(str(test.direction) for test in self.tests)
         missing = [effect for effect in missing_effects(model, places) if not (effect.replaces or effect.under)]
         of_effects = [(effect, sensitivity(model, self.data_sets, effect)[1]) for effect in missing]
         return [Column(effect, row) for effect, rows in of_effects for row in rows]
@@ -199,10 +200,4 @@ def relative_slopes(known: Knowledge, data_sets: Sequence[DataSet]) -> Array:
 
 def _points_of(test: SimulatedSweep) -> Array:
     """Amplitude and frequency of each point of a run, (n, 2)."""
-    return np.stack([values.ravel() for values in reversed(test.points)], axis=-1)
-
-
-def _of_run(noise: Noise, points: int) -> Whitening:
-    """The whitening of one run of so many points."""
-    first, random = np.array([0]), np.repeat(np.array(noise.scatter)[:, None], points, axis=1)
-    return Whitening(first, first, random, SweepNoise({}, noise.shared, "stated", 0), np.ones(points))
+    return np.stack(operating_points(test)[::-1], axis=-1)

@@ -10,14 +10,11 @@ from __future__ import annotations
 import csv
 import io
 import math
-import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import lru_cache
-from pathlib import Path
-from typing import IO, TYPE_CHECKING, Literal, TextIO
+from typing import TYPE_CHECKING, Literal, TextIO
 
 from bushfit.errors import OutputError, printable
 
@@ -58,25 +55,6 @@ def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
         OutputError: a table that is too large for a sheet.
     """
     return to_xlsx({name: table}) if form == "xlsx" else to_csv(table, decimal_comma=form == "decimal-comma")
-
-
-@contextmanager
-def opened(file: Path, form: Form, headers: Iterable[str]) -> Iterator[Callable[[Row], None]]:
-    """Give what writes a row of a new file as it comes; in the end the file is whole and on the disk.
-
-    The rows of a workbook are held in a file beside it until its end; its one sheet is named after the file.
-
-    Raises:
-        OutputError: more rows or columns than a sheet has.
-    """
-    if form == "xlsx":
-        with file.open("wb") as stream, _book(stream, constant_memory=True, tmpdir=str(file.parent)) as book:
-            yield _Sheet(book, _sheet_name(file.stem, set()), headers).add
-    else:
-        with file.open("w", encoding=_encoding(form), errors="replace", newline="") as text:
-            yield _csv_writer(text, form, headers)
-    with file.open("rb") as written:
-        os.fsync(written.fileno())
 
 
 def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
@@ -187,23 +165,16 @@ def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
     Raises:
         OutputError: a table that is too large for a sheet.
     """
+    from xlsxwriter import Workbook
+
     stream, names = io.BytesIO(), set[str]()
-    with _book(stream, in_memory=True) as book:
+    with Workbook(stream, {"in_memory": True}) as book:
+        book.set_properties({"created": _MADE})
         for title, table in tables.items():
             sheet = _Sheet(book, _sheet_name(title, names), map(str, table.columns))
             for cells in _rows(table):
                 sheet.add(cells)
     return stream.getvalue()
-
-
-@contextmanager
-def _book(stream: IO[bytes], **options: object) -> Iterator[Workbook]:
-    """A workbook that is whole in the end; also after an error, so that no file of its rows stays."""
-    from xlsxwriter import Workbook
-
-    with Workbook(stream, options) as book:
-        book.set_properties({"created": _MADE})
-        yield book
 
 
 def _text(text: str) -> str:

@@ -9,7 +9,7 @@ import pandas as pd
 from bushfit.campaign.schema import SimulatedLoop
 from bushfit.effects.contract import Array
 from bushfit.planning.contract import Plan, Test, operating_points
-from bushfit.planning.purpose import purposes
+from bushfit.planning.plan import purposes
 from bushfit.report import plots
 from bushfit.report.contents import Contents
 from bushfit.units import number

@@ -78,4 +78,4 @@ def _said(order: Order) -> Iterator[tuple[str, str]]:
         yield "test", str(source.file)
         yield "test, sha256", source.sha256
     yield "bushfit", __version__
-    yield from order.said([NO_LOOPS])
+    yield from order.remarks([NO_LOOPS])

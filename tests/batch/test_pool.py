@@ -12,8 +12,11 @@ from pathlib import Path
 
 import pytest
 
+from bushfit.batch.manifest import Row, Settings
 from bushfit.batch.pool import LocalPool, run
+from bushfit.batch.work import Orders, failed, work
 from bushfit.errors import BatchError
+from bushfit.report.contents import Formats
 
 
 def double(rows: Sequence[int], folder: Path, deadly: tuple[int, ...] = (), once: tuple[int, ...] = ()) -> list[str]:
@@ -26,20 +29,22 @@ def double(rows: Sequence[int], folder: Path, deadly: tuple[int, ...] = (), once
     return [str(2 * row) for row in rows]
 
 
-def results(count: int, folder: Path, **deaths: tuple[int, ...]) -> dict[int, str]:
+@pytest.mark.parametrize(
+    ("count", "once", "deadly"), [(300, (), ()), (40, (100, 117), ()), (30, (), (103, 120))], ids=str
+)
+def test_a_worker_that_dies_costs_a_second_try_and_only_what_always_kills_is_given_up(
+    tmp_path: Path, count: int, once: tuple[int, ...], deadly: tuple[int, ...]
+) -> None:
     rows = list(range(100, 100 + count))
-    found = list(run(rows, partial(double, folder=folder, **deaths), lambda why: why, LocalPool(2)))
+    task = partial(double, folder=tmp_path, once=once, deadly=deadly)
+    found = list(run(rows, task, lambda why: why, LocalPool(2)))
     assert sorted(number for number, _ in found) == list(range(count)), "each row once"
-    return dict(found)
-
-
-def test_every_row_once(tmp_path: Path) -> None:
-    assert results(300, tmp_path) == {n: str(2 * (100 + n)) for n in range(300)}
-
-
-def test_a_worker_that_dies_costs_a_second_try(tmp_path: Path) -> None:
-    assert results(40, tmp_path, once=(100, 117)) == {n: str(2 * (100 + n)) for n in range(40)}
-    assert len(list(tmp_path.iterdir())) == 2
+    for number, result in found:
+        if 100 + number in deadly:
+            assert "its worker process died twice" in result
+        else:
+            assert result == str(2 * (100 + number))
+    assert len(list(tmp_path.iterdir())) == len(once + deadly)
 
 
 def test_workers_that_die_before_they_are_given_more_are_replaced(tmp_path: Path) -> None:
@@ -55,22 +60,11 @@ def test_workers_that_die_before_they_are_given_more_are_replaced(tmp_path: Path
     assert dict(done) == {n: str(2 * (100 + n)) for n in range(40)}
 
 
-def test_rows_that_always_kill_are_given_up_and_no_others(tmp_path: Path) -> None:
-    found = results(30, tmp_path, deadly=(103, 120))
-    for number, result in found.items():
-        if number in (3, 20):
-            assert "its worker process died twice" in result
-        else:
-            assert result == str(2 * (100 + number))
-
-
-def refuse(rows: Sequence[int]) -> list[str]:
-    raise BatchError("another version")
-
-
-def test_what_no_retry_can_mend_ends_the_batch() -> None:
-    with pytest.raises(BatchError, match="another version"):
-        list(run([1, 2, 3], refuse, lambda why: why, LocalPool(1)))
+def test_a_worker_of_another_version_ends_the_batch(tmp_path: Path) -> None:
+    row = Row("a", "a", "a.toml", "a.toml", Settings())
+    orders = Orders(tmp_path, (), Formats(False, False), resume=False, version="0.0.0")
+    with pytest.raises(BatchError, match=r"another bushfit[\s\S]*0\.0\.0"):
+        list(run([row], partial(work, orders=orders), failed, LocalPool(1)))
 
 
 def die(rows: Sequence[int]) -> list[str]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import sys
+import time
 from pathlib import Path
+from subprocess import Popen
 
 PATTERN = "bushings/*/bushing.toml"
 
@@ -26,13 +28,23 @@ def rows(folder: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-def command(folder: Path, *options: str) -> list[str]:
-    return [
-        str(Path(sys.executable).with_name("bushfit")),
-        "batch",
-        "many.csv",
-        "-o",
-        str(folder),
-        "--no-plots",
-        *options,
-    ]
+def command(folder: str, *options: str) -> list[str]:
+    """The rows of many.csv into a folder."""
+    program = str(Path(sys.executable).with_name("bushfit"))
+    return [program, "batch", "many.csv", "-o", folder, "--no-plots", *options]
+
+
+def list_many(shop: Path, count: int) -> None:
+    """Write a manifest of so many rows, of five campaigns in turn."""
+    (shop / "many.csv").write_text("campaign\n" + "".join(f"bushings/b{n % 5}/bushing.toml\n" for n in range(count)))
+
+
+def kept(folder: Path) -> int:
+    """How many rows are on the disk."""
+    return sum(1 for _ in folder.glob("bushings/*/row.json"))
+
+
+def wait_for(running: Popen[bytes], folder: Path, count: int) -> None:
+    """Wait until so many rows of a running batch are on the disk."""
+    while running.poll() is None and kept(folder) < count:
+        time.sleep(0.002)

@@ -21,8 +21,9 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from bushfit.batch import ledger
 from bushfit.batch.manifest import Settings, read_manifest
+from bushfit.batch.outcome import Plan
 from bushfit.batch.pool import LocalPool
-from bushfit.batch.run import Plan, run
+from bushfit.batch.run import run
 from bushfit.batch.work import Orders, work
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.model.model import Model
@@ -69,7 +70,7 @@ def plan_of(bushings: Path, count: int, folder: Path) -> Plan:
 def of_its_fits(bushings: Path, count: int, folder: Path) -> float:
     """Seconds that the rows take one after the other in this process, which has imported all they need."""
     plan = plan_of(bushings, count, folder)
-    for name in (ledger.ROWS, ledger.ASIDE):
+    for name in (ledger.ROWS, ledger.STAGE):
         (folder / name).mkdir(parents=True)
     begin = time.perf_counter()
     work(plan.rows, plan.orders)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from fmus import Running, order_of
-from kept import HASH
+from readers import HASH
 
 from bushfit.export.contract import Exported, Order
 from bushfit.export.fmu import export

@@ -1,4 +1,7 @@
-"""Readers of what bushfit exports, none of them bushfit's: pyNastran, and parsers written from the vendors' pages."""
+"""Readers of what bushfit exports, none of them bushfit's: pyNastran, and parsers written from the vendors' pages.
+
+And the kept computation of the paper's bushing, level by level, as decks hold it.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from bushfit.geometry import Direction
+
+#: Of an order that no file stands behind.
+HASH = "0123456789abcdef" * 4
 #: By degree of freedom from 1 and by level from 1: frequency, and complex stiffness, in the units of the deck.
 Curves = dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]
 
@@ -160,3 +168,12 @@ def teimorbit(text: str) -> dict[str, tuple[dict[str, str], list[str], np.ndarra
         else:
             rows.append([float(part) for part in line.split()])
     return {block: (pairs, columns, np.array(table)) for block, (pairs, columns, table) in found.items()}
+
+
+def rows_of(known: pd.DataFrame, direction: Direction, level: int) -> tuple[np.ndarray, np.ndarray]:
+    """Frequency and complex stiffness of the kept computation at a level of amplitude from 1, or else the last."""
+    rows = known[known["direction"] == direction]
+    amplitudes = np.sort(rows["amplitude"].unique())
+    rows = rows[rows["amplitude"] == amplitudes[min(level, amplitudes.size) - 1]].sort_values("frequency")
+    storage = rows["stiffness"] / np.hypot(1.0, rows["loss"])
+    return rows["frequency"].to_numpy(), (storage * (1.0 + 1j * rows["loss"])).to_numpy()

@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from kept import HASH, rows_of
-from readers import Curves, abaqus_options, by_abaqus, by_optistruct, by_pynastran, teimorbit
+from readers import HASH, Curves, abaqus_options, by_abaqus, by_optistruct, by_pynastran, rows_of, teimorbit
 
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.export import abaqus, adams, nastran
 from bushfit.export.contract import Exported, Order
-from bushfit.export.levels import DOFS, levels
+from bushfit.export.deck import DOFS, levels
 from bushfit.export.systems import MM_T_S_N, UnitSystem
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
@@ -108,13 +107,8 @@ def test_adams_holds_curve_and_damping(order: Order, known: pd.DataFrame) -> Non
     factors = {"x": (1e3, 1.0), "ax": (np.degrees(1.0), 1e3)}
     for kind in ("car", "ride"):
         blocks = teimorbit(exported.files[f"bushing_{kind}.bus"].decode("ascii"))
-        assert blocks["UNITS"][0] == {
-            "LENGTH": "'mm'",
-            "ANGLE": "'degrees'",
-            "FORCE": "'newton'",
-            "MASS": "'kg'",
-            "TIME": "'second'",
-        }
+        units = {"LENGTH": "mm", "ANGLE": "degrees", "FORCE": "newton", "MASS": "kg", "TIME": "second"}
+        assert blocks["UNITS"][0] == {name: f"'{unit}'" for name, unit in units.items()}
         assert list(blocks) == ["MDI_HEADER", "UNITS", "DAMPING", *(f"{end}_CURVE" for end in ENDS)]
         for direction, ends in (("axial", ["FZ"]), ("radial", ["FX", "FY"]), ("torsion", ["TZ"])):
             own = known[known["direction"] == direction]
@@ -162,27 +156,18 @@ WRITERS: list[Callable[[Order], Exported]] = [nastran.export, abaqus.export, ada
 
 
 @pytest.mark.parametrize("export", WRITERS)
-def test_bushing_model_hash_and_units_are_in_every_deck(export: Callable[[Order], Exported], order: Order) -> None:
-    exported = export(replace(order, units=MM_T_S_N))
-    for content in exported.files.values():
-        text = content.decode("ascii")
-        for words in ("bushing: CMP 15 961", "model: model.json", f"sha256: {HASH}", "units: mm"):
-            assert words in text, words
-        assert "left out" in text
-
-
-@pytest.mark.parametrize("export", WRITERS)
-def test_a_specimen_alone_is_refused_and_beside_a_bushing_left_out(
+def test_every_deck_says_what_it_is_of_and_takes_directions_of_one_grid_alone(
     export: Callable[[Order], Exported], order: Order
 ) -> None:
     body = predict(order.result, Specimen("DMA =1+1", "modulus"), [5.0, 10.0], [0.01])
+    exported = export(replace(order, units=MM_T_S_N, predictions=(*order.predictions, body)))
+    assert "specimens: DMA =1+1" in exported.losses
+    for content in exported.files.values():
+        text = content.decode("ascii")
+        for words in ("bushing: CMP 15 961", "model: model.json", f"sha256: {HASH}", "units: mm", "left out"):
+            assert words in text, words
     with pytest.raises(ModelError, match="no direction of a bushing"):
         export(replace(order, predictions=(body,)))
-    assert "specimens: DMA =1+1" in export(replace(order, predictions=(*order.predictions, body))).losses
-
-
-@pytest.mark.parametrize("export", WRITERS)
-def test_directions_at_different_frequencies_are_refused(export: Callable[[Order], Exported], order: Order) -> None:
     other = predict(order.result, Direction.RADIAL, [5.0, 11.0], [1e-4])
     with pytest.raises(ModelError, match="different frequencies"):
         export(replace(order, predictions=(order.predictions[0], other)))

@@ -116,7 +116,3 @@ def test_points_that_a_grid_lacks_are_empty(order: Order) -> None:
     table = wide_table(holes)
     assert table.isna().sum().sum() == 2
     assert np.isnan(table.iloc[3, 1])
-
-
-def test_the_same_model_is_the_same_bytes(order: Order) -> None:
-    assert spreadsheets.xlsx(order).files == spreadsheets.xlsx(order).files

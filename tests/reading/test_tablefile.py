@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from functools import partial
 from pathlib import Path
 from typing import get_args
 
@@ -21,7 +20,7 @@ from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.reading.sweeps import read_sweep
-from bushfit.reading.tablefile import Form, defused, ending, opened, to_bytes, to_csv
+from bushfit.reading.tablefile import Form, defused, ending, to_bytes, to_csv
 
 FORMS: tuple[Form, ...] = get_args(Form)
 PHASE = np.linspace(0.0, 12.0, 50)
@@ -88,27 +87,13 @@ def test_a_workbook_has_numbers_in_full_and_texts_that_nothing_runs() -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_rows_as_they_come_are_the_table_and_the_same_table_the_same_bytes(form: Form, tmp_path: Path) -> None:
-    file = tmp_path / f"t.{ending(form)}"
-    with opened(file, form, TABLE.columns) as write:
-        for cells in TABLE.itertuples(index=False):
-            write(cells)
-    assert list(tmp_path.iterdir()) == [file], "nothing is left beside it"
-    read = partial(pd.read_excel, engine="openpyxl") if form == "xlsx" else pd.read_csv
-    first, second = (to_bytes("t", TABLE, form) for _ in range(2))
-    pd.testing.assert_frame_equal(read(file), read(io.BytesIO(first)))
-    assert first == second
+def test_the_same_table_is_the_same_bytes(form: Form) -> None:
+    assert len({to_bytes("t", TABLE, form) for _ in range(2)}) == 1
 
 
-def test_what_a_sheet_does_not_hold_is_an_error_and_leaves_no_file_of_its_rows(tmp_path: Path) -> None:
+def test_what_a_sheet_does_not_hold_is_refused_and_not_cut(tmp_path: Path) -> None:
     wide = pd.DataFrame(np.ones((1, 16_385)), columns=[f"c{n}" for n in range(16_385)])
     assert to_bytes("t", wide, "csv")
     with pytest.raises(OutputError, match="too large for a sheet"):
         to_bytes("t", wide, "xlsx")
-    with pytest.raises(OutputError), opened(tmp_path / "t.xlsx", "xlsx", wide.columns):
-        pass
-    with opened(tmp_path / "t.xlsx", "xlsx", ["n"]) as write:
-        write.__self__._count = 1_048_576  # type: ignore[attr-defined]  # as after so many rows, which take their time
-        with pytest.raises(OutputError, match="too large"):
-            write([1.0])
-    assert [file.name for file in tmp_path.iterdir()] == ["t.xlsx"]
+    assert to_bytes("t", wide, "csv")

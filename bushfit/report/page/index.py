@@ -14,7 +14,7 @@ from markupsafe import Markup
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.file import read_document, require_schema
-from bushfit.report.contents import Contents, Documents, Tables
+from bushfit.report.contents import Contents, Documents, Page, Tables
 from bushfit.report.page import rendered
 from bushfit.report.page.chart import LIMIT, Rule, Series, chart
 from bushfit.report.page.readback import canonical, read_table
@@ -71,11 +71,8 @@ def is_batch(folder: Path) -> bool:
     return (folder / "batch.json").exists() or (folder / "batch.csv").exists()
 
 
-def read_batch(folder: Path, base: str = "", rows: Path | None = None) -> Contents:
+def read_batch(folder: Path, base: str = "") -> Contents:
     """What a batch wrote, with its page; links begin with `base`.
-
-    Args:
-        rows: folder of the batch, where these are not in it yet.
 
     Raises:
         ModelError: files that are missing, or not as bushfit writes them.
@@ -89,11 +86,14 @@ def read_batch(folder: Path, base: str = "", rows: Path | None = None) -> Conten
         raise ModelError(
             "the table of the batch is missing", file=folder / "batch.csv", hint="run the batch again with --resume"
         )
-    pages = frozenset(
-        f"{page.parent.parent.name}/{page.parent.name}" for page in (rows or folder).glob("bushings/*/report.html")
-    )
-    page = partial(index_page, reported=pages, base=base)
-    return Contents({"batch": document}, {"batch": lambda: table}, {}, {"index": page})
+    return Contents({"batch": document}, {"batch": lambda: table}, {}, {"index": page_of(folder, base)})
+
+
+def page_of(folder: Path, base: str = "") -> Page:
+    """What makes the page of a batch, its bushings linked to their reports in a folder; links begin with `base`."""
+    reports = folder.glob("bushings/*/report.html")
+    reported = frozenset(f"{report.parent.parent.name}/{report.parent.name}" for report in reports)
+    return partial(index_page, reported=reported, base=base)
 
 
 def index_page(documents: Documents, tables: Tables, *, reported: Collection[str] = (), base: str = "") -> str:

@@ -8,7 +8,7 @@ from bushfit.errors import ModelError
 from bushfit.jobs.plan import PlanTests
 from bushfit.planning.campaign import settings_of
 from bushfit.planning.contract import Noise, Test
-from bushfit.planning.plan import TOLD
+from bushfit.planning.plan import RIVALS_APART
 from bushfit.simulation.measured import Simulated, simulate
 
 #: Highest frequency of the rig that makes the session, over that of the tests so far: what `diagnose` asks for at most.
@@ -25,7 +25,7 @@ def planned_session(campaign: Campaign, hours: float) -> tuple[Test, ...]:
         found = PlanTests("rivals", hours).run(replace(campaign, rig=rig)).plan.planned
     except ModelError:  # rivals of which the fit of either is no model: no test is planned for them
         return ()
-    return found.tests if found.apart is not None and found.apart >= TOLD else ()
+    return found.tests if found.apart is not None and found.apart >= RIVALS_APART else ()
 
 
 def with_session(campaign: Campaign, hidden: Simulated, tests: Sequence[Test]) -> Campaign:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bushfit.batch.points import parse_point
-from bushfit.batch.work import _numbers
+from bushfit.batch.quantities import parse_point
+from bushfit.batch.work import numbers_of
 from bushfit.errors import BatchError, ModelError, UnitError
 from bushfit.geometry import STRAINING, TRANSLATION, Specimen
 from bushfit.model.model import Model
@@ -38,10 +38,10 @@ def test_what_is_no_point(text: str) -> None:
 
 def test_a_point_at_a_specimen_is_that_of_the_model(paper_model: Model) -> None:
     result = Result(paper_model, specimens=(coupon := Specimen("DMA", "modulus"),))
-    record = _numbers(result, [parse_point("DMA 10 Hz 1 %")], ())
+    record = numbers_of(result, [parse_point("DMA 10 Hz 1 %")], ())
     modulus = abs(paper_model.stiffness(coupon, 10.0, 0.01))
     assert record["points"]["DMA 10 Hz 1 %"]["stiffness"][0] == pytest.approx(modulus)
     with pytest.raises(BatchError, match=r"this amplitude is none of the place[\s\S]*an amplitude in %"):
-        _numbers(result, [parse_point("DMA 10 Hz 1 mm")], ())
+        numbers_of(result, [parse_point("DMA 10 Hz 1 mm")], ())
     with pytest.raises(ModelError, match="no such direction or specimen"):
-        _numbers(result, [parse_point("coupon 10 Hz 1 %")], ())
+        numbers_of(result, [parse_point("coupon 10 Hz 1 %")], ())
