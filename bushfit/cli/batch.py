@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from bushfit.cli.common import Options, with_options
-from bushfit.cli.options import command_called
+from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
+from bushfit.cli.options import FILE, NO_REPORT, PLOT_FORMAT, TABLE_FORMAT, command_called, place_option
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import alike, for_people
@@ -31,9 +31,41 @@ _MOST_SHOWN = 10
 _SECONDS_A_LINE = 10.0
 
 
-@command_called("batch")
+@command_called("batch", '"data/practice/*/bushing.toml" --at "axial 25 Hz 0.1 mm"')
 @click.argument("manifest", metavar="MANIFEST", nargs=-1, required=True)
-@with_options
+@click.option(
+    "--command",
+    "commands",
+    type=click.Choice(["run", "fit", "diagnose", "predict"]),
+    multiple=True,
+    metavar="COMMAND",
+    help="What to do with each campaign: fit, diagnose, predict, may be given again; or run, the whole chain [fit].",
+)
+@place_option("Tests to fit, as in bushfit fit.")
+@click.option("--effect", "effects", multiple=True, metavar="NAME", help="Add an effect, as in bushfit fit.")
+@click.option(
+    "--at",
+    multiple=True,
+    metavar="POINT",
+    help='Stiffness and loss factor there, such as "axial 25 Hz 0.1 mm" (zero-to-peak); may be given again.',
+)
+@click.option("--limits", type=FILE, metavar="FILE", help="Judge each bushing by this TOML file (above).")
+@click.option("--junit", type=FILE, metavar="FILE", help="Write a JUnit report for CI.")
+@click.option("--jobs", type=click.IntRange(1), help="Worker processes [the cores there are].")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Work on this Dask cluster, such as tcp://10.0.0.5:8786, whose workers see the same files and paths.",
+)
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on with the results that stand: do what is missing, failed, or has changed (a test, a setting, bushfit).",
+)
+@click.option("--tables", is_flag=True, help="Write loops.csv, sweeps.csv and the like of each too.")
+@click.option("--plots", is_flag=True, help="Write each bushing's plots too.")
+@click.option("--reports", is_flag=True, help="Write report.html of each that is diagnosed too.")
+@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, NO_REPORT)
 def command(
     manifest: tuple[str, ...],
     at: tuple[str, ...],

@@ -7,9 +7,18 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, open_source, progress, with_options
+from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_source, progress, with_options
 from bushfit.cli.grids import asked_for
-from bushfit.cli.options import command_called, option_of
+from bushfit.cli.options import (
+    FILE,
+    NO_REPORT,
+    PLOT_FORMAT,
+    TABLE_FORMAT,
+    command_called,
+    grid_options,
+    option_of,
+    place_option,
+)
 from bushfit.cli.show import new_table
 from bushfit.errors import naming, typed
 
@@ -22,9 +31,26 @@ if TYPE_CHECKING:
 _ALL = "all"
 
 
-@command_called("compare")
-@click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@with_options
+@command_called(
+    "compare",
+    "configs/cmp_15961.toml configs/arm_bushing.toml",
+    "configs/arm_bushing.toml --families sliders,kraus",
+)
+@click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=FILE)
+@click.option(
+    "--families",
+    is_flag=False,
+    flag_value=_ALL,
+    metavar="[NAME,...]",
+    help="Compare model families on the one campaign A: the paper's, and those named, effects joined by + [each law of "
+    "rate with each of amplitude].",
+)
+@place_option(
+    "axial, radial or torsion, or a specimen's name: where to compare, and which tests of campaigns to fit; may be "
+    "given again [all where each was fitted]."
+)
+@grid_options("as far as all were measured")
+@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, NO_REPORT)
 def command(
     sources: tuple[Path, ...],
     families: str | None,

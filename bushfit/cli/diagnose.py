@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
 from rich.markup import escape
 
 from bushfit.cli.common import Options, Task, open_model, with_task
-from bushfit.cli.options import command_called
+from bushfit.cli.options import FILE, NO_REPORT, command_called
 from bushfit.cli.show import new_table, parameter_table
 from bushfit.errors import BushfitError, naming
 from bushfit.units import alike, for_people, number, quantity
@@ -22,8 +23,28 @@ if TYPE_CHECKING:
 _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 
 
-@command_called("diagnose")
-@with_task
+@command_called("diagnose", "configs/mystery_mount.toml")
+@click.option(
+    "--model",
+    type=FILE,
+    help="Start from this model's effects [the paper's three]; its values are fitted anew.",
+)
+@click.option(
+    "--adopt",
+    multiple=True,
+    metavar="EFFECT",
+    help="Add this effect by hand, such as inertia, or mend a mistake in the record of a test, such as "
+    "peak_to_peak:sweep_axial; may be given again.",
+)
+@click.option(
+    "--without",
+    multiple=True,
+    metavar="EFFECT",
+    help="Do not consider this effect or mistake; may be given again.",
+)
+@click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
+@click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
+@with_task(NO_REPORT, soft_l1="the same with outliers left out")
 def command(
     model: Path | None,
     adopt: tuple[str, ...],

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, with_options
+from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
 from bushfit.cli.inspect import tell_left_out
 from bushfit.cli.options import command_called, files_argument, option_of
 from bushfit.cli.raw import direction_error, options_named, with_stated
@@ -22,10 +22,20 @@ if TYPE_CHECKING:
 _SIDES = ("inner", "outer")
 
 
-@command_called("init")
+@command_called(
+    "init",
+    "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_axial.csv "
+    '--inner-diameter "28 mm" --outer-diameter "40 mm" --length "45 mm"',
+)
 @files_argument
-@with_stated
-@with_options
+@click.option("--inner-radius", help='Of the rubber, such as "10 mm"; or else')
+@click.option("--inner-diameter", help='such as "20 mm".')
+@click.option("--outer-radius", help='Of the rubber, such as "18 mm"; or else')
+@click.option("--outer-diameter", help='such as "36 mm".')
+@click.option("--length", help='Mean length of the rubber, such as "34 mm".')
+@click.option("--name", help="Of the bushing [the folder of the first file].")
+@with_stated()
+@with_options(CAMPAIGN_FOLDER)
 def command(
     files: tuple[Path, ...], name: str | None, stated: Mapping[str, Any], options: Options, **sizes: str | None
 ) -> None:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, with_options
-from bushfit.cli.options import command_called, files_argument
+from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
+from bushfit.cli.options import PLOT_FORMAT, command_called, files_argument
 from bushfit.cli.raw import options_named, with_stated
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
@@ -28,10 +28,10 @@ _KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw ste
 _FILES_A_PICTURE = 5
 
 
-@command_called("inspect")
+@command_called("inspect", "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv")
 @files_argument
-@with_stated
-@with_options
+@with_stated()
+@with_options(FIRST_FILE_FOLDER, PLOT_FORMAT)
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories, in any mixture.
 

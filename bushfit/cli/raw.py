@@ -1,42 +1,93 @@
 """What the commands on test files share: options for what a file does not say itself, and errors that name them."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
 from typing import Any, get_args
 
-from bushfit.cli.options import option_of, rows
+import click
+
+from bushfit.cli.options import Direction, Function, Parameter, in_order, option_of
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.reading.headers import AmplitudeConvention
 from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 
-_SAME_NAME = ("force_sign", *rows("test", "written"))
+#: What a test file does not say itself, as keys of a campaign: of loops and sweeps, and how any file is written.
+_OF_TESTS = {
+    "rate": 'Of a loop without time, a triangle: "10 mm/min".',
+    "frequency": 'Of a loop without time, with --waveform: "0.1 Hz".',
+    "waveform": "sine or triangle.",
+    "amplitude": "zero-to-peak or peak-to-peak, if headers do not say.",
+    "at_amplitude": 'Without a column: "0.1 mm" [found in the name].',
+    "at_frequency": 'Without a column: "10 Hz" [found in the name].',
+    "temperature": 'Of the test, or of the rows to take: "23 degC".',
+    "specimen": "Its name, if no bushing [coupon, or bar in tension].",
+    "specimen_number": "Of the part, or of the rows to take.",
+    "area": 'Of one rubber block in shear, such as "772 mm^2".',
+    "thickness": 'Of one rubber block in shear, such as "6 mm".',
+    "elements": "Rubber blocks in parallel [1].",
+}
+_AS_WRITTEN = {
+    "encoding": 'Such as "cp1252" [detected].',
+    "delimiter": "comma, semicolon, tab, pipe or blanks [detected].",
+    "decimal": '"." or "," [detected].',
+    "thousands": '".", ",", " ", "\'" or none [detected].',
+    "header_line": "Line of the header, from 1 [found].",
+    "sheet": "Of a workbook [all with a test].",
+}
+_WHOLE_NUMBERS = ("elements", "header_line")
+_SAME_NAME = ("force_sign", *_OF_TESTS, *_AS_WRITTEN)
 #: An inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")
 #: One entry of such a table that is an option here.
 _PAIRED = re.compile(r'(column|unit)s = \{ (\w+) = "([^"]*)"')
 
 
-def with_stated(function: Callable[..., Any]) -> Callable[..., Any]:
+def with_stated(*, sweeps: bool = True) -> Parameter:
     """Decorator of a command on test files: what its options say of them becomes one `stated`.
 
-    Beside loops there are sweeps, with all keys of a campaign, or else resonance tests, with those of any file.
+    Beside loops there are `sweeps`, with all keys of a campaign, or else resonance tests, with those of any file.
     """
+    others = SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS
+    known = tuple(dict.fromkeys((*LOOP_COLUMNS, *others)))
+    roles = (
+        f"ROLEs{' of loops' if sweeps else ''}: {', '.join(LOOP_COLUMNS)}; "
+        f"of {'sweeps' if sweeps else 'resonance tests'}: {', '.join(others)}"
+    )
+    keys = (_OF_TESTS if sweeps else {}) | _AS_WRITTEN
 
-    @wraps(function)
-    def wrapped(*args: Any, **kwargs: Any) -> Any:
-        sweeps = "rate" in kwargs
-        known = tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
-        keys = [*rows("file"), *(rows("test") if sweeps else ()), *rows("written")]
-        stated = {key: kwargs.pop(key) for key in keys if key not in ("column", "unit")}
-        stated["columns"] = _pairs(kwargs.pop("columns"), "--column", "force=Kraft", known)
-        stated["units"] = _pairs(kwargs.pop("units"), "--unit", "force=kN", known)
-        _check_amplitude(stated.get("amplitude"))
-        return function(*args, stated={key: value for key, value in stated.items() if value}, **kwargs)
+    def decorate(function: Function) -> Function:
+        @wraps(function)
+        def wrapped(columns: Sequence[str], units: Sequence[str], **given: Any) -> Any:
+            stated = {key: given.pop(key) for key in ("direction", "force_sign", *keys)}
+            stated["columns"] = _pairs(columns, "--column", "force=Kraft", known)
+            stated["units"] = _pairs(units, "--unit", "force=kN", known)
+            _check_amplitude(stated.get("amplitude"))
+            return function(stated={key: value for key, value in stated.items() if value}, **given)
 
-    return wrapped
+        return in_order(
+            wrapped,
+            click.option("--direction", type=Direction(), help="axial, radial or torsion [names, columns]."),
+            click.option(
+                "--column",
+                "columns",
+                multiple=True,
+                metavar="ROLE=HEADER",
+                help=f'Such as "force=Fz", of files that have this header; may be given again. {roles}.',
+            ),
+            click.option(
+                "--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Such as "force=kN"; ROLEs as above.'
+            ),
+            click.option("--force-sign", type=int, help="-1: the load cell counts the other way."),
+            *(
+                click.option(option_of(key), type=int if key in _WHOLE_NUMBERS else None, help=words)
+                for key, words in keys.items()
+            ),
+        )
+
+    return decorate
 
 
 @contextmanager

@@ -9,9 +9,11 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from bushfit.cli.common import Options, with_options
+import click
+
+from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
 from bushfit.cli.grids import parse_grid, positive
-from bushfit.cli.options import command_called, files_argument
+from bushfit.cli.options import PLOT_FORMAT, TABLE_FORMAT, command_called, files_argument
 from bushfit.cli.raw import direction_error, options_named, with_stated
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError, MeasurementError
@@ -33,10 +35,20 @@ if TYPE_CHECKING:
 _LINES_AN_OCTAVE = 3
 
 
-@command_called("reduce")
+@command_called(
+    "reduce",
+    "data/cmp_15961_raw/stepped_sine_axial.csv",
+    'data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --specimen mount',
+)
 @files_argument
-@with_stated
-@with_options
+@with_stated(sweeps=False)
+@click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].')
+@click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
+@click.option("--mass", help='Of a resonance test, such as "0.5 kg".')
+@click.option("--mass-added", help='What moves with it, such as "15 g".')
+@click.option("--specimen", help="What was tested, where it is no bushing.")
+@click.option("--base-acceleration", help='Such as "0.1 g", where no column says it.')
+@with_options(FIRST_FILE_FOLDER, TABLE_FORMAT, PLOT_FORMAT)
 def command(
     files: tuple[Path, ...],
     stated: Mapping[str, Any],

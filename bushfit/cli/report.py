@@ -5,12 +5,12 @@ from pathlib import Path
 import click
 
 from bushfit.cli.common import Options, with_options
-from bushfit.cli.options import command_called
+from bushfit.cli.options import FILE, command_called
 
 
-@command_called("report")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@with_options
+@command_called("report", "data/reports/mystery_mount -o results/page")
+@click.argument("folder", metavar="DIR", type=FILE)
+@with_options("DIR")
 def command(folder: Path, options: Options) -> None:
     """Make one page of DIR, the results of run, diagnose, a fit, or of a batch: to show, to print, to mail.
 

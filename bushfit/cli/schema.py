@@ -10,9 +10,9 @@ from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table
 
 
-@command_called("schema")
+@command_called("schema", "", "model")
 @click.argument("name", required=False)
-@with_options
+@with_options("nothing is written")
 def command(name: str | None, options: Options) -> None:
     """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, tell which there are.
 

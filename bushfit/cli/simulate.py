@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, open_model, with_options
-from bushfit.cli.options import command_called, option_of
+from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
+from bushfit.cli.options import FILE, TABLE_FORMAT, command_called, option_of
 from bushfit.errors import ModelError, UnitError, naming
 from bushfit.units import is_number, quantity
 
@@ -18,9 +18,28 @@ if TYPE_CHECKING:
     from bushfit.model.model import Model
 
 
-@command_called("simulate")
-@click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
-@with_options
+@command_called("simulate", "configs/simulate_arm_bushing.toml --seed 7")
+@click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
+@click.option("--seed", type=click.IntRange(0), help="Of the random numbers; the same seed gives the same data [0].")
+@click.option("--repeats", type=click.IntRange(1, 1000), help="Of each sweep [1].")
+@click.option("--noise", help='Scatter of a sweep point relative to |K|, such as "0.5 %".')
+@click.option("--force-noise", help='Scatter of a loop\'s force relative to its half range, such as "0.3 %".')
+@click.option(
+    "--displacement-noise", help='Scatter of a loop\'s displacement relative to its amplitude, such as "0.02 %".'
+)
+@click.option(
+    "--gain-error",
+    help='Gain error shared by a run (one repeat of one amplitude, or of what is held), such as "0.4 %".',
+)
+@click.option("--phase-error", help='Phase error shared by a run, such as "0.2 deg".')
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME.PARAMETER=VALUE",
+    help='Hide an effect, such as "inertia.mass=0.1 kg".',
+)
+@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT)
 def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
     """Put a model on the virtual rig and write a campaign of simulated raw tests.
 
