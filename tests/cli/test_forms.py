@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tomllib
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,13 +14,12 @@ import click
 import numpy as np
 import pandas as pd
 import pytest
-from commandline import Done, call
+from shell import typing
 
 from bushfit.cli import cli
 from bushfit.geometry import Direction
 from bushfit.reading.sweeps import read_sweep
 
-Run = Callable[..., Done]
 CONTEXT = click.Context(cli)
 READ = {
     "csv": pd.read_csv,
@@ -71,8 +70,7 @@ def place(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def written(place: Path, name: str, *options: str) -> set[Path]:
     """The files of a command, by their paths in its folder."""
-    done = call(place, name, *ARGUMENTS[name], *options)
-    assert done.returncode == 0, done.stderr
+    typing(place)(name, *ARGUMENTS[name], *options)
     folder = place / options[1]
     return {file.relative_to(folder) for file in folder.rglob("[!.]*") if file.is_file()}
 
@@ -116,23 +114,21 @@ def test_a_variable_of_the_environment_holds_for_all_commands(place: Path, monke
     monkeypatch.setenv("BUSHFIT_TABLE_FORMAT", "")
     assert Path("sweep.csv") in written(place, "reduce", "-o", "empty", "--no-plots")
     monkeypatch.setenv("BUSHFIT_TABLE_FORMAT", "german")
-    done = call(place, "reduce", *ARGUMENTS["reduce"], "-o", "none")
-    assert done.returncode == 2
+    done = typing(place)("reduce", *ARGUMENTS["reduce"], "-o", "none", status=2)
     assert "BUSHFIT_TABLE_FORMAT" in done.stderr
     assert not (place / "none").exists()
 
 
 @pytest.mark.parametrize("form", READ)
 def test_what_is_simulated_is_fitted(place: Path, form: str) -> None:
-    assert call(place, "simulate", "model.json", "-o", f"sim-{form}", "--table-format", form).returncode == 0
-    fitted = call(place, "fit", f"sim-{form}/campaign.toml", "-o", f"fitted-{form}", "--no-plots")
-    assert fitted.returncode == 0, fitted.stderr
+    typing(place)("simulate", "model.json", "-o", f"sim-{form}", "--table-format", form)
+    typing(place)("fit", f"sim-{form}/campaign.toml", "-o", f"fitted-{form}", "--no-plots")
 
 
 @pytest.mark.parametrize("form", READ)
 def test_what_is_reduced_is_read_as_the_text_for_the_campaign_says(place: Path, form: str) -> None:
     options = ("--no-plots", "--table-format", form)
-    told = call(place, "reduce", *ARGUMENTS["reduce"], "-o", f"swept-{form}", *options, "--json")
+    told = typing(place)("reduce", *ARGUMENTS["reduce"], "-o", f"swept-{form}", *options, "--json")
     document = json.loads(told.stdout)
     (entry,) = tomllib.loads(document["campaign"])["sweeps"]
     found = read_sweep(place / f"swept-{form}" / entry["file"], Direction(entry["direction"]))
@@ -142,7 +138,7 @@ def test_what_is_reduced_is_read_as_the_text_for_the_campaign_says(place: Path, 
 @pytest.mark.parametrize("form", READ)
 def test_a_wide_table_is_read_back(place: Path, form: str) -> None:
     options = ("--direction", "axial", "--amplitudes", "0.1, 0.25 mm", "--no-plots", "--table-format", form)
-    assert call(place, "predict", "model.json", "--wide", "-o", f"wide-{form}", *options).returncode == 0
+    typing(place)("predict", "model.json", "--wide", "-o", f"wide-{form}", *options)
     end = "xlsx" if form == "xlsx" else "csv"
     long, wide = (
         READ[form](place / f"wide-{form}/axial{end}.{'xlsx' if form == 'xlsx' else 'csv'}") for end in ("", "_wide")
@@ -152,6 +148,5 @@ def test_a_wide_table_is_read_back(place: Path, form: str) -> None:
         assert wide["frequency [Hz]"].tolist() == of_level["frequency [Hz]"].tolist()
         assert wide[f"stiffness {amplitude} mm [N/mm]"].tolist() == of_level["stiffness [N/mm]"].tolist()
         assert wide[f"loss factor {amplitude} mm [-]"].tolist() == of_level["loss factor [-]"].tolist()
-    seen = call(place, "inspect", f"wide-{form}/axial_wide.{end}", "--no-plots")
-    assert seen.returncode == 0, seen.stderr
+    seen = typing(place)("inspect", f"wide-{form}/axial_wide.{end}", "--no-plots")
     assert "amplitudes: 0.1, 0.25 mm" in seen.stderr

@@ -6,13 +6,14 @@ import json
 import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from commandline import Done, call
+from commandline import call
 from jsonschema import Draft202012Validator
+from shell import document as read
+from shell import typing
 
 from bushfit.model.file import load_result, to_document
 from bushfit.schemas import schema
@@ -132,16 +133,10 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return of
 
 
-def well(folder: Path, *arguments: object) -> Done:
-    done = call(folder, *arguments)
-    assert done.returncode == 0, f"{shlex.join(map(str, arguments))}\n{done.stderr}"
-    return done
-
-
 def simulated(folder: Path, shape: str) -> Path:
     text, *hidden = SHAPES[shape]
     (folder / "rig.toml").write_text(text, encoding="utf-8")
-    well(folder, "simulate", "rig.toml", *hidden, "-o", "tests", "--no-plots")
+    typing(folder)("simulate", "rig.toml", *hidden, "-o", "tests", "--no-plots")
     tests = folder / "tests"
     if shape == "a resonance":
         reduced(tests)
@@ -156,7 +151,7 @@ def reduced(tests: Path) -> None:
     said = [line.removeprefix("# ") for line in (tests / "campaign.toml").read_text(encoding="utf-8").splitlines()]
     typed = [line for line in said if line.startswith("bushfit reduce")]
     for line in typed:
-        well(tests, *shlex.split(line)[1:], "--no-plots")
+        typing(tests)(*shlex.split(line)[1:], "--no-plots")
     told = [line for line in said if line not in typed and not line.startswith(("A sweep comes", "Simulated by"))]
     (tests / "campaign.toml").write_text("\n".join(told), encoding="utf-8")
 
@@ -174,7 +169,7 @@ def written(tests: Path, writer: str, folder: Path) -> list[Path]:
     command, *options = shlex.split(writer)
     if command == "batch":
         (folder / "bushings.csv").write_text(f"campaign\n{tests / 'campaign.toml'}\n", encoding="utf-8")
-        well(folder, "batch", "bushings.csv", "--jobs", "1", "-o", "out", "--reports")
+        typing(folder)("batch", "bushings.csv", "--jobs", "1", "-o", "out", "--reports")
     else:
         done = call(folder, command, tests / "campaign.toml", *options, "-o", "out", "--no-plots")
         if done.returncode == 2 and writer in ("fit-static", "fit-dynamic", "fit --effect inertia"):
@@ -188,29 +183,30 @@ def written(tests: Path, writer: str, folder: Path) -> list[Path]:
 
 
 def is_model(file: Path) -> bool:
-    return str(json.loads(file.read_text(encoding="utf-8")).get("schema")).startswith("bushfit/model/")
+    return str(read(file).get("schema")).startswith("bushfit/model/")
 
 
 def taken(tests: Path, model: Path, folder: Path, formats: Sequence[str], *, whole: bool) -> None:
     """A model taken by every command that reads one; a part of them unless `whole`."""
-    document: dict[str, Any] = json.loads(model.read_text(encoding="utf-8"))
+    document = read(model)
     assert list(Draft202012Validator(schema("model")).iter_errors(document)) == []
     again = json.loads(json.dumps(to_document(load_result(model))))
     assert again == {key: value for key, value in document.items() if key in again}
     plain = ("--force", "--no-plots", "-q")
-    well(folder, "predict", model, "-o", "predicted", *plain)
-    well(folder, "compare", model, tests / "truth.json", model, "-o", "compared", *plain)
-    well(folder, "report", model.parent, "-o", "page", *plain)
+    well = typing(folder)
+    well("predict", model, "-o", "predicted", *plain)
+    well("compare", model, tests / "truth.json", model, "-o", "compared", *plain)
+    well("report", model.parent, "-o", "page", *plain)
     if whole:
         arms = ["--arms"] if "springpot" in document["effects"] else []
-        well(folder, "predict", model, "--campaign", tests / "campaign.toml", *arms, "-o", "predicted", *plain)
-        well(folder, "plan", model, "--hours", "1", "-o", "planned", *plain)
-        well(folder, "diagnose", tests / "campaign.toml", "--model", model, "-o", "anew", *plain)
+        well("predict", model, "--campaign", tests / "campaign.toml", *arms, "-o", "predicted", *plain)
+        well("plan", model, "--hours", "1", "-o", "planned", *plain)
+        well("diagnose", tests / "campaign.toml", "--model", model, "-o", "anew", *plain)
     bushing = document["bushing"] is not None
     if bushing:
-        well(folder, "simulate", model, "-o", "simulated", *plain)
+        well("simulate", model, "-o", "simulated", *plain)
     for form in formats if bushing else [each for each in formats if each in TABLES]:
-        well(folder, "export", model, "--format", *shlex.split(form), "-o", "exported", *plain)
+        well("export", model, "--format", *shlex.split(form), "-o", "exported", *plain)
 
 
 @pytest.mark.parametrize(
