@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -21,7 +21,7 @@ from bushfit.errors import naming
 from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
-    from bushfit.batch.manifest import Command, Settings
+    from bushfit.batch.manifest import Command
     from bushfit.batch.pool import Pool
     from bushfit.batch.run import Plan, Summary
 
@@ -68,6 +68,9 @@ _SECONDS_A_LINE = 10.0
 @with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, NO_REPORT)
 def command(
     manifest: tuple[str, ...],
+    commands: tuple[Command, ...],
+    directions: tuple[str, ...],
+    effects: tuple[str, ...],
     at: tuple[str, ...],
     limits: Path | None,
     junit: Path | None,
@@ -78,7 +81,6 @@ def command(
     plots: bool,
     reports: bool,
     options: Options,
-    **asked: tuple[Any, ...],
 ) -> None:
     """Fit (diagnose, predict, run) every campaign of MANIFEST: a TOML or CSV list, a pattern in quotes, or campaigns.
 
@@ -103,12 +105,15 @@ def command(
     # Workers import what they need while this process does.
     workers: Pool = DaskPool(scheduler) if scheduler else LocalPool(jobs or os.cpu_count() or 1)
     from bushfit.batch.limits import check_judged, read_limits
-    from bushfit.batch.manifest import read_manifest
+    from bushfit.batch.manifest import Settings, read_manifest
     from bushfit.batch.points import parse_point
     from bushfit.batch.run import Plan, check_free, run
     from bushfit.batch.work import Orders
+    from bushfit.effects import effect_named
 
-    read = read_manifest(manifest[0], _settings(**asked), *manifest[1:])
+    names = tuple(effect_named(name).name for name in effects)
+    of_all = Settings(commands=commands or None, directions=directions or None, effects=names or None)
+    read = read_manifest(manifest[0], of_all, *manifest[1:])
     judged_by = read_limits(limits) if limits else None
     if limits and judged_by:
         check_judged(judged_by, limits, read.rows)
@@ -120,19 +125,10 @@ def command(
     plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.formats)
     check_free(plan, force=options.force)
     with _progress(options, len(plan.rows)) as advance:
-        summary = run(plan, workers, advance, lambda summary: options.tell(summary.to_document()))
+        summary = run(plan, workers, advance, lambda summary: options.print_json(summary.to_document()))
     _tell(options, summary, options.folder(read.stem), plan)
     if summary.status["failed"] or summary.missed:
         click.get_current_context().exit(1)
-
-
-def _settings(commands: tuple[Command, ...], directions: tuple[str, ...], effects: tuple[str, ...]) -> Settings:
-    """What the options ask of every row that does not say otherwise."""
-    from bushfit.batch.manifest import Settings
-    from bushfit.effects import effect_named
-
-    names = tuple(effect_named(name).name for name in effects)
-    return Settings(commands=commands or None, directions=directions or None, effects=names or None)
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from rich.segment import Segment
 from bushfit.campaign.naming import folder_name
 from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, Folder, Function, Parameter, Size, in_order
 from bushfit.errors import ModelError, printable, typed
-from bushfit.report.contents import Formats
+from bushfit.report.contents import Formats, Kinds
 from bushfit.report.folder import check_free, to_json, write_files
 
 if TYPE_CHECKING:
@@ -59,6 +59,12 @@ class Options:
         """Where results go: --output, or results/<name>, in which `form` says what stands around it."""
         return self.output or Path("results") / form.format(folder_name(name))
 
+    def free_folder(self, name: str, kinds: Kinds, *files: str, form: str = "{}") -> Path:
+        """The folder of results of some kinds, and further files; refused before the work where they stand there."""
+        folder = self.folder(name, form)
+        check_free(folder, [*self.formats.names(kinds), *files], force=self.force)
+        return folder
+
     @property
     def console(self) -> Console:
         """People read standard error; nothing at all with --quiet."""
@@ -86,15 +92,11 @@ class Options:
             files,
             force=self.force,
             by=click.get_current_context().info_name,
-            before=lambda: self.tell(document) if document is not None else None,
+            before=lambda: self.print_json(document) if document is not None else None,
         )
         self.say(f"wrote {', '.join(files)} to {folder}")
 
-    def require_free(self, folder: Path, names: Sequence[str]) -> None:
-        """Refuse before the work rather than after it."""
-        check_free(folder, list(names), force=self.force)
-
-    def tell(self, document: Mapping[str, Any]) -> None:
+    def print_json(self, document: Mapping[str, Any]) -> None:
         """The result on standard output, where --json asks for it."""
         if self.as_json:
             sys.stdout.write(to_json(document).decode())
@@ -170,8 +172,7 @@ class Task:
         options, loaded = self.options, load_campaign(self.campaign)
         if self.loss:
             loaded = replace(loaded, fit=replace(loaded.fit, loss=self.loss))
-        folder = options.folder(loaded.name)
-        options.require_free(folder, options.formats.names(job.kinds(loaded)))
+        folder = options.free_folder(loaded.name, job.kinds(loaded))
         data = Data.of(loaded)
         options.warn(data.notes)
         outcome = job.run(data)
@@ -199,7 +200,7 @@ def with_task(*forms: Parameter, soft_l1: str = "points far off pull less, outli
         def wrapped(
             campaigns: Sequence[Path], loss: Loss | None, max_nrmse: float | None, options: Options, **others: Any
         ) -> Any:
-            return function(task=Task(_only(campaigns), loss, max_nrmse, options), **others)
+            return function(task=Task(_one_campaign(campaigns), loss, max_nrmse, options), **others)
 
         return in_order(
             wrapped,
@@ -220,7 +221,7 @@ def with_task(*forms: Parameter, soft_l1: str = "points far off pull less, outli
     return decorate
 
 
-def _only(campaigns: Sequence[Path]) -> Path:
+def _one_campaign(campaigns: Sequence[Path]) -> Path:
     """The one campaign of a command line; several test files in its place are told what makes one of them."""
     from bushfit.campaign.campaign import refuse_tests
 

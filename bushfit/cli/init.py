@@ -13,6 +13,7 @@ from bushfit.cli.inspect import tell_left_out
 from bushfit.cli.options import command_called, files_argument, option_of
 from bushfit.cli.raw import direction_error, options_named, with_stated
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
+from bushfit.report.folder import check_free
 from bushfit.units import quantity
 
 if TYPE_CHECKING:
@@ -53,9 +54,11 @@ def command(
     from bushfit.inspection.draft import campaign_text, campaigns_of_parts, named_apart
 
     name = name or (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
-    folder, target = _place(options, name)
+    folder, target = options.folder(name), "campaign.toml"
+    if options.output and options.output.suffix == ".toml":
+        folder, target = options.output.parent, options.output.name
     bushing = _bushing(name, sizes) if any(sizes.values()) else None
-    options.require_free(folder, [target])
+    check_free(folder, [target], force=options.force)
     seen, left_out = _usable(files, stated, is_sized=bushing is not None)
     seen = named_apart(seen)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
@@ -64,7 +67,7 @@ def command(
     if len({one.part for one in seen if one.part}) > 1:
         target = target if options.output and options.output.suffix == ".toml" else "batch.toml"
         written = campaigns_of_parts(name, table, seen, folder, target)
-        options.require_free(folder, list(written))
+        check_free(folder, list(written), force=options.force)
     else:
         written = {target: campaign_text(name, table, seen, folder)}
     if bushing:
@@ -93,15 +96,6 @@ def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
         raise click.UsageError(f"Missing option '{options[0]}' or '{options[1]}'.")
     with naming(place=options[1]):
         return f"{1e3 * quantity(diameter, 'm') / 2.0:.12g} mm"
-
-
-def _place(options: Options, name: str) -> tuple[Path, str]:
-    """Folder and name of the campaign."""
-
-    file = options.output
-    if file and file.suffix == ".toml":
-        return file.parent, file.name
-    return options.folder(name), "campaign.toml"
 
 
 def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[str, str]]:

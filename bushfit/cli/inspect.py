@@ -50,12 +50,11 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     from bushfit.inspection.draft import named_apart, pasted_text
     from bushfit.inspection.gathering import gather, with_contradictions
 
-    folder = options.folder(files[0].stem)
     sources, left_out = gather(files, stated)
     tell_left_out(options, left_out)
     last = math.ceil(len(sources) / _FILES_A_PICTURE)
     pages = ["inspect", *(f"inspect_{page}" for page in range(2, last + 1))]
-    options.require_free(folder, options.formats.names(Kinds(pictures=tuple(pages))))
+    folder = options.free_folder(files[0].stem, Kinds(pictures=tuple(pages)))
     seen: list[Inspected] = []
     failed: list[BushfitError] = []
     for source in sources:
@@ -89,7 +88,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         }
         options.write(folder, options.formats.files(Contents(pictures=figures)), document)
     else:
-        options.tell(document)
+        options.print_json(document)
 
 
 def tell(options: Options, seen: Inspected) -> None:

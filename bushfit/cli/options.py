@@ -88,19 +88,6 @@ def place_option(words: str) -> Parameter:
     return click.option("--direction", "directions", type=_Place(), multiple=True, help=words)
 
 
-def grid_options(usual: str) -> Parameter:
-    """Where stiffness is predicted, by the keys of [predict]; `usual` says what the grid is without them."""
-    return lambda function: in_order(
-        function,
-        click.option("--frequencies", help=f'Such as "5:155:10 Hz" or "20, 50, 100 Hz" [{usual}].'),
-        click.option("--amplitudes", help=f'Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [{usual}].'),
-        click.option("--torsion-amplitudes", help='Zero-to-peak rotation, for --direction torsion ["0.5, 1, 2 deg"].'),
-        click.option(
-            "--strain-amplitudes", help='Zero-to-peak strain, for specimens that give a modulus ["1, 2, 5 %"].'
-        ),
-    )
-
-
 #: Decorators of a command that writes tables, pictures or pages.
 TABLE_FORMAT: Parameter = click.option(
     "--table-format",

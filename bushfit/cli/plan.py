@@ -14,8 +14,8 @@ import click
 from rich.markup import escape
 
 from bushfit.cli.common import Options, open_source, with_options
-from bushfit.cli.grids import asked_for
-from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, Size, command_called, grid_options, place_option
+from bushfit.cli.grids import asked_for, grid_options
+from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, Size, command_called, place_option
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import for_people, number
@@ -100,8 +100,7 @@ def command(
     opened, beside = open_source(source), load_campaign(campaign) if campaign else None
     if beside and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' goes with MODEL.json.")
-    folder = options.folder(opened.name, "plan {}")
-    options.require_free(folder, [*options.formats.names(job.kinds()), CAMPAIGN_FILE])
+    folder = options.free_folder(opened.name, job.kinds(), CAMPAIGN_FILE, form="plan {}")
     with naming(source):
         outcome = job.run(opened, beside)
     _tell(options, outcome)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
-from bushfit.cli.grids import asked_for, positive
-from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, command_called, grid_options, place_option
+from bushfit.cli.grids import asked_for, grid_options, positive
+from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, command_called, place_option
 from bushfit.cli.show import new_table, tell_tests
 
 if TYPE_CHECKING:
@@ -22,9 +22,7 @@ _MOST_AMPLITUDES = 8
 @command_called("predict", 'data/arm_bushing/truth.json --frequencies "10:100:10 Hz" --amplitudes "0.1, 0.5 mm"')
 @click.argument("model", type=FILE)
 @click.option(
-    "--campaign",
-    type=FILE,
-    help="Lay its sweeps over the plots and beside the prediction, and use its [predict] grid.",
+    "--campaign", type=FILE, help="Lay its sweeps over the plots and beside the prediction, and use its [predict] grid."
 )
 @click.option(
     "--bushing",
@@ -95,9 +93,8 @@ def command(
         warm = None if temperature is None else kelvin(temperature)
     within = positive(arms, "--arms", "1")
     job = Predict(asked, *shaken, warm, wide, within)
-    folder = options.folder((loaded or result).name)
     measured = Kinds(tables=("measured",) if loaded and loaded.sweeps else ())
-    options.require_free(folder, options.formats.names(job.kinds(result, loaded) + measured))
+    folder = options.free_folder((loaded or result).name, job.kinds(result, loaded) + measured)
     outcome = job.run(result, loaded, tuple(notes))
     tell_predictions(options, outcome)
     for found in outcome.resonances:

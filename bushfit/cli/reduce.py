@@ -55,7 +55,7 @@ def command(
     levels: str | None,
     cycles: int,
     options: Options,
-    **moving: str | None,
+    **shaker: str | None,
 ) -> None:
     """Reduce raw stepped-sine histories or a resonance test to a sweep.
 
@@ -70,12 +70,11 @@ def command(
 
     Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """
-
-    folder, formats = options.folder(files[0].stem), options.formats
-    options.require_free(folder, formats.names(Kinds(tables=("sweep",), pictures=("reduce",))))
-    table = _resonance_table(files[0], stated, moving)
+    formats, kinds = options.formats, Kinds(tables=("sweep",), pictures=("reduce",))
+    folder = options.free_folder(files[0].stem, kinds)
+    table = _resonance_table(files[0], stated, shaker)
     found = (
-        _histories(files, stated, levels, cycles) if table is None else _resonance(files, table, stated, moving, levels)
+        _histories(files, stated, levels, cycles) if table is None else _resonance(files, table, stated, shaker, levels)
     )
     found.tell(options)
     contents = Contents(tables={"sweep": lambda: found.points}, pictures={"reduce": found.figure})
@@ -88,7 +87,7 @@ def command(
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Reduced:
     """What files were reduced to: the points as a table, how to show and draw them, and what --json has besides.
 
     What was tested is told by `body` and `name`, as in a campaign: direction = "axial", or specimen = "mount".
@@ -103,7 +102,7 @@ class _Found:
     document: Mapping[str, Any] = field(default_factory=dict)
 
 
-def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | None, cycles: int) -> _Found:
+def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | None, cycles: int) -> _Reduced:
     """Raw stepped-sine histories, reduced."""
     from bushfit.reduction.steps import reduce
     from bushfit.report.tables import reduced_table
@@ -115,7 +114,7 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
 
     names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
     title = f"{names}: {len(reduction.steps)} points, {direction}"
-    return _Found(
+    return _Reduced(
         "direction",
         str(direction),
         reduced_table(reduction),
@@ -125,7 +124,7 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
     )
 
 
-def _resonance_table(file: Path, stated: Mapping[str, Any], moving: Mapping[str, str | None]) -> Table | None:
+def _resonance_table(file: Path, stated: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
     """The table of a resonance test; None of a file that has none of its columns, unless a mass or the like is stated.
 
     Raises:
@@ -135,7 +134,7 @@ def _resonance_table(file: Path, stated: Mapping[str, Any], moving: Mapping[str,
     from bushfit.reading.resonance import is_resonance
     from bushfit.reading.words import RESONANCE_COLUMNS
 
-    said = any(value is not None for value in moving.values())
+    said = any(value is not None for value in shaker.values())
     try:
         with options_named():
             table = open_table(file, RESONANCE_COLUMNS, stated)
@@ -147,8 +146,8 @@ def _resonance_table(file: Path, stated: Mapping[str, Any], moving: Mapping[str,
 
 
 def _resonance(
-    files: Sequence[Path], table: Table, stated: Mapping[str, Any], moving: Mapping[str, str | None], levels: str | None
-) -> _Found:
+    files: Sequence[Path], table: Table, stated: Mapping[str, Any], shaker: Mapping[str, str | None], levels: str | None
+) -> _Reduced:
     """A resonance test, reduced."""
     from bushfit.geometry import Direction
     from bushfit.inspection.recognition import direction_of
@@ -164,20 +163,20 @@ def _resonance(
             expected="one file, and no levels: the amplitude follows the resonance",
             hint="call bushfit reduce for each of them, with its own mass",
         )
-    direction, specimen = direction_of(table.file, table, stated), moving["specimen"] or None
+    direction, specimen = direction_of(table.file, table, stated), shaker["specimen"] or None
     if direction is None and specimen is None:
         error = direction_error(table.file)
         error.hint = f'{error.hint}; or name the specimen that was tested: --specimen "mount"'
         raise error
-    mass = _mass(table, direction, moving)
-    base_acceleration = positive(moving["base_acceleration"], "--base-acceleration", "m/s^2")
+    mass = _mass(table, direction, shaker)
+    base_acceleration = positive(shaker["base_acceleration"], "--base-acceleration", "m/s^2")
     read_as = direction or Direction.AXIAL  # which translation it is makes no difference to reading
     with options_named():
         reduction = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
 
     title = f"{table.file.stem}, {specimen or direction}: {number(mass, 4)} kg on a shaker"
     frequency, largest = reduction.peak
-    return _Found(
+    return _Reduced(
         "specimen" if specimen else "direction",
         specimen or str(direction),
         resonance_table(reduction),
@@ -188,9 +187,9 @@ def _resonance(
     )
 
 
-def _mass(table: Table, direction: Direction | None, moving: Mapping[str, str | None]) -> float:
+def _mass(table: Table, direction: Direction | None, shaker: Mapping[str, str | None]) -> float:
     """The mass that moves [kg]."""
-    mass = positive(moving["mass"], "--mass", "kg")
+    mass = positive(shaker["mass"], "--mass", "kg")
     if direction is not None and direction.is_rotation:
         raise MeasurementError(
             "a mass resists no rotation", file=table.file, found=str(direction), expected="a translation"
@@ -204,7 +203,7 @@ def _mass(table: Table, direction: Direction | None, moving: Mapping[str, str | 
             expected="the mass that moves on the mount",
             hint='state it: --mass "0.5 kg"',
         )
-    return mass + (positive(moving["mass_added"], "--mass-added", "kg") or 0.0)
+    return mass + (positive(shaker["mass_added"], "--mass-added", "kg") or 0.0)
 
 
 def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:

@@ -23,10 +23,11 @@ def command(folder: Path, options: Options) -> None:
     """
     from bushfit.jobs.report import report
     from bushfit.report.contents import pages_of
+    from bushfit.report.folder import check_free
 
     target = options.output or folder
     base = "" if options.output is None else f"{folder.resolve().as_uri()}/"
     contents = report(folder, base)
-    options.require_free(target, [f"{name}.html" for name in contents.pages])
+    check_free(target, [f"{name}.html" for name in contents.pages], force=options.force)
     pages = pages_of(contents)
     options.write(target, pages, {"pages": {str(target / name): len(page) for name, page in pages.items()}})

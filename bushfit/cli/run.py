@@ -41,7 +41,7 @@ def command(task: Task) -> None:
     """
     from bushfit.jobs.run import Run
 
-    task.perform(Run(), tell_run, _which)
+    task.perform(Run(), tell_run, _model_to_use)
 
 
 def tell_run(options: Options, name: str, outcome: Ran) -> None:
@@ -64,7 +64,7 @@ def tell_run(options: Options, name: str, outcome: Ran) -> None:
     options.say(two_step or f"{outcome.no_two_step}: the two-step procedure is passed over")
 
 
-def _which(folder: Path, outcome: Ran) -> str:
+def _model_to_use(folder: Path, outcome: Ran) -> str:
     """Which of the files to use."""
     which = "the joint fit"
     if outcome.diagnosed and outcome.added:

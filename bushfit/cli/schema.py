@@ -41,4 +41,4 @@ def command(name: str | None, options: Options) -> None:
             table.add_row(each, described.files)
         options.console.print(table)
     if not options.output:
-        replace(options, as_json=options.as_json or name is not None).tell(document)
+        replace(options, as_json=options.as_json or name is not None).print_json(document)

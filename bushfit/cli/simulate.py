@@ -50,12 +50,18 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
     Writes campaign.toml, the tables it names, and truth.json, the model behind them.
     """
+    from bushfit.campaign.campaign import load_campaign, model_of
+    from bushfit.campaign.schema import SimulateSettings
     from bushfit.effects.unnamed import NAME as UNNAMED
     from bushfit.model.file import to_document
     from bushfit.simulation.files import to_files
     from bushfit.simulation.measured import simulate
 
-    truth, plan = _task(source)
+    if source.suffix.lower() == ".json":
+        truth, plan = open_model(source).model, SimulateSettings()
+    else:
+        campaign = load_campaign(source)
+        truth, plan = model_of(campaign), campaign.simulate or SimulateSettings()
     if truth.unnamed:
         options.warn(["what has no name is a correction of steady states, without a law in time: it is left out here"])
         truth = truth.without(UNNAMED)
@@ -68,16 +74,6 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     folder = options.folder(simulated.result.name, "simulated {}")
     options.say(truth.equation())
     options.write(folder, files, {"truth": to_document(simulated.result), "files": sorted(files)})
-
-
-def _task(source: Path) -> tuple[Model, SimulateSettings]:
-    from bushfit.campaign.campaign import load_campaign, model_of
-    from bushfit.campaign.schema import SimulateSettings
-
-    if source.suffix.lower() == ".json":
-        return open_model(source).model, SimulateSettings()
-    campaign = load_campaign(source)
-    return model_of(campaign), campaign.simulate or SimulateSettings()
 
 
 def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateSettings:

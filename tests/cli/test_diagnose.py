@@ -170,15 +170,6 @@ def test_look_alikes_are_told_with_their_odds(work: Path, bushfit: Run) -> None:
     assert f"<b>Next test:</b> {written['next_test']}." in page
 
 
-@pytest.mark.slow
-def test_the_gap_in_a_picture(bushfit: Run, tmp_path: Path) -> None:
-    bushfit("diagnose", CAMPAIGN, "-o", tmp_path / "x")
-    assert names(tmp_path / "x") == TABLES | {"gap.png"}
-    picture = (tmp_path / "x" / "gap.png").read_bytes()
-    assert picture.startswith(b"\x89PNG")
-    assert len(picture) > 20_000
-
-
 def test_it_is_told_with_its_line_and_nothing_is_mended(bushfit: Run, work: Path) -> None:
     done = bushfit("diagnose", DOUBLED, "-o", "doubled_told")
     for words in ("these tests agree if the", "sweep_axial.csv are peak-to-peak", 'amplitude = "peak-to-peak"', LABEL):

@@ -74,14 +74,6 @@ def test_the_formats_of_the_option_are_those_of_the_job() -> None:
     assert list(FORMATS) == list(formats.choices)
 
 
-def test_effects_of_the_rig_are_left_out(bushfit: Run, root: Path, tmp_path: Path) -> None:
-    truth = root / "data/mystery_mount/open_last/truth.json"
-    done = bushfit("export", truth, "--format", "xlsx", "--format", "nastran", "-o", tmp_path / "x")
-    assert "left out of the prediction, because they belong to the rig" in done.stderr
-    book = pd.read_excel(tmp_path / "x/bushing.xlsx", "provenance", engine="openpyxl")
-    assert "Mystery" in " ".join(map(str, book.to_numpy().ravel()))
-
-
 def test_an_unresolved_effect_is_a_loss_of_every_deck(bushfit: Run, root: Path, tmp_path: Path) -> None:
     model = document(root / "data/arm_bushing/truth.json")
     model["effects"].append("sleeve_compliance")

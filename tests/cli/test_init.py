@@ -136,15 +136,6 @@ def test_a_file_that_names_a_direction_is_no_block_in_shear(typed: Run, tests: l
     assert [str(sweep.direction) for sweep in campaign.sweeps] == ["axial", "mount"]
 
 
-def test_amplitudes_that_may_be_counted_otherwise_are_said(typed: Run, tests: list[Path], tmp_path: Path) -> None:
-    done = typed("init", tests[1], *GEOMETRY, "-o", "x")
-    assert "taken zero-to-peak, else --amplitude peak-to-peak" in done.stderr
-    done = typed("init", tests[1], *GEOMETRY, "-o", "y", "--amplitude", "peak-to-peak")
-    assert "taken zero-to-peak" not in done.stderr
-    one, other = (load_campaign(tmp_path / name / "campaign.toml").sweeps[0].amplitude for name in "xy")
-    assert other.tolist() == (one / 2.0).tolist()
-
-
 def test_a_force_that_counts_the_other_way_is_turned_and_said(typed: Run, tests: list[Path], tmp_path: Path) -> None:
     table = pd.read_csv(tests[0])
     table["force [N]"] *= -1.0

@@ -14,17 +14,11 @@ from commandline import call
 from jsonschema import Draft202012Validator
 from shell import document as read
 from shell import typing
+from virtual_rig import LOOP, MOUNT, SWEEP, SWEEPS, rig
 
 from bushfit.model.file import load_result, to_document
 from bushfit.schemas import schema
 
-BUSHING = """
-[bushing]
-name = "Mount"
-inner_radius = "12 mm"
-outer_radius = "24 mm"
-length = "50 mm"
-"""
 SPECIMENS = """
 [[specimens]]
 name = "Dumbbell"
@@ -36,36 +30,8 @@ area = "500 mm^2"
 thickness = "6 mm"
 elements = 4
 """
-RIG = """
-[simulate]
-seed = 629
-repeats = 2
-noise = "0.3 %"
-force_noise = "0.4 %"
-displacement_noise = "0.05 %"
-gain_error = "0.2 %"
-{}
-[simulate.parameters]
-mu = "0.78 MPa"
-m = "0.16 MPa*s^alpha"
-alpha = 0.27
-sigma_fmax = "11 kPa"
-eps_half = 0.014
-"""
-COLOURED = 'force_correlation = "90 %"'
-LOOP = """
-[[simulate.loops]]
-direction = "{}"
-amplitude = "{}"
-frequency = "{}"
-cycles = 2
-"""
-SWEEP = """
-[[simulate.sweeps]]
-{} = "{}"
-amplitudes = {}
-frequencies = ["5 Hz", "20 Hz", "50 Hz", "90 Hz", "150 Hz"]
-"""
+RIG = rig("0.4 %", 'displacement_noise = "0.05 %"')
+COLOURED = rig("0.4 %", 'displacement_noise = "0.05 %"', 'force_correlation = "90 %"')
 SHAKEN = """
 [[simulate.resonances]]
 direction = "axial"
@@ -73,10 +39,7 @@ mass = "3 kg"
 base_acceleration = "4 m/s^2"
 frequencies = {}
 """
-LEVELS = {"axial": '["0.1 mm", "0.2 mm", "0.5 mm"]', "torsion": '["0.3 deg", "0.6 deg", "1.5 deg"]'}
-LEVELS["radial"] = LEVELS["axial"]
 LOOPS = LOOP.format("axial", "0.5 mm", "0.1 Hz") + LOOP.format("axial", "1 mm", "0.1 Hz")
-SWEEPS = {place: SWEEP.format("direction", place, levels) for place, levels in LEVELS.items()}
 COUPONS = SWEEP.format("specimen", "Dumbbell", '["0.5 %", "1 %", "4 %"]') + SWEEP.format(
     "specimen", "Quad", '["0.05 mm", "0.2 mm"]'
 )
@@ -92,17 +55,17 @@ WEAK = "rig_compliance.compliance=3e-8 m/N"
 
 #: What is tested, by the shape of the campaign, and what is hidden in it.
 SHAPES: dict[str, tuple[str, ...]] = {
-    "coloured loops": (BUSHING + RIG.format(COLOURED) + LOOPS + SWEEPS["axial"],),
-    "one coloured loop": (BUSHING + RIG.format(COLOURED) + LOOP.format("axial", "1 mm", "0.1 Hz"),),
-    "one loop in torsion": (BUSHING + RIG.format("") + LOOP.format("torsion", "2 deg", "0.1 Hz"),),
-    "amplitudes at one frequency": (BUSHING + RIG.format("") + ONE_FREQUENCY,),
-    "coupons alone": ('name = "Sheet"\n' + SPECIMENS + RIG.format("") + COUPONS,),
-    "coupons beside a bushing": (BUSHING + SPECIMENS + RIG.format("") + LOOPS + SWEEPS["axial"] + COUPONS,),
-    "all directions": (BUSHING + RIG.format("") + LOOPS + "".join(SWEEPS.values()),),
-    "radial alone": (BUSHING + RIG.format("") + LOOP.format("radial", "0.3 mm", "0.1 Hz") + SWEEPS["radial"],),
-    "a resonance": (BUSHING + RIG.format("") + LOOPS + SHAKEN.format(RISING),),
-    "twins": (BUSHING + RIG.format("") + LOOPS + SWEEPS["axial"] + SWEEPS["radial"], "--effect", WEAK),
-    "described": (BUSHING + RIG.format("") + LOOPS + SWEEPS["axial"] + SWEEPS["radial"],),
+    "coloured loops": (MOUNT + COLOURED + LOOPS + SWEEPS["axial"],),
+    "one coloured loop": (MOUNT + COLOURED + LOOP.format("axial", "1 mm", "0.1 Hz"),),
+    "one loop in torsion": (MOUNT + RIG + LOOP.format("torsion", "2 deg", "0.1 Hz"),),
+    "amplitudes at one frequency": (MOUNT + RIG + ONE_FREQUENCY,),
+    "coupons alone": ('name = "Sheet"\n' + SPECIMENS + RIG + COUPONS,),
+    "coupons beside a bushing": (MOUNT + SPECIMENS + RIG + LOOPS + SWEEPS["axial"] + COUPONS,),
+    "all directions": (MOUNT + RIG + LOOPS + "".join(SWEEPS.values()),),
+    "radial alone": (MOUNT + RIG + LOOP.format("radial", "0.3 mm", "0.1 Hz") + SWEEPS["radial"],),
+    "a resonance": (MOUNT + RIG + LOOPS + SHAKEN.format(RISING),),
+    "twins": (MOUNT + RIG + LOOPS + SWEEPS["axial"] + SWEEPS["radial"], "--effect", WEAK),
+    "described": (MOUNT + RIG + LOOPS + SWEEPS["axial"] + SWEEPS["radial"],),
 }
 #: Commands that write a model, and its name in their folder.
 WRITERS = {

@@ -15,28 +15,16 @@ from shell import BUSHING, GEOMETRY, Run, refused
 
 from bushfit.campaign.campaign import load_campaign
 
-ENGLISH = ("Frequency [Hz]", "Amplitude [mm]", "Stiffness [N/mm]", "Loss factor [-]")
-#: Header of the column, its words for axial and radial, the other headers, delimiter and decimal mark.
-LANGUAGES = {
-    "English": ("Direction", "Axial", "Radial", ENGLISH, ",", "."),
-    "short": ("Dir.", "ax", "rad", ENGLISH, "\t", "."),
-    "German": (
-        "Prüfrichtung", "axial", "radial",
-        ("Frequenz [Hz]", "Wegamplitude [mm]", "Steifigkeit [N/mm]", "tan d"), ";", ",",
-    ),
-    "French": (
-        "Direction", "axiale", "radiale",
-        ("Fréquence [Hz]", "Amplitude [mm]", "Raideur [N/mm]", "Facteur de perte"), ";", ",",
-    ),
-    "Italian": (
-        "Direzione", "assiale", "radiale",
-        ("Frequenza [Hz]", "Ampiezza [mm]", "Rigidezza [N/mm]", "Fattore di perdita"), ";", ",",
-    ),
-    "Spanish": (
-        "Dirección", "axial", "radial",
-        ("Frecuencia [Hz]", "Amplitud [mm]", "Rigidez [N/mm]", "Factor de pérdida"), ";", ",",
-    ),
-}  # fmt: skip
+HEADERS = ("Frequency [Hz]", "Amplitude [mm]", "Stiffness [N/mm]", "Loss factor [-]")
+#: Header of the column, its words for axial and radial, and the delimiter; beside semicolons decimals have a comma.
+DIRECTIONS = {
+    "English": ("Direction", "Axial", "Radial", ","),
+    "short": ("Dir.", "ax", "rad", "\t"),
+    "German": ("Prüfrichtung", "axial", "radial", ";"),
+    "French": ("Direction", "axiale", "radiale", ";"),
+    "Italian": ("Direzione", "assiale", "radiale", ";"),
+    "Spanish": ("Dirección", "axial", "radial", ";"),
+}
 Rows = list[tuple[float, ...]]
 
 
@@ -50,9 +38,7 @@ def points(root: Path) -> dict[str, Rows]:
     }
 
 
-def export(
-    file: Path, header: Sequence[str], rows: Sequence[Sequence[object]], mark: str = ",", point: str = "."
-) -> Path:
+def export(file: Path, header: Sequence[str], rows: Sequence[Sequence[object]], delimiter: str = ",") -> None:
     """A table as a laboratory exports it, as text or as a workbook with title lines."""
     if file.suffix == ".xlsx":
         book = openpyxl.Workbook()
@@ -60,40 +46,36 @@ def export(
             book.active.append([*row])
         book.save(file)
     else:
-        lines = [
-            mark.join(str(cell).replace(".", point) if cell not in header else str(cell) for cell in row)
-            for row in (header, *rows)
-        ]
-        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return file
+        decimal = "," if delimiter == ";" else "."
+        lines = [delimiter.join(str(cell).replace(".", decimal) for cell in row) for row in rows]
+        file.write_text("\n".join([delimiter.join(header), *lines]) + "\n", encoding="utf-8")
 
 
-@pytest.mark.parametrize("ending", ["csv", "xlsx"])
-@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize(("language", "ending"), [*((language, "csv") for language in DIRECTIONS), ("English", "xlsx")])
 def test_directions_are_tests_of_their_own(
-    typed: Run, points: dict, tmp_path: Path, language: str, ending: str
+    typed: Run, points: dict[str, Rows], tmp_path: Path, language: str, ending: str
 ) -> None:
-    head, axial, radial, others, mark, point = LANGUAGES[language]
+    head, axial, radial, delimiter = DIRECTIONS[language]
     # in a workbook the cells of one direction are merged, and empty but for the first
     word = {
         way: [name, *[None if ending == "xlsx" else name] * 47] for way, name in (("axial", axial), ("radial", radial))
     }
     rows = [(w, *row) for way in points for w, row in zip(word[way], points[way], strict=True)]
-    export(tmp_path / f"both.{ending}", (head, *others), rows, mark, point)
+    export(tmp_path / f"both.{ending}", (head, *HEADERS), rows, delimiter)
     typed("init", f"both.{ending}", *GEOMETRY, "-o", "x")
-    campaign = load_campaign(tmp_path / "x/campaign.toml")
-    assert {str(sweep.direction): sweep.name for sweep in campaign.sweeps} == {
-        "axial": "both axial",
-        "radial": "both radial",
-    }
-    for sweep in campaign.sweeps:
+    sweeps = load_campaign(tmp_path / "x/campaign.toml").sweeps
+    assert [(str(sweep.direction), sweep.name) for sweep in sweeps] == [
+        ("axial", "both axial"),
+        ("radial", "both radial"),
+    ]
+    for sweep in sweeps:
         assert np.abs(sweep.stiffness) == pytest.approx([1e3 * row[2] for row in points[str(sweep.direction)]])
     one = typed("init", f"both.{ending}", *GEOMETRY, "-o", "y", "--direction", "axial")
     assert "its rows of radial, as stated" in one.stderr
     assert [str(sweep.direction) for sweep in load_campaign(tmp_path / "y/campaign.toml").sweeps] == ["axial"]
 
 
-def test_parts_are_a_batch(typed: Run, points: dict, tmp_path: Path) -> None:
+def test_parts_are_a_batch(typed: Run, points: dict[str, Rows], tmp_path: Path) -> None:
     factors = {"17": 1.0, "A/1": 1.1, "19": 0.9}
     rows = [
         (part, way, *row[:2], row[2] * by, row[3])
@@ -101,7 +83,7 @@ def test_parts_are_a_batch(typed: Run, points: dict, tmp_path: Path) -> None:
         for way in points
         for row in points[way]
     ]
-    export(tmp_path / "parts.csv", ("Part No.", "Direction", *ENGLISH), rows)
+    export(tmp_path / "parts.csv", ("Part No.", "Direction", *HEADERS), rows)
     done = typed("init", "parts.csv", *GEOMETRY, "-o", "x", "--name", "B")
     assert "next: bushfit batch x/batch.toml" in done.stderr
     typed("batch", "x/batch.toml", "-o", "b", "--no-plots", "-q")
@@ -117,23 +99,23 @@ def test_parts_are_a_batch(typed: Run, points: dict, tmp_path: Path) -> None:
     refused(asked, tmp_path / "f", "tests of several parts", 'specimen_number = "..."')
 
 
-@pytest.mark.parametrize(("ending", "mark", "point"), [("csv", ",", "."), ("csv", ";", ","), ("xlsx", "", "")])
-def test_runs_are_repeats(typed: Run, points: dict, tmp_path: Path, ending: str, mark: str, point: str) -> None:
+@pytest.mark.parametrize(("ending", "delimiter"), [("csv", ","), ("csv", ";"), ("xlsx", "")])
+def test_runs_are_repeats(typed: Run, points: dict[str, Rows], tmp_path: Path, ending: str, delimiter: str) -> None:
     """A row that begins with #1 is no comment where all do."""
     rows = [(f"#{run}", *row[:2], row[2] * (1.0 + run / 1e3), row[3]) for run in (1, 2, 3) for row in points["axial"]]
-    export(tmp_path / f"axial.{ending}", ("Run", *ENGLISH), rows, mark, point)
+    export(tmp_path / f"axial.{ending}", ("Run", *HEADERS), rows, delimiter)
     (seen,) = json.loads(typed("inspect", f"axial.{ending}", "-o", "x", "--json", "--no-plots").stdout)["files"]
     assert seen["facts"]["repeats"] == "3"
     assert not [sentence for sentence in seen["odd"] if "not understood" in sentence]
 
 
-def test_what_is_not_understood_is_named(typed: Run, points: dict, tmp_path: Path) -> None:
+def test_what_is_not_understood_is_named(typed: Run, points: dict[str, Rows], tmp_path: Path) -> None:
     rows = [
         (*row[:2], row[2] * by, row[3], name, k)
         for name, by in (("NR45", 1.0), ("NR60", 1.1))
         for k, row in enumerate(points["axial"])
     ]
-    export(tmp_path / "axial.csv", (*ENGLISH, "Compound", "Pt"), rows)
+    export(tmp_path / "axial.csv", (*HEADERS, "Compound", "Pt"), rows)
     said = '"Compound" (column 5) varies from row to row (NR45, NR60) and is not understood'
     done = typed("init", "axial.csv", *GEOMETRY, "-o", "x")
     assert done.stderr.count("is not understood") == done.stderr.count(said) == 1
@@ -155,9 +137,9 @@ def test_what_is_not_understood_is_named(typed: Run, points: dict, tmp_path: Pat
     ],
 )
 def test_a_campaign_that_contradicts_a_column(
-    typed: Run, points: dict, tmp_path: Path, entries: str, said: list[str]
+    typed: Run, points: dict[str, Rows], tmp_path: Path, entries: str, said: list[str]
 ) -> None:
-    export(tmp_path / "both.csv", ("Direction", *ENGLISH), [(way, *row) for way in points for row in points[way]])
+    export(tmp_path / "both.csv", ("Direction", *HEADERS), [(way, *row) for way in points for row in points[way]])
     (tmp_path / "c.toml").write_text(f'{BUSHING}[[sweeps]]\nfile = "both.csv"\n{entries}\n', encoding="utf-8")
     refused(typed("fit", "c.toml", "-o", "x", status=2), tmp_path / "x", *said)
 
@@ -205,7 +187,7 @@ def test_blanks_in_headers_and_empty_cells_below(
     ]  # fmt: skip
 
 
-def test_a_column_that_is_given_twice(typed: Run, points: dict, tmp_path: Path) -> None:
+def test_a_column_that_is_given_twice(typed: Run, points: dict[str, Rows], tmp_path: Path) -> None:
     head = ("Freq [Hz]", "Dyn. Disp. [mm]", "Dyn. Disp. [mm]", "K* [N/mm]", "Tan Delta")
     export(tmp_path / "axial.csv", head, [(row[0], row[1], row[1], *row[2:]) for row in points["axial"]])
     typed("inspect", "axial.csv", "-o", "x", "--no-plots")

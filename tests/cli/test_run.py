@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from commandline import Done
 from shell import CAMPAIGN, Run, document, names, typing
+from virtual_rig import LOOP, MOUNT, SWEEPS, rig
 
 from bushfit.cli.run import two_step_line
 from bushfit.fitting.procedures import TwoStep
@@ -21,40 +22,6 @@ from bushfit.model.result import Result
 #: Files that run and diagnose write alike.
 FILES = ("diagnosis.json", "gap.csv", "candidates.csv")
 UNKNOWN = "the tests leave mu, m, alpha open (unknown by 100 % or more)"
-
-#: A short campaign of the virtual rig: few frequencies, two repeats, its tests to be added.
-RIG = """
-[bushing]
-name = "Mount"
-inner_radius = "12 mm"
-outer_radius = "24 mm"
-length = "50 mm"
-[simulate]
-seed = 629
-repeats = 2
-noise = "0.3 %"
-force_noise = "0.1 %"
-gain_error = "0.2 %"
-[simulate.parameters]
-mu = "0.78 MPa"
-m = "0.16 MPa*s^alpha"
-alpha = 0.27
-sigma_fmax = "11 kPa"
-eps_half = 0.014
-"""
-SWEEP = """
-[[simulate.sweeps]]
-direction = "{}"
-amplitudes = ["{} {unit}", "{} {unit}", "{} {unit}"]
-frequencies = ["5 Hz", "20 Hz", "50 Hz", "90 Hz", "150 Hz"]
-"""
-LOOP = """
-[[simulate.loops]]
-direction = "axial"
-amplitude = "0.5 mm"
-frequency = "0.1 Hz"
-cycles = 2
-"""
 
 
 def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp_path: Path) -> None:
@@ -189,10 +156,9 @@ def test_what_gives_way_in_one_direction_or_in_all_is_a_set_where_it_is_equal(
     typed: Run, tmp_path: Path, directions: tuple[str, ...], hidden: str, sets: list[str]
 ) -> None:
     """Axially the bushing is so soft that a give of the rig passes for mu; torsion, which does not give way, tells."""
-    sizes = {"axial": (0.1, 0.2, 0.5, "mm"), "radial": (0.1, 0.2, 0.5, "mm"), "torsion": (0.3, 0.6, 1.5, "deg")}
-    swept = "".join(SWEEP.format(place, *sizes[place][:3], unit=sizes[place][3]) for place in directions)
-    looped = LOOP if directions == ("axial",) else ""
-    (tmp_path / "rig.toml").write_text(RIG + looped + swept, encoding="utf-8")
+    tests = [LOOP.format("axial", "0.5 mm", "0.1 Hz")] if directions == ("axial",) else []
+    tests += [SWEEPS[place] for place in directions]
+    (tmp_path / "rig.toml").write_text("".join([MOUNT, rig("0.1 %"), *tests]), encoding="utf-8")
     typed("simulate", "rig.toml", "--effect", f"{hidden} m/N", "-o", "tests", "--no-plots")
     found = json.loads(typed("diagnose", "tests/campaign.toml", "-o", "found", "--no-plots", "--json").stdout)
     (leader,) = found["effects"]

@@ -62,10 +62,10 @@ def test_warnings_of_a_resonance_are_those_of_the_prediction(campaign: Campaign)
 
 
 def test_a_campaign_has_the_kinds_of_test_that_it_lists(campaign: Campaign) -> None:
-    assert fits.tests_of(campaign, ()) == ("loops", "sweeps")
-    assert fits.tests_of(replace(campaign, loops=()), ("temperature",)) == ("sweeps",)
+    assert fits.kinds_of_test(campaign, ()) == ("loops", "sweeps")
+    assert fits.kinds_of_test(replace(campaign, loops=()), ("temperature",)) == ("sweeps",)
     warm = replace(campaign, sweeps=tuple(replace(sweep, temperature=300.0) for sweep in campaign.sweeps))
-    assert fits.tests_of(warm, ("temperature",)) == ("loops", "sweeps", "master_curve", "shift_factors")
+    assert fits.kinds_of_test(warm, ("temperature",)) == ("loops", "sweeps", "master_curve", "shift_factors")
 
 
 def test_a_prediction_is_over_what_was_asked_for_before_what_the_campaign_says(
