@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
+from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.inspect import tell_left_out
-from bushfit.cli.options import command_called, files_argument, option_of
-from bushfit.cli.raw import direction_error, options_named, with_stated
+from bushfit.cli.options import command_called, option_of
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
 from bushfit.report.folder import check_free
 from bushfit.units import quantity
@@ -28,7 +28,6 @@ _SIDES = ("inner", "outer")
     "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_axial.csv "
     '--inner-diameter "28 mm" --outer-diameter "40 mm" --length "45 mm"',
 )
-@files_argument
 @click.option("--inner-radius", help='Of the rubber, such as "10 mm"; or else')
 @click.option("--inner-diameter", help='such as "20 mm".')
 @click.option("--outer-radius", help='Of the rubber, such as "18 mm"; or else')

@@ -12,8 +12,8 @@ import click
 from rich.markup import escape
 
 from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
-from bushfit.cli.options import PLOT_FORMAT, command_called, files_argument
-from bushfit.cli.raw import options_named, with_stated
+from bushfit.cli.file_options import options_named, with_stated
+from bushfit.cli.options import PLOT_FORMAT, command_called
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
 from bushfit.report import plots
@@ -29,7 +29,6 @@ _FILES_A_PICTURE = 5
 
 
 @command_called("inspect", "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv")
-@files_argument
 @with_stated()
 @with_options(FIRST_FILE_FOLDER, PLOT_FORMAT)
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:

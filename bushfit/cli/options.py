@@ -7,7 +7,6 @@ from typing import Any, get_args
 
 import click
 
-from bushfit.errors import MeasurementError
 from bushfit.reading.tablefile import Form
 from bushfit.report.contents import Picture
 
@@ -15,6 +14,7 @@ Function = Callable[..., Any]
 #: Decorator that gives the function of a command an option or an argument.
 Parameter = Callable[[Function], Function]
 
+#: Type of an option or an argument that names a file or a folder.
 FILE = click.Path(path_type=Path)
 
 
@@ -109,19 +109,3 @@ PLOT_FORMAT: Parameter = click.option(
     help="png, svg, pdf; may be given again [png].",
 )
 NO_REPORT: Parameter = click.option("--no-report", is_flag=True, help="Write no page (HTML).")
-
-#: What test files are not, by their endings.
-_NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
-
-
-def _tests_alone(_: click.Context, __: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
-    """Refuse a campaign or a model among test files."""
-    for file in files:
-        if (found := _NO_TESTS.get(file.suffix.lower())) and file.is_file():
-            hint = "bushfit diagnose looks at all tests of a campaign together; name its files, or their folder, here"
-            raise MeasurementError("a test file is needed", file=file, found=found, expected="a table", hint=hint)
-    return files
-
-
-#: Decorator of a command that takes files.
-files_argument = click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone)

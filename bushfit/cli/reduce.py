@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
+from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.grids import parse_grid, positive
-from bushfit.cli.options import PLOT_FORMAT, TABLE_FORMAT, command_called, files_argument
-from bushfit.cli.raw import direction_error, options_named, with_stated
+from bushfit.cli.options import PLOT_FORMAT, TABLE_FORMAT, command_called
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.report import plots
@@ -40,7 +40,6 @@ _LINES_AN_OCTAVE = 3
     "data/cmp_15961_raw/stepped_sine_axial.csv",
     'data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --specimen mount',
 )
-@files_argument
 @with_stated(sweeps=False)
 @click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].')
 @click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")

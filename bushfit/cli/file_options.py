@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 import click
 
-from bushfit.cli.options import Direction, Function, Parameter, in_order, option_of
+from bushfit.cli.options import FILE, Direction, Function, Parameter, in_order, option_of
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.reading.headers import AmplitudeConvention
 from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
@@ -37,6 +37,8 @@ _AS_WRITTEN = {
     "header_line": "Line of the header, from 1 [found].",
     "sheet": "Of a workbook [all with a test].",
 }
+#: What test files are not, by their endings.
+_NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
 _WHOLE_NUMBERS = ("elements", "header_line")
 _SAME_NAME = ("force_sign", *_OF_TESTS, *_AS_WRITTEN)
 #: An inline table of TOML in the hint of an error.
@@ -46,7 +48,7 @@ _PAIRED = re.compile(r'(column|unit)s = \{ (\w+) = "([^"]*)"')
 
 
 def with_stated(*, sweeps: bool = True) -> Parameter:
-    """Decorator of a command on test files: what its options say of them becomes one `stated`.
+    """Decorator of a command on test `files`: what its options say of them becomes one `stated`.
 
     Beside loops there are `sweeps`, with all keys of a campaign, or else resonance tests, with those of any file.
     """
@@ -69,6 +71,7 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
 
         return in_order(
             wrapped,
+            click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
             click.option("--direction", type=Direction(), help="axial, radial or torsion [names, columns]."),
             click.option(
                 "--column",
@@ -88,6 +91,15 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
         )
 
     return decorate
+
+
+def _tests_alone(_: click.Context, __: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Refuse a campaign or a model among test files."""
+    for file in files:
+        if (found := _NO_TESTS.get(file.suffix.lower())) and file.is_file():
+            hint = "bushfit diagnose looks at all tests of a campaign together; name its files, or their folder, here"
+            raise MeasurementError("a test file is needed", file=file, found=found, expected="a table", hint=hint)
+    return files
 
 
 @contextmanager
