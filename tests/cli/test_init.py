@@ -56,8 +56,6 @@ def test_where_it_is_written(typed: Run, tests: list[Path], tmp_path: Path) -> N
     assert tomllib.loads(text)["bushing"]["name"] == "my tests"
     assert tomllib.loads(text)["loops"][0]["file"] == "my tests/loop_axial_1.csv"
     assert "next: bushfit run lab/my.toml" in done.stderr
-    assert "results stand there already" in typed("init", *tests, *GEOMETRY, "-o", "lab/my.toml", status=2).stderr
-    typed("init", *tests, *GEOMETRY, "-o", "lab/my.toml", "--force")
     typed("init", *tests, *GEOMETRY)
     assert (tmp_path / "results/my tests/campaign.toml").exists()
 
