@@ -78,7 +78,7 @@ def fit(
     """
     if loss:
         campaign = replace(campaign, fit=replace(campaign.fit, loss=loss))
-    return Fit(tuple(directions), tuple(effects), _untold if profile else None).run(Data.of(campaign))
+    return Fit(tuple(directions), tuple(effects), (lambda *_: None) if profile else None).run(Data.of(campaign))
 
 
 def fit_static(campaign: Campaign, *, dynamic: Result | Outcome | None = None) -> Fitted:
@@ -250,20 +250,14 @@ def save(
     return Path(folder)
 
 
-def _untold(name: str, left: int) -> None:
-    """Says nothing of a profile that is done."""
-
-
 def _asked(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
     """Places, then frequencies and amplitudes of displacements, rotations and strains, as they are asked for."""
-    frequencies, amplitudes, rotations, strains = map(_values, axes)
+    frequencies, amplitudes, rotations, strains = (
+        None if axis is None else tuple(float(value) for value in axis) for axis in axes
+    )
     return PredictSettings(
         frequencies, amplitudes, rotations, None if directions is None else tuple(directions), strains
     )
-
-
-def _values(axis: Numbers | None) -> tuple[float, ...] | None:
-    return None if axis is None else tuple(float(value) for value in axis)
 
 
 def _result(model: Result | Outcome) -> Result:

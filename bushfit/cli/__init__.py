@@ -5,9 +5,7 @@ import importlib
 import io
 import os
 import sys
-import tomllib
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TextIO
 
 import click
@@ -15,9 +13,26 @@ import click
 from bushfit.errors import BushfitError, OutputError, printable
 from bushfit.version import __version__
 
-#: Commands, examples and options by the tables of commands.toml; no module of a command is loaded before it is needed.
-TABLES = tomllib.loads(Path(__file__).with_name("commands.toml").read_text(encoding="utf-8"))
-_COMMANDS = TABLES["commands"]
+#: Commands in their order: the module of each, loaded when it is called, with a function not called `command` after a
+#: point; and the line that `bushfit --help` shows.
+_COMMANDS = {
+    "run": ("run", "The whole chain: fit-static, fit-dynamic, fit, diagnose, predict."),
+    "fit-static": ("fit.static", "Loops -> mu, sigma_fmax, eps_half (elasticity and friction)."),
+    "fit-dynamic": ("fit.dynamic", "Smallest-amplitude sweep -> m, alpha (rate dependence)."),
+    "fit": ("fit.fit", "Loops and sweeps -> all five parameters together: the fit to use."),
+    "predict": ("predict", "Model -> axial and radial stiffness tables and plots."),
+    "compare": ("compare", "Results side by side, or model families: what differs, and is it more than chance?"),
+    "export": ("export", "Model -> files of solvers, multibody codes and spreadsheets."),
+    "diagnose": ("diagnose", "Where do model and tests disagree? What is missing? Add it, show the gap shrink."),
+    "plan": ("plan", "Which tests next? Chosen for what they would tell, with errors beforehand."),
+    "report": ("report", "A folder of results -> one page to show, to print and to mail."),
+    "batch": ("batch", "Many campaigns at once -> one table, limits, a report for CI."),
+    "inspect": ("inspect", "Test files: how they are understood, what is in them, what is odd."),
+    "init": ("init", "Test files and geometry -> a campaign."),
+    "reduce": ("reduce", "Raw stepped-sine histories -> a sweep, with its noise and distortion."),
+    "simulate": ("simulate", "Model -> a simulated campaign of raw tests, with noise."),
+    "schema": ("schema", "JSON Schemas of the files: for programs that read them, and for editors."),
+}
 
 #: Linear algebra on one thread: the matrices are small, and a sum split over threads ends in other digits.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")

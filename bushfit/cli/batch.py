@@ -9,19 +9,19 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from bushfit.cli.common import Options, with_options
-from bushfit.cli.options import command_called
+from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
+from bushfit.cli.options import FILE, NO_REPORT, PLOT_FORMAT, TABLE_FORMAT, command_called, place_option
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
-    from bushfit.batch.manifest import Command, Settings
+    from bushfit.batch.manifest import Command
     from bushfit.batch.outcome import Outcome
     from bushfit.batch.pool import Pool
 
@@ -31,11 +31,46 @@ _MOST_SHOWN = 10
 _SECONDS_A_LINE = 10.0
 
 
-@command_called("batch")
+@command_called("batch", '"data/practice/*/bushing.toml" --at "axial 25 Hz 0.1 mm"')
 @click.argument("manifest", metavar="MANIFEST", nargs=-1, required=True)
-@with_options
+@click.option(
+    "--command",
+    "commands",
+    type=click.Choice(["run", "fit", "diagnose", "predict"]),
+    multiple=True,
+    metavar="COMMAND",
+    help="What to do with each campaign: fit, diagnose, predict, may be given again; or run, the whole chain [fit].",
+)
+@place_option("Tests to fit, as in bushfit fit.")
+@click.option("--effect", "effects", multiple=True, metavar="NAME", help="Add an effect, as in bushfit fit.")
+@click.option(
+    "--at",
+    multiple=True,
+    metavar="POINT",
+    help='Stiffness and loss factor there, such as "axial 25 Hz 0.1 mm" (zero-to-peak); may be given again.',
+)
+@click.option("--limits", type=FILE, metavar="FILE", help="Judge each bushing by this TOML file (above).")
+@click.option("--junit", type=FILE, metavar="FILE", help="Write a JUnit report for CI.")
+@click.option("--jobs", type=click.IntRange(1), help="Worker processes [the cores there are].")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Work on this Dask cluster, such as tcp://10.0.0.5:8786, whose workers see the same files and paths.",
+)
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on with the results that stand: do what is missing, failed, or has changed (a test, a setting, bushfit).",
+)
+@click.option("--tables", is_flag=True, help="Write loops.csv, sweeps.csv and the like of each too.")
+@click.option("--plots", is_flag=True, help="Write each bushing's plots too.")
+@click.option("--reports", is_flag=True, help="Write report.html of each that is diagnosed too.")
+@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, NO_REPORT)
 def command(
     manifest: tuple[str, ...],
+    commands: tuple[Command, ...],
+    directions: tuple[str, ...],
+    effects: tuple[str, ...],
     at: tuple[str, ...],
     limits: Path | None,
     junit: Path | None,
@@ -46,7 +81,6 @@ def command(
     plots: bool,
     reports: bool,
     options: Options,
-    **asked: tuple[Any, ...],
 ) -> None:
     """Fit (diagnose, predict, run) every campaign of MANIFEST: a TOML or CSV list, a pattern in quotes, or campaigns.
 
@@ -71,13 +105,16 @@ def command(
     # Workers import what they need while this process does.
     workers: Pool = DaskPool(scheduler) if scheduler else LocalPool(jobs or os.cpu_count() or 1)
     from bushfit.batch.limits import check_judged, read_limits
-    from bushfit.batch.manifest import read_manifest
+    from bushfit.batch.manifest import Settings, read_manifest
     from bushfit.batch.outcome import Plan
     from bushfit.batch.quantities import parse_point
     from bushfit.batch.run import check_free, run
     from bushfit.batch.work import Orders
+    from bushfit.effects import effect_named
 
-    read = read_manifest(manifest[0], _settings(**asked), *manifest[1:])
+    names = tuple(effect_named(name).name for name in effects)
+    of_all = Settings(commands=commands or None, directions=directions or None, effects=names or None)
+    read = read_manifest(manifest[0], of_all, *manifest[1:])
     judged_by = read_limits(limits) if limits else None
     if limits and judged_by:
         check_judged(judged_by, limits, read.rows)
@@ -89,19 +126,10 @@ def command(
     plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.formats)
     check_free(plan, force=options.force)
     with _progress(options, len(plan.rows)) as advance:
-        outcome = run(plan, workers, advance, lambda outcome: options.tell(outcome.summary))
+        outcome = run(plan, workers, advance, lambda outcome: options.print_json(outcome.summary))
     _tell(options, outcome, options.folder(read.stem))
     if outcome.status["failed"] or outcome.missed:
         click.get_current_context().exit(1)
-
-
-def _settings(commands: tuple[Command, ...], directions: tuple[str, ...], effects: tuple[str, ...]) -> Settings:
-    """What the options ask of every row that does not say otherwise."""
-    from bushfit.batch.manifest import Settings
-    from bushfit.effects import effect_named
-
-    names = tuple(effect_named(name).name for name in effects)
-    return Settings(commands=commands or None, directions=directions or None, effects=names or None)
 
 
 @contextmanager

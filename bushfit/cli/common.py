@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import click
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -16,8 +16,9 @@ from rich.markup import escape
 from rich.segment import Segment
 
 from bushfit.campaign.naming import folder_name
+from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, Folder, Function, Parameter, Size, in_order
 from bushfit.errors import ModelError, printable, typed
-from bushfit.report.contents import Formats
+from bushfit.report.contents import Formats, Kinds
 from bushfit.report.folder import check_free, to_json, write_files
 
 if TYPE_CHECKING:
@@ -25,7 +26,12 @@ if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
     from bushfit.jobs import Found, Job
     from bushfit.model.result import Result
+    from bushfit.reading.tablefile import Form
+    from bushfit.report.contents import Picture
 
+#: Where results go by default, as the help says it.
+CAMPAIGN_FOLDER = "results/<campaign or file>"
+FIRST_FILE_FOLDER = "results/<first file>"
 #: Width of tables where standard error is no terminal, in characters.
 _WIDTH = 100
 
@@ -52,6 +58,12 @@ class Options:
     def folder(self, name: str, form: str = "{}") -> Path:
         """Where results go: --output, or results/<name>, in which `form` says what stands around it."""
         return self.output or Path("results") / form.format(folder_name(name))
+
+    def free_folder(self, name: str, kinds: Kinds, *files: str, form: str = "{}") -> Path:
+        """The folder of results of some kinds, and further files; refused before the work where they stand there."""
+        folder = self.folder(name, form)
+        check_free(folder, [*self.formats.names(kinds), *files], force=self.force)
+        return folder
 
     @property
     def console(self) -> Console:
@@ -80,36 +92,59 @@ class Options:
             files,
             force=self.force,
             by=click.get_current_context().info_name,
-            before=lambda: self.tell(document) if document is not None else None,
+            before=lambda: self.print_json(document) if document is not None else None,
         )
         self.say(f"wrote {', '.join(files)} to {folder}")
 
-    def require_free(self, folder: Path, names: Sequence[str]) -> None:
-        """Refuse before the work rather than after it."""
-        check_free(folder, list(names), force=self.force)
-
-    def tell(self, document: Mapping[str, Any]) -> None:
+    def print_json(self, document: Mapping[str, Any]) -> None:
         """The result on standard output, where --json asks for it."""
         if self.as_json:
             sys.stdout.write(to_json(document).decode())
             sys.stdout.flush()
 
 
-def with_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator of a command: the options that all have, and those of the files it writes, become one `options`."""
+def with_options(folder: str, *forms: Parameter) -> Parameter:
+    """Decorator of a command: the options that all have become one `options`.
 
-    @wraps(function)
-    def wrapped(*args: Any, **kwargs: Any) -> Any:
-        given = {name: kwargs.pop(name) for name in ("output", "verbose", "quiet", "as_json", "force")}
-        formats = Formats(
-            pictures=not kwargs.pop("no_plots"),
-            pages=not kwargs.pop("no_report", False),
-            table_form=kwargs.pop("table_format", Formats.table_form),
-            picture_forms=tuple(dict.fromkeys(kwargs.pop("plot_format", Formats.picture_forms))),
+    Args:
+        folder: where results go without --output, as the help says it.
+        forms: options on the form of what it writes: TABLE_FORMAT, PLOT_FORMAT, NO_REPORT.
+    """
+
+    def decorate(function: Function) -> Function:
+        @wraps(function)
+        def wrapped(
+            output: Path | None,
+            verbose: bool,
+            quiet: bool,
+            as_json: bool,
+            no_plots: bool,
+            force: bool,
+            table_format: Form = Formats.table_form,
+            plot_format: Sequence[Picture] = Formats.picture_forms,
+            no_report: bool = False,
+            **others: Any,
+        ) -> Any:
+            formats = Formats(
+                pictures=not no_plots,
+                pages=not no_report,
+                table_form=table_format,
+                picture_forms=tuple(dict.fromkeys(plot_format)),
+            )
+            return function(options=Options(output, verbose, quiet, as_json, formats, force), **others)
+
+        return in_order(
+            wrapped,
+            click.option("-o", "--output", type=Folder(path_type=Path), help=f"Folder for the results [{folder}]."),
+            click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, correlations, files."),
+            click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
+            click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output."),
+            click.option("--no-plots", is_flag=True, help="Write no plots."),
+            click.option("--force", is_flag=True, help="Replace results that stand."),
+            *forms,
         )
-        return function(*args, options=Options(formats=formats, **given), **kwargs)
 
-    return wrapped
+    return decorate
 
 
 @dataclass(frozen=True)
@@ -117,7 +152,7 @@ class Task:
     """Work on one campaign as its command line asks for it."""
 
     campaign: Path
-    loss: str | None
+    loss: Loss | None
     max_nrmse: float | None
     options: Options
 
@@ -136,9 +171,8 @@ class Task:
 
         options, loaded = self.options, load_campaign(self.campaign)
         if self.loss:
-            loaded = replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", self.loss)))
-        folder = options.folder(loaded.name)
-        options.require_free(folder, options.formats.names(job.kinds(loaded)))
+            loaded = replace(loaded, fit=replace(loaded.fit, loss=self.loss))
+        folder = options.free_folder(loaded.name, job.kinds(loaded))
         data = Data.of(loaded)
         options.warn(data.notes)
         outcome = job.run(data)
@@ -152,21 +186,42 @@ class Task:
             click.get_current_context().exit(1)
 
 
-def with_task(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator of a command on one campaign: CAMPAIGN and its options become one `task`."""
+def with_task(*forms: Parameter, soft_l1: str = "points far off pull less, outliers not at all") -> Parameter:
+    """Decorator of a command on one campaign, with tables and plots: CAMPAIGN and its options become one `task`.
 
-    @click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=click.Path(path_type=Path))
-    @with_options
-    @wraps(function)
-    def wrapped(*args: Any, options: Options, **kwargs: Any) -> Any:
-        campaign = _only(kwargs.pop("campaigns"))
-        task = Task(campaign, kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
-        return function(*args, task=task, **kwargs)
+    Args:
+        forms: further ones of `with_options`.
+        soft_l1: what this loss does, as the help says it.
+    """
 
-    return wrapped
+    def decorate(function: Function) -> Function:
+        @with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, *forms)
+        @wraps(function)
+        def wrapped(
+            campaigns: Sequence[Path], loss: Loss | None, max_nrmse: float | None, options: Options, **others: Any
+        ) -> Any:
+            return function(task=Task(_one_campaign(campaigns), loss, max_nrmse, options), **others)
+
+        return in_order(
+            wrapped,
+            click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
+            click.option(
+                "--loss",
+                type=click.Choice(["linear", "soft_l1"]),
+                help=f"linear: least squares [the campaign's, else this]. soft_l1: {soft_l1}.",
+            ),
+            click.option(
+                "--max-nrmse",
+                type=Size("share such as 0.02"),
+                metavar="SHARE",
+                help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
+            ),
+        )
+
+    return decorate
 
 
-def _only(campaigns: Sequence[Path]) -> Path:
+def _one_campaign(campaigns: Sequence[Path]) -> Path:
     """The one campaign of a command line; several test files in its place are told what makes one of them."""
     from bushfit.campaign.campaign import refuse_tests
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, open_source, progress, with_options
-from bushfit.cli.grids import asked_for
-from bushfit.cli.options import command_called, option_of
+from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_source, progress, with_options
+from bushfit.cli.grids import asked_for, grid_options
+from bushfit.cli.options import FILE, NO_REPORT, PLOT_FORMAT, TABLE_FORMAT, command_called, option_of, place_option
 from bushfit.cli.show import new_table
-from bushfit.errors import naming, typed
+from bushfit.errors import naming
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
@@ -22,15 +22,26 @@ if TYPE_CHECKING:
 _ALL = "all"
 
 
-@command_called("compare")
-@click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@with_options
+@command_called(
+    "compare", "configs/cmp_15961.toml configs/arm_bushing.toml", "configs/arm_bushing.toml --families sliders,kraus"
+)
+@click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=FILE)
+@click.option(
+    "--families",
+    is_flag=False,
+    flag_value=_ALL,
+    metavar="[NAME,...]",
+    help="Compare model families on the one campaign A: the paper's, and those named, effects joined by + [each law of "
+    "rate with each of amplitude].",
+)
+@place_option(
+    "axial, radial or torsion, or a specimen's name: where to compare, and which tests of campaigns to fit; may be "
+    "given again [all where each was fitted]."
+)
+@grid_options("as far as all were measured")
+@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, NO_REPORT)
 def command(
-    sources: tuple[Path, ...],
-    families: str | None,
-    directions: tuple[str, ...],
-    options: Options,
-    **grids: str | None,
+    sources: tuple[Path, ...], families: str | None, directions: tuple[str, ...], options: Options, **grids: str | None
 ) -> None:
     """Compare A, the reference, with others: what differs, by how much, and whether by more than chance.
 
@@ -46,32 +57,31 @@ def command(
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.effects import effect_named
-    from bushfit.jobs import about
     from bushfit.jobs.compare import MOST, Compare
+    from bushfit.jobs.provenance import command_line, repeated_options
 
     if families is None and not 2 <= len(sources) <= MOST:
         raise click.UsageError(f"2 to {MOST} results are compared; one campaign alone with '--families' after it.")
     if families is not None and len(sources) > 1:
         raise click.UsageError("'--families' is of one campaign.")
-    asked = asked_for(directions, grids)
-    words = about.asked(direction=directions, **{option_of(name)[2:]: [text] for name, text in grids.items() if text})
-    words = (*map(str, sources), *about.asked(families=[families] if families is not None else []), *words)
-    typed_words = ["bushfit", "compare", *(typed(Path(word)) for word in words)]
-    job = Compare(asked, " ".join(typed_words))
+    words = repeated_options(
+        families=[families] if families is not None else [],
+        direction=directions,
+        **{option_of(name)[2:]: [text] for name, text in grids.items() if text},
+    )
+    job = Compare(asked_for(directions, grids), command_line("compare", *map(str, sources), *words))
     if families is not None:
         names = () if families == _ALL else tuple(name.replace(" ", "") for name in families.split(","))
         with naming(place="--families"):
             for name in names:
                 all(map(effect_named, name.split("+")))
         campaign = load_campaign(sources[0])
-        folder = options.folder(campaign.name, "{} families")
-        options.require_free(folder, options.formats.names(job.kinds(families=True)))
+        folder = options.free_folder(campaign.name, job.kinds(families=True), form="{} families")
         with progress(options, "family") as advance:
             outcome = job.run_families(campaign, str(sources[0]), names, advance)
     else:
         opened = [_opened(source) for source in sources]
-        folder = options.folder(" and ".join(each.name for each, *_ in opened))
-        options.require_free(folder, options.formats.names(job.kinds()))
+        folder = options.free_folder(" and ".join(each.name for each, *_ in opened), job.kinds())
         outcome = job.run([job.entry(*each) for each in opened])
     _tell(options, outcome)
     options.write(folder, options.formats.files(outcome.contents), outcome.document)
@@ -102,7 +112,7 @@ def _tell(options: Options, outcome: Compared) -> None:
         for cells in SideBySide.of(outcome.document).family_cells():
             table.add_row(*cells)
         options.console.print(table)
-    for line in (*outcome.judged, *(outcome.words if options.verbose or not outcome.families else ())):
+    for line in (*outcome.advice, *(outcome.words if options.verbose or not outcome.families else ())):
         options.say(line)
     options.warn(outcome.warnings)
 

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
 from rich.markup import escape
 
 from bushfit.cli.common import Options, Task, open_model, with_task
-from bushfit.cli.options import command_called
+from bushfit.cli.options import FILE, NO_REPORT, command_called
 from bushfit.cli.show import new_table, parameter_table
 from bushfit.errors import BushfitError, naming
 from bushfit.units import alike, for_people, number, quantity
@@ -22,15 +23,25 @@ if TYPE_CHECKING:
 _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 
 
-@command_called("diagnose")
-@with_task
+@command_called("diagnose", "configs/mystery_mount.toml")
+@click.option(
+    "--model", type=FILE, help="Start from this model's effects [the paper's three]; its values are fitted anew."
+)
+@click.option(
+    "--adopt",
+    multiple=True,
+    metavar="EFFECT",
+    help="Add this effect by hand, such as inertia, or mend a mistake in the record of a test, such as "
+    "peak_to_peak:sweep_axial; may be given again.",
+)
+@click.option(
+    "--without", multiple=True, metavar="EFFECT", help="Do not consider this effect or mistake; may be given again."
+)
+@click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
+@click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
+@with_task(NO_REPORT, soft_l1="the same with outliers left out")
 def command(
-    model: Path | None,
-    adopt: tuple[str, ...],
-    without: tuple[str, ...],
-    max_effects: int,
-    tolerance: str,
-    task: Task,
+    model: Path | None, adopt: tuple[str, ...], without: tuple[str, ...], max_effects: int, tolerance: str, task: Task
 ) -> None:
     """Find where the model and the tests of CAMPAIGN disagree, name the missing effect, add it, show the gap shrink.
 
@@ -45,16 +56,12 @@ def command(
     from bushfit.jobs.diagnose import Diagnose
 
     start = open_model(model) if model else None
-    settings = Settings(max_effects, _share(tolerance), adopt, without, start.unresolved if start else ())
-    task.perform(Diagnose(settings, start.model if start else None), tell_diagnosis)
-
-
-def _share(text: str) -> float:
     with naming(place="--tolerance"):
-        share = quantity(text, "1")
+        share = quantity(tolerance, "1")
         if not 0.0 <= share <= 1.0:
-            raise BushfitError("this is no share of |K|", found=f'"{text}"', expected="0 % to 100 %")
-    return share
+            raise BushfitError("this is no share of |K|", found=f'"{tolerance}"', expected="0 % to 100 %")
+    settings = Settings(max_effects, share, adopt, without, start.unresolved if start else ())
+    task.perform(Diagnose(settings, start.model if start else None), tell_diagnosis)
 
 
 def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
@@ -63,7 +70,7 @@ def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
     tell_verdict(options, name, outcome)
     tell_findings(options, outcome)
     for effect in outcome.document["effects"]:
-        _tell_evidence(options, effect)
+        options.console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
     if options.verbose:
         _tell_candidates(options, diagnosis)
     if diagnosis.added or options.verbose:
@@ -133,12 +140,6 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
         console.print(f"    the line that puts it right: {escape(effect['correction'])}")
     if effect["alternatives"]:
         console.print(f"    cannot be told from: {escape(', '.join(effect['alternatives']))}")
-
-
-def _tell_evidence(options: Options, effect: Mapping[str, Any]) -> None:
-    """Why an effect was named."""
-    console = options.console
-    console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
 
 
 def _tell_candidates(options: Options, diagnosis: Diagnosis) -> None:

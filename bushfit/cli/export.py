@@ -5,14 +5,36 @@ from typing import Literal
 
 import click
 
-from bushfit.cli.common import Options, open_model, with_options
-from bushfit.cli.grids import asked_for, positive
-from bushfit.cli.options import command_called
+from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
+from bushfit.cli.grids import asked_for, grid_options, positive
+from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, command_called, place_option
 
 
-@command_called("export")
-@click.argument("model", type=click.Path(path_type=Path))
-@with_options
+@command_called(
+    "export",
+    "data/arm_bushing/truth.json --format nastran --format xlsx",
+    'data/arm_bushing/truth.json --format abaqus --units "m kg s N" -o results/si',
+)
+@click.argument("model", type=FILE)
+@click.option(
+    "--format",
+    "formats",
+    type=click.Choice(["fmu", "nastran", "abaqus", "adams", "csv", "xlsx"]),
+    multiple=True,
+    required=True,
+    help="May be given again.",
+)
+@click.option("--campaign", type=FILE, help="Take the grid of this campaign's [predict], or of its sweeps.")
+@place_option(
+    "axial, radial or torsion, or a specimen's name; may be given again [axial and radial, and all specimens]."
+)
+@grid_options("the campaign's")
+@click.option(
+    "--units", help='Length, mass, time and force that fit together [decks "mm t s N"; tables as predict; fmu SI].'
+)
+@click.option("--dialect", type=click.Choice(["optistruct"]), help="Of --format nastran: |K| and loss angle.")
+@click.option("--accuracy", default="1 %", help="Largest error of the modulus that an fmu may have [1 %].")
+@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT)
 def command(
     model: Path,
     formats: tuple[str, ...],
@@ -36,6 +58,7 @@ def command(
     from bushfit.export.systems import UnitSystem
     from bushfit.jobs.export import Export, source_of
     from bushfit.jobs.predict import Predict
+    from bushfit.report.contents import Kinds
 
     result, loaded = open_model(model), load_campaign(campaign) if campaign else None
     asked = asked_for(directions, grids)
@@ -51,8 +74,7 @@ def command(
         dialect or "nastran",
         options.formats.table_form == "decimal-comma",
     )
-    folder = options.folder((loaded or result).name)
-    options.require_free(folder, [])
+    folder = options.free_folder((loaded or result).name, Kinds())
     outcome = job.run(result, source_of(model), loaded)
     for name, exported in outcome.exported.items():
         for loss in exported.losses:

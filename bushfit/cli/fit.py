@@ -3,13 +3,16 @@
 from contextlib import nullcontext
 from pathlib import Path
 
+import click
+
 from bushfit.cli.common import Task, open_model, progress, with_task
-from bushfit.cli.options import command_called
+from bushfit.cli.options import FILE, command_called, place_option
 from bushfit.cli.show import tell_fit
 
 
-@command_called("fit-static")
-@with_task
+@command_called("fit-static", "configs/cmp_15961.toml")
+@click.option("--dynamic", type=FILE, help="Hold the springpot at m and alpha of this dynamic.json or model.json.")
+@with_task()
 def static(dynamic: Path | None, task: Task) -> None:
     """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, the springpot held.
 
@@ -23,8 +26,13 @@ def static(dynamic: Path | None, task: Task) -> None:
     task.perform(FitStatic(open_model(dynamic) if dynamic else None), tell_fit)
 
 
-@command_called("fit-dynamic")
-@with_task
+@command_called("fit-dynamic", "configs/cmp_15961.toml")
+@click.option(
+    "--static",
+    type=FILE,
+    help="Hold mu, sigma_fmax and eps_half at those of this static.json [fitted to the loops on the spot].",
+)
+@with_task()
 def dynamic(static: Path | None, task: Task) -> None:
     """Fit m and alpha to the smallest-amplitude sweep of CAMPAIGN, the other three held.
 
@@ -38,8 +46,21 @@ def dynamic(static: Path | None, task: Task) -> None:
     task.perform(FitDynamic(open_model(static) if static else None), tell_fit)
 
 
-@command_called("fit")
-@with_task
+@command_called("fit", "configs/arm_bushing.toml --direction axial --direction radial --profile")
+@place_option(
+    "Tests to fit: axial, radial or torsion, or a specimen's name; may be given again [axial, as in the paper, and all "
+    "specimens; of loops, or of sweeps, all where none is axial]."
+)
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME",
+    help="Add an effect to the paper's three and to those of [fit] effects, such as inertia; may be given again. A "
+    "wrong NAME lists them all.",
+)
+@click.option("--profile", is_flag=True, help="Add 95 % intervals by profile likelihood (some seconds).")
+@with_task()
 def fit(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:
     """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
 

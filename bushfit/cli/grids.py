@@ -6,7 +6,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from bushfit.cli.options import option_of
+import click
+
+from bushfit.cli.options import Parameter, in_order, option_of
 from bushfit.errors import UnitError, naming
 from bushfit.units import quantity
 
@@ -17,6 +19,19 @@ if TYPE_CHECKING:
 _MOST_VALUES = 100_000
 #: SI units of the options of a grid, by their keys.
 _UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
+
+
+def grid_options(usual: str) -> Parameter:
+    """Where stiffness is predicted, by the keys of [predict]; `usual` says what the grid is without them."""
+    return lambda function: in_order(
+        function,
+        click.option("--frequencies", help=f'Such as "5:155:10 Hz" or "20, 50, 100 Hz" [{usual}].'),
+        click.option("--amplitudes", help=f'Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [{usual}].'),
+        click.option("--torsion-amplitudes", help='Zero-to-peak rotation, for --direction torsion ["0.5, 1, 2 deg"].'),
+        click.option(
+            "--strain-amplitudes", help='Zero-to-peak strain, for specimens that give a modulus ["1, 2, 5 %"].'
+        ),
+    )
 
 
 def asked_for(directions: Sequence[str], grids: Mapping[str, str | None]) -> PredictSettings:

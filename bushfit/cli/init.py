@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, with_options
+from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
+from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.inspect import tell_left_out
-from bushfit.cli.options import command_called, files_argument, option_of
-from bushfit.cli.raw import direction_error, options_named, with_stated
+from bushfit.cli.options import command_called, option_of
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
+from bushfit.report.folder import check_free
 from bushfit.units import quantity
 
 if TYPE_CHECKING:
@@ -22,10 +23,19 @@ if TYPE_CHECKING:
 _SIDES = ("inner", "outer")
 
 
-@command_called("init")
-@files_argument
-@with_stated
-@with_options
+@command_called(
+    "init",
+    "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_axial.csv "
+    '--inner-diameter "28 mm" --outer-diameter "40 mm" --length "45 mm"',
+)
+@click.option("--inner-radius", help='Of the rubber, such as "10 mm"; or else')
+@click.option("--inner-diameter", help='such as "20 mm".')
+@click.option("--outer-radius", help='Of the rubber, such as "18 mm"; or else')
+@click.option("--outer-diameter", help='such as "36 mm".')
+@click.option("--length", help='Mean length of the rubber, such as "34 mm".')
+@click.option("--name", help="Of the bushing [the folder of the first file].")
+@with_stated()
+@with_options(CAMPAIGN_FOLDER)
 def command(
     files: tuple[Path, ...], name: str | None, stated: Mapping[str, Any], options: Options, **sizes: str | None
 ) -> None:
@@ -43,9 +53,11 @@ def command(
     from bushfit.inspection.draft import campaign_text, campaigns_of_parts, with_specimens_named
 
     name = name or (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
-    folder, target = _place(options, name)
+    folder, target = options.folder(name), "campaign.toml"
+    if options.output and options.output.suffix == ".toml":
+        folder, target = options.output.parent, options.output.name
     bushing = _bushing(name, sizes) if any(sizes.values()) else None
-    options.require_free(folder, [target])
+    check_free(folder, [target], force=options.force)
     seen, left_out = _usable(files, stated, is_sized=bushing is not None)
     seen = with_specimens_named(seen)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
@@ -54,7 +66,7 @@ def command(
     if len({one.part for one in seen if one.part}) > 1:
         target = target if options.output and options.output.suffix == ".toml" else "batch.toml"
         written = campaigns_of_parts(name, table, seen, folder, target)
-        options.require_free(folder, list(written))
+        check_free(folder, list(written), force=options.force)
     else:
         written = {target: campaign_text(name, table, seen, folder)}
     if bushing:
@@ -83,15 +95,6 @@ def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
         raise click.UsageError(f"Missing option '{options[0]}' or '{options[1]}'.")
     with naming(place=options[1]):
         return f"{1e3 * quantity(diameter, 'm') / 2.0:.12g} mm"
-
-
-def _place(options: Options, name: str) -> tuple[Path, str]:
-    """Folder and name of the campaign."""
-
-    file = options.output
-    if file and file.suffix == ".toml":
-        return file.parent, file.name
-    return options.folder(name), "campaign.toml"
 
 
 def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[str, str]]:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, with_options
-from bushfit.cli.options import command_called, files_argument
-from bushfit.cli.raw import options_named, with_stated
+from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
+from bushfit.cli.file_options import options_named, with_stated
+from bushfit.cli.options import PLOT_FORMAT, command_called
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
 from bushfit.report import plots
@@ -28,10 +28,9 @@ _KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw ste
 _FILES_A_PICTURE = 5
 
 
-@command_called("inspect")
-@files_argument
-@with_stated
-@with_options
+@command_called("inspect", "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv")
+@with_stated()
+@with_options(FIRST_FILE_FOLDER, PLOT_FORMAT)
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories, in any mixture.
 
@@ -50,12 +49,11 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     from bushfit.inspection.draft import pasted_text, with_specimens_named
     from bushfit.inspection.gathering import gather, with_contradictions
 
-    folder = options.folder(files[0].stem)
     sources, left_out = gather(files, stated)
     tell_left_out(options, left_out)
     last = math.ceil(len(sources) / _FILES_A_PICTURE)
     pages = ["inspect", *(f"inspect_{page}" for page in range(2, last + 1))]
-    options.require_free(folder, options.formats.names(Kinds(pictures=tuple(pages))))
+    folder = options.free_folder(files[0].stem, Kinds(pictures=tuple(pages)))
     seen: list[Inspected] = []
     failed: list[BushfitError] = []
     for source in sources:
@@ -89,7 +87,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         }
         options.write(folder, options.formats.files(Contents(pictures=figures)), document)
     else:
-        options.tell(document)
+        options.print_json(document)
 
 
 def tell(options: Options, seen: Inspected) -> None:

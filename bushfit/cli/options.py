@@ -1,31 +1,33 @@
-"""Commands and their options by commands.toml, and the types of these."""
+"""What options are made of: their types, those that several commands have, and commands with examples."""
 
 import math
-import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, get_args
 
 import click
 
-from bushfit.cli import TABLES
-from bushfit.errors import MeasurementError
 from bushfit.reading.tablefile import Form
 from bushfit.report.contents import Picture
 
-#: Hours of the rig at most: months, as a typing error.
-_MOST_HOURS = 2000.0
+Function = Callable[..., Any]
+#: Decorator that gives the function of a command an option or an argument.
+Parameter = Callable[[Function], Function]
+
+#: Type of an option or an argument that names a file or a folder.
+FILE = click.Path(path_type=Path)
 
 
-class _Direction(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
+class Direction(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
     """A direction of a test; geometry, which lists them, is slow to import, and is asked when they are needed."""
 
     name = "direction"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        from bushfit.geometry import Direction
+        from bushfit import geometry
 
-        return Direction(click.Choice([str(direction) for direction in Direction]).convert(value, param, ctx))
+        choice = click.Choice([str(direction) for direction in geometry.Direction])
+        return geometry.Direction(choice.convert(value, param, ctx))
 
 
 class _Place(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
@@ -37,7 +39,7 @@ class _Place(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
         return str(value) if str(value).strip() else self.fail("this is no direction: an empty text", param, ctx)
 
 
-class _Folder(click.Path):
+class Folder(click.Path):
     """A folder for results; an empty text, as of a variable that is not set, is none."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -46,11 +48,11 @@ class _Folder(click.Path):
         )
 
 
-class _Size(click.FloatRange):
-    """A number within ends, called by what it is of; nan, which click takes, is none."""
+class Size(click.FloatRange):
+    """A number above zero, called by what it is of; nan, which click takes, is none."""
 
-    def __init__(self, name: str, **ends: Any) -> None:
-        super().__init__(**ends)
+    def __init__(self, name: str, most: float | None = None) -> None:
+        super().__init__(min=0.0, max=most, min_open=True)
         self.name = name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -58,38 +60,22 @@ class _Size(click.FloatRange):
         return size if math.isfinite(size) else self.fail(f"{value} is no {self.name}", param, ctx)
 
 
-#: What click takes for each type of commands.toml; of a place several may be given.
-_TYPES: Mapping[str, Mapping[str, Any]] = {
-    "direction": {"type": _Direction()},
-    "flag": {"is_flag": True},
-    "folder": {"type": _Folder(path_type=Path)},
-    "hours": {"type": _Size("time in hours such as 8", min=0.0, max=_MOST_HOURS, min_open=True), "metavar": "HOURS"},
-    "integer": {"type": int},
-    "path": {"type": click.Path(path_type=Path)},
-    "picture form": {"type": click.Choice(get_args(Picture))},
-    "place": {"type": _Place(), "multiple": True},
-    "share": {"type": _Size("share such as 0.02", min=0.0, min_open=True)},
-    "table form": {"type": click.Choice(get_args(Form))},
-}
+def command_called(name: str, *examples: str) -> Callable[[Function], click.Command]:
+    """Decorator that makes a function a command, with command lines at the end of its help.
+
+    These work in a copy of the repository.
+    """
+    title = f"Example{'s' * (len(examples) > 1)}:"
+    return click.command(
+        name, epilog="\n".join(["\b", title, *(f"  bushfit {name} {line}".rstrip() for line in examples)])
+    )
 
 
-def command_called(name: str) -> Callable[[Callable[..., Any]], click.Command]:
-    """Decorator that makes a function a command, with its options, and its examples at the end of the help."""
-    lines = TABLES["examples"][name]
-    title = f"Example{'s' * (len(lines) > 1)}:"
-    epilog = "\n".join(["\b", title, *(f"  bushfit {line}" for line in lines)])
-
-    def decorate(function: Callable[..., Any]) -> click.Command:
-        command = click.command(name, epilog=epilog)(function)
-        command.params.extend(_options(name))
-        return command
-
-    return decorate
-
-
-def rows(*tables: str) -> list[str]:
-    """The arguments of a command for the options of some tables."""
-    return [name.replace("-", "_") for table in tables for name in TABLES[table]]
+def in_order(function: Function, *parameters: Parameter) -> Function:
+    """A command with options and arguments in the order of its help, before those that it has."""
+    for parameter in reversed(parameters):
+        function = parameter(function)
+    return function
 
 
 def option_of(key: str) -> str:
@@ -97,39 +83,29 @@ def option_of(key: str) -> str:
     return "--" + key.replace("_", "-")
 
 
-#: What test files are not, by their endings.
-_NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
+def place_option(words: str) -> Parameter:
+    """Directions or specimens by name, as `directions`."""
+    return click.option("--direction", "directions", type=_Place(), multiple=True, help=words)
 
 
-def _tests_alone(_: click.Context, __: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
-    """Refuse a campaign or a model among test files."""
-    for file in files:
-        if (found := _NO_TESTS.get(file.suffix.lower())) and file.is_file():
-            hint = "bushfit diagnose looks at all tests of a campaign together; name its files, or their folder, here"
-            raise MeasurementError("a test file is needed", file=file, found=found, expected="a table", hint=hint)
-    return files
-
-
-#: Decorator of a command that takes files.
-files_argument = click.argument(
-    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path), callback=_tests_alone
+#: Decorators of a command that writes tables, pictures or pages.
+TABLE_FORMAT: Parameter = click.option(
+    "--table-format",
+    type=click.Choice(get_args(Form)),
+    metavar="FORM",
+    default="csv",
+    envvar="BUSHFIT_TABLE_FORMAT",
+    show_envvar=True,
+    help="csv, decimal-comma (for a German Excel), xlsx [csv].",
 )
-
-
-def _options(table: str, without: str = "") -> Iterator[click.Option]:
-    """The options of a table; `without` stands in their help where it says what holds without them."""
-    for name, row in TABLES[table].items():
-        if isinstance(row, str):  # the rows of another table stand here
-            yield from _options(name, row)
-            continue
-        given = dict(row)
-        kind, ends = given.pop("type", None), given.pop("range", None)
-        known = {"type": click.Choice(kind)} if isinstance(kind, list) else _TYPES[kind] if kind else {}
-        if ends:
-            known = {"type": click.IntRange(*ends)}
-        if given.get("default") == "cores":
-            given["default"] = os.cpu_count() or 1
-        to = given.pop("to", "directions" if kind == "place" else name.replace("-", "_"))
-        short = [given.pop("short")] if "short" in given else []
-        words = given.pop("help").replace("{}", without)
-        yield click.Option([*short, f"--{name}", to], help=words, **known, **given)
+PLOT_FORMAT: Parameter = click.option(
+    "--plot-format",
+    type=click.Choice(get_args(Picture)),
+    multiple=True,
+    metavar="FORM",
+    default=["png"],
+    envvar="BUSHFIT_PLOT_FORMAT",
+    show_envvar=True,
+    help="png, svg, pdf; may be given again [png].",
+)
+NO_REPORT: Parameter = click.option("--no-report", is_flag=True, help="Write no page (HTML).")

@@ -14,8 +14,8 @@ import click
 from rich.markup import escape
 
 from bushfit.cli.common import Options, open_source, with_options
-from bushfit.cli.grids import asked_for
-from bushfit.cli.options import command_called
+from bushfit.cli.grids import asked_for, grid_options
+from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, Size, command_called, place_option
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import for_people, number
@@ -26,15 +26,47 @@ if TYPE_CHECKING:
     from bushfit.planning.check import Check
     from bushfit.planning.contract import Aim
 
+#: Hours of the rig at most: months, as a typing error.
+_MOST_HOURS = 2000.0
 #: Effects that the terminal shows at most without -v: those that the plan shows least well beside the standard.
 _MOST_EFFECTS = 6
 #: Amplitudes or frequencies of a test that are listed in full at most.
 _MOST_VALUES = 6
 
 
-@command_called("plan")
-@click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
-@with_options
+@command_called("plan", "configs/arm_bushing.toml --hours 4", "configs/new_bushing.toml --hours 2.5 --for parameters")
+@click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
+@click.option(
+    "--for",
+    "aim",
+    type=click.Choice(["parameters", "predictions", "rivals"]),
+    help="What the tests are to tell best: errors of parameters, of stiffness, or rivals apart [predictions].",
+)
+@click.option(
+    "--hours",
+    type=Size("time in hours such as 8", _MOST_HOURS),
+    metavar="HOURS",
+    default=8.0,
+    show_default=True,
+    help="Of the rig, at most.",
+)
+@place_option(
+    "axial, radial or torsion, or a specimen's name: where the rig can test; may be given again [axial and radial of a "
+    "bushing, else all specimens]."
+)
+@click.option("--parameters", metavar="NAME,...", help="Whose errors count, with --for parameters [all].")
+@click.option(
+    "--rivals",
+    metavar="NAME,...",
+    help="Effects to be told apart [those that a diagnosis of the campaign cannot tell].",
+)
+@grid_options("the campaign's")
+@click.option("--campaign", type=FILE, help="Of MODEL.json: take the [rig] and [predict] of this campaign.")
+@click.option(
+    "--check", "count", type=click.IntRange(2, 100_000), metavar="N", help="Simulate the plan N times, and fit each."
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of --check.")
+@with_options("results/plan <name>", TABLE_FORMAT, PLOT_FORMAT)
 def command(
     source: Path,
     aim: str | None,
@@ -68,8 +100,7 @@ def command(
     opened, beside = open_source(source), load_campaign(campaign) if campaign else None
     if beside and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' goes with MODEL.json.")
-    folder = options.folder(opened.name, "plan {}")
-    options.require_free(folder, [*options.formats.names(job.kinds()), CAMPAIGN_FILE])
+    folder = options.free_folder(opened.name, job.kinds(), CAMPAIGN_FILE, form="plan {}")
     with naming(source):
         outcome = job.run(opened, beside)
     _tell(options, outcome)

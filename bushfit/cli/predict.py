@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, open_model, with_options
-from bushfit.cli.grids import asked_for, positive
-from bushfit.cli.options import command_called
+from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
+from bushfit.cli.grids import asked_for, grid_options, positive
+from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, command_called, place_option
 from bushfit.cli.show import new_table, tell_tests
 
 if TYPE_CHECKING:
@@ -19,9 +19,34 @@ if TYPE_CHECKING:
 _MOST_AMPLITUDES = 8
 
 
-@command_called("predict")
-@click.argument("model", type=click.Path(path_type=Path))
-@with_options
+@command_called("predict", 'data/arm_bushing/truth.json --frequencies "10:100:10 Hz" --amplitudes "0.1, 0.5 mm"')
+@click.argument("model", type=FILE)
+@click.option(
+    "--campaign", type=FILE, help="Lay its sweeps over the plots and beside the prediction, and use its [predict] grid."
+)
+@click.option(
+    "--bushing",
+    type=FILE,
+    metavar="FILE",
+    help="Predict another bushing of the same compound: the [bushing] table of this TOML file.",
+)
+@place_option(
+    "axial, radial or torsion, or a specimen's name; may be given again [axial and radial of a bushing, and all "
+    "specimens]."
+)
+@grid_options("the campaign's")
+@click.option("--temperature", help='Of the rubber, such as "40 degC", for a model with the effect of it [23 degC].')
+@click.option("--mass", help='Predict its resonance on each place, too: such as "1.2 kg", with --base-acceleration.')
+@click.option("--base-acceleration", help='Amplitude of the base under the mass, such as "0.1 g" or "1 m/s^2".')
+@click.option("--wide", is_flag=True, help="Also <place>_wide.csv: frequency down, amplitude across, no bands.")
+@click.option(
+    "--arms",
+    is_flag=False,
+    flag_value="1 %",
+    metavar="[ERROR]",
+    help="Also arms.csv, arms.png: Maxwell arms for the springpot, within this error [1 %].",
+)
+@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT)
 def command(
     model: Path,
     campaign: Path | None,
@@ -68,9 +93,8 @@ def command(
         warm = None if temperature is None else kelvin(temperature)
     within = positive(arms, "--arms", "1")
     job = Predict(asked, *shaken, warm, wide, within)
-    folder = options.folder((loaded or result).name)
     measured = Kinds(tables=("measured",) if loaded and loaded.sweeps else ())
-    options.require_free(folder, options.formats.names(job.kinds(result, loaded) + measured))
+    folder = options.free_folder((loaded or result).name, job.kinds(result, loaded) + measured)
     outcome = job.run(result, loaded, tuple(notes))
     tell_predictions(options, outcome)
     for found in outcome.resonances:

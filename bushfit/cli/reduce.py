@@ -9,10 +9,12 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from bushfit.cli.common import Options, with_options
+import click
+
+from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
+from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.grids import parse_grid, positive
-from bushfit.cli.options import command_called, files_argument
-from bushfit.cli.raw import direction_error, options_named, with_stated
+from bushfit.cli.options import PLOT_FORMAT, TABLE_FORMAT, command_called
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.report import plots
@@ -33,17 +35,26 @@ if TYPE_CHECKING:
 _LINES_AN_OCTAVE = 3
 
 
-@command_called("reduce")
-@files_argument
-@with_stated
-@with_options
+@command_called(
+    "reduce",
+    "data/cmp_15961_raw/stepped_sine_axial.csv",
+    'data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --specimen mount',
+)
+@with_stated(sweeps=False)
+@click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].')
+@click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
+@click.option("--mass", help='Of a resonance test, such as "0.5 kg".')
+@click.option("--mass-added", help='What moves with it, such as "15 g".')
+@click.option("--specimen", help="What was tested, where it is no bushing.")
+@click.option("--base-acceleration", help='Such as "0.1 g", where no column says it.')
+@with_options(FIRST_FILE_FOLDER, TABLE_FORMAT, PLOT_FORMAT)
 def command(
     files: tuple[Path, ...],
     stated: Mapping[str, Any],
     levels: str | None,
     cycles: int,
     options: Options,
-    **moving: str | None,
+    **shaker: str | None,
 ) -> None:
     """Reduce raw stepped-sine histories or a resonance test to a sweep.
 
@@ -58,12 +69,11 @@ def command(
 
     Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """
-
-    folder, formats = options.folder(files[0].stem), options.formats
-    options.require_free(folder, formats.names(Kinds(tables=("sweep",), pictures=("reduce",))))
-    table = _resonance_table(files[0], stated, moving)
+    formats, kinds = options.formats, Kinds(tables=("sweep",), pictures=("reduce",))
+    folder = options.free_folder(files[0].stem, kinds)
+    table = _resonance_table(files[0], stated, shaker)
     found = (
-        _histories(files, stated, levels, cycles) if table is None else _resonance(files, table, stated, moving, levels)
+        _histories(files, stated, levels, cycles) if table is None else _resonance(files, table, stated, shaker, levels)
     )
     found.tell(options)
     contents = Contents(tables={"sweep": lambda: found.points}, pictures={"reduce": found.figure})
@@ -76,7 +86,7 @@ def command(
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Reduced:
     """What files were reduced to: the points as a table, how to show and draw them, and what --json has besides.
 
     What was tested is told by `body` and `name`, as in a campaign: direction = "axial", or specimen = "mount".
@@ -91,7 +101,7 @@ class _Found:
     document: Mapping[str, Any] = field(default_factory=dict)
 
 
-def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | None, cycles: int) -> _Found:
+def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | None, cycles: int) -> _Reduced:
     """Raw stepped-sine histories, reduced."""
     from bushfit.reduction.steps import reduce
     from bushfit.report.tables import reduced_table
@@ -103,7 +113,7 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
 
     names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
     title = f"{names}: {len(reduction.steps)} points, {direction}"
-    return _Found(
+    return _Reduced(
         "direction",
         str(direction),
         reduced_table(reduction),
@@ -113,7 +123,7 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
     )
 
 
-def _resonance_table(file: Path, stated: Mapping[str, Any], moving: Mapping[str, str | None]) -> Table | None:
+def _resonance_table(file: Path, stated: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
     """The table of a resonance test; None of a file that has none of its columns, unless a mass or the like is stated.
 
     Raises:
@@ -123,7 +133,7 @@ def _resonance_table(file: Path, stated: Mapping[str, Any], moving: Mapping[str,
     from bushfit.reading.resonance import is_resonance
     from bushfit.reading.words import RESONANCE_COLUMNS
 
-    said = any(value is not None for value in moving.values())
+    said = any(value is not None for value in shaker.values())
     try:
         with options_named():
             table = open_table(file, RESONANCE_COLUMNS, stated)
@@ -135,8 +145,8 @@ def _resonance_table(file: Path, stated: Mapping[str, Any], moving: Mapping[str,
 
 
 def _resonance(
-    files: Sequence[Path], table: Table, stated: Mapping[str, Any], moving: Mapping[str, str | None], levels: str | None
-) -> _Found:
+    files: Sequence[Path], table: Table, stated: Mapping[str, Any], shaker: Mapping[str, str | None], levels: str | None
+) -> _Reduced:
     """A resonance test, reduced."""
     from bushfit.geometry import Direction
     from bushfit.inspection.recognition import direction_of
@@ -152,20 +162,20 @@ def _resonance(
             expected="one file, and no levels: the amplitude follows the resonance",
             hint="call bushfit reduce for each of them, with its own mass",
         )
-    direction, specimen = direction_of(table.file, table, stated), moving["specimen"] or None
+    direction, specimen = direction_of(table.file, table, stated), shaker["specimen"] or None
     if direction is None and specimen is None:
         error = direction_error(table.file)
         error.hint = f'{error.hint}; or name the specimen that was tested: --specimen "mount"'
         raise error
-    mass = _mass(table, direction, moving)
-    base_acceleration = positive(moving["base_acceleration"], "--base-acceleration", "m/s^2")
+    mass = _mass(table, direction, shaker)
+    base_acceleration = positive(shaker["base_acceleration"], "--base-acceleration", "m/s^2")
     read_as = direction or Direction.AXIAL  # which translation it is makes no difference to reading
     with options_named():
         reduction = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
 
     title = f"{table.file.stem}, {specimen or direction}: {number(mass, 4)} kg on a shaker"
     frequency, largest = reduction.peak
-    return _Found(
+    return _Reduced(
         "specimen" if specimen else "direction",
         specimen or str(direction),
         resonance_table(reduction),
@@ -176,9 +186,9 @@ def _resonance(
     )
 
 
-def _mass(table: Table, direction: Direction | None, moving: Mapping[str, str | None]) -> float:
+def _mass(table: Table, direction: Direction | None, shaker: Mapping[str, str | None]) -> float:
     """The mass that moves [kg]."""
-    mass = positive(moving["mass"], "--mass", "kg")
+    mass = positive(shaker["mass"], "--mass", "kg")
     if direction is not None and direction.is_rotation:
         raise MeasurementError(
             "a mass resists no rotation", file=table.file, found=str(direction), expected="a translation"
@@ -192,7 +202,7 @@ def _mass(table: Table, direction: Direction | None, moving: Mapping[str, str | 
             expected="the mass that moves on the mount",
             hint='state it: --mass "0.5 kg"',
         )
-    return mass + (positive(moving["mass_added"], "--mass-added", "kg") or 0.0)
+    return mass + (positive(shaker["mass_added"], "--mass-added", "kg") or 0.0)
 
 
 def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:

@@ -5,12 +5,12 @@ from pathlib import Path
 import click
 
 from bushfit.cli.common import Options, with_options
-from bushfit.cli.options import command_called
+from bushfit.cli.options import FILE, command_called
 
 
-@command_called("report")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@with_options
+@command_called("report", "data/reports/mystery_mount -o results/page")
+@click.argument("folder", metavar="DIR", type=FILE)
+@with_options("DIR")
 def command(folder: Path, options: Options) -> None:
     """Make one page of DIR, the results of run, diagnose, a fit, or of a batch: to show, to print, to mail.
 
@@ -23,10 +23,11 @@ def command(folder: Path, options: Options) -> None:
     """
     from bushfit.jobs.report import report
     from bushfit.report.contents import pages_of
+    from bushfit.report.folder import check_free
 
     target = options.output or folder
     base = "" if options.output is None else f"{folder.resolve().as_uri()}/"
     contents = report(folder, base)
-    options.require_free(target, [f"{name}.html" for name in contents.pages])
+    check_free(target, [f"{name}.html" for name in contents.pages], force=options.force)
     pages = pages_of(contents)
     options.write(target, pages, {"pages": {str(target / name): len(page) for name, page in pages.items()}})

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from bushfit.cli.common import Options, Task, with_task
 from bushfit.cli.diagnose import tell_findings, tell_verdict
-from bushfit.cli.options import command_called
+from bushfit.cli.options import NO_REPORT, command_called
 from bushfit.cli.predict import tell_predictions
 from bushfit.cli.show import new_table, report, tell_fit, tell_result, tell_sources
 from bushfit.units import alike, for_people, number
@@ -27,8 +27,8 @@ _COUNTED = 10.0
 _OPEN = 100.0
 
 
-@command_called("run")
-@with_task
+@command_called("run", "configs/cmp_15961.toml")
+@with_task(NO_REPORT)
 def command(task: Task) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 
@@ -41,7 +41,7 @@ def command(task: Task) -> None:
     """
     from bushfit.jobs.run import Run
 
-    task.perform(Run(), tell_run, _which)
+    task.perform(Run(), tell_run, _model_to_use)
 
 
 def tell_run(options: Options, name: str, outcome: Ran) -> None:
@@ -64,7 +64,7 @@ def tell_run(options: Options, name: str, outcome: Ran) -> None:
     options.say(two_step or f"{outcome.no_two_step}: the two-step procedure is passed over")
 
 
-def _which(folder: Path, outcome: Ran) -> str:
+def _model_to_use(folder: Path, outcome: Ran) -> str:
     """Which of the files to use."""
     which = "the joint fit"
     if outcome.diagnosed and outcome.added:

@@ -10,9 +10,9 @@ from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table
 
 
-@command_called("schema")
+@command_called("schema", "", "model")
 @click.argument("name", required=False)
-@with_options
+@with_options("nothing is written")
 def command(name: str | None, options: Options) -> None:
     """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, tell which there are.
 
@@ -41,4 +41,4 @@ def command(name: str | None, options: Options) -> None:
             table.add_row(each, described.files)
         options.console.print(table)
     if not options.output:
-        replace(options, as_json=options.as_json or name is not None).tell(document)
+        replace(options, as_json=options.as_json or name is not None).print_json(document)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, open_model, with_options
-from bushfit.cli.options import command_called, option_of
+from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
+from bushfit.cli.options import FILE, TABLE_FORMAT, command_called, option_of
 from bushfit.errors import ModelError, UnitError, naming
 from bushfit.units import is_number, quantity
 
@@ -18,9 +18,28 @@ if TYPE_CHECKING:
     from bushfit.model.model import Model
 
 
-@command_called("simulate")
-@click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
-@with_options
+@command_called("simulate", "configs/simulate_arm_bushing.toml --seed 7")
+@click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
+@click.option("--seed", type=click.IntRange(0), help="Of the random numbers; the same seed gives the same data [0].")
+@click.option("--repeats", type=click.IntRange(1, 1000), help="Of each sweep [1].")
+@click.option("--noise", help='Scatter of a sweep point relative to |K|, such as "0.5 %".')
+@click.option("--force-noise", help='Scatter of a loop\'s force relative to its half range, such as "0.3 %".')
+@click.option(
+    "--displacement-noise", help='Scatter of a loop\'s displacement relative to its amplitude, such as "0.02 %".'
+)
+@click.option(
+    "--gain-error",
+    help='Gain error shared by a run (one repeat of one amplitude, or of what is held), such as "0.4 %".',
+)
+@click.option("--phase-error", help='Phase error shared by a run, such as "0.2 deg".')
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME.PARAMETER=VALUE",
+    help='Hide an effect, such as "inertia.mass=0.1 kg".',
+)
+@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT)
 def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
     """Put a model on the virtual rig and write a campaign of simulated raw tests.
 
@@ -31,12 +50,18 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
     Writes campaign.toml, the tables it names, and truth.json, the model behind them.
     """
+    from bushfit.campaign.campaign import load_campaign, model_of
+    from bushfit.campaign.schema import SimulateSettings
     from bushfit.effects.unnamed import NAME as UNNAMED
     from bushfit.model.file import to_document
     from bushfit.simulation.files import to_files
     from bushfit.simulation.measured import simulate
 
-    truth, plan = _task(source)
+    if source.suffix.lower() == ".json":
+        truth, plan = open_model(source).model, SimulateSettings()
+    else:
+        campaign = load_campaign(source)
+        truth, plan = model_of(campaign), campaign.simulate or SimulateSettings()
     if truth.unnamed:
         options.warn(["what has no name is a correction of steady states, without a law in time: it is left out here"])
         truth = truth.without(UNNAMED)
@@ -49,16 +74,6 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     folder = options.folder(simulated.result.name, "simulated {}")
     options.say(truth.equation())
     options.write(folder, files, {"truth": to_document(simulated.result), "files": sorted(files)})
-
-
-def _task(source: Path) -> tuple[Model, SimulateSettings]:
-    from bushfit.campaign.campaign import load_campaign, model_of
-    from bushfit.campaign.schema import SimulateSettings
-
-    if source.suffix.lower() == ".json":
-        return open_model(source).model, SimulateSettings()
-    campaign = load_campaign(source)
-    return model_of(campaign), campaign.simulate or SimulateSettings()
 
 
 def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateSettings:

@@ -22,7 +22,7 @@ from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.jobs.fits import Fit
 from bushfit.jobs.grid import AMPLITUDES, common_grid
-from bushfit.jobs.predict import filled
+from bushfit.jobs.predict import columns_of
 from bushfit.model.document import BushingTable
 from bushfit.model.file import model_document, versions
 from bushfit.model.result import Result
@@ -92,11 +92,11 @@ class Compared:
         return [f"{label} against {first}, {line}" for label, found in pairs for line in found.words()]
 
     @cached_property
-    def judged(self) -> list[str]:
+    def advice(self) -> list[str]:
         """Of families, which to use; and of each but the first, whether it is nearer to what was held out."""
         pairs = list(zip(self.labels, self.families, strict=False))
-        advice = [_use(self.families, self.entries)] if self.families else []
-        return [*advice, *(f"{label}, {family.name}: {family.words}" for label, family in pairs[1:])]
+        to_use = [_family_to_use(self.families, self.entries)] if self.families else []
+        return [*to_use, *(f"{label}, {family.name}: {family.words}" for label, family in pairs[1:])]
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -137,7 +137,7 @@ class Compared:
             "compared": compared,
             "pairs": pairs,
             "families": families or None,
-            "words": [*self.judged, *self.words],
+            "words": [*self.advice, *self.words],
             "warnings": self.warnings,
             "command": self.command,
             "versions": {"bushfit": __version__, **versions()},
@@ -151,7 +151,7 @@ class Compared:
             "shared_inputs": list(found.shared),
             "joint": {"p": found.joint[0], "parameters": found.joint[1]} if found.joint else None,
             "parameters": [_plain(row) for row in found.parameters],
-            "places": {str(each.place): filled(contrast_table(found, each)) for each in found.contrasts},
+            "places": {str(each.place): columns_of(contrast_table(found, each)) for each in found.contrasts},
         }
 
     @property
@@ -292,7 +292,7 @@ class Compare:
         return self.asked.frequencies or frequencies, asked or amplitudes
 
 
-def _use(families: Sequence[FittedFamily], entries: Sequence[Entry]) -> str:
+def _family_to_use(families: Sequence[FittedFamily], entries: Sequence[Entry]) -> str:
     """Which family to use, and over what range the likely ones say the same."""
     every = list(zip(ascii_uppercase, families, entries, strict=False))
     label, family, entry = max(every, key=lambda each: each[1].probability)

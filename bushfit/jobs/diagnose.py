@@ -11,8 +11,8 @@ from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import FitError, typed
 from bushfit.fitting.data import Data
-from bushfit.jobs.about import about, asked, document_of
 from bushfit.jobs.fits import Fit, Fitted
+from bushfit.jobs.provenance import campaign_document, document_of, repeated_options
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.knowledge import look_alikes
@@ -75,12 +75,12 @@ class Diagnose:
         found = with_plan(diagnose(data, self.model, self.settings), data.campaign.path)
         if not (found.changed or self.model or self.settings.adopt):  # then the model to use is that of `fit`
             found = replace(found, result=found.odds.averaged((self.joint or Fit().run(data)).result))
-        return Diagnosed(about(data, "diagnose", self._options()), found)
+        return Diagnosed(campaign_document(data, "diagnose", self._options()), found)
 
     def _options(self) -> tuple[str, ...]:
         """What was asked for, as it is typed."""
         mine, usual = self.settings, Settings()
-        options = asked(model=["MODEL.json"] if self.model else [], adopt=mine.adopt, without=mine.without)
+        options = repeated_options(model=["MODEL.json"] if self.model else [], adopt=mine.adopt, without=mine.without)
         if mine.max_effects != usual.max_effects:
             options += ("--max-effects", str(mine.max_effects))
         return options + (("--tolerance", f"{mine.tolerance:g}") if mine.tolerance != usual.tolerance else ())

@@ -1,7 +1,7 @@
 """export: one fitted model in the files of other programs."""
 
 import importlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -109,15 +109,13 @@ class Export:
             predicted = replace(self.predict, asked=asked).run(result, campaign)
         settings = (self.accuracy, self.units, self.dialect, self.decimal_comma)
         order = Order(result, source, tuple(predicted.predictions), *settings)
-        return Written(predicted, {name: _writer(name)(order) for name in self.formats})
+        exported = {}
+        for name in self.formats:
+            module, _, function = FORMATS[name].partition(":")
+            exported[name] = getattr(importlib.import_module(f"bushfit.{module}"), function)(order)
+        return Written(predicted, exported)
 
 
 def source_of(file: Path) -> Source:
     """A model file by its name and hash."""
     return Source(Path(file.name), sha256(view_bytes(file, ModelError)).result())
-
-
-def _writer(name: str) -> Callable[[Order], Exported]:
-    """The function that writes a format."""
-    module, _, function = FORMATS[name].partition(":")
-    return getattr(importlib.import_module(f"bushfit.{module}"), function)

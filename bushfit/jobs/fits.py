@@ -11,7 +11,7 @@ from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.master_curve import can_shift
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
-from bushfit.jobs.about import about, asked, document_of
+from bushfit.jobs.provenance import campaign_document, document_of, repeated_options
 from bushfit.model.result import Result
 from bushfit.report.artifacts import fit_contents, temperature_contents
 from bushfit.report.contents import Contents, Kinds
@@ -60,7 +60,7 @@ class FitStatic:
 
     def run(self, data: Data) -> Fitted:
         result = fit_static(data, self.dynamic)
-        campaign = about(data, "fit-static", ("--dynamic", "DYNAMIC.json") if self.dynamic else ())
+        campaign = campaign_document(data, "fit-static", ("--dynamic", "DYNAMIC.json") if self.dynamic else ())
         return Fitted("static", ("loops",), data, (("static fit of the loops", result),), campaign)
 
 
@@ -86,7 +86,7 @@ class FitDynamic:
             static = fit_static(data)
             reports.append(("static fit of the loops, because no --static was given", static))
         reports.append(("dynamic fit of the smallest sweep", fit_dynamic(data, static)))
-        campaign = about(data, "fit-dynamic", ("--static", "STATIC.json") if self.static else ())
+        campaign = campaign_document(data, "fit-dynamic", ("--static", "STATIC.json") if self.static else ())
         return Fitted("dynamic", ("sweeps",), data, tuple(reports), campaign)
 
 
@@ -103,7 +103,7 @@ class Fit:
     profile: Callable[[str, int], None] | None = None
 
     def kinds(self, campaign: Campaign) -> Kinds:
-        return Kinds(("model",)) + Kinds.shown(tests_of(campaign, self._added(campaign)))
+        return Kinds(("model",)) + Kinds.shown(kinds_of_test(campaign, self._added(campaign)))
 
     def _added(self, campaign: Campaign) -> tuple[str, ...]:
         """The effects that [fit] of the campaign adds to the paper's, and those asked for."""
@@ -112,12 +112,15 @@ class Fit:
     def run(self, data: Data) -> Fitted:
         added = self._added(data.campaign)
         result = fit_joint(data, effects=with_base(added), directions=self.directions or None, profile=self.profile)
-        options = (*asked(direction=self.directions, effect=self.effects), *(["--profile"] if self.profile else []))
-        kinds = tests_of(data.campaign, added)
-        return Fitted("model", kinds, data, (("joint fit", result),), about(data, "fit", options))
+        options = (
+            *repeated_options(direction=self.directions, effect=self.effects),
+            *(["--profile"] if self.profile else []),
+        )
+        kinds = kinds_of_test(data.campaign, added)
+        return Fitted("model", kinds, data, (("joint fit", result),), campaign_document(data, "fit", options))
 
 
-def tests_of(campaign: Campaign, effects: Collection[str]) -> tuple[str, ...]:
+def kinds_of_test(campaign: Campaign, effects: Collection[str]) -> tuple[str, ...]:
     """The kinds of test that a campaign has: loops, sweeps; and what a model of effects makes of their temperatures."""
     warm = "temperature" in effects and any(map(can_shift, campaign.sweeps))
     return (*(kind for kind in ("loops", "sweeps") if getattr(campaign, kind)), *(_AT_TEMPERATURES if warm else ()))

@@ -44,7 +44,7 @@ def grid_at(
     return asked.frequencies or frequencies, getattr(asked, AMPLITUDES[place.motion]) or amplitudes
 
 
-def wanted(asked: PredictSettings, campaign: Campaign | None) -> PredictSettings:
+def grid_settings(asked: PredictSettings, campaign: Campaign | None) -> PredictSettings:
     """What is asked for, and where that says nothing the [predict] of a campaign."""
     given = {key: value for key, value in vars(asked).items() if value is not None}
     return replace(campaign.predict if campaign else PredictSettings(), **given)

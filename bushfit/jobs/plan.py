@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Place, place_named
-from bushfit.jobs.grid import grid_at, wanted
+from bushfit.jobs.grid import grid_at, grid_settings
 from bushfit.jobs.plan_document import Checked, PlanFile, PlannedRun, Reached, Rivalry, Shown
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
@@ -56,23 +56,23 @@ class Planned:
                 name: _reached([programme.errors[place] for programme in every])
                 for place, name in enumerate(known.names)
             },
-            "stiffness": dict(self._means([programme.stiffness for programme in every])),
-            "loss_factor": dict(self._means([programme.loss for programme in every])),
-            "visible": dict(self._shown()),
+            "stiffness": dict(self._root_mean_squares([programme.stiffness for programme in every])),
+            "loss_factor": dict(self._root_mean_squares([programme.loss for programme in every])),
+            "visible": dict(self._smallest_amounts()),
             "drift": {"planned": found.planned.drift, "standard": found.standard.drift},
             "rivals": self._rivalry(found.planned, found.standard),
             "check": _checked(self.check) if self.check else None,
             "warnings": list(found.notes),
         }
 
-    def _means(self, errors: Sequence[Array]) -> Iterator[tuple[str, Reached]]:
+    def _root_mean_squares(self, errors: Sequence[Array]) -> Iterator[tuple[str, Reached]]:
         """Root mean square of errors at the points of each place, of each programme."""
         points = self.plan.wanted.points
         ends = np.cumsum([each.frequency.size for each in points])[:-1]
         for each, *parts in zip(points, *(np.split(error, ends) for error in errors), strict=True):
             yield str(each.place), _reached([float(np.sqrt(np.mean(np.square(part)))) for part in parts])
 
-    def _shown(self) -> Iterator[tuple[str, Shown]]:
+    def _smallest_amounts(self) -> Iterator[tuple[str, Shown]]:
         """The smallest amounts that either programme finds of each effect."""
         for planned, standard in zip(self.plan.planned.visible, self.plan.standard.visible, strict=True):
             amounts = [each.amount if np.isfinite(each.amount) else None for each in (planned, standard)]
@@ -159,7 +159,7 @@ class PlanTests:
 
     def _points(self, result: Result, campaign: Campaign | None, usual: Sequence[Place]) -> Iterator[Points]:
         """Where the stiffness is wanted: as asked, as the campaign's [predict] says, or on the grid of `predict`."""
-        settings = wanted(self.asked, campaign)
+        settings = grid_settings(self.asked, campaign)
         places = [place_named(name, result.specimens) for name in settings.directions or ()]
         for place in places or usual:
             frequencies, amplitudes = grid_at(settings, result, place, campaign.sweeps if campaign else ())

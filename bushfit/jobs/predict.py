@@ -19,7 +19,7 @@ from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
 from bushfit.fitting.data_sets import SweepData, sweep_data
 from bushfit.geometry import Direction, Place, Specimen, place_named
-from bushfit.jobs.grid import grid_at, wanted
+from bushfit.jobs.grid import grid_at, grid_settings
 from bushfit.model.arms import Arms, model_arms
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Result, Usable
@@ -65,7 +65,7 @@ class Predicted:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        tables = {str(p.direction): filled(prediction_table(p)) for p in self.predictions}
+        tables = {str(p.direction): columns_of(prediction_table(p)) for p in self.predictions}
         shaken = {f"{found.place}_resonance": shaken_table(found).to_dict(orient="list") for found in self.resonances}
         arms = [
             {
@@ -88,15 +88,15 @@ class Predicted:
     @cached_property
     def tests(self) -> tuple[Misfit, ...]:
         """How well the model meets each of the sweeps."""
-        return misfits(self.result.model, *self._parted)
+        return misfits(self.result.model, *self._fitted_and_other_sweeps)
 
     @cached_property
     def usable(self) -> tuple[Usable, ...]:
         """Within what it meets them, by place."""
-        return met_within(self.result.model, *self._parted)
+        return met_within(self.result.model, *self._fitted_and_other_sweeps)
 
     @property
-    def _parted(self) -> tuple[list[SweepData], list[SweepData]]:
+    def _fitted_and_other_sweeps(self) -> tuple[list[SweepData], list[SweepData]]:
         """The sweeps whose files the model was fitted to, and the others."""
         files = {source.sha256 for source in self.result.inputs}
         known = [bool(sweep.source and sweep.source.sha256 in files) for sweep in self.measured]
@@ -116,10 +116,10 @@ class Predicted:
     @property
     def contents_beside(self) -> Contents:
         """The same, and the measured points beside the model's as a table."""
-        return self.contents | measured_contents(self.result, *self._parted)
+        return self.contents | measured_contents(self.result, *self._fitted_and_other_sweeps)
 
 
-def filled(table: pd.DataFrame) -> dict[str, list[Any]]:
+def columns_of(table: pd.DataFrame) -> dict[str, list[Any]]:
     """The columns of a table, None where a cell is empty."""
     return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}
 
@@ -151,7 +151,7 @@ class Predict:
         bodies = [(result.model.bushing, result.specimens)] if result else []
         bodies += [(campaign.bushing, campaign.specimens)] if campaign else []
         specimens = {specimen.name: specimen for _, some in bodies for specimen in some}
-        if names := wanted(self.asked, campaign).directions:
+        if names := grid_settings(self.asked, campaign).directions:
             return [place_named(name, specimens.values()) for name in names]
         return [*(_DIRECTIONS if bodies[0][0] or not specimens else ()), *specimens.values()]
 
@@ -176,7 +176,7 @@ class Predict:
                 expected="a model with the effect of temperature",
                 hint="fit tests at several temperatures with --effect temperature",
             )
-        settings, sweeps = wanted(self.asked, campaign), campaign.sweeps if campaign else ()
+        settings, sweeps = grid_settings(self.asked, campaign), campaign.sweeps if campaign else ()
         under = measured_session(result.model.bushing, (*campaign.loops, *sweeps) if campaign else ())
         known = [
             replace(each, under=own)

@@ -12,10 +12,10 @@ from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import TwoStep, fit_two_step
-from bushfit.jobs.about import about, document_of
 from bushfit.jobs.diagnose import Diagnose, Diagnosed
-from bushfit.jobs.fits import Fit, FitStatic, Fitted, contents_of_tests, tests_of
+from bushfit.jobs.fits import Fit, FitStatic, Fitted, contents_of_tests, kinds_of_test
 from bushfit.jobs.predict import Predict, Predicted
+from bushfit.jobs.provenance import campaign_document, document_of
 from bushfit.model.document import ModelFile
 from bushfit.model.model import FIVE
 from bushfit.model.result import Result
@@ -82,14 +82,14 @@ class Ran:
         """The documents that are files of their own."""
         results = {"static": self.static and self.static.result, "dynamic": self.two_step and self.two_step.result}
         results |= {"joint": self.joint.result if self.added else None, "model": self.result}
-        campaign = about(self.data, "run")
+        campaign = campaign_document(self.data, "run")
         documents = {name: document_of(result, campaign) for name, result in results.items() if result}
         return {**documents, "diagnosis": self.diagnosed.document} if self.diagnosed else documents
 
     @property
     def contents(self) -> Contents:
         campaign, found = self.data.campaign, self.diagnosed
-        of_tests = contents_of_tests(self.data, self.result, tests_of(campaign, campaign.fit.effects))
+        of_tests = contents_of_tests(self.data, self.result, kinds_of_test(campaign, campaign.fit.effects))
         of_gap = diagnosis_contents(found.diagnosis, campaign.name) if found else Contents()
         return (Contents(self._files) | of_tests | of_gap | self.predicted.contents).paged(report=report_page)
 
@@ -101,7 +101,7 @@ class Run:
     def kinds(self, campaign: Campaign) -> Kinds:
         steps = (("static",) if campaign.loops else ()) + (("dynamic",) if campaign.loops and campaign.sweeps else ())
         found = Kinds((*steps, "joint")) + Diagnose().kinds(campaign)
-        return found + Kinds.shown(tests_of(campaign, campaign.fit.effects)) + Predict().kinds(None, campaign)
+        return found + Kinds.shown(kinds_of_test(campaign, campaign.fit.effects)) + Predict().kinds(None, campaign)
 
     def run(self, data: Data) -> Ran:
         static = FitStatic().run(data) if data.loops else None

@@ -1,15 +1,12 @@
-"""The campaign of the paper and its joint fit in a folder, and commands typed there."""
+"""The campaign of the paper and its joint fit in a folder, and commands typed there or in an empty one."""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from commandline import Done, call
-
-Run = Callable[..., Done]
+from shell import CAMPAIGN, Run, typing
 
 
 @pytest.fixture(scope="session")
@@ -18,12 +15,26 @@ def work(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("work")
     shutil.copytree(root / "data/cmp_15961", folder / "data/cmp_15961")
     (folder / "configs").mkdir()
-    shutil.copy(root / "configs/cmp_15961.toml", folder / "configs")
-    done = call(folder, "fit", "configs/cmp_15961.toml", "-o", "model", "--no-plots")
-    assert done.returncode == 0, done.stderr
+    shutil.copy(root / CAMPAIGN, folder / "configs")
+    typing(folder)("fit", CAMPAIGN, "-o", "model", "--no-plots")
     return folder
 
 
 @pytest.fixture
+def own(work: Path, tmp_path: Path) -> Path:
+    """A folder with a copy of the campaign, to be changed."""
+    for name in ("data", "configs"):
+        shutil.copytree(work / name, tmp_path / name)
+    return tmp_path
+
+
+@pytest.fixture
 def bushfit(work: Path) -> Run:
-    return lambda *arguments: call(work, *arguments)
+    """Commands in the folder of the paper's campaign."""
+    return typing(work)
+
+
+@pytest.fixture
+def typed(tmp_path: Path) -> Run:
+    """Commands in an empty folder."""
+    return typing(tmp_path)

@@ -9,19 +9,10 @@ from itertools import cycle
 from typing import Any
 
 import numpy as np
-import spoiled_sizes as sizes
-from spoiled_exports import EXPORTS
-from spoiled_rows import (
-    IN_CAMPAIGN,
-    IN_MODEL,
-    IN_MORE,
-    IN_PREDICTED,
-    IN_RESONANCE,
-    WHOLE_CAMPAIGNS,
-    WHOLE_MODELS,
-)
-from spoiled_tables import IN_LOOP, IN_SWEEP
-from spoiled_usage import USAGE
+from spoiled_campaigns import IN_CAMPAIGN, IN_MORE, WHOLE_CAMPAIGNS
+from spoiled_models import IN_MODEL, IN_PREDICTED, WHOLE_MODELS
+from spoiled_tables import IN_LOOP, IN_RESONANCE, IN_SWEEP
+from spoiled_usage import LIMITS, USAGE
 
 CAMPAIGN = """\
 [bushing]
@@ -180,12 +171,12 @@ class Spoiled:
 def campaigns() -> Iterator[Spoiled]:
     """A text of the campaign replaced by another; the commands in turn."""
     commands = cycle(READING)
-    for old, new, *says in [*IN_CAMPAIGN, *sizes.IN_CAMPAIGN]:
+    for old, new, *says in IN_CAMPAIGN:
         assert old in CAMPAIGN, old
         text = CAMPAIGN.replace(old, new, 1)
         name = f"{old.strip()} -> {new.strip()}"
         yield Spoiled(name, (next(commands), "campaign.toml"), tuple(says), {"campaign.toml": text})
-    for old, new, *says in [*IN_MORE, *sizes.IN_MORE]:
+    for old, new, *says in IN_MORE:
         assert old in MORE, old
         text = CAMPAIGN + MORE.replace(old, new, 1)
         command = "simulate" if MORE.index(old) > MORE.index("[simulate]") else next(commands)
@@ -197,7 +188,7 @@ def campaigns() -> Iterator[Spoiled]:
 def models() -> Iterator[Spoiled]:
     """One entry of the model file changed; the commands that take a model in turn, and export each."""
     commands = cycle(TAKING_MODELS)
-    for rows, taking in (([*IN_MODEL, *sizes.IN_MODEL], commands), (IN_PREDICTED, cycle(TAKING_MODELS[:1]))):
+    for rows, taking in ((IN_MODEL, commands), (IN_PREDICTED, cycle(TAKING_MODELS[:1]))):
         for name, change, *says in rows:
             document = json.loads(json.dumps(MODEL))
             change(document)
@@ -212,28 +203,25 @@ def given(name: str, command: tuple[str, ...], says: Iterable[str], model: str |
     yield Spoiled(f"export: {name}", EXPORT, tuple(says), {"model.json": model})
 
 
-def usage() -> Iterator[Spoiled]:
-    for command, *says in [*USAGE, *EXPORTS, *sizes.USAGE]:
-        yield Spoiled(command, tuple(command.split("|")), tuple(says))
-
-
 def tables() -> Iterator[Spoiled]:
     """Rows of the measured tables changed."""
     commands = cycle(READING)
-    for name, change, *says in [*IN_LOOP, *sizes.IN_LOOP]:
+    for name, change, *says in IN_LOOP:
         yield Spoiled(f"loop: {name}", (next(commands), "campaign.toml"), tuple(says), {"loop.csv": change(loop())})
-    for name, change, *says in [*IN_SWEEP, *sizes.IN_SWEEP]:
+    for name, change, *says in IN_SWEEP:
         yield Spoiled(f"sweep: {name}", (next(commands), "campaign.toml"), tuple(says), {"sweep.csv": change(sweep())})
     for name, change, *says in IN_RESONANCE:
         command = ("reduce", "shaker.csv", "--mass", "0.5 kg", "--direction", "axial")
         yield Spoiled(f"resonance: {name}", command, tuple(says), {"shaker.csv": change(shaker())})
 
 
-def limits() -> Iterator[Spoiled]:
-    """A limit for a batch."""
-    for text, *says in sizes.LIMITS:
+def typed() -> Iterator[Spoiled]:
+    """Command lines, and limits of a batch."""
+    for command, *says in USAGE:
+        yield Spoiled(command, tuple(command.split("|")), tuple(says))
+    for text, *says in LIMITS:
         command = ("batch", "campaign*.toml", "--limits", "judge.toml")
         yield Spoiled(f"limits: {text}", command, tuple(says), {"judge.toml": text + "\n"})
 
 
-ROWS = [*limits(), *campaigns(), *models(), *usage(), *tables()]
+ROWS = [*campaigns(), *models(), *typed(), *tables()]

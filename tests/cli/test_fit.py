@@ -1,70 +1,53 @@
-"""fit-static, fit-dynamic and fit as typed: their files, and each taking what the one before wrote."""
+"""fit-static, fit-dynamic and fit as typed: their files, what they warn of, and campaigns that hold parameters."""
 
 from __future__ import annotations
 
 import json
 import re
-import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from commandline import Done, call
+from shell import CAMPAIGN, Run, document, names, typing, values
 
-Run = Callable[..., Done]
-CAMPAIGN = "configs/cmp_15961.toml"
+from bushfit.model.file import load_result
 
-
-CAMPAIGN_FILES = {
+FILES = {
     "fit-static": {"static.json", "loops.csv", "loops.png"},
     "fit-dynamic": {"dynamic.json", "sweeps.csv", "sweeps.png"},
     "fit": {"model.json", "loops.csv", "loops.png", "sweeps.csv", "sweeps.png"},
 }
+SWEEP = "data/cmp_15961/sweep_axial.csv"
+REPEATS_OFF = "repeats differ as a whole by an error of"
+ROWS_APART = "points that repeat each other lie up to"
 
 
-@pytest.mark.parametrize("command", CAMPAIGN_FILES)
+@pytest.mark.parametrize("command", FILES)
 def test_fits_write_the_files_of_the_interface(bushfit: Run, tmp_path: Path, command: str) -> None:
-    done = bushfit(command, CAMPAIGN, "-o", str(tmp_path / "x"))
-    assert done.returncode == 0, done.stderr
-    assert done.stdout == ""
-    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == CAMPAIGN_FILES[command]
+    done = bushfit(command, CAMPAIGN, "-o", tmp_path / "x")
+    assert names(tmp_path / "x") == FILES[command]
     for word in ("parameter", "std error", "95 % interval", "unit", "NRMSE"):
         assert word in done.stderr
 
 
 def test_the_paper_s_order_by_hand(bushfit: Run, tmp_path: Path) -> None:
     """fit-static, fit-dynamic --static, predict: each takes what the one before wrote."""
-    s, d, p = (str(tmp_path / name) for name in "sdp")
-    assert bushfit("fit-static", CAMPAIGN, "-o", s, "--no-plots").returncode == 0
-    assert bushfit("fit-dynamic", CAMPAIGN, "--static", f"{s}/static.json", "-o", d, "--no-plots").returncode == 0
-    done = bushfit("predict", f"{d}/dynamic.json", "-o", p, "--no-plots", "--direction", "torsion")
-    assert done.returncode == 0, done.stderr
-    assert [file.name for file in Path(p).glob("[!.]*")] == ["torsion.csv"]
-    again = bushfit("fit-static", CAMPAIGN, "--dynamic", f"{d}/dynamic.json", "-o", str(tmp_path / "s2"), "--no-plots")
+    s, d, p = (tmp_path / name for name in "sdp")
+    bushfit("fit-static", CAMPAIGN, "-o", s, "--no-plots")
+    bushfit("fit-dynamic", CAMPAIGN, "--static", s / "static.json", "-o", d, "--no-plots")
+    bushfit("predict", d / "dynamic.json", "-o", p, "--no-plots", "--direction", "torsion")
+    assert names(p) == {"torsion.csv"}
+    again = bushfit("fit-static", CAMPAIGN, "--dynamic", d / "dynamic.json", "-o", tmp_path / "s2", "--no-plots")
     assert "left out" not in again.stderr
-
-
-@pytest.fixture
-def own(work: Path, tmp_path: Path) -> Path:
-    """A folder with a copy of the campaign, to be changed."""
-    for name in ("data", "configs"):
-        shutil.copytree(work / name, tmp_path / name)
-    return tmp_path
-
-
-REPEATS_OFF = "repeats differ as a whole by an error of"
-ROWS_APART = "points that repeat each other lie up to"
 
 
 def second_off(own: Path, off: float, tilted: bool = False) -> None:
     """The second of two repeats is off, at all frequencies or more and more along them."""
-    file = own / "data/cmp_15961/sweep_axial.csv"
-    table = pd.read_csv(file).query("repeat <= 2")
+    table = pd.read_csv(own / SWEEP).query("repeat <= 2")
     share = np.log(table["frequency [Hz]"] / 5.0) / np.log(31.0) if tilted else 1.0
     table["stiffness [N/mm]"] *= 1.0 + off * share * (table["repeat"] == 2)
-    table.to_csv(file, index=False)
+    table.to_csv(own / SWEEP, index=False)
 
 
 @pytest.mark.parametrize(
@@ -76,21 +59,16 @@ def second_off(own: Path, off: float, tilted: bool = False) -> None:
         (0.13, True, [ROWS_APART, REPEATS_OFF]),
     ],
 )
-@pytest.mark.parametrize("command", ["fit", "diagnose"])
-def test_repeats_that_disagree_do_not_excuse_themselves(
-    own: Path, command: str, off: float, tilted: bool, told: list[str]
-) -> None:
+def test_repeats_that_disagree_do_not_excuse_themselves(own: Path, off: float, tilted: bool, told: list[str]) -> None:
     second_off(own, off, tilted)
-    done = call(own, command, CAMPAIGN, "-o", "out", "--no-plots")
-    assert done.returncode == 0, done.stderr
-    warnings = [line for line in done.stderr.splitlines() if line.startswith("warning:")]
-    assert [words for words in (ROWS_APART, REPEATS_OFF) if any(words in line for line in warnings)] == told
-    if ROWS_APART in told:
-        assert "sweep_axial.csv" in warnings[0]
-        assert re.search(r"rows \d+ and \d+", warnings[0])
-        assert done.stderr.startswith("warning:")  # before anything is fitted
-    if command == "diagnose":
-        assert ("consistent" in done.stderr) is not bool(told)
+    for command in ("fit", "diagnose"):
+        done = typing(own)(command, CAMPAIGN, "-o", command, "--no-plots")
+        warnings = [line for line in done.stderr.splitlines() if line.startswith("warning:")]
+        assert [words for words in (ROWS_APART, REPEATS_OFF) if any(words in line for line in warnings)] == told
+        if ROWS_APART in told:
+            assert done.stderr.startswith("warning:")  # before anything is fitted
+            assert re.search(r"sweep_axial.csv.*rows \d+ and \d+", warnings[0])
+    assert ("consistent" in done.stderr) is not bool(told)
 
 
 @pytest.mark.parametrize(
@@ -100,7 +78,7 @@ def test_repeats_that_disagree_do_not_excuse_themselves(
         ("plan", CAMPAIGN),
         ("compare", CAMPAIGN, CAMPAIGN),
         ("compare", CAMPAIGN, "--families", "intrinsic_time"),
-        ("inspect", "data/cmp_15961/sweep_axial.csv"),
+        ("inspect", SWEEP),
     ],
     ids=["predict", "plan", "compare", "families", "inspect"],
 )
@@ -108,8 +86,7 @@ def test_rows_that_lie_far_apart_are_told_wherever_tests_are_read(
     own: Path, work: Path, words: tuple[str, ...]
 ) -> None:
     second_off(own, 0.13)
-    done = call(own, *(word.format(work=work) for word in words), "-o", "out", "--no-plots", "--json")
-    assert done.returncode == 0, done.stderr
+    done = typing(own)(*(word.format(work=work) for word in words), "-o", "out", "--no-plots", "--json")
     for told in (done.stderr, done.stdout):
         assert ROWS_APART in " ".join(told.split())
         assert re.search(r"sweep_axial.csv: .*, rows \d+ and \d+", " ".join(told.split()))
@@ -125,12 +102,9 @@ def test_a_test_that_repeats_another_and_lies_far_off_is_told(own: Path, kind: s
     table.to_csv(own / "data/cmp_15961/again.csv", index=False)
     with (own / CAMPAIGN).open("a", encoding="utf-8") as campaign:
         campaign.write(f'\n[[{kind}]]\nfile = "../data/cmp_15961/again.csv"\ndirection = "axial"\n')
-    for words in (
-        ("fit", CAMPAIGN),
-        ("inspect", f"data/cmp_15961/{file}.csv", "data/cmp_15961/again.csv", "--direction", "axial"),
-    ):
-        done = call(own, *words, "-o", words[0], "--no-plots")
-        told = " ".join(done.stderr.split())
+    both = (f"data/cmp_15961/{file}.csv", "data/cmp_15961/again.csv", "--direction", "axial")
+    for words in (("fit", CAMPAIGN), ("inspect", *both)):
+        told = " ".join(typing(own)(*words, "-o", words[0], "--no-plots").stderr.split())
         assert re.search(rf"again(\.csv)?: it repeats {file}, and their stiffness lies 1\d % apart", told), told
 
 
@@ -139,10 +113,9 @@ def test_the_gain_error_of_loops_is_said(own: Path) -> None:
     for stated in ("", "0.5 %", "0 %"):
         campaign = plain + f'\n[rig]\ngain_error = "{stated}"\n' * bool(stated)
         (own / CAMPAIGN).write_text(campaign, encoding="utf-8")
-        done = call(own, "fit", CAMPAIGN, "-o", "out", "--no-plots", "--force")
+        done = typing(own)("fit", CAMPAIGN, "-o", "out", "--no-plots", "--force")
         assert ("gain of a loop within 0.5 %" in done.stderr) is (stated != "0 %")
-        fit = json.loads((own / "out/model.json").read_text(encoding="utf-8"))
-        errors[stated] = fit["fit"]["loop_gain_error"]
+        errors[stated] = document(own / "out/model.json")["fit"]["loop_gain_error"]
     assert errors == {"": 0.005, "0.5 %": 0.005, "0 %": 0.0}
 
 
@@ -157,8 +130,59 @@ def test_a_bar_in_tension_and_a_coupon_in_shear_of_one_rubber_have_one_fit(typed
         rows = "\n".join(",".join(f"{cell:.7g}" for cell in row) for row in zip(*columns, strict=True))
         header = f"Frequency [Hz],Strain [%],Storage Modulus {symbol}' [MPa],tan delta [-]"
         (tmp_path / f"{symbol}.csv").write_text(f"{header}\n{rows}\n", encoding="utf-8")
-        assert typed("init", f"{symbol}.csv", "-o", f"{symbol}.toml").returncode == 0
-        done = typed("fit", f"{symbol}.toml", "-o", symbol, "--no-plots", "--json")
-        assert done.returncode == 0, done.stderr
-        fitted[symbol] = {name: each["value"] for name, each in json.loads(done.stdout)["parameters"].items()}
+        typed("init", f"{symbol}.csv", "-o", f"{symbol}.toml")
+        fitted[symbol] = values(typed("fit", f"{symbol}.toml", "-o", symbol, "--no-plots", "--json"))
     assert fitted["E"] == pytest.approx(fitted["G"], rel=1e-3)
+
+
+@pytest.mark.parametrize("ending", ["xls", "XLSX"])
+def test_a_test_file_is_no_campaign(typed: Run, tmp_path: Path, ending: str) -> None:
+    (tmp_path / f"x.{ending}").write_bytes(b"PK\x03\x04")
+    done = typed("run", f"x.{ending}", status=2)
+    assert f"x.{ending}: a campaign is needed" in done.stderr
+    assert f"try: bushfit init x.{ending} " in done.stderr
+    assert typed("run", f"lost.{ending}", status=2).stderr.count("there is no such file") == 1
+
+
+def held(own: Path, mu: str) -> None:
+    """The campaign holds all five parameters."""
+    held = {"mu": mu, "m": "0.2 MPa*s^alpha", "alpha": 0.24, "sigma_fmax": "14.6 kPa", "eps_half": 0.013}
+    with (own / CAMPAIGN).open("a", encoding="utf-8") as campaign:
+        for key, value in held.items():
+            campaign.write(f"\n[fit.{key}]\nvalue = {json.dumps(value)}\nvary = false\n")
+
+
+@pytest.mark.parametrize(
+    ("command", "loss"), [("fit-static", "linear"), ("fit-dynamic", "soft_l1"), ("fit", "soft_l1"), ("run", "linear")]
+)
+def test_five_held_parameters_are_checked_against_the_tests(own: Path, command: str, loss: str) -> None:
+    held(own, "1.09 MPa")
+    done = typing(own)(command, CAMPAIGN, "-o", "x", "--no-plots", "--loss", loss)
+    assert "nothing was fitted here, every parameter is held; the values given meet the tests" in done.stderr
+    found = document(next((own / "x").glob("[sdm]*.json")))
+    assert {entry["vary"] for entry in found["parameters"].values()} == {False}
+    assert found["parameters"]["mu"]["value"] == 1.09e6
+    assert found["fit"]["nrmse"] < 0.01
+
+
+def test_held_parameters_that_miss_the_tests_are_said_to(own: Path) -> None:
+    held(own, "1.3 MPa")
+    done = typing(own)("fit", CAMPAIGN, "-o", "x", "--no-plots", "--max-nrmse", "0.02", status=1)
+    assert "the values given miss the tests by" in done.stderr
+    assert "every parameter is held" in typing(own)("diagnose", CAMPAIGN, "-o", "y", "--no-plots", status=2).stderr
+
+
+def test_a_parameter_on_a_bound_shows_no_interval(own: Path) -> None:
+    """Sweeps whose stiffness falls with frequency leave the springpot nothing to do."""
+    sweep = pd.read_csv(own / SWEEP)
+    sweep["stiffness [N/mm]"] *= (sweep["frequency [Hz]"] / 5.0) ** -0.15
+    sweep.to_csv(own / SWEEP, index=False)
+    with (own / CAMPAIGN).open("a", encoding="utf-8") as campaign:
+        campaign.write('\n[rig]\ngain_error = "0 %"\n')
+    done = typing(own)("fit", CAMPAIGN, "-o", "x", "--no-plots")
+    result = load_result(own / "x" / "model.json")
+    assert result.at_bound["m"] == "min"
+    for name, end in result.at_bound.items():
+        (row,) = [line for line in done.stderr.splitlines() if line.split()[:1] == [name]]
+        assert row.split()[:3] == [name, "(at", f"{end})"]
+        assert " to " not in row

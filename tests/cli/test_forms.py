@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 import tomllib
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,12 @@ import click
 import numpy as np
 import pandas as pd
 import pytest
-from commandline import Done, call
+from shell import typing
 
 from bushfit.cli import cli
 from bushfit.geometry import Direction
 from bushfit.reading.sweeps import read_sweep
 
-Run = Callable[..., Done]
 CONTEXT = click.Context(cli)
 READ = {
     "csv": pd.read_csv,
@@ -39,15 +39,7 @@ ARGUMENTS = {
     "export": ["model.json", "--format", "csv"],
     "reduce": ["data/cmp_15961_raw/stepped_sine_axial.csv"],
     "inspect": TESTS,
-    "batch": [
-        "data/practice/case_00[01]/bushing.toml",
-        "--tables",
-        "--plots",
-        "--command",
-        "fit",
-        "--command",
-        "predict",
-    ],
+    "batch": shlex.split("data/practice/case_00[01]/bushing.toml --tables --plots --command fit --command predict"),
 }
 
 
@@ -71,8 +63,7 @@ def place(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def written(place: Path, name: str, *options: str) -> set[Path]:
     """The files of a command, by their paths in its folder."""
-    done = call(place, name, *ARGUMENTS[name], *options)
-    assert done.returncode == 0, done.stderr
+    typing(place)(name, *ARGUMENTS[name], *options)
     folder = place / options[1]
     return {file.relative_to(folder) for file in folder.rglob("[!.]*") if file.is_file()}
 
@@ -106,33 +97,27 @@ def test_pictures_are_of_every_form_asked_for(place: Path, name: str) -> None:
 def test_a_variable_of_the_environment_holds_for_all_commands(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BUSHFIT_TABLE_FORMAT", "xlsx")
     monkeypatch.setenv("BUSHFIT_PLOT_FORMAT", "svg png")
-    assert {file.name for file in written(place, "reduce", "-o", "of-all")} == {
-        "sweep.xlsx",
-        "reduce.png",
-        "reduce.svg",
-    }
+    assert set(map(str, written(place, "reduce", "-o", "of-all"))) == {"sweep.xlsx", "reduce.png", "reduce.svg"}
     over = written(place, "reduce", "-o", "over", "--table-format", "csv", "--plot-format", "pdf")
-    assert {file.name for file in over} == {"sweep.csv", "reduce.pdf"}
+    assert set(map(str, over)) == {"sweep.csv", "reduce.pdf"}
     monkeypatch.setenv("BUSHFIT_TABLE_FORMAT", "")
     assert Path("sweep.csv") in written(place, "reduce", "-o", "empty", "--no-plots")
     monkeypatch.setenv("BUSHFIT_TABLE_FORMAT", "german")
-    done = call(place, "reduce", *ARGUMENTS["reduce"], "-o", "none")
-    assert done.returncode == 2
+    done = typing(place)("reduce", *ARGUMENTS["reduce"], "-o", "none", status=2)
     assert "BUSHFIT_TABLE_FORMAT" in done.stderr
     assert not (place / "none").exists()
 
 
 @pytest.mark.parametrize("form", READ)
 def test_what_is_simulated_is_fitted(place: Path, form: str) -> None:
-    assert call(place, "simulate", "model.json", "-o", f"sim-{form}", "--table-format", form).returncode == 0
-    fitted = call(place, "fit", f"sim-{form}/campaign.toml", "-o", f"fitted-{form}", "--no-plots")
-    assert fitted.returncode == 0, fitted.stderr
+    typing(place)("simulate", "model.json", "-o", f"sim-{form}", "--table-format", form)
+    typing(place)("fit", f"sim-{form}/campaign.toml", "-o", f"fitted-{form}", "--no-plots")
 
 
 @pytest.mark.parametrize("form", READ)
 def test_what_is_reduced_is_read_as_the_text_for_the_campaign_says(place: Path, form: str) -> None:
     options = ("--no-plots", "--table-format", form)
-    told = call(place, "reduce", *ARGUMENTS["reduce"], "-o", f"swept-{form}", *options, "--json")
+    told = typing(place)("reduce", *ARGUMENTS["reduce"], "-o", f"swept-{form}", *options, "--json")
     document = json.loads(told.stdout)
     (entry,) = tomllib.loads(document["campaign"])["sweeps"]
     found = read_sweep(place / f"swept-{form}" / entry["file"], Direction(entry["direction"]))
@@ -142,7 +127,7 @@ def test_what_is_reduced_is_read_as_the_text_for_the_campaign_says(place: Path, 
 @pytest.mark.parametrize("form", READ)
 def test_a_wide_table_is_read_back(place: Path, form: str) -> None:
     options = ("--direction", "axial", "--amplitudes", "0.1, 0.25 mm", "--no-plots", "--table-format", form)
-    assert call(place, "predict", "model.json", "--wide", "-o", f"wide-{form}", *options).returncode == 0
+    typing(place)("predict", "model.json", "--wide", "-o", f"wide-{form}", *options)
     end = "xlsx" if form == "xlsx" else "csv"
     long, wide = (
         READ[form](place / f"wide-{form}/axial{end}.{'xlsx' if form == 'xlsx' else 'csv'}") for end in ("", "_wide")
@@ -152,6 +137,5 @@ def test_a_wide_table_is_read_back(place: Path, form: str) -> None:
         assert wide["frequency [Hz]"].tolist() == of_level["frequency [Hz]"].tolist()
         assert wide[f"stiffness {amplitude} mm [N/mm]"].tolist() == of_level["stiffness [N/mm]"].tolist()
         assert wide[f"loss factor {amplitude} mm [-]"].tolist() == of_level["loss factor [-]"].tolist()
-    seen = call(place, "inspect", f"wide-{form}/axial_wide.{end}", "--no-plots")
-    assert seen.returncode == 0, seen.stderr
+    seen = typing(place)("inspect", f"wide-{form}/axial_wide.{end}", "--no-plots")
     assert "amplitudes: 0.1, 0.25 mm" in seen.stderr

@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from commandline import Done
+from shell import CAMPAIGN, Run, names
 
-Run = Callable[..., Done]
-CAMPAIGN = "configs/cmp_15961.toml"
+ARM = "data/arm_bushing/truth.json"
 
 
 def test_predict_lays_measurements_over_and_takes_grids(bushfit: Run, tmp_path: Path) -> None:
-    done = bushfit(
-        "predict", "model/model.json", "--campaign", CAMPAIGN, "-o", str(tmp_path / "x"),
-        "--frequencies", "10:30:10 Hz", "--amplitudes", "0.1, 0.3 mm",
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == {
-        *(f"{d}.{end}" for d in ("axial", "radial") for end in ("csv", "png")), "measured.csv",
-    }  # fmt: skip
+    grid = ("--frequencies", "10:30:10 Hz", "--amplitudes", "0.1, 0.3 mm")
+    done = bushfit("predict", "model/model.json", "--campaign", CAMPAIGN, "-o", tmp_path / "x", *grid)
+    assert names(tmp_path / "x") == {"axial.csv", "axial.png", "radial.csv", "radial.png", "measured.csv"}
     measured = pd.read_csv(tmp_path / "x" / "measured.csv")
     assert set(measured["sweep"]) == {"sweep_axial", "sweep_radial"}
     assert dict(zip(measured["direction"], measured["fitted"], strict=True)) == {"axial": "yes", "radial": "no"}
@@ -34,10 +27,9 @@ def test_predict_lays_measurements_over_and_takes_grids(bushfit: Run, tmp_path: 
 
 
 def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: Path, tmp_path: Path) -> None:
-    at = (*("-o", str(tmp_path / "x")), "--no-plots", "--force", "--json")
-    truth = str(root / "data/mystery_mount/open_last/truth.json")
+    truth = root / "data/mystery_mount/open_last/truth.json"
     for model, said in ((truth, "left out of the prediction"), ("model/model.json", "radial: not fitted")):
-        done = bushfit("predict", model, *at)
+        done = bushfit("predict", model, "-o", tmp_path / "x", "--no-plots", "--force", "--json")
         told = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
         assert len(set(told)) == len(told) > 0
         warnings = json.loads(done.stdout)["warnings"]
@@ -47,27 +39,27 @@ def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: 
 
 def test_predict_shows_at_most_eight_amplitudes_a_direction(bushfit: Run, tmp_path: Path) -> None:
     amplitudes = ", ".join(f"{0.02 * n:.2f}" for n in range(1, 31)) + " mm"
-    options = ("--direction", "axial", "--amplitudes", amplitudes, "--no-plots", "-o", str(tmp_path / "x"))
+    options = ("--direction", "axial", "--amplitudes", amplitudes, "--no-plots", "-o", tmp_path / "x")
     done = bushfit("predict", "model/model.json", *options)
-    assert done.returncode == 0, done.stderr
     shown = [line.split()[1] for line in done.stderr.splitlines() if line.split()[:1] == ["155"]]
     assert len(shown) == 8
     assert (shown[0], shown[-1]) == ("0.02", "0.6")
     assert len(pd.read_csv(tmp_path / "x/axial.csv")["amplitude [mm]"].unique()) == 30
 
 
-def test_predict_at_a_temperature_needs_a_model_that_knows_one(bushfit: Run, tmp_path: Path) -> None:
-    at = ("predict", "model/model.json", "--no-plots", "-o", str(tmp_path / "x"))
-    for temperature, said in (("40 degC", "the model knows no temperature"), ("warm", "--temperature")):
-        done = bushfit(*at, "--temperature", temperature)
-        assert done.returncode == 2
-        assert said in done.stderr
+@pytest.mark.parametrize(
+    ("temperature", "said"), [("40 degC", "the model knows no temperature"), ("warm", "--temperature")]
+)
+def test_predict_at_a_temperature_needs_a_model_that_knows_one(
+    bushfit: Run, tmp_path: Path, temperature: str, said: str
+) -> None:
+    at = ("--no-plots", "-o", tmp_path / "x", "--temperature", temperature)
+    assert said in bushfit("predict", "model/model.json", *at, status=2).stderr
 
 
 def test_predict_writes_maxwell_arms_where_asked(bushfit: Run, root: Path, tmp_path: Path) -> None:
-    model, folder = str(root / "data/arm_bushing/truth.json"), tmp_path / "x"
-    done = bushfit("predict", model, "--arms", "0.5 %", "-o", str(folder), "--json")
-    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "x"
+    done = bushfit("predict", root / ARM, "--arms", "0.5 %", "-o", folder, "--json")
     (part,) = json.loads(done.stdout)["arms"]
     assert part["in_place_of"] == "springpot"
     assert part["largest_relative_error"] <= 0.005
@@ -81,7 +73,5 @@ def test_predict_writes_maxwell_arms_where_asked(bushfit: Run, root: Path, tmp_p
 
 
 def test_predict_takes_one_per_cent_for_arms_where_no_error_is_given(bushfit: Run, root: Path, tmp_path: Path) -> None:
-    model = str(root / "data/arm_bushing/truth.json")
-    done = bushfit("predict", model, "-o", str(tmp_path / "x"), "--json", "--no-plots", "--arms")
-    assert done.returncode == 0, done.stderr
+    done = bushfit("predict", root / ARM, "-o", tmp_path / "x", "--json", "--no-plots", "--arms")
     assert 0.001 < json.loads(done.stdout)["arms"][0]["largest_relative_error"] <= 0.01

@@ -6,24 +6,19 @@ import json
 import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from commandline import Done, call
+from commandline import call
 from jsonschema import Draft202012Validator
+from shell import document as read
+from shell import typing
+from virtual_rig import LOOP, MOUNT, SWEEP, SWEEPS, rig
 
 from bushfit.model.file import load_result, to_document
 from bushfit.schemas import schema
 
-BUSHING = """
-[bushing]
-name = "Mount"
-inner_radius = "12 mm"
-outer_radius = "24 mm"
-length = "50 mm"
-"""
 SPECIMENS = """
 [[specimens]]
 name = "Dumbbell"
@@ -35,36 +30,8 @@ area = "500 mm^2"
 thickness = "6 mm"
 elements = 4
 """
-RIG = """
-[simulate]
-seed = 629
-repeats = 2
-noise = "0.3 %"
-force_noise = "0.4 %"
-displacement_noise = "0.05 %"
-gain_error = "0.2 %"
-{}
-[simulate.parameters]
-mu = "0.78 MPa"
-m = "0.16 MPa*s^alpha"
-alpha = 0.27
-sigma_fmax = "11 kPa"
-eps_half = 0.014
-"""
-COLOURED = 'force_correlation = "90 %"'
-LOOP = """
-[[simulate.loops]]
-direction = "{}"
-amplitude = "{}"
-frequency = "{}"
-cycles = 2
-"""
-SWEEP = """
-[[simulate.sweeps]]
-{} = "{}"
-amplitudes = {}
-frequencies = ["5 Hz", "20 Hz", "50 Hz", "90 Hz", "150 Hz"]
-"""
+RIG = rig("0.4 %", 'displacement_noise = "0.05 %"')
+COLOURED = rig("0.4 %", 'displacement_noise = "0.05 %"', 'force_correlation = "90 %"')
 SHAKEN = """
 [[simulate.resonances]]
 direction = "axial"
@@ -72,10 +39,7 @@ mass = "3 kg"
 base_acceleration = "4 m/s^2"
 frequencies = {}
 """
-LEVELS = {"axial": '["0.1 mm", "0.2 mm", "0.5 mm"]', "torsion": '["0.3 deg", "0.6 deg", "1.5 deg"]'}
-LEVELS["radial"] = LEVELS["axial"]
 LOOPS = LOOP.format("axial", "0.5 mm", "0.1 Hz") + LOOP.format("axial", "1 mm", "0.1 Hz")
-SWEEPS = {place: SWEEP.format("direction", place, levels) for place, levels in LEVELS.items()}
 COUPONS = SWEEP.format("specimen", "Dumbbell", '["0.5 %", "1 %", "4 %"]') + SWEEP.format(
     "specimen", "Quad", '["0.05 mm", "0.2 mm"]'
 )
@@ -91,17 +55,17 @@ WEAK = "rig_compliance.compliance=3e-8 m/N"
 
 #: What is tested, by the shape of the campaign, and what is hidden in it.
 SHAPES: dict[str, tuple[str, ...]] = {
-    "coloured loops": (BUSHING + RIG.format(COLOURED) + LOOPS + SWEEPS["axial"],),
-    "one coloured loop": (BUSHING + RIG.format(COLOURED) + LOOP.format("axial", "1 mm", "0.1 Hz"),),
-    "one loop in torsion": (BUSHING + RIG.format("") + LOOP.format("torsion", "2 deg", "0.1 Hz"),),
-    "amplitudes at one frequency": (BUSHING + RIG.format("") + ONE_FREQUENCY,),
-    "coupons alone": ('name = "Sheet"\n' + SPECIMENS + RIG.format("") + COUPONS,),
-    "coupons beside a bushing": (BUSHING + SPECIMENS + RIG.format("") + LOOPS + SWEEPS["axial"] + COUPONS,),
-    "all directions": (BUSHING + RIG.format("") + LOOPS + "".join(SWEEPS.values()),),
-    "radial alone": (BUSHING + RIG.format("") + LOOP.format("radial", "0.3 mm", "0.1 Hz") + SWEEPS["radial"],),
-    "a resonance": (BUSHING + RIG.format("") + LOOPS + SHAKEN.format(RISING),),
-    "twins": (BUSHING + RIG.format("") + LOOPS + SWEEPS["axial"] + SWEEPS["radial"], "--effect", WEAK),
-    "described": (BUSHING + RIG.format("") + LOOPS + SWEEPS["axial"] + SWEEPS["radial"],),
+    "coloured loops": (MOUNT + COLOURED + LOOPS + SWEEPS["axial"],),
+    "one coloured loop": (MOUNT + COLOURED + LOOP.format("axial", "1 mm", "0.1 Hz"),),
+    "one loop in torsion": (MOUNT + RIG + LOOP.format("torsion", "2 deg", "0.1 Hz"),),
+    "amplitudes at one frequency": (MOUNT + RIG + ONE_FREQUENCY,),
+    "coupons alone": ('name = "Sheet"\n' + SPECIMENS + RIG + COUPONS,),
+    "coupons beside a bushing": (MOUNT + SPECIMENS + RIG + LOOPS + SWEEPS["axial"] + COUPONS,),
+    "all directions": (MOUNT + RIG + LOOPS + "".join(SWEEPS.values()),),
+    "radial alone": (MOUNT + RIG + LOOP.format("radial", "0.3 mm", "0.1 Hz") + SWEEPS["radial"],),
+    "a resonance": (MOUNT + RIG + LOOPS + SHAKEN.format(RISING),),
+    "twins": (MOUNT + RIG + LOOPS + SWEEPS["axial"] + SWEEPS["radial"], "--effect", WEAK),
+    "described": (MOUNT + RIG + LOOPS + SWEEPS["axial"] + SWEEPS["radial"],),
 }
 #: Commands that write a model, and its name in their folder.
 WRITERS = {
@@ -132,16 +96,10 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return of
 
 
-def well(folder: Path, *arguments: object) -> Done:
-    done = call(folder, *arguments)
-    assert done.returncode == 0, f"{shlex.join(map(str, arguments))}\n{done.stderr}"
-    return done
-
-
 def simulated(folder: Path, shape: str) -> Path:
     text, *hidden = SHAPES[shape]
     (folder / "rig.toml").write_text(text, encoding="utf-8")
-    well(folder, "simulate", "rig.toml", *hidden, "-o", "tests", "--no-plots")
+    typing(folder)("simulate", "rig.toml", *hidden, "-o", "tests", "--no-plots")
     tests = folder / "tests"
     if shape == "a resonance":
         reduced(tests)
@@ -156,7 +114,7 @@ def reduced(tests: Path) -> None:
     said = [line.removeprefix("# ") for line in (tests / "campaign.toml").read_text(encoding="utf-8").splitlines()]
     typed = [line for line in said if line.startswith("bushfit reduce")]
     for line in typed:
-        well(tests, *shlex.split(line)[1:], "--no-plots")
+        typing(tests)(*shlex.split(line)[1:], "--no-plots")
     told = [line for line in said if line not in typed and not line.startswith(("A sweep comes", "Simulated by"))]
     (tests / "campaign.toml").write_text("\n".join(told), encoding="utf-8")
 
@@ -174,7 +132,7 @@ def written(tests: Path, writer: str, folder: Path) -> list[Path]:
     command, *options = shlex.split(writer)
     if command == "batch":
         (folder / "bushings.csv").write_text(f"campaign\n{tests / 'campaign.toml'}\n", encoding="utf-8")
-        well(folder, "batch", "bushings.csv", "--jobs", "1", "-o", "out", "--reports")
+        typing(folder)("batch", "bushings.csv", "--jobs", "1", "-o", "out", "--reports")
     else:
         done = call(folder, command, tests / "campaign.toml", *options, "-o", "out", "--no-plots")
         if done.returncode == 2 and writer in ("fit-static", "fit-dynamic", "fit --effect inertia"):
@@ -188,29 +146,30 @@ def written(tests: Path, writer: str, folder: Path) -> list[Path]:
 
 
 def is_model(file: Path) -> bool:
-    return str(json.loads(file.read_text(encoding="utf-8")).get("schema")).startswith("bushfit/model/")
+    return str(read(file).get("schema")).startswith("bushfit/model/")
 
 
 def taken(tests: Path, model: Path, folder: Path, formats: Sequence[str], *, whole: bool) -> None:
     """A model taken by every command that reads one; a part of them unless `whole`."""
-    document: dict[str, Any] = json.loads(model.read_text(encoding="utf-8"))
+    document = read(model)
     assert list(Draft202012Validator(schema("model")).iter_errors(document)) == []
     again = json.loads(json.dumps(to_document(load_result(model))))
     assert again == {key: value for key, value in document.items() if key in again}
     plain = ("--force", "--no-plots", "-q")
-    well(folder, "predict", model, "-o", "predicted", *plain)
-    well(folder, "compare", model, tests / "truth.json", model, "-o", "compared", *plain)
-    well(folder, "report", model.parent, "-o", "page", *plain)
+    well = typing(folder)
+    well("predict", model, "-o", "predicted", *plain)
+    well("compare", model, tests / "truth.json", model, "-o", "compared", *plain)
+    well("report", model.parent, "-o", "page", *plain)
     if whole:
         arms = ["--arms"] if "springpot" in document["effects"] else []
-        well(folder, "predict", model, "--campaign", tests / "campaign.toml", *arms, "-o", "predicted", *plain)
-        well(folder, "plan", model, "--hours", "1", "-o", "planned", *plain)
-        well(folder, "diagnose", tests / "campaign.toml", "--model", model, "-o", "anew", *plain)
+        well("predict", model, "--campaign", tests / "campaign.toml", *arms, "-o", "predicted", *plain)
+        well("plan", model, "--hours", "1", "-o", "planned", *plain)
+        well("diagnose", tests / "campaign.toml", "--model", model, "-o", "anew", *plain)
     bushing = document["bushing"] is not None
     if bushing:
-        well(folder, "simulate", model, "-o", "simulated", *plain)
+        well("simulate", model, "-o", "simulated", *plain)
     for form in formats if bushing else [each for each in formats if each in TABLES]:
-        well(folder, "export", model, "--format", *shlex.split(form), "-o", "exported", *plain)
+        well("export", model, "--format", *shlex.split(form), "-o", "exported", *plain)
 
 
 @pytest.mark.parametrize(

@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 import re
 import zipfile
-from collections.abc import Callable
 from html import unescape
 from pathlib import Path
 
 import pandas as pd
 import pytest
 from commandline import Done
+from shell import Run, document, typing
 from tries import some
 
-Run = Callable[..., Done]
 #: What a fit may have said: longer than a comment of a deck, with signs that mean something to CSV, HTML and XML.
 ODD = 'sweep_axial: "5 < 7 & 9", |K| of 3 points, ' + "far from the others, " * 5 + "left out of the fit"
 PAPER = ("radial: not fitted; its band holds", "+4.9 % in stiffness and +36 % in strain against finite elements")
@@ -27,7 +26,6 @@ MOUNT = (
 
 def warned(done: Done) -> list[str]:
     """What the terminal warns of."""
-    assert done.returncode == 0, done.stderr
     return [line.removeprefix("warning: ") for line in done.stderr.splitlines() if line.startswith("warning: ")]
 
 
@@ -52,11 +50,9 @@ def ran(
     request: pytest.FixtureRequest, root: Path, tmp_path_factory: pytest.TempPathFactory, work: Path
 ) -> tuple[Path, Path, tuple[str, ...], list[str]]:
     """A campaign, the folder of its run, what must be warned of there, and what the terminal warned of."""
-    from commandline import call
-
     name, words = request.param
     folder, campaign = tmp_path_factory.mktemp(name) / "run", root / f"configs/{name}.toml"
-    return campaign, folder, words, warned(call(work, "run", campaign, "-o", folder, "--no-plots"))
+    return campaign, folder, words, warned(typing(work)("run", campaign, "-o", folder, "--no-plots"))
 
 
 Ran = tuple[Path, Path, tuple[str, ...], list[str]]
@@ -65,9 +61,9 @@ Ran = tuple[Path, Path, tuple[str, ...], list[str]]
 @pytest.fixture
 def model(ran: Ran, tmp_path: Path) -> Path:
     """The model of the run, whose fit warned of something, too."""
-    document = json.loads((ran[1] / "model.json").read_text(encoding="utf-8"))
-    document["warnings"].insert(0, ODD)
-    (tmp_path / "model.json").write_text(json.dumps(document), encoding="utf-8")
+    found = document(ran[1] / "model.json")
+    found["warnings"].insert(0, ODD)
+    (tmp_path / "model.json").write_text(json.dumps(found), encoding="utf-8")
     return tmp_path / "model.json"
 
 
@@ -77,7 +73,7 @@ def test_pages_of_run_and_diagnose_say_what_the_terminal_says(ran: Ran, bushfit:
     for each in words:
         assert any(each in line for line in told), told
     assert [line for line in told if line not in page] == []
-    of_model = json.loads((folder / "model.json").read_text(encoding="utf-8"))["warnings"]
+    of_model = document(folder / "model.json")["warnings"]
     assert set(of_model) <= set(told)
     assert warned(bushfit("report", folder, "-o", tmp_path / "page")) == []
     assert text_of(tmp_path / "page/report.html") == page
@@ -87,7 +83,7 @@ def test_pages_of_run_and_diagnose_say_what_the_terminal_says(ran: Ran, bushfit:
         page = text_of(tmp_path / "d" / name).replace('\\"', '"')
         assert [line for line in told if line not in page] == [], name
     joint = warned(bushfit("fit", campaign, "-o", tmp_path / "f", "--no-plots"))
-    assert joint == json.loads((tmp_path / "f/model.json").read_text(encoding="utf-8"))["warnings"]
+    assert joint == document(tmp_path / "f/model.json")["warnings"]
 
 
 def test_every_export_says_what_predict_says(ran: Ran, model: Path, bushfit: Run, tmp_path: Path) -> None:
@@ -112,7 +108,7 @@ def test_a_comparison_says_of_whom_each_holds(ran: Ran, model: Path, bushfit: Ru
     told = warned(done)
     assert told == json.loads(done.stdout)["warnings"]
     assert f"B: {ODD}" in told
-    for line in json.loads(model.read_text(encoding="utf-8"))["warnings"]:
+    for line in document(model)["warnings"]:
         assert any(re.match(r"(A, )?B: ", each) and each.endswith(line) for each in told), line
     page = text_of(tmp_path / "c/compare.html")
     assert [line for line in told if line not in page] == []
@@ -124,11 +120,10 @@ def test_a_batch_says_a_long_text_once(ran: Ran, model: Path, bushfit: Run, tmp_
     )
     at = 'at = ["axial 25 Hz 0.1 mm", "radial 25 Hz 0.1 mm"]\n'
     (tmp_path / "b.toml").write_text(at + row.format("one") + row.format("two"), encoding="utf-8")
-    done = bushfit("batch", tmp_path / "b.toml", "-o", tmp_path / "b", "--jobs", "1", "--no-plots")
-    assert done.returncode == 0, done.stderr
+    bushfit("batch", tmp_path / "b.toml", "-o", tmp_path / "b", "--jobs", "1", "--no-plots")
     table, page = pd.read_csv(tmp_path / "b/batch.csv"), text_of(tmp_path / "b/index.html")
     for cell in table["warnings"]:
         assert all(each in cell for each in (ODD, *ran[2]))
-    told = json.loads((tmp_path / "b/bushings/one/row.json").read_text(encoding="utf-8"))["warnings"]
+    told = document(tmp_path / "b/bushings/one/row.json")["warnings"]
     assert [page.count(line) for line in told] == [1] * len(told)
     assert page.count('<td class="remarks">warnings: 1, ') == 2

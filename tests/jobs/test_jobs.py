@@ -1,40 +1,37 @@
-"""Jobs: the files that one names before the work are those that its outcome holds."""
+"""Jobs: the files that one names before the work are those that its outcome holds; grids, and who is warned of."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
-from bushfit.geometry import Direction
+from bushfit.geometry import Bushing, Direction
 from bushfit.jobs import fits
+from bushfit.jobs.compare import Compare, Entry
 from bushfit.jobs.diagnose import Diagnose
 from bushfit.jobs.fits import Fit, FitDynamic, FitStatic
+from bushfit.jobs.grid import common_grid, default_grid
 from bushfit.jobs.predict import Predict
+from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
-from bushfit.model.result import Result
+from bushfit.model.result import Range, Result
 from bushfit.report.contents import Formats, Kinds
 
 
-@pytest.fixture(scope="module")
-def campaign(root: Path) -> Campaign:
-    return load_campaign(root / "configs/cmp_15961.toml")
-
-
-@pytest.mark.parametrize("formats", [Formats(pictures=False), Formats()], ids=str)
 @pytest.mark.parametrize("job", [FitStatic(), FitDynamic(), Fit(), Diagnose()], ids=lambda job: type(job).__name__)
-def test_an_outcome_holds_the_files_that_were_named(campaign: Campaign, job: Any, formats: Formats) -> None:
+def test_an_outcome_holds_the_files_that_were_named(campaign: Campaign, job: Any) -> None:
     outcome = job.run(Data.of(campaign))
-    files = formats.files(outcome.contents)
-    assert list(files) == formats.names(job.kinds(campaign))
+    for formats in (Formats(pictures=False), Formats()):
+        files = formats.files(outcome.contents)
+        assert list(files) == formats.names(job.kinds(campaign))
     documents = [json.loads(content) for name, content in files.items() if name.endswith(".json")]
     assert json.loads(json.dumps(outcome.document)) in documents
 
@@ -65,10 +62,10 @@ def test_warnings_of_a_resonance_are_those_of_the_prediction(campaign: Campaign)
 
 
 def test_a_campaign_has_the_kinds_of_test_that_it_lists(campaign: Campaign) -> None:
-    assert fits.tests_of(campaign, ()) == ("loops", "sweeps")
-    assert fits.tests_of(replace(campaign, loops=()), ("temperature",)) == ("sweeps",)
+    assert fits.kinds_of_test(campaign, ()) == ("loops", "sweeps")
+    assert fits.kinds_of_test(replace(campaign, loops=()), ("temperature",)) == ("sweeps",)
     warm = replace(campaign, sweeps=tuple(replace(sweep, temperature=300.0) for sweep in campaign.sweeps))
-    assert fits.tests_of(warm, ("temperature",)) == ("loops", "sweeps", "master_curve", "shift_factors")
+    assert fits.kinds_of_test(warm, ("temperature",)) == ("loops", "sweeps", "master_curve", "shift_factors")
 
 
 def test_a_prediction_is_over_what_was_asked_for_before_what_the_campaign_says(
@@ -87,13 +84,58 @@ def test_a_prediction_without_a_campaign_is_axial_and_radial(paper_model: Model)
     found = Predict().run(Result(paper_model), None)
     assert [prediction.direction for prediction in found.predictions] == [Direction.AXIAL, Direction.RADIAL]
     table = found.document["axial"]
-    np.testing.assert_allclose(
-        table["stiffness [N/mm]"],
-        1e-3
-        * np.abs(
-            paper_model.stiffness(
-                Direction.AXIAL, np.array(table["frequency [Hz]"]), np.array(table["amplitude [mm]"]) / 1e3
-            )
-        ),
-    )
+    points = np.array(table["frequency [Hz]"]), np.array(table["amplitude [mm]"]) / 1e3
+    expected = np.abs(paper_model.stiffness(Direction.AXIAL, *points))
+    np.testing.assert_allclose(table["stiffness [N/mm]"], 1e-3 * expected)
     assert found.document["warnings"] == found.warnings
+
+
+def fitted(model: Model, frequency: tuple[float, float], displacement: tuple[float, float]) -> Result:
+    low, high = (x * model.unit_strain(Direction.AXIAL) for x in displacement)
+    covariance = Covariance(("mu",), np.array([[1e6]]))
+    return Result(model, fitted=("mu",), covariance=covariance, measured=Range(frequency, (low, high), ("axial",)))
+
+
+@pytest.mark.parametrize("families", [False, True])
+def test_a_comparison_holds_the_files_that_were_named(campaign: Campaign, families: bool) -> None:
+    job = Compare(PredictSettings(frequencies=(5.0, 50.0), amplitudes=(1e-4,)))
+    entry = job.entry(campaign, "cmp")
+    outcome = job.run_families(campaign, "cmp", ["sliders"]) if families else job.run([entry, entry])
+    files = Formats().files(outcome.contents)
+    assert list(files) == Formats().names(job.kinds(families=families))
+    assert json.loads(files["compare.json"]) == json.loads(json.dumps(outcome.document))
+    assert files["compare.png"].startswith(b"\x89PNG")
+
+
+def test_the_grid_lies_within_what_all_were_fitted_at(paper_model: Model, other_models: dict[str, Model]) -> None:
+    one = fitted(paper_model, (0.1, 155.0), (1e-4, 1e-3))
+    two = fitted(next(iter(other_models.values())), (4.0, 60.0), (2e-4, 5e-3))
+    frequency, amplitude = common_grid([one, two], [Direction.AXIAL] * 2)
+    assert frequency.tolist() == [5.0, 15.0, 25.0, 35.0, 45.0, 55.0]
+    assert amplitude.tolist() == [2e-4, 5e-4]
+    assert common_grid([one, one], [Direction.AXIAL] * 2)[0][0] == 1.0
+    apart = fitted(paper_model, (200.0, 300.0), (1e-4, 1e-3))
+    assert (
+        common_grid([one, apart], [Direction.AXIAL] * 2)[0].tolist() == default_grid(one, Direction.AXIAL)[0].tolist()
+    )
+    narrow = fitted(paper_model, (6.0, 9.0), (1.2e-4, 1.8e-4))
+    frequency, amplitude = common_grid([one, narrow], [Direction.AXIAL] * 2)
+    assert (frequency.min(), frequency.max(), amplitude.min(), amplitude.max()) == pytest.approx((6, 9, 1.2e-4, 1.8e-4))
+
+
+def test_a_place_beyond_what_one_was_fitted_at_is_warned_of_by_its_label(paper_model: Model) -> None:
+    entries = [
+        Entry("one", "one.json", fitted(paper_model, (5.0, 155.0), (1e-4, 1e-3))),
+        Entry("two", "two.json", fitted(paper_model, (200.0, 300.0), (1e-4, 1e-3))),
+    ]
+    found = Compare().run(entries)
+    assert any(line.startswith("B: axial: predicted at frequencies of 5 to 155 Hz") for line in found.warnings)
+    assert not any(line.startswith("A: axial: predicted") for line in found.warnings)
+
+
+def test_a_bushing_of_another_shape_is_compared_at_the_same_displacement(paper_model: Model) -> None:
+    longer = replace(paper_model, bushing=Bushing("longer", 0.010, 0.018, 0.068))
+    entries = [Entry(m.name, m.name, fitted(m, (1.0, 155.0), (1e-4, 1e-3))) for m in (paper_model, longer)]
+    (pair,) = Compare().run(entries).comparisons
+    np.testing.assert_allclose(np.expm1(pair.contrasts[0].stiffness.value), 1.0)
+    assert [row.difference for row in pair.parameters if row.difference is not None] == [0.0]

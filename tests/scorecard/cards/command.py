@@ -16,7 +16,7 @@ from bushfit import __version__
 from bushfit.cli.common import Options
 from bushfit.cli.show import new_table
 from bushfit.report.contents import Formats
-from bushfit.report.folder import to_json
+from bushfit.report.folder import check_free, to_json
 from bushfit.validation import plain
 from cards.card import card, confusion
 from cards.document import Asked, Scorecard
@@ -71,7 +71,7 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
         "session": session,
     }
     if folder and not (folder / LEDGER).exists():
-        options.require_free(folder, ["scorecard.json"])
+        check_free(folder, ["scorecard.json"], force=options.force)
     with ledger(folder, asked, force=options.force) as (done, write):
         kept = folder / "campaigns" if folder and keep else None
         outcomes = {name: _made(options, done, write, each, jobs, kept, session) for name, each in chosen.items()}
@@ -96,7 +96,7 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
     if folder:
         replace(options, force=True).write(folder, {"scorecard.json": to_json(document)}, document)
     else:
-        options.tell(document)
+        options.print_json(document)
 
 
 def _made(

@@ -17,23 +17,27 @@ def document_of(result: Result, campaign: Mapping[str, Any]) -> dict[str, Any]:
     return {**to_document(result), "warnings": warnings_of(result), "campaign": campaign}
 
 
-def about(data: Data, command: str, options: Iterable[str] = ()) -> dict[str, Any]:
+def campaign_document(data: Data, command: str, options: Iterable[str] = ()) -> dict[str, Any]:
     """The campaign as JSON-ready data: its name, file and tests, and the command with all that settles its numbers."""
     campaign = data.campaign
     loss = () if campaign.fit.loss == "linear" else ("--loss", campaign.fit.loss)
-    words = ["bushfit", command, *(typed(Path(word)) for word in (campaign.path.name, *options, *loss))]
     return {
         "name": campaign.name,
         "file": campaign.path.name,
         "sha256": campaign.sha256,
-        "command": " ".join(words),
+        "command": command_line(command, campaign.path.name, *options, *loss),
         "tests": [_test(data_set) for data_set in data.data_sets],
         "report": {key: value for key, value in vars(campaign.report).items() if value is not None},
     }
 
 
-def asked(**options: Iterable[str]) -> tuple[str, ...]:
-    """Options that may be given again as they are typed, each with all its values."""
+def command_line(command: str, *words: str) -> str:
+    """A command of bushfit as it is typed into a terminal."""
+    return " ".join(["bushfit", command, *(typed(Path(word)) for word in words)])
+
+
+def repeated_options(**options: Iterable[str]) -> tuple[str, ...]:
+    """The words of options that may be given again, each with all its values."""
     return tuple(word for name, values in options.items() for value in values for word in (f"--{name}", value))
 
 

@@ -1,0 +1,49 @@
+"""Commands typed in a folder, that end as they should, and what they leave there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from commandline import Done, call
+
+#: Types a command, and gives what it left; an exit status other than `status=0` fails the test.
+Run = Callable[..., Done]
+#: The paper's tests, in the folder `work`.
+CAMPAIGN = "configs/cmp_15961.toml"
+GEOMETRY = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
+BUSHING = '[bushing]\nname = "B"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n'
+
+
+def typing(folder: Path) -> Run:
+    def run(*arguments: object, status: int = 0) -> Done:
+        done = call(folder, *arguments)
+        assert done.returncode == status, done.stderr
+        return done
+
+    return run
+
+
+def refused(done: Done, folder: Path, *words: str) -> None:
+    """One error that says these words, and nothing written."""
+    assert done.stderr.count("rror: ") == 1
+    for each in words:
+        assert each in done.stderr
+    assert not folder.exists()
+
+
+def names(folder: Path) -> set[str]:
+    """The files of a result."""
+    return {file.name for file in folder.glob("[!.]*")}
+
+
+def document(file: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    return found
+
+
+def values(done: Done) -> dict[str, float]:
+    """The parameters of a fit that was printed as JSON."""
+    return {name: entry["value"] for name, entry in json.loads(done.stdout)["parameters"].items()}
