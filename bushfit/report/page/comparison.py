@@ -14,10 +14,10 @@ from bushfit.model.file import read_document
 from bushfit.report.compare_document import ComparedEntry
 from bushfit.report.compared import FAMILY_HEADS, Heads, Panel, SideBySide, Sides, chance, parameter_cells, signed
 from bushfit.report.contents import Contents
-from bushfit.report.page.chart import DASHES, Rule, Series, chart, colors
-from bushfit.report.page.drawings import LOG_FREQUENCIES, MOST_PLACES, Drawn, span_of
-from bushfit.report.page.gathered import thin
-from bushfit.report.page.story import MOST, conditions, corners, tube
+from bushfit.report.page.chart import DASHES, MOST_PLACES, Rule, Series, chart, colors, span_of, thin
+from bushfit.report.page.chart import Panel as PlacePanel
+from bushfit.report.page.report import MOST, conditions, corners, tube
+from bushfit.report.page.sweeps import LOG_FREQUENCIES
 from bushfit.report.tables import numbers
 from bushfit.units import alike, number, split_header, told
 
@@ -49,7 +49,7 @@ def read_comparison(folder: Path) -> Contents:
     return Contents({"compare": document})
 
 
-def account(found: SideBySide) -> dict[str, Any]:
+def comparison_context(found: SideBySide) -> dict[str, Any]:
     """All that the template of a comparison asks for."""
     document, names = found.document, found.names
     named, *others = names.values()
@@ -113,11 +113,11 @@ def _sizes(found: SideBySide, place: str) -> Iterator[dict[str, Any]]:
         yield row
 
 
-def _panels(shown: Sequence[Sides], looks: dict[str, str]) -> list[Drawn]:
+def _panels(shown: Sequence[Sides], looks: dict[str, str]) -> list[PlacePanel]:
     """Four pictures a place: stiffness and loss factor of all, and below how far they are off the first."""
     curves = sum(len(panel.lines) for sides in shown for panel in sides.panels)
     most = max(_FEWEST, _MOST_POINTS // max(curves, 1))
-    return [Drawn(s.place, [_picture(s, panel, looks, most) for panel in s.panels], []) for s in shown]
+    return [PlacePanel(s.place, [_picture(s, panel, looks, most) for panel in s.panels], []) for s in shown]
 
 
 def _picture(sides: Sides, panel: Panel, looks: dict[str, str], most: int) -> Markup:
