@@ -1,21 +1,25 @@
-"""Results on disk: all or none, and never over others unasked."""
+"""Results on disk: all or none, never over others unasked; and what Linux offers for that."""
 
 from __future__ import annotations
 
 import os
 import stat
+import sys
+import threading
 from pathlib import Path
 
 import pytest
 
 from bushfit.errors import OutputError
-from bushfit.report.folder import check_free, write_files
+from bushfit.report import disk
+from bushfit.report.folder import write_files
 
 FILES = {"a.csv": b"1\n", "b.json": b"{}\n"}
+locking = pytest.mark.skipif(sys.platform == "win32", reason="folders are neither locked nor exchanged there")
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.iterdir()}
+def contents(folder: Path, pattern: str = "*") -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.glob(pattern)}
 
 
 def test_a_new_folder_is_made_with_its_parents(tmp_path: Path) -> None:
@@ -28,71 +32,49 @@ def test_a_new_folder_is_made_with_its_parents(tmp_path: Path) -> None:
     assert stat.S_IMODE(folder.stat().st_mode) == 0o777 & ~umask
 
 
-def test_standing_results_are_kept_and_the_remedy_is_named(tmp_path: Path) -> None:
-    write_files(tmp_path / "x", FILES, force=False)
+def test_standing_results_are_kept_until_force_replaces_them_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "x"
+    folder.mkdir()
+    (folder / "mine.txt").write_bytes(b"kept")
+    write_files(folder, FILES, force=False)
     with pytest.raises(OutputError) as caught:
-        write_files(tmp_path / "x", {"b.json": b"new", "c.csv": b"new"}, force=False)
+        write_files(folder, {"b.json": b"new", "c.csv": b"new"}, force=False)
     assert "b.json" in str(caught.value)
     assert "--force" in str(caught.value)
-    assert contents(tmp_path / "x") == FILES
-
-
-def test_force_replaces_its_own_files_only(tmp_path: Path) -> None:
-    write_files(tmp_path / "x", FILES, force=False)
-    (tmp_path / "x" / "mine.txt").write_text("kept")
-    write_files(tmp_path / "x", {"b.json": b"new"}, force=True)
-    assert contents(tmp_path / "x") == {"a.csv": b"1\n", "b.json": b"new", "mine.txt": b"kept"}
+    assert contents(folder) == FILES | {"mine.txt": b"kept"}
+    write_files(folder, {"b.json": b"new"}, force=True)
+    assert contents(folder) == {"a.csv": b"1\n", "b.json": b"new", "mine.txt": b"kept"}
     assert [child.name for child in tmp_path.iterdir()] == ["x"]
 
 
-def test_other_files_in_the_folder_do_not_hinder(tmp_path: Path) -> None:
-    (tmp_path / "x").mkdir()
-    (tmp_path / "x" / "mine.txt").write_text("kept")
-    write_files(tmp_path / "x", FILES, force=False)
-    assert set(contents(tmp_path / "x")) == {*FILES, "mine.txt"}
-
-
-def test_a_file_in_the_way(tmp_path: Path) -> None:
-    (tmp_path / "x").write_text("a file")
-    with pytest.raises(OutputError, match="not a folder"):
-        write_files(tmp_path / "x", FILES, force=True)
-    with pytest.raises(OutputError, match="cannot be written"):
-        write_files(tmp_path / "x" / "below", FILES, force=True)
-    assert (tmp_path / "x").read_text() == "a file"
-
-
-def test_a_folder_in_the_way(tmp_path: Path) -> None:
+def test_a_file_or_a_folder_in_the_way(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("a file")
     (tmp_path / "x" / "a.csv").mkdir(parents=True)
-    for force in (True, False):
-        with pytest.raises(OutputError, match="a folder stands where a file goes"):
-            write_files(tmp_path / "x", FILES, force=force)
+    for folder, says in (
+        ("file", "not a folder"),
+        ("file/below", "cannot be written"),
+        ("x", "a folder stands where a file goes"),
+    ):
+        for force in (True, False):
+            with pytest.raises(OutputError, match=says):
+                write_files(tmp_path / folder, FILES, force=force)
+    assert (tmp_path / "file").read_text() == "a file"
     assert list((tmp_path / "x").iterdir()) == [tmp_path / "x" / "a.csv"]
-
-
-def test_check_free_says_nothing_where_nothing_stands(tmp_path: Path) -> None:
-    check_free(tmp_path / "absent", ["a.csv"], force=False)
-    check_free(tmp_path, ["a.csv"], force=False)
 
 
 def test_force_takes_away_what_the_same_command_wrote_before(tmp_path: Path) -> None:
     """Not what another wrote, what somebody has changed since, or what stands there besides."""
     folder = tmp_path / "x"
-    write_files(folder, {"a.csv": b"1", "b.csv": b"1", "c.csv": b"1"}, force=False, by="one")
-    write_files(folder, {"d.csv": b"1", "e.csv": b"1"}, force=False, by="other")
-    write_files(folder, {"f.csv": b"1", "g.csv": b"1"}, force=False, by="one")
-    assert {file.name for file in folder.glob("[!.]*")} == {f"{letter}.csv" for letter in "abcdefg"}
+    for names, by in (("abc", "one"), ("de", "other"), ("fg", "one")):
+        write_files(folder, {f"{name}.csv": b"1" for name in names}, force=False, by=by)
+    assert set(contents(folder, "[!.]*")) == {f"{letter}.csv" for letter in "abcdefg"}
     (folder / "b.csv").write_bytes(b"mine")
     (folder / "notes.txt").write_bytes(b"mine")
     write_files(folder, {"c.csv": b"2", "d.csv": b"2"}, force=True, by="one")
-    assert {file.name: file.read_bytes() for file in folder.glob("[!.]*")} == {
-        "b.csv": b"mine",
-        "c.csv": b"2",
-        "d.csv": b"2",
-        "e.csv": b"1",
-        "notes.txt": b"mine",
-    }
+    new = {"c.csv": b"2", "d.csv": b"2", "e.csv": b"1"}
+    assert contents(folder, "[!.]*") == {"b.csv": b"mine", "notes.txt": b"mine", **new}
     write_files(folder, {"h.csv": b"1"}, force=True, by="one")
-    assert {file.name for file in folder.glob("[!.]*")} == {"b.csv", "e.csv", "h.csv", "notes.txt"}
+    assert set(contents(folder, "[!.]*")) == {"b.csv", "e.csv", "h.csv", "notes.txt"}
 
 
 @pytest.mark.parametrize(
@@ -105,7 +87,7 @@ def test_a_record_that_is_spoiled_removes_nothing(record: bytes, tmp_path: Path)
     write_files(folder, {"a.csv": b"1", "b.csv": b"1"}, force=False, by="one")
     (folder / ".bushfit.json").write_bytes(record)
     write_files(folder, {"b.csv": b"2"}, force=True, by="one")
-    assert {file.name for file in folder.glob("[!.]*")} == {"a.csv", "b.csv"}
+    assert set(contents(folder, "[!.]*")) == {"a.csv", "b.csv"}
     assert (tmp_path / "mine.txt").read_bytes() == b"mine"
 
 
@@ -116,3 +98,61 @@ def test_nothing_stands_where_the_last_word_fails(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="standard output"):
         write_files(tmp_path / "x", {"a.csv": b"1"}, force=False, before=closed)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="renameat2")
+def test_two_folders_are_exchanged_or_left_as_they_were(tmp_path: Path) -> None:
+    one, other = tmp_path / "one", tmp_path / "other"
+    for folder in (one, other):
+        folder.mkdir()
+        (folder / folder.name).touch()
+    try:
+        disk.exchange(one, other)
+    except OSError:  # a file system that cannot
+        assert [path.name for path in (*one.iterdir(), *other.iterdir())] == ["one", "other"]
+    else:
+        assert [path.name for path in (*one.iterdir(), *other.iterdir())] == ["other", "one"]
+    with pytest.raises(OSError, match="such file"):
+        disk.exchange(one, tmp_path / "none")
+    assert one.is_dir()
+
+
+@locking
+def test_a_claim_holds_until_it_is_closed(tmp_path: Path) -> None:
+    assert disk.is_abandoned(tmp_path)
+    claim = disk.claim(tmp_path)
+    assert not disk.is_abandoned(tmp_path)
+    with pytest.raises(BlockingIOError):
+        disk.claim(tmp_path, wait=False)
+    claim.close()
+    assert disk.is_abandoned(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    assert not disk.is_abandoned(tmp_path / "none"), "what is not there cannot be told to be abandoned"
+
+
+@locking
+def test_a_locked_folder_lets_one_in_after_the_other(tmp_path: Path) -> None:
+    inside: list[str] = []
+
+    def enter() -> None:
+        with disk.locked(tmp_path):
+            inside.append("second")
+
+    waiting = threading.Thread(target=enter)
+    with disk.locked(tmp_path):
+        waiting.start()
+        waiting.join(0.2)
+        assert waiting.is_alive()
+        inside.append("first")
+    waiting.join(10.0)
+    assert inside == ["first", "second"]
+
+
+@locking
+def test_open_files_are_flushed_and_closed_ones_are_an_error(tmp_path: Path) -> None:
+    descriptor = os.open(tmp_path / "a", os.O_CREAT | os.O_WRONLY)
+    disk.flush([descriptor])
+    os.close(descriptor)
+    disk.flush([])
+    with pytest.raises(OSError, match=r"[Bb]ad file descriptor"):
+        disk.flush([descriptor])

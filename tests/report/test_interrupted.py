@@ -63,20 +63,17 @@ def test_stopped_at_every_system_call(where: str, how: str, tmp_path: Path) -> N
     assert len(states) >= 2
 
 
+PREDICT = ("--frequencies|10:20:5 Hz", ("predict", "data/arm_bushing/truth.json", "--no-plots"))
+OFTEN = [
+    (50, *PREDICT),
+    (8, "--no-report", ("run", "configs/cmp_15961.toml", "--no-plots")),
+    (12, "--format|csv", ("export", "data/arm_bushing/truth.json", "--format", "nastran")),
+]
+
+
 @pytest.mark.parametrize(
     ("times", "otherwise", "arguments"),
-    [
-        (10, "--frequencies|10:20:5 Hz", ("predict", "data/arm_bushing/truth.json", "--no-plots")),
-        *(
-            pytest.param(*more, marks=pytest.mark.slow)
-            for more in (
-                (50, "--frequencies|10:20:5 Hz", ("predict", "data/arm_bushing/truth.json", "--no-plots")),
-                (8, "--no-report", ("run", "configs/cmp_15961.toml", "--no-plots")),
-                (12, "--format|csv", ("export", "data/arm_bushing/truth.json", "--format", "nastran")),
-            )
-        ),
-    ],
-    ids=lambda given: given[0] if isinstance(given, tuple) else "",
+    [(10, *PREDICT), *(pytest.param(*each, marks=pytest.mark.slow) for each in OFTEN)],
 )
 def test_killed_at_random_times(
     root: Path, tmp_path: Path, times: int, otherwise: str, arguments: tuple[str, ...]
@@ -105,21 +102,19 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", str(folder)], check=True)
 
 
-def test_a_full_disk(small_disk: Path) -> None:
+@pytest.mark.parametrize(
+    ("mounted", "size", "says"),
+    [("", 90_000, "No space left"), ("remount,ro", 10, "no right to write there")],
+    ids=["full", "read only"],
+)
+def test_a_disk_that_is_full_or_may_only_be_read(small_disk: Path, mounted: str, size: int, says: str) -> None:
     write_files(small_disk / "x", OLD, force=False)
+    if mounted:
+        subprocess.run(["mount", "-o", mounted, str(small_disk)], check=True)
     for place in (small_disk / "y", small_disk / "x"):
-        with pytest.raises(OutputError, match="No space left"):
-            write_files(place, {"a.csv": bytes(30_000), "b.json": bytes(60_000)}, force=True)
+        with pytest.raises(OutputError, match=says):
+            write_files(place, {"a.csv": bytes(size // 3), "b.json": bytes(2 * size // 3)}, force=True)
     assert [path.name for path in small_disk.iterdir()] == ["x"]
-    assert contents(small_disk / "x") == OLD
-
-
-def test_a_disk_that_may_only_be_read(small_disk: Path) -> None:
-    write_files(small_disk / "x", OLD, force=False)
-    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
-    for place in (small_disk / "y", small_disk / "x"):
-        with pytest.raises(OutputError, match="no right to write there"):
-            write_files(place, NEW, force=True)
     assert contents(small_disk / "x") == OLD
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bushfit.errors import printable
+from bushfit.units import number
 
 if TYPE_CHECKING:
     import jinja2
@@ -26,11 +27,10 @@ def report_page(documents: Documents, tables: Tables) -> str:
     Raises:
         ModelError: no model among the documents, or a spoiled one.
     """
-    from bushfit.report.page.readback import canonical, checked
-    from bushfit.report.page.story import story
+    from bushfit.report.page.readback import ReportData
+    from bushfit.report.page.report import report_context
 
-    same = {name: canonical(table) for name, table in tables.items()}
-    return rendered("report.html", story(checked(documents), same))
+    return rendered("report.html", report_context(ReportData.of(documents, tables)))
 
 
 def comparison_page(documents: Documents, _: Tables) -> str:
@@ -40,9 +40,9 @@ def comparison_page(documents: Documents, _: Tables) -> str:
         ModelError: a spoiled document.
     """
     from bushfit.report.compared import SideBySide
-    from bushfit.report.page.comparison import account
+    from bushfit.report.page.comparison import comparison_context
 
-    return rendered("compare.html", account(SideBySide.of(documents["compare"])))
+    return rendered("compare.html", comparison_context(SideBySide.of(documents["compare"])))
 
 
 def rendered(template: str, context: dict[str, Any]) -> str:
@@ -53,8 +53,13 @@ def rendered(template: str, context: dict[str, Any]) -> str:
     allowed = (
         f"default-src 'none'; style-src {_hash(style)}; script-src {_hash(script)}; base-uri 'none'; form-action 'none'"
     )
-    page = _environment().get_template(template).render(style=style, script=script, allowed=allowed, **context)
+    page = filled(template, {"style": style, "script": script, "allowed": allowed, **context})
     return printable(page, lines=True) + "\n"
+
+
+def filled(template: str, context: dict[str, Any]) -> str:
+    """A template with its context; all texts that come from elsewhere are escaped."""
+    return _environment().get_template(template).render(context)
 
 
 def _hash(text: str) -> str:
@@ -64,13 +69,15 @@ def _hash(text: str) -> str:
 
 @cache
 def _environment() -> jinja2.Environment:
-    """Templates in which all that comes from elsewhere is escaped."""
     import jinja2
 
-    return jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_TEMPLATES),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["number"] = number
+    environment.filters["px"] = lambda pixels: f"{pixels:.1f}".removesuffix(".0")
+    return environment

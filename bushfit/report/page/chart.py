@@ -1,45 +1,62 @@
-"""The two pictures of a page: a chart of lines, bands and points, and maps of cells."""
+"""The two pictures of a page: a chart of lines, bands and points, and maps of cells.
 
-from collections.abc import Iterator, Sequence
+They are SVG of the page's own, in the templates chart.html and maps.html, not matplotlib's: every run writes a page,
+also where no other picture is asked for. matplotlib would take 0.3 s to load and 0.05 s a chart, each five times as
+large. Colours are attributes, since pages are shown where style sheets and scripts are forbidden: by Jenkins, in mail.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, Self
 
 import numpy as np
 from markupsafe import Markup
 
 from bushfit.effects.contract import Array
-from bushfit.report.page.svg import GREY, Axis, axes, dots, path, picture, tag, text
+from bushfit.report.page import filled
 from bushfit.report.tables import spread
+from bushfit.units import number
 
+#: Most levels, tests or loops that a chart draws: more colours are not told apart; most places of a page.
+MOST_LEVELS, MOST_PLACES = 8, 8
 #: Width of a picture [pixels]: two stand side by side on a screen, and on paper.
-WIDTH = 460.0
-#: Height of the panel of a chart [pixels].
-_PANEL = 168.0
-#: Left of a panel: ticks and the label of the axis [pixels].
-_LEFT = 62.0
-#: Right of a panel [pixels].
-_RIGHT = 10.0
-#: Below a panel: ticks and the label of the axis [pixels].
-_BELOW = 42.0
-#: Height of a line of text [pixels].
-_LINE = 17.0
-#: Width of a letter in a legend, and of its swatch [pixels].
-_LETTER, _SWATCH = 6.4, 34.0
+_WIDTH = 460.0
+#: Height of the panel of a chart, and the room left, right and below for ticks and labels [pixels].
+_PANEL, _LEFT, _RIGHT, _BELOW = 168.0, 62.0, 10.0, 42.0
+#: Height of a line of text, width of a letter, and of the stroke before a name in a legend [pixels].
+_LINE, _LETTER, _SWATCH = 17.0, 6.4, 34.0
+#: Most ticks of a logarithmic axis with 1, 2 and 5 of each decade.
+_MOST_TICKS = 7
+#: Free space beyond the data on a linear axis, as a share of their span.
+_MARGIN = 0.05
 #: Colours of levels, from cold to warm, each with a contrast of 4 to 1 and more on white.
 _COLORS = ("#2d1160", "#1f4e9c", "#0a7399", "#0d7f62", "#4b7f1b", "#85690a", "#b4500c", "#a11d4a")
 #: Dashes of levels, one after the other: they tell lines apart in a print without colours.
 DASHES = ("", "6 2", "2 2", "9 2 2 2", "4 4", "1 3", "12 3", "6 2 2 2")
-#: Colour of limits.
-LIMIT = "#b3121d"
+#: Colour of limits, and of other level lines.
+LIMIT, _GREY = "#b3121d", "#595959"
+#: Left of maps, between two of them, and above the first: room for names [pixels].
+_MAPS_LEFT, _BETWEEN, _MAPS_TOP = 96.0, 12.0, 48.0
 #: Height of a row of cells, and the most that a map is high [pixels].
 _CELL, _MOST_MAP = 15.0, 110.0
 #: Where the colour of a cell changes, in % off; the first is that of what agrees.
-EDGES = (0.5, 1.0, 2.0, 5.0, 10.0)
+_EDGES = (0.5, 1.0, 2.0, 5.0, 10.0)
 #: Colours from agreement outward, of what was measured above the model and below.
 _ABOVE = ("#ececec", "#f9c4ab", "#ee8f6c", "#d1493e", "#9f1330", "#5d0a26")
 _BELOW_MODEL = ("#ececec", "#bfdcec", "#7fb8d8", "#3984be", "#1f5290", "#0b2a56")
 #: From this colour outward a cell below the model bears a bar: red and blue are one grey in a print without colours.
 _BARRED = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """What a page shows of a place: its pictures, and what must be told of them."""
+
+    place: str
+    pictures: Sequence[Markup]
+    notes: Sequence[str]
 
 
 def colors(count: int) -> list[str]:
@@ -49,7 +66,7 @@ def colors(count: int) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """What a legend names: a line, its band and points, each x and y, (n,)."""
+    """What a legend names: a line, its band (x, low, high) and points, each x and y, (n,)."""
 
     name: str
     color: str
@@ -58,23 +75,80 @@ class Series:
     band: tuple[Array, Array, Array] | None = None
     points: tuple[Array, Array] | None = None
 
-    def values(self, place: int) -> Iterator[Array]:
+    def values(self, which: int) -> Iterator[Array]:
         """All x (0) or y (1) values."""
-        for part in (self.line, self.points):
-            if part is not None:
-                yield part[place]
-        if self.band is not None:
-            yield from ((self.band[0],), self.band[1:])[place]
+        for x, *ys in filter(None, (self.line, self.points, self.band)):
+            yield from ([x], ys)[which]
 
 
 @dataclass(frozen=True)
 class Rule:
-    """A level line across a chart: its value, its name, whether it is a limit, and its dashes."""
+    """A level line across a chart: its value, its name, its dashes and colour."""
 
     value: float
     name: str
-    limit: bool = False
     dashes: str = ""
+    color: str = _GREY
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Values from `low` to `high` along the pixels from `first` to `last`."""
+
+    label: str
+    low: float
+    high: float
+    first: float
+    last: float
+    log: bool = False
+
+    @classmethod
+    def over(
+        cls, label: str, values: Iterable[Array], first: float, last: float, *, log: bool = False, least: float = 0.0
+    ) -> Self:
+        """An axis that holds all these values, with a margin; a linear one spans `least` or more."""
+        known = np.concatenate([np.empty(0), *(np.ravel(each) for each in values)])
+        known = known[np.isfinite(known) & ((known > 0.0) | (not log))]
+        low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+        if log and high > low:
+            margin = (high / low) ** (_MARGIN / 2.0)
+            return cls(label, low / margin, high * margin, first, last, log=True)
+        margin = max(_MARGIN * (high - low), (least - high + low) / 2.0) or 0.1 * abs(high) or 1.0
+        return cls(label, low - margin, high + margin, first, last)
+
+    def __call__(self, values: Array | float) -> Array:
+        """Pixels of values."""
+        ends = (math.log(self.low), math.log(self.high)) if self.log else (self.low, self.high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at = np.log(values) if self.log else np.asarray(values, dtype=float)
+        return np.asarray(self.first + (self.last - self.first) * (at - ends[0]) / (ends[1] - ends[0]))
+
+    @property
+    def ticks(self) -> list[tuple[float, str]]:
+        """Pixels of round values within, and how they are written."""
+        values = self._decades() if self.log else []
+        if len(values) < 2:
+            raw = (self.high - self.low) / 5  # as many ticks, or a few more
+            power = 10.0 ** math.floor(math.log10(raw))
+            step = power * next(digit for digit in (1, 2, 5, 10) if digit * power >= raw * 0.999)
+            values = [step * count for count in range(math.ceil(self.low / step), math.floor(self.high / step) + 1)]
+        return [(float(self(value)), number(value, 4)) for value in values]
+
+    def _decades(self) -> list[float]:
+        """1, 2 and 5 of each decade within, or the decades alone where these are too many."""
+        powers = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
+        fine = [digit * 10.0**power for power in powers for digit in (1, 2, 5) if self._holds(digit * 10.0**power)]
+        whole = [10.0**power for power in powers if self._holds(10.0**power)]
+        return fine if len(fine) <= _MOST_TICKS else whole[:: math.ceil(len(whole) / _MOST_TICKS)]
+
+    def _holds(self, value: float) -> bool:
+        return self.low <= value <= self.high
+
+    @property
+    def described(self) -> str:
+        """What turns pixels back into values, for the script of the page."""
+        ends = (number(x, 9) for x in (self.low, self.high, self.first, self.last))
+        return " ".join((*ends, "log" if self.log else "linear"))
 
 
 def chart(
@@ -88,140 +162,144 @@ def chart(
     dot: float = 4.6,
     least: float = 0.0,
 ) -> Markup:
-    """Lines, bands and points over x, which is logarithmic on request, under a legend; y spans `least` or more."""
+    """Lines, bands and points over x, which is logarithmic on request, under a legend; y spans `least` or more.
+
+    `alt` tells of the picture those who do not see it; `dot` is the width of a point [pixels].
+    """
     legend, lines = _legend(series, rules)
     top = _LINE * (1 + lines) + 12.0
     levels = np.array([rule.value for rule in rules])
-    x = Axis.over(labels[0], (values for each in series for values in each.values(0)), _LEFT, WIDTH - _RIGHT, log=log)
-    ys = [*(values for each in series for values in each.values(1)), levels]
+    x = Axis.over(labels[0], (own for each in series for own in each.values(0)), _LEFT, _WIDTH - _RIGHT, log=log)
+    ys = [*(own for each in series for own in each.values(1)), levels]
     y = Axis.over(labels[1], ys, top + _PANEL, top, least=least)
-    drawn = [_drawn(each, x, y, dot) for each in series]
-    across = np.array([x.first, x.last])
-    drawn += [
-        path(across, y(np.full(2, rule.value)), stroke=LIMIT if rule.limit else GREY, **_dashed(rule.dashes))
-        for rule in rules
-    ]
-    heading = text(4, 14, title, font_weight="bold", font_size=13)
-    data = {"data_x": x.described, "data_y": y.described}
-    return picture(WIDTH, top + _PANEL + _BELOW, alt, heading, *legend, *axes(x, y), *drawn, **data)
-
-
-def _dashed(dashes: str) -> dict[str, Any]:
-    """The attribute of a dashed line; none of a whole one."""
-    return {"stroke_dasharray": dashes} if dashes else {}
-
-
-def _drawn(series: Series, x: Axis, y: Axis, dot: float) -> Markup:
-    """Band, line and points of a series."""
-    parts = []
-    if series.band is not None:
-        along, low, high = series.band
-        there = np.isfinite(along) & np.isfinite(low) & np.isfinite(high)
-        around = (
-            x(np.concatenate([along[there], along[there][::-1]])),
-            y(np.concatenate([low[there], high[there][::-1]])),
+    drawn = [
+        (
+            each,
+            _line(x(each.line[0]), y(each.line[1])) if each.line else "",
+            _band(x(each.band[0]), y(each.band[1]), y(each.band[2])) if each.band else "",
+            _dots(x(each.points[0]), y(each.points[1])) if each.points else "",
         )
-        d = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(*around, strict=True))
-        parts.append(tag("path", d=f"M{d}Z", fill=series.color, fill_opacity=0.18) if d else Markup())
-    if series.line is not None:
-        line = x(series.line[0]), y(series.line[1])
-        parts.append(path(*line, stroke=series.color, stroke_width=1.5, data_of="model", **_dashed(series.dashes)))
-    if series.points is not None:
-        parts.append(dots(x(series.points[0]), y(series.points[1]), series.color, dot))
-    return tag("g", *parts, data_series=series.name)
+        for each in series
+    ]
+    size = {"width": _WIDTH, "height": top + _PANEL + _BELOW}
+    axes = {"x": x, "y": y, "legend": legend, "drawn": drawn, "rules": rules, "dot": dot}
+    return Markup(filled("chart.html", {"title": title, "alt": alt, **size, **axes}))
 
 
-def _legend(series: Sequence[Series], rules: Sequence[Rule]) -> tuple[list[Markup], int]:
-    """The entries of a legend under the title, and how many lines they take."""
-    drawn, left, line = [], 4.0, 1
-    entries = [(each.name, each) for each in series if each.name] + [(rule.name, rule) for rule in rules if rule.name]
-    for name, each in entries:
-        width = _SWATCH + _LETTER * len(name) + 10.0
-        if left + width > WIDTH and left > 4.0:
+def _legend(series: Sequence[Series], rules: Sequence[Rule]) -> tuple[list[tuple[Any, ...]], int]:
+    """The entries of a legend under the title, and how many lines they take.
+
+    Of each its left end and height [pixels], name, colour, dashes, whether it has a line, and whether points.
+    """
+    entries = [(each.name, each.color, each.dashes, bool(each.line), bool(each.points)) for each in series if each.name]
+    entries += [(rule.name, rule.color, rule.dashes, True, False) for rule in rules if rule.name]
+    placed, left, line = [], 4.0, 1
+    for entry in entries:
+        width = _SWATCH + _LETTER * len(entry[0]) + 10.0
+        if left + width > _WIDTH and left > 4.0:
             left, line = 4.0, line + 1
-        at = 14.0 + _LINE * line
-        across, level = np.array([left, left + _SWATCH - 8.0]), np.full(2, at - 4.0)
-        color = each.color if isinstance(each, Series) else LIMIT if each.limit else GREY
-        if isinstance(each, Rule) or each.line is not None:
-            drawn.append(path(across, level, stroke=color, stroke_width=1.5, **_dashed(each.dashes)))
-        if isinstance(each, Series) and each.points is not None:
-            middle = tag("circle", cx=left + (_SWATCH - 8.0) / 2, cy=at - 4.0, r=2.5, fill=color)
-            drawn.append(middle)
-        drawn.append(text(left + _SWATCH - 4.0, at, name))
+        placed.append((left, 14.0 + _LINE * line, *entry))
         left += width
-    return drawn, line if entries else 0
+    return placed, line if entries else 0
+
+
+def _line(x: Array, y: Array) -> str:
+    """A line through pixels, as SVG writes its path; what is not a number parts it."""
+    there = np.isfinite(x) & np.isfinite(y)
+    runs = np.split(np.arange(x.size), np.flatnonzero(np.diff(there)) + 1)
+    drawn = ("L".join(_pair(x[at], y[at]) for at in run) for run in runs if run.size and there[run[0]])
+    return "".join(f"M{run}" for run in drawn)
+
+
+def _band(x: Array, low: Array, high: Array) -> str:
+    """The outline of what lies between two lines."""
+    there = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
+    ends = np.concatenate([low[there], high[there][::-1]])
+    around = zip(np.concatenate([x[there], x[there][::-1]]), ends, strict=True)
+    d = "L".join(f"{a:.1f} {b:.1f}" for a, b in around)
+    return f"M{d}" if d else ""
+
+
+def _dots(x: Array, y: Array) -> str:
+    """Points as strokes of no length, which have round ends: a third of the bytes of circles."""
+    return "".join(f"M{_pair(a, b)}h0" for a, b in zip(x, y, strict=True) if math.isfinite(a + b))
+
+
+def _pair(x: float, y: float) -> str:
+    """A place to a tenth of a pixel."""
+    return f"{x:.1f} {y:.1f}".replace(".0 ", " ").removesuffix(".0")
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """A map: what it shows, its rows from below, what lies along x, and one or two sides, (rows, columns) in %."""
+    """A map: what it shows, its rows from below, what lies along x, and values in %, (rows, columns), before and after;
+    of one side alone where both are the same."""
 
     name: str
     rows: Sequence[str]
     along: tuple[str, str, str]
     sides: Sequence[Array]
 
+    def side(self, at: int) -> Array:
+        """The values before (0) or after (1)."""
+        return self.sides[min(at, len(self.sides) - 1)]
+
+    @property
+    def size(self) -> float:
+        """Height of a row [pixels]."""
+        return min(_CELL, _MOST_MAP / len(self.rows))
+
+    @property
+    def every(self) -> int:
+        """Of so many rows one has room for its name."""
+        return max(1, round(12.0 / self.size))
+
 
 def maps(title: str, heads: Sequence[str], shown: Sequence[Cells], alt: str) -> Markup:
     """Maps below each other, before and after side by side, one scale for all."""
-    left = 96.0
-    width = (WIDTH - left - _RIGHT - 12.0 * (len(heads) - 1)) / len(heads)
-    drawn = [text(4, 14, title, font_weight="bold", font_size=13)]
-    starts = [left + side * (width + 12.0) for side in range(len(heads))]
-    for start, head in zip(starts, heads, strict=True):
-        drawn.append(text(start + width / 2, 34, head, text_anchor="middle", fill=GREY))
-    top = 48.0
-    for cells in shown:
-        size = min(_CELL, _MOST_MAP / len(cells.rows))
-        height = size * len(cells.rows)
-        for start, values in zip(starts, cells.sides, strict=True):
-            drawn += _cells(values, start, top, width / values.shape[1], size)
-            low, name, high = cells.along
-            drawn.append(text(start, top + height + 13, low, font_size=11))
-            drawn.append(
-                text(start + width / 2, top + height + 13, name, text_anchor="middle", font_size=11, fill=GREY)
-            )
-            drawn.append(text(start + width, top + height + 13, high, text_anchor="end", font_size=11))
-        every = max(1, round(12.0 / size))
-        for row, label in enumerate(cells.rows):
-            if row % every == 0:
-                at = top + height - (row + 0.5) * size + 4
-                drawn.append(text(left - 6, at, label, text_anchor="end", font_size=11))
-        drawn.append(text(4, top - 6, cells.name, font_weight="bold", font_size=11))
-        top += height + 36.0
-    return picture(WIDTH, top + 30.0, alt, *drawn, *_scale(top))
+    width = (_WIDTH - _MAPS_LEFT - _RIGHT - _BETWEEN * (len(heads) - 1)) / len(heads)
+    heights = [each.size * len(each.rows) + 36.0 for each in shown]
+    tops = [_MAPS_TOP + sum(heights[:place]) for place in range(len(heights) + 1)]
+    scale = (*_BELOW_MODEL[:0:-1], *_ABOVE)
+    context: dict[str, Any] = {
+        "title": title,
+        "alt": alt,
+        "width": _WIDTH,
+        "height": tops[-1] + 30.0,
+        "heads": heads,
+        "starts": [_MAPS_LEFT + side * (width + _BETWEEN) for side in range(len(heads))],
+        "map_width": width,
+        "placed": [*zip(shown, tops[:-1], strict=True)],
+        "painted": partial(_painted, width=width),
+        "scale": scale,
+        "scale_left": (_WIDTH - 24.0 * len(scale)) / 2,
+        "scale_top": tops[-1],
+        "edges": (*(-edge for edge in _EDGES[::-1]), *_EDGES),
+    }
+    return Markup(filled("maps.html", context))
 
 
-def _cells(values: Array, left: float, top: float, width: float, size: float) -> list[Markup]:
-    """The cells of one map, each colour one path, and bars where the measurement is far below."""
-    rows, _ = values.shape
-    step = np.searchsorted(EDGES, np.abs(values), side="right") * np.where(values < 0.0, -1, 1)
-    drawn = []
-    for level in range(-len(EDGES), len(EDGES) + 1):
+def _painted(values: Array, left: float, top: float, height: float, width: float) -> Iterator[tuple[str, str, str]]:
+    """The cells of one map by colour: colour, their outlines, and bars where the measurement is far below."""
+    rows, columns = values.shape
+    wide = width / columns
+    step = np.searchsorted(_EDGES, np.abs(values), side="right") * np.where(values < 0.0, -1, 1)
+    for level in range(-len(_EDGES), len(_EDGES) + 1):
         found = np.argwhere(np.isfinite(values) & (step == level))
-        boxes = [(left + column * width, top + (rows - 1 - row) * size) for row, column in found]
+        boxes = [(left + column * wide, top + (rows - 1 - row) * height) for row, column in found]
+        outlines = "".join(f"M{x:.1f} {y:.1f}h{wide:.1f}v{height:.1f}h-{wide:.1f}z" for x, y in boxes)
+        bars = "".join(f"M{x + wide / 4:.1f} {y + height / 2:.1f}h{wide / 2:.1f}" for x, y in boxes)
         if boxes:
             color = _ABOVE[level] if level >= 0 else _BELOW_MODEL[-level]
-            d = "".join(f"M{x:.1f} {y:.1f}h{width:.1f}v{size:.1f}h-{width:.1f}z" for x, y in boxes)
-            drawn.append(tag("path", d=d, fill=color, stroke="#ffffff", stroke_width=0.5))
-        if boxes and level <= -_BARRED:
-            d = "".join(f"M{x + width / 4:.1f} {y + size / 2:.1f}h{width / 2:.1f}" for x, y in boxes)
-            drawn.append(tag("path", d=d, stroke="#ffffff", stroke_width=1.2))
-    return drawn
+            yield color, outlines, bars if level <= -_BARRED else ""
 
 
-def _scale(top: float) -> list[Markup]:
-    """The scale of colours: below the model left, above right, edges numbered."""
-    colors = (*_BELOW_MODEL[:0:-1], *_ABOVE)
-    width = 24.0
-    left = (WIDTH - width * len(colors)) / 2
-    drawn = [
-        tag("rect", x=left + place * width, y=top, width=width, height=10, fill=color)
-        for place, color in enumerate(colors)
-    ]
-    ends = (*(-edge for edge in EDGES[::-1]), *EDGES)
-    for place, edge in enumerate(ends, start=1):
-        drawn.append(text(left + place * width, top + 22, f"{edge:g}", text_anchor="middle", font_size=10))
-    drawn.append(text(left - 8, top + 9, "measured below", text_anchor="end", font_size=11, fill=GREY))
-    drawn.append(text(left + width * len(colors) + 8, top + 9, "above, %", font_size=11, fill=GREY))
-    return drawn
+def span_of(values: Array) -> str:
+    """Least and largest of the values that are known, in words."""
+    known = values[np.isfinite(values)]
+    return f"{number(float(known.min()), 3)} to {number(float(known.max()), 3)}" if known.size else "nothing"
+
+
+def every_nth(count: int, most: int) -> slice:
+    """Every so many-th of some rows, at most so many."""
+    return slice(None, None, max(1, -(-count // most)))

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Self
 from urllib.parse import quote
 
 import numpy as np
+import pandas as pd
 from markupsafe import Markup
 
 from bushfit.effects.contract import Array
@@ -19,7 +20,7 @@ from bushfit.report.page import rendered
 from bushfit.report.page.chart import LIMIT, Rule, Series, chart
 from bushfit.report.page.readback import canonical, read_table
 from bushfit.report.tables import BETWEEN
-from bushfit.units import for_people, number
+from bushfit.units import for_people, number, split_header
 from bushfit.validation import Number, WholeNumber, check_tables
 
 #: What "schema" of the document says.
@@ -28,8 +29,6 @@ SCHEMA = "bushfit/batch/1"
 _MOST_CELLS, _MOST_POINTS = 4000, 400
 #: Charts at most, those with limits first.
 _MOST_CHARTS = 12
-#: Colour of what lies beyond a chart.
-FAR = "#b4500c"
 #: Control limits, in standard deviations of the batch about its median, as on Shewhart's charts.
 _CONTROL = 3.0
 #: Bushings that a quantity must be known of for a chart.
@@ -106,39 +105,81 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
     """
     batch = check_tables(documents["batch"], None, Batch, kind=ModelError)
     table = canonical(tables["batch"])
-    quantities = {header: each for header, each in batch.quantities.items() if header in table}
+    columns = [_Column.of(name, each, table) for name, each in batch.quantities.items() if name in table]
     shown = [name for name in _WORDS if name in table and any(table[name])]
-    rows = _ordered(table)
-    most = max(1, _MOST_CELLS // (len(shown) + len(quantities) + 1))
-    warned = [cell.split(BETWEEN) if cell else [] for cell in table["warnings"]]
-    footnotes = list(dict.fromkeys(line for at in rows[:most] for line in warned[at]))
-    for at in rows[:most]:
-        table.loc[at, "warnings"] = ", ".join(str(footnotes.index(line) + 1) for line in warned[at])
-    charts = sorted(quantities, key=lambda header: all(end is None for end in quantities[header].allowed))
-    charts = [header for header in charts if np.isfinite(table[header]).sum() >= _FEWEST]
-    return rendered(
-        "index.html",
-        {
-            "batch": batch,
-            "charts": [
-                _chart(header, quantities[header], table[header].to_numpy()) for header in charts[:_MOST_CHARTS]
-            ],
-            "left_charts": max(0, len(charts) - _MOST_CHARTS),
-            "heads": [*shown, *(_for_people(header, each)[0] for header, each in quantities.items())],
-            "remarked": any(any(table[name]) for name in _REMARKS if name in table),
-            "footnotes": footnotes,
-            "texts": len(shown),
-            "rows": [_row(table.iloc[at], shown, quantities, reported, base) for at in rows[:most]],
-            "left_rows": max(0, len(rows) - most),
-            "tones": _TONES,
-            "failed": [
-                (row["name"], row["error"]) for row in table[table["status"] == "failed"].head(20).to_dict("records")
-            ],
-        },
-    )
+    remarks = [name for name in _REMARKS if name in table]
+    order = _ordered(table)
+    first = order[: max(1, _MOST_CELLS // (len(shown) + len(columns) + 1))]
+    warned = {at: table["warnings"][at].split(BETWEEN) if table["warnings"][at] else [] for at in first}
+    footnotes = list(dict.fromkeys(line for lines in warned.values() for line in lines))
+    for at, lines in warned.items():
+        table.loc[at, "warnings"] = ", ".join(str(footnotes.index(line) + 1) for line in lines)
+    charts = [column for column in columns if np.isfinite(column.known).sum() >= _FEWEST]
+    charts.sort(key=lambda column: not column.limits)
+    rows = table.to_dict("records")
+    context = {
+        "batch": batch,
+        "charts": [_chart(column) for column in charts[:_MOST_CHARTS]],
+        "left_charts": max(0, len(charts) - _MOST_CHARTS),
+        "heads": [*shown, *(column.header for column in columns)],
+        "remarked": any(any(table[name]) for name in remarks),
+        "footnotes": footnotes,
+        "texts": len(shown),
+        "rows": [
+            {
+                "name": rows[at]["name"],
+                "link": _link(rows[at]["folder"], reported, base),
+                "words": [rows[at][name] for name in shown],
+                "cells": [(column.cells[at], column.out[at]) for column in columns],
+                "remarks": "; ".join(f"{name}: {rows[at][name]}" for name in remarks if rows[at][name]),
+            }
+            for at in first
+        ],
+        "left_rows": len(order) - len(first),
+        "tones": _TONES,
+        "failed": [(row["name"], row["error"]) for row in rows if row["status"] == "failed"][:20],
+    }
+    return rendered("index.html", context)
 
 
-def _ordered(table: Any) -> list[int]:
+@dataclass(frozen=True, eq=False)
+class _Column:
+    """A quantity of all bushings in the unit in which people read it, NaN where it is not known, (n,)."""
+
+    header: str
+    known: Array
+    median: float
+    sigma: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, name: str, quantity: Quantity, table: pd.DataFrame) -> Self:
+        """A column of the table of the batch."""
+        what, _, unit = name.rpartition(" [")
+        unit, factor = for_people(unit.rstrip("]"), 1.0, quantity.median)
+        low, high = quantity.allowed
+        ends = (-math.inf if low is None else low * factor, math.inf if high is None else high * factor)
+        values = table[name].to_numpy() * factor
+        return cls(f"{what} [{unit}]", values, quantity.median * factor, quantity.sigma * factor, *ends)
+
+    @property
+    def limits(self) -> list[float]:
+        """The ends of what is allowed, as far as there are some."""
+        return [end for end in (self.low, self.high) if math.isfinite(end)]
+
+    @cached_property
+    def out(self) -> Array:
+        """Which bushings are out of limits, (n,) bool."""
+        return (self.known < self.low) | (self.known > self.high)
+
+    @cached_property
+    def cells(self) -> list[str]:
+        """The values as texts."""
+        return ["" if math.isnan(value) else number(value, 4) for value in self.known.tolist()]
+
+
+def _ordered(table: pd.DataFrame) -> list[int]:
     """Numbers of the rows, those that need a look first, else as they stand."""
     limits = table["limits"] if "limits" in table else [""] * len(table)
     words = [status if status == "failed" else limit for status, limit in zip(table["status"], limits, strict=True)]
@@ -146,68 +187,37 @@ def _ordered(table: Any) -> list[int]:
     return np.argsort(order, kind="stable").tolist()
 
 
-def _row(
-    row: Any, shown: list[str], quantities: Mapping[str, Quantity], reported: Collection[str], base: str
-) -> dict[str, Any]:
-    """A bushing in a row: its link, its words, and its numbers with whether they are out of limits."""
-    folder = row["folder"]
-    page = "/report.html" if folder in reported else "/"
-    cells = []
-    for header, quantity in quantities.items():
-        value, (low, high) = float(row[header]), quantity.allowed
-        out = (low is not None and value < low) or (high is not None and value > high)
-        cells.append(("" if math.isnan(value) else number(value * _for_people(header, quantity)[1], 4), out))
-    link = base + quote(folder) + page if folder else ""
-    remarks = "; ".join(f"{name}: {row[name]}" for name in _REMARKS if row.get(name))
-    return {
-        "name": row["name"],
-        "link": link,
-        "words": [row[name] for name in shown],
-        "cells": cells,
-        "remarks": remarks,
-    }
+def _link(folder: str, reported: Collection[str], base: str) -> str:
+    """What the name of a bushing leads to: its report, else its folder, if it has one."""
+    return base + quote(folder) + ("/report.html" if folder in reported else "/") if folder else ""
 
 
-def _for_people(header: str, quantity: Quantity) -> tuple[str, float]:
-    """A header with the unit in which people read its numbers, and the factor to it."""
-    name, _, unit = header.rpartition(" [")
-    unit, factor = for_people(unit.rstrip("]"), 1.0, quantity.median)
-    return f"{name} [{unit}]", factor
-
-
-def _chart(header: str, quantity: Quantity, values: Array) -> Markup:
+def _chart(column: _Column) -> Markup:
     """A control chart: values in the manifest's order, median and three standard deviations, limits."""
-    header, factor = _for_people(header, quantity)
-    at, values = np.arange(1.0, values.size + 1.0), values * factor
-    median, sigma = quantity.median * factor, quantity.sigma * factor
-    limits = [end * factor for end in quantity.allowed if end is not None]
-    low, high = (end if end is None else end * factor for end in quantity.allowed)
-    out = (values < (-math.inf if low is None else low)) | (values > (math.inf if high is None else high))
-    ends = min(median - _FURTHEST * sigma, *limits, median), max(median + _FURTHEST * sigma, *limits, median)
-    far = ((values < ends[0]) | (values > ends[1])) & (sigma > 0.0)
-    shown = np.where(far, np.clip(values, *ends), values)
+    values, median, sigma, out = column.known, column.median, column.sigma, column.out
+    at = np.arange(1.0, values.size + 1.0)
+    reach = [median - _FURTHEST * sigma, median + _FURTHEST * sigma, *column.limits]
+    far = ((values < min(reach)) | (values > max(reach))) & (sigma > 0.0)
+    shown = np.where(far, np.clip(values, min(reach), max(reach)), values)
     thin = np.arange(values.size) % max(1, -(-values.size // _MOST_POINTS)) == 0
     looks = (
         ("", "#1f4e9c", ~out & ~far & thin),
         ("out of limits", LIMIT, out & _some(out)),
-        ("further out", FAR, far & ~out & _some(far)),
+        ("further out", "#b4500c", far & ~out & _some(far)),
     )
-    series = [Series(name, color, points=(at[which], shown[which])) for name, color, which in looks]
-    dot = 4.6 if values.size <= 60 else 3.0
+    series = [Series(name, color, points=(at[which], shown[which])) for name, color, which in looks if which.any()]
     rules = [Rule(median, "median")]
     if sigma > 0.0:
-        control = median - _CONTROL * sigma, median + _CONTROL * sigma
-        rules += [Rule(control[0], "3 standard deviations", dashes="2 3"), Rule(control[1], "", dashes="2 3")]
-    rules += [Rule(end, "" if place else "limit", limit=True, dashes="6 3") for place, end in enumerate(limits)]
+        rules.append(Rule(median - _CONTROL * sigma, "3 standard deviations", dashes="2 3"))
+        rules.append(Rule(median + _CONTROL * sigma, "", dashes="2 3"))
+    rules += [Rule(end, "" if place else "limit", "6 3", LIMIT) for place, end in enumerate(column.limits)]
     words = (
-        f"{header} of {int(np.isfinite(values).sum())} bushings: median {number(median, 4)}, robust standard deviation "
+        f"{column.header} of {int(np.isfinite(values).sum())} bushings: median {number(median, 4)}, robust standard "
+        f"deviation {number(sigma, 2)}, {int(out.sum())} out of limits"
     )
-    words += f"{number(sigma, 2)}, {int(out.sum())} out of limits"
-    there = [one for one in series if one.points and one.points[0].size]
-    unit = header.rpartition(" [")[2].rstrip("]")
-    return chart(
-        header, ("bushing, in the manifest's order", unit.replace("-", "")), there, words, rules=rules, dot=dot
-    )
+    unit = (split_header(column.header)[1] or "").replace("-", "")
+    dot = 4.6 if values.size <= 60 else 3.0
+    return chart(column.header, ("bushing, in the manifest's order", unit), series, words, rules=rules, dot=dot)
 
 
 def _some(which: Array) -> Array:

@@ -7,25 +7,27 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import ModelError
-from bushfit.model.document import CampaignTable
+from bushfit.geometry import Direction, Place
+from bushfit.model.document import CampaignTable, TestTable
 from bushfit.model.file import from_document, read_document, require_schema
 from bushfit.model.result import Result
 from bushfit.reading.files import read_utf8, view_bytes
 from bushfit.reading.tablefile import in_a_line, undefused
 from bushfit.reading.workbook import read_sheets
 from bushfit.report.artifacts import place_names
-from bushfit.report.contents import Contents
-from bushfit.report.tables import TEXTS
+from bushfit.report.contents import Contents, Documents, Tables
+from bushfit.report.tables import TEXTS, required
 from bushfit.validation import LARGEST_NUMBER, check_tables
 
 #: Documents that hold a model, the one to use first.
@@ -43,57 +45,93 @@ _TABLES = ("loops", "sweeps", "gap", "candidates")
 _LARGEST = 500_000_000
 
 
-@dataclass(frozen=True)
-class _Model:
-    campaign: CampaignTable | None = None
-
-
 @dataclass(frozen=True, eq=False)
-class Checked:
-    """All documents of a result: the model to use, the plain fit beside it, the campaign, and the diagnosis.
+class ReportData:
+    """All that a report is made of: the documents of a result, checked, and its tables.
 
     Args:
+        result: the model to use.
+        plain: the plain fit, where another model is to be used.
+        campaign: the campaign.
         has_odds: whether the diagnosis tells probabilities, as that of an older version does not.
+        versions: of bushfit and of the packages that the numbers rest on.
+        tables: by name, as their files give them back.
     """
 
     result: Result
     plain: Result | None
-    about: CampaignTable | None
+    campaign: CampaignTable | None
     diagnosis: DiagnosisFile | None
     has_odds: bool
     versions: Mapping[str, str]
+    tables: Tables
 
+    @classmethod
+    def of(cls, documents: Documents, tables: Tables, files: Mapping[str, Path] | None = None) -> ReportData:
+        """Documents and tables by their names, the documents checked; errors name the `files` they were read from.
 
-def checked(documents: Mapping[str, Mapping[str, Any]], files: Mapping[str, Path] | None = None) -> Checked:
-    """The documents by their names, checked; errors name the `files` that they were read from.
+        Raises:
+            ModelError: no model among them, or one that is spoiled.
+        """
+        at = files or {}
+        name = next((name for name in MODELS if name in documents), None)
+        if name is None:
+            expected = " or ".join(f"{name}.json" for name in MODELS)
+            raise ModelError("there is no model among the results", expected=expected)
+        model, plain, diagnosis = documents[name], documents.get(PLAIN), documents.get("diagnosis")
+        result = from_document(model, at.get(name))
+        has_odds = diagnosis is not None and diagnosis.get("schema") == DIAGNOSES[0]
+        if diagnosis is not None:
+            hint = "bushfit diagnose writes it anew"
+            require_schema(diagnosis, at.get("diagnosis"), "a diagnosis", *DIAGNOSES, hint=hint)
+            diagnosis = diagnosis if has_odds else {**diagnosis, **_ODDS}
+            diagnosis = check_tables(diagnosis, at.get("diagnosis"), DiagnosisFile, kind=ModelError)
+        campaign, provenance = model.get("campaign"), model.get("provenance", {})
+        return cls(
+            result,
+            from_document(plain, at.get(PLAIN)) if plain else None,
+            check_tables(campaign, at.get(name), CampaignTable, "campaign", kind=ModelError) if campaign else None,
+            diagnosis,
+            has_odds,
+            {"bushfit": provenance.get("bushfit") or "", **provenance.get("packages", {})},
+            {name: canonical(table) for name, table in tables.items()},
+        )
 
-    Raises:
-        ModelError: no model among them, or one that is spoiled.
-    """
-    at = files or {}
-    name = next((name for name in MODELS if name in documents), None)
-    if name is None:
-        raise ModelError("there is no model among the results", expected=" or ".join(f"{name}.json" for name in MODELS))
-    model, plain, diagnosis = documents[name], documents.get(PLAIN), documents.get("diagnosis")
-    result = from_document(model, at.get(name))
-    has_odds = diagnosis is not None and diagnosis.get("schema") == DIAGNOSES[0]
-    if diagnosis is not None:
-        hint = "bushfit diagnose writes it anew"
-        require_schema(diagnosis, at.get("diagnosis"), "a diagnosis", *DIAGNOSES, hint=hint)
-        diagnosis = diagnosis if has_odds else {**diagnosis, **_ODDS}
-    provenance = model.get("provenance", {})
-    return Checked(
-        result,
-        from_document(plain, at.get(PLAIN)) if plain else None,
-        check_tables(model, at.get(name), _Model, kind=ModelError).campaign,
-        check_tables(diagnosis, at.get("diagnosis"), DiagnosisFile, kind=ModelError) if diagnosis is not None else None,
-        has_odds,
-        {"bushfit": str(provenance.get("bushfit", "")), **_texts(provenance.get("packages"))},
-    )
+    @property
+    def tests(self) -> Sequence[TestTable]:
+        """The tests of the campaign, as far as they are known."""
+        return self.campaign.tests if self.campaign else ()
 
+    @cached_property
+    def places(self) -> dict[str, Place]:
+        """Every place of which there are tests or predictions, directions first, by the name of its table."""
+        every: list[Place] = [*(Direction if self.result.model.bushing else ()), *self.result.specimens]
+        tables = (table for table in self.tables.values() if "direction" in table)
+        tested = {place for table in tables for place in table["direction"].unique()}
+        named = zip(place_names(every), every, strict=True)
+        return {name: place for name, place in named if name in self.tables or str(place) in tested}
 
-def _texts(versions: object) -> dict[str, str]:
-    return {str(key): str(value) for key, value in versions.items()} if isinstance(versions, Mapping) else {}
+    @property
+    def gap(self) -> pd.DataFrame | None:
+        """The table of what is left before and after a diagnosis, where there is one."""
+        return required(self.tables["gap"], "test", "kind", "direction") if "gap" in self.tables else None
+
+    def measured(self, kind: Literal["sweep", "loop"]) -> Iterator[tuple[str, Place, pd.DataFrame]]:
+        """Points of sweeps, or rows of loops, beside the model, of each place that has any: name, place and rows.
+
+        They stand in a table of their own, else among those of the gap.
+        """
+        gap = self.gap
+        if (table := self.tables.get(f"{kind}s")) is not None:
+            table = required(table.rename(columns={kind: "test"}), "test", "direction")
+        elif gap is not None and any(str(name).startswith("model ") for name in gap):  # not an older version's
+            table = gap[gap["kind"] == kind]
+        if table is None:
+            return
+        for name, place in self.places.items():
+            rows = table[table["direction"] == str(place)]
+            if len(rows):
+                yield name, place, rows
 
 
 def has_model(folder: Path) -> bool:
@@ -107,9 +145,6 @@ def read_results(folder: Path) -> Contents:
     Raises:
         ModelError: no folder, none of results, or a file in it that is not as bushfit writes it.
     """
-    from bushfit.geometry import Direction
-    from bushfit.report.contents import Contents
-
     if not folder.is_dir():
         found = "a file" if folder.exists() else "nothing"
         raise ModelError("a folder of results is needed", file=folder, found=found, expected="as bushfit run writes it")
@@ -124,10 +159,13 @@ def read_results(folder: Path) -> Contents:
             hint=f"bushfit run CAMPAIGN -o {folder} makes one",
         )
     documents = {name: read_document(file) for name, file in files.items()}
-    result = checked(documents, files).result
-    names = (*_TABLES, *place_names([*Direction, *result.specimens]))
-    tables = {name: table for name in names if (table := read_table(folder, name)) is not None}
-    return Contents(documents, {name: _given(table) for name, table in tables.items()})
+    specimens = ReportData.of(documents, {}, files).result.specimens
+    tables = {name: read_table(folder, name) for name in (*_TABLES, *place_names([*Direction, *specimens]))}
+    return Contents(documents, {name: partial(_given, table) for name, table in tables.items() if table is not None})
+
+
+def _given(table: pd.DataFrame) -> pd.DataFrame:
+    return table
 
 
 def canonical(table: pd.DataFrame) -> pd.DataFrame:
@@ -141,10 +179,6 @@ def canonical(table: pd.DataFrame) -> pd.DataFrame:
         return [float(f"{value:.7g}") for value in numbers.tolist()]
 
     return pd.DataFrame({str(name): column(name) for name in table.columns})
-
-
-def _given(table: pd.DataFrame) -> Callable[[], pd.DataFrame]:
-    return lambda: table
 
 
 def read_table(folder: Path, name: str) -> pd.DataFrame | None:

@@ -1,18 +1,22 @@
-"""A page as its reader's browser takes it: elements, texts, and what it would load."""
+"""A page as its reader's browser takes it: elements, texts, what it would load; and results that somebody spoiled."""
 
 from __future__ import annotations
 
 import json
 import re
 from collections import Counter
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 
-from bushfit.errors import printable
+from bushfit.errors import BushfitError, printable
+from bushfit.jobs.report import report
+from bushfit.report.contents import pages_of
 
 #: A page at most [bytes].
 LARGEST = 500_000
@@ -125,11 +129,32 @@ def drawn(page: str, title: str) -> dict[str, dict[str, np.ndarray]]:
         return low * (high / low) ** share if axis[4] == "log" else low + (high - low) * share
 
     found: dict[str, dict[str, np.ndarray]] = {}
-    for name, inside in re.findall(r'<g data-series="([^"]*)">(.*?)</g>', svg):
+    for name, inside in re.findall(r'<g data-series="([^"]*)">(.*?)</g>', svg, re.DOTALL):
         for d, of in re.findall(r'd="([^"]*)"[^>]*data-of="(\w+)"', inside):
             pairs = np.array([pair.split() for pair in re.findall(r"-?[\d.]+ -?[\d.]+", d)], dtype=float).T
             found.setdefault(name, {})[of] = np.stack((back(x, pairs[0]), back(y, pairs[1])))
     return found
+
+
+def spoiled(value: Any, name: str, keys: Collection[str], key: str = "") -> Any:
+    """A document with this name in place of the texts of these keys, which come from a user, and in those of places."""
+    if isinstance(value, dict) and key == "places":
+        return {f"{name}{n}": columns for n, columns in enumerate(value.values())}
+    if isinstance(value, dict):
+        return {each: spoiled(inside, name, keys, each) for each, inside in value.items()}
+    if isinstance(value, list):
+        return [spoiled(each, name, keys, "" if isinstance(each, dict) else key) for each in value]
+    return name if isinstance(value, str) and key in keys else value
+
+
+def assert_page_or_error(make: Callable[[], str]) -> None:
+    """What is made is one error, or a whole page all the same; never another exception."""
+    try:
+        page = make()
+    except BushfitError:
+        return
+    parsed(page)
+    assert not re.search(r' (d|data-[xy])="[^"]*(nan|inf)', page)
 
 
 def change(file: Path, **keys: object) -> None:
@@ -138,3 +163,8 @@ def change(file: Path, **keys: object) -> None:
 
 def page_of(folder: Path) -> str:
     return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def made_of(folder: Path) -> str:
+    """The report that is made of what stands in a folder."""
+    return pages_of(report(folder))["report.html"].decode()

@@ -1,4 +1,7 @@
-"""The report of a result: the same from memory and from its files, whole, escaped, small, and true to the tables."""
+"""The report of a result: the same from memory and from its files, whole, escaped, small, and true to the tables.
+
+Reports that are kept are those that are made now.
+"""
 
 from __future__ import annotations
 
@@ -16,42 +19,44 @@ import pytest
 from commandline import call
 from hypothesis import given
 from hypothesis import strategies as st
-from reading_html import LARGEST, NASTY, assert_harmless, change, drawn, loads, page_of, parsed
+from reading_html import (
+    LARGEST,
+    NASTY,
+    assert_harmless,
+    assert_page_or_error,
+    change,
+    drawn,
+    loads,
+    made_of,
+    page_of,
+    parsed,
+    spoiled,
+)
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.errors import BushfitError
 from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
-from bushfit.jobs.report import report
-from bushfit.report.contents import Formats, pages_of
+from bushfit.report.contents import Formats
 from bushfit.report.page import report_page
 from bushfit.report.page.readback import canonical, read_results
 
 Results = Callable[[str], Path]
-
-
-SECTIONS = ["tested", "verdict", "parameters", "predicted", "loops", "gap", "open", "provenance"]
+STYLED = re.compile(r"<(style|script)>(.*?)</\1>", re.DOTALL)
 
 
 @pytest.mark.parametrize("name", ["cmp_15961", "mystery_mount"])
-def test_run_writes_a_whole_page_that_loads_nothing(results: Results, name: str) -> None:
+def test_run_writes_a_whole_page_that_loads_nothing_and_its_folder_gives_the_same(results: Results, name: str) -> None:
     page = page_of(results(name))
     found = parsed(page)
     assert loads(page) == []
     sections = [value for tag, key, value in found.attributes if (tag, key) == ("section", "id")]
-    assert sections == SECTIONS
-    print(f"{name}: {len(page.encode())} bytes, {found.counts['svg']} pictures")
+    assert sections == ["tested", "verdict", "parameters", "predicted", "loops", "gap", "open", "provenance"]
     assert len(page.encode()) < LARGEST
     described = [value for tag, key, value in found.attributes if (tag, key) == ("svg", "aria-label")]
     assert len(described) == found.counts["svg"] >= 6
     assert min(map(len, described)) > 40
     assert not [key for _, key, _ in found.attributes if key == "style"], "a content policy would drop it"
-
-
-@pytest.mark.parametrize("name", ["cmp_15961", "mystery_mount"])
-def test_the_folder_gives_the_page_that_run_wrote(results: Results, name: str) -> None:
-    folder = results(name)
-    assert pages_of(report(folder))["report.html"] == (folder / "report.html").read_bytes()
+    assert made_of(results(name)) == page
 
 
 def test_diagnose_writes_it_too_and_its_folder_gives_the_same(root: Path, tmp_path: Path) -> None:
@@ -60,18 +65,11 @@ def test_diagnose_writes_it_too_and_its_folder_gives_the_same(root: Path, tmp_pa
     files = Formats(pictures=False).files(Diagnose().run(data).contents)
     for file, content in files.items():
         (tmp_path / file).write_bytes(content)
-    page = files["report.html"]
-    assert pages_of(report(tmp_path))["report.html"] == page
-    found = parsed(page.decode())
-    for words in (
-        "axial: stiffness",
-        "axial: loss factor",
-        "radial: stiffness",
-        "axial: hysteresis",
-        "bushfit diagnose bushing.toml",
-    ):
-        assert words in found.text
-    assert "Lines without bands: the model at the measured points." in found.text
+    page = files["report.html"].decode()
+    assert made_of(tmp_path) == page
+    drawn_of = ("axial: stiffness", "axial: loss factor", "radial: stiffness", "axial: hysteresis")
+    for words in (*drawn_of, "bushfit diagnose bushing.toml", "Lines without bands: the model at the measured points."):
+        assert words in parsed(page).text
 
 
 @pytest.mark.parametrize("form", ["xlsx", "decimal comma"])
@@ -85,7 +83,7 @@ def test_other_forms_of_tables_are_read_back(results: Results, tmp_path: Path, f
             file.unlink()
         else:
             file.write_bytes(table.to_csv(index=False, sep=";", decimal=",").encode("utf-8-sig"))
-    assert pages_of(report(folder))["report.html"].decode() == page_of(folder)
+    assert made_of(folder) == page_of(folder)
 
 
 def test_what_it_says_is_what_the_documents_say(results: Results) -> None:
@@ -115,27 +113,13 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
     text = text.replace("[[sweeps]]\n", f"[[sweeps]]\n{stated}")
     head = '[report]\ncustomer = "Vehicle works"\npart_number = "15 961"\ndrawing = "D 7, issue C"\n'
     (tmp_path / "c.toml").write_text(f"{text}\n{head}", encoding="utf-8")
-    done = call(
-        tmp_path,
-        "fit",
-        "c.toml",
-        "-o",
-        "x",
-        "--no-plots",
-        "-q",
-        "--effect",
-        "inertia",
-        "--direction",
-        "axial",
-        "--direction",
-        "radial",
-    )
+    options = ("--effect", "inertia", "--direction", "axial", "--direction", "radial")
+    done = call(tmp_path, "fit", "c.toml", "-o", "x", "--no-plots", "-q", *options)
     assert done.returncode == 0, done.stderr
     assert call(tmp_path, "report", "x", "-q").returncode == 0
     found = parsed(page_of(tmp_path / "x")).text
-    for words in ("22 °C", "150 N axial", "12 May 2025", "night shift", "A-7", "Fitted, not diagnosed"):
-        assert words in found
-    for words in ("Customer", "Vehicle works", "Part number", "15 961", "Drawing", "D 7, issue C"):
+    conditions = ("22 °C", "150 N axial", "12 May 2025", "night shift", "A-7", "Fitted, not diagnosed")
+    for words in (*conditions, "Customer", "Vehicle works", "Part number", "15 961", "Drawing", "D 7, issue C"):
         assert words in found
     assert "bushfit fit c.toml --direction axial --direction radial --effect inertia" in found
 
@@ -148,9 +132,7 @@ def test_loops_in_torsion_are_drawn(root: Path, tmp_path: Path) -> None:
     for command in (("simulate", "turned.toml", "-o", "tests"), ("fit-static", "tests/campaign.toml", "-o", "fit")):
         done = call(tmp_path, *command, "-q", "--no-plots")
         assert done.returncode == 0, done.stderr
-    done = call(tmp_path, "report", "fit")
-    assert done.returncode == 0, done.stderr
-    assert "rotation [deg]" in (tmp_path / "fit/report.html").read_text(encoding="utf-8")
+    assert "rotation [deg]" in made_of(tmp_path / "fit")
 
 
 @pytest.mark.parametrize(
@@ -207,92 +189,24 @@ def test_a_large_campaign_stays_small_and_says_what_is_left_out(results: Results
     between = [level.assign(**{"frequency [Hz]": level["frequency [Hz]"] + n / 10}) for n, level in enumerate(levels)]
     large["sweeps"] = pd.concat([*levels, *between], ignore_index=True)
     page = report_page(contents.documents, large)
-    print(f"{sum(map(len, large.values()))} rows in {len(page.encode())} bytes")
     assert len(page.encode()) < LARGEST
     text = parsed(page).text
     for words in ("further levels are left out", "further loops are left out", "one row in "):
         assert words in text
 
 
-@given(st.data())
-def test_names_do_no_harm(root: Path, data: st.DataObject) -> None:
+#: Keys of the documents whose texts come from a user's files.
+FOREIGN = {"name", "summary", "next_test", "command", "reading", "sentence", "evidence", "preload", "date", "warnings"}
+
+
+@given(name=NASTY)
+def test_names_do_no_harm(root: Path, name: str) -> None:
     """Whatever stands in a text, the page has the same elements and attributes, and says it to the letter."""
     contents = read_results(root / "data/reports/mystery_mount")
-    plain = parsed(report_page(contents.documents, {name: make() for name, make in contents.tables.items()}))
-    name = data.draw(NASTY)
-
-    def spoiled(value: Any, key: str = "") -> Any:
-        if isinstance(value, dict):
-            return {name: spoiled(each, name) for name, each in value.items()}
-        if isinstance(value, list):
-            return [spoiled(each, key) for each in value]
-        return name if isinstance(value, str) and key in FOREIGN else value
-
-    tables = {
-        key: make().replace({"test": dict.fromkeys(["sweep_axial"], name)}) for key, make in contents.tables.items()
-    }
-    assert_harmless(report_page(spoiled(contents.documents), tables), plain, name)
-
-
-#: Keys of the documents whose texts come from a user's files.
-FOREIGN = {
-    "name",
-    "summary",
-    "next_test",
-    "command",
-    "reading",
-    "sentence",
-    "evidence",
-    "preload",
-    "date",
-    "warnings",
-    "test",
-} - {"test"}
-
-
-@pytest.mark.parametrize(
-    ("spoil", "says"),
-    [
-        (lambda folder: shutil.rmtree(folder), ("a folder of results is needed", "nothing")),
-        (
-            lambda folder: [file.unlink() for file in folder.glob("*.json")],
-            ("there is no model in this folder", "axial.csv", "bushfit run CAMPAIGN"),
-        ),
-        (lambda folder: (folder / "model.json").write_text("{"), ("model.json, line 1", "not valid JSON")),
-        (lambda folder: (folder / "model.json").write_text("[]"), ("model.json: not a result", "a list")),
-        (lambda folder: change(folder / "model.json", schema="bushfit/model/9"), ("model.json, schema",)),
-        (lambda folder: change(folder / "model.json", campaign={"name": 3}), ("model.json, campaign.",)),
-        (
-            lambda folder: change(folder / "diagnosis.json", schema="bushfit/diagnosis/1"),
-            ("diagnosis.json, schema", "bushfit/diagnosis/3 or bushfit/diagnosis/2"),
-        ),
-        (lambda folder: change(folder / "diagnosis.json", gap=7), ("diagnosis.json, gap", "a table")),
-        (
-            lambda folder: (folder / "sweeps.csv").write_text("sweep,direction\na,axial\n"),
-            ("a column of a table is missing", "frequency [Hz]"),
-        ),
-        (
-            lambda folder: (folder / "axial.csv").write_text("frequency [Hz],amplitude [mm]\nx,1\n"),
-            ("axial.csv: this table is not as bushfit writes it", "'x'"),
-        ),
-        (lambda folder: (folder / "axial.csv").write_bytes(b""), ("axial.csv: the file is empty",)),
-        (lambda folder: (folder / "axial.csv").write_bytes(b"\xff\xfe\x00"), ("axial.csv", "not UTF-8")),
-        (lambda folder: (folder / "report.html").write_text("mine"), ("results stand there already", "--force")),
-    ],
-)
-def test_spoiled_folders_are_one_clear_error(
-    root: Path, tmp_path: Path, spoil: Callable[[Path], object], says: tuple[str, ...]
-) -> None:
-    folder = tmp_path / "x"
-    shutil.copytree(root / "data/reports/mystery_mount", folder)
-    spoil(folder)
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-    done = call(tmp_path, "report", "x")
-    assert done.returncode == 2
-    assert done.stderr.count("bushfit: error: ") == 1, done.stderr
-    for words in says:
-        assert words in done.stderr
-    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+    plain = {key: make() for key, make in contents.tables.items()}
+    tables = {key: table.replace({"test": {"sweep_axial": name}}) for key, table in plain.items()}
+    page = report_page(spoiled(contents.documents, name, FOREIGN), tables)
+    assert_harmless(page, parsed(report_page(contents.documents, plain)), name)
 
 
 @pytest.fixture(scope="module")
@@ -308,7 +222,6 @@ def thinned(results: Results, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @given(st.data())
 def test_any_cell_may_be_spoiled(thinned: Path, tmp_path_factory: Any, data: st.DataObject) -> None:
-    """It is one error, or a page all the same; never another exception."""
     folder = tmp_path_factory.mktemp("x") / "y"
     shutil.copytree(thinned, folder)
     file = folder / data.draw(st.sampled_from(["axial.csv", "sweeps.csv", "loops.csv", "gap.csv", "radial.csv"]))
@@ -319,12 +232,7 @@ def test_any_cell_may_be_spoiled(thinned: Path, tmp_path_factory: Any, data: st.
     cells[column] = data.draw(st.sampled_from(["", "nan", "inf", "-1", "0", "x", "1e300", "1e-300", "axial", "'=1"]))
     lines[row] = ",".join(f'"{cell}"' for cell in cells)
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    try:
-        page = pages_of(report(folder))["report.html"].decode()
-    except BushfitError:
-        return
-    parsed(page)
-    assert not re.search(r' (d|data-[xy])="[^"]*(nan|inf)', page)
+    assert_page_or_error(lambda: made_of(folder))
 
 
 def test_the_command(root: Path, tmp_path: Path) -> None:
@@ -353,3 +261,64 @@ def test_canonical_tables_are_those_of_the_files() -> None:
     assert found["test"].tolist() == ["=1", "a b"]
     assert found["force [N]"].tolist()[1] == 1.234568
     assert np.isnan(found["force [N]"][0])
+
+
+def test_results_of_older_versions_have_a_page_and_are_compared(root: Path, tmp_path: Path) -> None:
+    """Without probabilities (diagnosis_2.json), what a model says of its campaign, and all but residuals of the gap."""
+    folder = tmp_path / "x"
+    shutil.copytree(root / "data/reports/mystery_mount", folder)
+    shutil.copy(Path(__file__).with_name("diagnosis_2.json"), folder / "diagnosis.json")
+    change(folder / "model.json", campaign=None)
+    (folder / "gap.csv").write_text("test,kind,direction,force before [noise]\na,loop,axial,1\n")
+    text = parsed(made_of(folder)).text
+    for words in (
+        *("Mystery mount", "axial: stiffness", "Verdict: named", "sleeve_compliance closes the gap"),
+        *("Told without odds", "put a steel dummy"),
+    ):
+        assert words in text
+    assert "all but sure" not in text
+    (folder / "sweeps.csv").unlink()
+    assert "Lines" not in parsed(made_of(folder)).text
+    done = call(tmp_path, "compare", "x", root / "data/reports/mystery_mount", "-o", "y", "--no-plots")
+    assert done.returncode == 0, done.stderr
+
+
+def bare(page: str) -> str:
+    """A page without its pictures, every number the same: other processors round otherwise."""
+    return re.sub(
+        r"[-+]?\d+(?:\.\d+)?(?:e-?\d+)?", "#", re.sub(r"<svg.*?</svg>|[0-9a-f]{64}", "", page, flags=re.DOTALL)
+    )
+
+
+def assert_current(kept: Path, made: Path) -> None:
+    one, other = kept.read_text(encoding="utf-8"), made.read_text(encoding="utf-8")
+    remedy = f"stale: copy {made.name} of the command that data/README.md names to {kept}"
+    assert STYLED.findall(one) == STYLED.findall(other), remedy
+    assert bare(one) == bare(other), remedy
+    assert one.count("<svg") == other.count("<svg")
+    assert len(one) == pytest.approx(len(other), rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["cmp_15961", "mystery_mount"])
+def test_the_reports_of_the_readme_are_current(root: Path, results: Results, name: str) -> None:
+    assert_current(root / f"data/reports/{name}.html", results(name) / "report.html")
+
+
+def test_the_report_of_measured_rubber_is_current_and_says_that_the_mount_was_not_fitted(
+    root: Path, measured: Path
+) -> None:
+    assert_current(root / "data/measured/epdm_70/report.html", measured / "report.html")
+    text = parsed(page_of(measured)).text
+    assert loads(page_of(measured)) == []
+    specimen = "2 blocks in parallel in shear, 772 mm² each, 6 mm thick"
+    for words in ("(not fitted)", specimen, "mount 24 %", "Fitted, not diagnosed"):
+        assert words in text
+
+
+def test_the_results_to_try_it_on_are_current(root: Path, results: Results) -> None:
+    made = results("mystery_mount")
+    kept = sorted((root / "data/reports/mystery_mount").iterdir())
+    assert len(kept) == 5
+    for file in kept:
+        one, other = (bare(folder.read_text(encoding="utf-8")) for folder in (file, made / file.name))
+        assert one == other, f"stale: copy {file.name} of bushfit run configs/mystery_mount.toml to {file}"

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from figures import AMPLITUDES, FREQUENCIES
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData, loop_data, sweep_data
@@ -13,9 +14,6 @@ from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
-
-FREQUENCIES = np.arange(5.0, 156.0, 10.0)
-AMPLITUDES = np.array([1e-4, 2e-4, 5e-4])
 
 
 @pytest.fixture(scope="session")

@@ -1,13 +1,15 @@
-"""Predictions to draw, and what a figure shows: its lines, points, labels and legends."""
+"""Predictions to draw, and what a figure shows: its lines, points and texts, and whether these have room."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData
@@ -52,6 +54,41 @@ def labels(figure: Figure) -> list[str]:
     return [" ".join(name.split()) for name in names]
 
 
+def titles(figure: Figure) -> list[str]:
+    """What stands left above the panels."""
+    return [title for axes in figure.axes if (title := axes.get_title(loc="left"))]
+
+
 def legend(axes: Axes) -> list[str]:
     box = axes.get_legend()
     return [] if box is None else [text.get_text() for text in box.get_texts()]
+
+
+def note(figure: Figure) -> str:
+    """What is explained below the panels."""
+    return " ".join(figure.get_supxlabel().split())
+
+
+def inside(figure: Figure) -> Figure:
+    """The figure, once it is seen that nothing leaves it."""
+    figure.draw_without_rendering()
+    legends = [box.get_window_extent() for axes in figure.axes if (box := axes.get_legend())]
+    for box in (*panels(figure), *legends):
+        assert min(box.x0, box.y0) >= -1
+        assert max(box.x1 - figure.bbox.x1, box.y1 - figure.bbox.y1) <= 1
+    return figure
+
+
+def whole(figure: Figure) -> Figure:
+    """The figure, once it is seen that nothing leaves it and no panel, with all its texts, lies on another."""
+    assert not [pair for pair in combinations(panels(inside(figure)), 2) if overlap(*pair)]
+    return figure
+
+
+def panels(figure: Figure) -> list[Bbox]:
+    return [box for axes in figure.axes if (box := axes.get_tightbbox())]
+
+
+def overlap(one: Bbox, other: Bbox) -> bool:
+    common = Bbox.intersection(one, other)
+    return common is not None and common.width > 1.0 and common.height > 1.0

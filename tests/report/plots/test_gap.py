@@ -9,35 +9,32 @@ from typing import Any
 
 import numpy as np
 import pytest
+from figures import Looped, Swept, legend, note, whole
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.transforms import Bbox
+from tries import some
 
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.report.plots.gap import gap_figure
-from bushfit.report.plots.style import to_image
 
-Swept = Callable[..., SweepData]
-Looped = Callable[..., LoopData]
+Heavier = Callable[[float], Model]
 
 
 @pytest.fixture
-def heavier(paper_model: Model) -> Callable[[float], Model]:
+def heavier(paper_model: Model) -> Heavier:
     """The paper's model with a mass [kg] moving along."""
 
     def model(mass: float) -> Model:
-        return Model(
-            paper_model.bushing, (*paper_model.effects, "inertia"), {**paper_model.values, "inertia.mass": mass}
-        )
+        return paper_model.with_effect("inertia", {"inertia.mass": mass})
 
     return model
 
 
 @pytest.fixture
-def campaign(heavier: Callable[[float], Model], swept: Swept, looped: Looped) -> list[DataSet]:
+def campaign(heavier: Heavier, swept: Swept, looped: Looped) -> list[DataSet]:
     """Two directions and two loops of a bushing with a mass that the paper's model lacks."""
     truth = heavier(0.1)
     return [swept(truth), swept(truth, Direction.RADIAL), looped(truth, 1e-3), looped(truth, 2e-3)]
@@ -52,12 +49,9 @@ def cells(axes: Axes) -> list[PolyCollection]:
     return [found for found in axes.collections if type(found) is PolyCollection and found.get_array() is not None]
 
 
-def name(axes: Axes) -> str:
-    return " ".join(axes.get_ylabel().split())
-
-
 def names(figure: Figure) -> list[str]:
-    return [name(axes) for axes in figure.axes if name(axes)]
+    """What stands left of the rows."""
+    return [" ".join(axes.get_ylabel().split()) for axes in figure.axes if axes.get_ylabel()]
 
 
 def headings(figure: Figure) -> list[str]:
@@ -70,7 +64,7 @@ def values(axes: Axes) -> Any:
 
 
 def test_rows_are_directions_and_parts_columns_before_and_after(
-    paper_model: Model, heavier: Callable[[float], Model], campaign: list[DataSet]
+    paper_model: Model, heavier: Heavier, campaign: list[DataSet]
 ) -> None:
     figure = gap_figure(paper_model, heavier(0.1), campaign, "mount", "Inertia closes the gap.")
     assert names(figure) == ["axial storage", "axial loss", "radial storage", "radial loss", "axial loops / noise"]
@@ -83,19 +77,14 @@ def test_rows_are_directions_and_parts_columns_before_and_after(
     counted = sum(data_set.counted for data_set in campaign)
     assert f"data fitted {np.sqrt(squares / counted):.2f} x noise" in before
     x_labels = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel()]
-    assert x_labels == [
-        *["frequency [Hz]"] * 4,
-        *["phase after the upper turn [deg]"] * 2,
-        "measured less model, in units of noise",
-    ]
+    over_phase = ["phase after the upper turn [deg]"] * 2
+    assert x_labels == ["frequency [Hz]"] * 4 + [*over_phase, "measured less model, in units of noise"]
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["0.1 mm", "0.2 mm", "0.5 mm"]
     bar = figure.axes[-1]
     assert {text.get_text() for text in bar.texts} == {"measured\nbelow model", "measured\nabove model"}
 
 
-def test_one_symmetric_scale_for_all_maps(
-    paper_model: Model, heavier: Callable[[float], Model], campaign: list[DataSet]
-) -> None:
+def test_one_symmetric_scale_for_all_maps(paper_model: Model, heavier: Heavier, campaign: list[DataSet]) -> None:
     figure = gap_figure(paper_model, heavier(0.1), campaign, "mount", "")
     coloured = [found for axes in maps(figure) for found in cells(axes)]
     assert len(coloured) == 8
@@ -112,8 +101,7 @@ def test_one_symmetric_scale_for_all_maps(
 
 def test_a_cell_is_measured_less_model_over_the_noise_of_the_mean(paper_model: Model, swept: Swept) -> None:
     data_set = swept(paper_model)
-    stiffer = {k: value * (1.0 if k in ("alpha", "eps_half") else 1.2) for k, value in paper_model.values.items()}
-    harder = Model(paper_model.bushing, paper_model.effects, stiffer)
+    harder = paper_model.with_values({name: 1.2 * paper_model.values[name] for name in ("mu", "m", "sigma_fmax")})
     axes = maps(gap_figure(harder, paper_model, [data_set], "", ""))
     storage = values(axes[0])
     assert (storage < 0).all(), "the measurement lies below a model that is too stiff"
@@ -130,48 +118,35 @@ def test_a_cell_is_measured_less_model_over_the_noise_of_the_mean(paper_model: M
 def test_loops_are_means_in_units_of_their_noise(paper_model: Model, looped: Looped) -> None:
     data_set = looped(paper_model, 1e-3)
     figure = gap_figure(paper_model, paper_model, [data_set], "loop", "Nothing is missing.")
-    (axes,) = figure.axes
-    figure.draw_without_rendering()
-    assert not overlap(axes.title.get_window_extent(), axes.get_legend().get_window_extent())
-    assert name(axes) == "axial loops / noise"
+    (axes,) = whole(figure).axes
+    assert not axes.title.get_window_extent().overlaps(axes.get_legend().get_window_extent())
+    assert names(figure) == ["axial loops / noise"]
     assert headings(figure)[0].startswith("nothing added\n")
     curve = axes.get_lines()[0]
     assert len(curve.get_xdata()) == 36
     assert 0.6 < np.std(curve.get_ydata()) < 1.5
     assert axes.get_yscale() == "linear"
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["1 mm, 0.1 Hz"]
+    assert legend(axes) == ["1 mm, 0.1 Hz"]
 
 
-def test_huge_gaps_of_loops_keep_what_is_small_readable(
-    paper_model: Model, heavier: Callable[[float], Model], looped: Looped
-) -> None:
-    values = {**paper_model.values, "mu": 2.0 * paper_model.values["mu"]}
-    wrong = Model(paper_model.bushing, paper_model.effects, values)
+def test_huge_gaps_of_loops_keep_what_is_small_readable(paper_model: Model, heavier: Heavier, looped: Looped) -> None:
+    wrong = paper_model.with_values({"mu": 2.0 * paper_model.values["mu"]})
     figure = gap_figure(wrong, paper_model, [looped(paper_model, 1e-3)], "loop", "")
     first, second = figure.axes
     assert first.get_yscale() == second.get_yscale() == "symlog"
     assert first.get_ylim() == second.get_ylim()
 
 
-def test_same_model_makes_one_column(paper_model: Model, campaign: list[DataSet]) -> None:
-    twin = Model(paper_model.bushing, paper_model.effects, dict(paper_model.values))
-    figure = gap_figure(paper_model, twin, campaign, "mount", "Nothing is missing.")
-    assert len(maps(figure)) == 4
-    assert len(headings(figure)) == 1
-    assert headings(figure)[0].startswith("nothing added")
-
-
 @pytest.mark.slow
 def test_any_set_of_tests_is_drawn_and_nothing_lies_on_another(
-    paper_model: Model, heavier: Callable[[float], Model], swept: Swept, looped: Looped
+    paper_model: Model, heavier: Heavier, swept: Swept, looped: Looped
 ) -> None:
     truth, torsion = heavier(0.1), Direction.TORSION
     many = np.geomspace(1e-5, 1e-3, 14)
     turns = np.radians([0.5, 1.0, 2.0])
     sets: dict[str, list[DataSet]] = {
         "sweep alone": [swept(truth)],
-        "one amplitude, one repeat": [swept(truth, amplitudes=np.array([2e-4]), repeats=1)],
-        "two frequencies": [swept(truth, frequencies=np.array([10.0, 100.0]))],
+        "two frequencies": [swept(truth, frequencies=np.array([10.0, 100.0]), amplitudes=np.array([2e-4]), repeats=1)],
         "decades": [swept(truth, frequencies=np.geomspace(0.01, 300.0, 40), amplitudes=many)],
         "six loops": [looped(truth, (i + 1) * 5e-4) for i in range(6)],
         "torsion": [swept(truth, torsion, amplitudes=turns), looped(truth, 0.05, direction=torsion)],
@@ -184,19 +159,9 @@ def test_any_set_of_tests_is_drawn_and_nothing_lies_on_another(
     }
     for words, data_sets in sets.items():
         for after in (truth, paper_model):
-            figure = gap_figure(paper_model, after, data_sets, words, "A sentence that goes on and on. " * 8)
-            figure.draw_without_rendering()
-            boxes = [axes.get_tightbbox() for axes in figure.axes]
-            assert not any(overlap(a, b) for i, a in enumerate(boxes) for b in boxes[:i]), words
-            assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 + 1 and box.y0 >= 0 for box in boxes), words
+            whole(gap_figure(paper_model, after, data_sets, words, "A sentence that goes on and on. " * 8))
     for words, said in (("missing points", True), ("sweep alone", False)):
-        note = gap_figure(paper_model, truth, sets[words], "", "").get_supxlabel()
-        assert ("White: not measured" in note.replace("\n", " ")) is said
-
-
-def overlap(one: Bbox, other: Bbox) -> bool:
-    common = Bbox.intersection(one, other)
-    return common is not None and common.width > 1.0 and common.height > 1.0
+        assert ("White: not measured" in note(gap_figure(paper_model, truth, sets[words], "", ""))) is said
 
 
 def test_a_hole_stays_white(paper_model: Model, swept: Swept) -> None:
@@ -208,25 +173,16 @@ def test_a_hole_stays_white(paper_model: Model, swept: Swept) -> None:
     np.testing.assert_allclose(np.ptp(edges, axis=1), 10.0)
 
 
-@pytest.mark.slow
-def test_same_figure_same_bytes(paper_model: Model, heavier: Callable[[float], Model], campaign: list[DataSet]) -> None:
-    pictures = {to_image(gap_figure(paper_model, heavier(0.1), campaign, "$ 衬套", "50 % _of_ $")) for _ in range(2)}
-    assert len(pictures) == 1
-
-
-@pytest.mark.parametrize("stiffer", [1.05, 1.3, 3.0, 20.0])
+@pytest.mark.parametrize("stiffer", some([1.05, 1.3, 3.0, 20.0], {1.3, 20.0}))
 def test_numbers_of_the_scale_stay_apart(paper_model: Model, swept: Swept, stiffer: float) -> None:
-    off = Model(
-        paper_model.bushing, paper_model.effects, {**paper_model.values, "mu": paper_model.values["mu"] * stiffer}
-    )
+    off = paper_model.with_values({"mu": paper_model.values["mu"] * stiffer})
     figure = gap_figure(off, paper_model, [swept(paper_model)], "", "")
     figure.draw_without_rendering()
     bar = figure.axes[-1]
-    labels = [label for label in bar.get_xticklabels() if label.get_text()]
-    print(stiffer, [label.get_text() for label in labels])
-    boxes = [label.get_window_extent() for label in labels]
+    shown = [label for label in bar.get_xticklabels() if label.get_text()]
+    boxes = [label.get_window_extent() for label in shown]
     assert all(right.x0 - left.x1 > 2.0 for left, right in pairwise(boxes))
-    assert labels[-1].get_text() == f"{bar.get_xticks()[-1]:g}", "where the scale ends"
+    assert shown[-1].get_text() == f"{bar.get_xticks()[-1]:g}", "where the scale ends"
 
 
 def test_a_mended_test_is_drawn_where_it_was_recorded(paper_model: Model, swept: Swept) -> None:
@@ -236,7 +192,6 @@ def test_a_mended_test_is_drawn_where_it_was_recorded(paper_model: Model, swept:
     figure = gap_figure(paper_model, paper_model, [filed], "mount", "", mended=[radial])
     assert names(figure) == ["axial storage", "axial loss"]
     (before, after) = headings(figure)
-    print(before, "|", after)
     assert before.startswith("the tests as they are")
     assert after.startswith("if the record is mistaken")
     storage = maps(figure)[:2]

@@ -6,6 +6,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
+from figures import note, points, titles
 
 from bushfit.report.plots.batch import Panel, batch_figure
 from bushfit.report.plots.style import to_image
@@ -32,11 +33,10 @@ def test_medians_limits_and_names(count: int) -> None:
     low, high = axes.get_ylim()
     assert low < 1.0 < 1.2 < high
     assert high < 2.0, "one far out must not squash the rest"
-    assert f"{len(one.missed)} out" in axes.get_title(loc="left")
+    assert f"{len(one.missed)} out" in titles(figure)[0]
     named = {text.get_text().partition(":")[0] for text in axes.texts}
     assert named == {f"$name {k}" for k in one.missed}
-    points = sum(len(line.get_xdata()) for line in axes.lines if line.get_linestyle() == "None")
-    assert points == count - 1, "each bushing that has a value, once"
+    assert sum(len(line.get_xdata()) for line in points(axes)) == count - 1, "each bushing that has a value, once"
     assert other.get_ylim()[0] < 0.24 < other.get_ylim()[1]
 
 
@@ -61,7 +61,6 @@ def test_an_odd_panel_leaves_no_gap_between_the_rows() -> None:
     to_image(figure)
     places = [axes.get_position() for axes in figure.axes[:5:2]]
     gaps = [above.y0 - below.y1 for above, below in pairwise(places)]
-    print("gaps between the rows, shares of the height:", gaps)
     assert gaps[1] == pytest.approx(gaps[0], abs=0.003)
     right, last = figure.axes[3], figure.axes[4]
     lowest = min(label.get_window_extent().y0 for label in right.get_xticklabels())
@@ -82,4 +81,4 @@ def test_a_panel_shows_no_less_than_what_is_known() -> None:
     assert unknown.collections[:] == []
     for axes in (known, unknown):
         assert all(len(label.get_text()) < 9 for label in axes.get_yticklabels())
-    assert "95 % intervals" in figure.get_supxlabel()
+    assert "95 % intervals" in note(figure)

@@ -1,4 +1,4 @@
-"""What a page tells of a result, in the order in which its reader asks: what was tested, the verdict, the numbers."""
+"""The report of a result, in the order in which its reader asks: what was tested, the verdict, the numbers."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -7,15 +7,16 @@ import numpy as np
 import pandas as pd
 
 from bushfit.caveats import of_points, warnings_of
-from bushfit.diagnosis.document import BeforeAfter, EffectEntry
+from bushfit.diagnosis.document import BeforeAfter, EffectEntry, GapEntry
 from bushfit.diagnosis.record import odds_in_words
 from bushfit.geometry import Bushing, Place, Specimen
-from bushfit.model.document import CampaignTable, TestTable
-from bushfit.model.result import Misfit, Result, Usable
-from bushfit.report.contents import Tables
-from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, tested_panels
-from bushfit.report.page.gathered import places_of
-from bushfit.report.page.readback import Checked
+from bushfit.model.document import TestTable
+from bushfit.model.result import Misfit, Result
+from bushfit.report.page.chart import MOST_PLACES
+from bushfit.report.page.gap import gap_panels
+from bushfit.report.page.loops import loop_panels
+from bushfit.report.page.readback import ReportData
+from bushfit.report.page.sweeps import sweep_panels
 from bushfit.report.parameters import interval_kind, parameter_rows
 from bushfit.report.tables import DISPLAYS, IF_RIGS, columns_of, complete, numbers, spread
 from bushfit.units import alike, for_people, number, told
@@ -30,24 +31,22 @@ _CONDITIONS = {
     "operator": "Operator",
     "specimen_number": "Specimen no.",
 }
-#: Correlation between two parameters from which on it is shown: they trade off against each other.
-_CLOSE = 0.9
-#: Frequencies and amplitudes of a place whose predicted values are tabled.
-_FREQUENCIES, _AMPLITUDES = 3, 2
-#: Rows of predicted values of all places together.
-_ROWS = 12
+#: Frequencies and amplitudes of a place whose predicted values are tabled, and rows of all places together.
+_FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 #: Regions and tests that a page lists at most: the documents have all.
 MOST = 12
 
 
-def story(found: Checked, tables: Tables) -> dict[str, Any]:
+def report_context(found: ReportData) -> dict[str, Any]:
     """All that the template of a report asks for."""
-    result, diagnosis, about = found.result, found.diagnosis, found.about
-    tests = about.tests if about else ()
+    result, diagnosis, campaign, tests = found.result, found.diagnosis, found.campaign, found.tests
+    gaps = _gaps(diagnosis["gap"]) if diagnosis else []
+    report = campaign.report if campaign else {}
+    head = {key.replace("_", " ").capitalize(): value for key, value in report.items()}
     return {
-        "name": about.name if about else result.name,
+        "name": campaign.name if campaign else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
-        "facts": [*_head(about), *_bodies(result), *conditions(test.conditions for test in tests)],
+        "facts": [*head.items(), *_bodies(result), *conditions(test.conditions for test in tests)],
         "tests": [_tested(test, result.tests) for test in tests[:MOST]],
         "conditioned": any(test.conditions for test in tests),
         "more_tests": max(0, len(tests) - MOST),
@@ -55,51 +54,47 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
         "tone": _TONES.get(diagnosis["verdict"], "fair") if diagnosis else "fair",
         "has_odds": found.has_odds,
         "odds": odds_in_words(diagnosis) if diagnosis and found.has_odds else [],
-        "effects": [_effect(effect) for effect in diagnosis["effects"]] if diagnosis else [],
-        "usable": [_usable(place) for place in result.usable],
+        "effects": [(effect, [*_sizes(effect)]) for effect in diagnosis["effects"]] if diagnosis else [],
+        "usable": result.usable,
         "rows": list(parameter_rows(result)),
         "interval": interval_kind(result),
-        "plain": _plain(found),
-        "quality": _quality(result),
+        "plain": {row.name: row.value for row in parameter_rows(found.plain)} if found.plain else {},
+        "quality": result.quality,
         "model_error": result.model_error is not None,
         "correlations": [
-            f"{one}/{other} {size:+.2f}" for one, other, size in result.covariance.correlations() if abs(size) > _CLOSE
+            f"{one}/{other} {size:+.2f}"
+            for one, other, size in result.covariance.correlations()
+            if abs(size) > 0.9  # they trade off against each other
         ],
         "equation": result.model.equation().splitlines()[0],
-        "places": tested_panels(result, tables, tests),
-        "tabled": _tabled(result, tables),
-        "loops": loop_panels(result, tables, tests),
-        "gap": gap_panels(result, tables, tests),
-        "gaps": (gaps := _gaps(found)),
+        "places": sweep_panels(found),
+        "tabled": _tabled(found),
+        "loops": loop_panels(found),
+        "gap": gap_panels(found),
+        "gaps": gaps,
         "added": any(before != after for _, before, after in gaps if after),
-        "warnings": warnings_of(result, _of_tables(result, tables), diagnosis["warnings"] if diagnosis else ()),
-        "outliers": len(result.outliers),
-        "about": about,
+        "warnings": warnings_of(result, _of_tables(found), diagnosis["warnings"] if diagnosis else ()),
+        "campaign": campaign,
         "files": _files(found),
         "versions": found.versions,
     }
 
 
-def _of_tables(result: Result, tables: Tables) -> Iterator[Iterator[str]]:
+def _of_tables(found: ReportData) -> Iterator[Iterator[str]]:
     """The warnings of what is predicted in the table of each place."""
-    for name, place in places_of(result, tables).items():
+    for name, place in found.places.items():
         (amplitude, stiffness, _), ((_, length), _, (_, unit)) = columns_of(place), place.display
         headers = "frequency [Hz]", amplitude, stiffness
-        if name not in tables:
+        if name not in found.tables:
             continue
-        table = complete(tables[name], *headers)
+        table = complete(found.tables[name], *headers)
         table = table[numbers(table, stiffness)[0] != 0.0]  # which only a hand puts there
         if len(table):
             others = (f"{stiffness}, {IF_RIGS}", f"measured {stiffness}")
             rigs, measured = (numbers(table, each)[0] / unit if each in table else None for each in others)
             measured = None if measured is None else np.where(measured == 0.0, np.nan, measured)
-            yield of_points(result, place, numbers(table, *headers) / [[1.0], [length], [unit]], rigs, measured, None)
-
-
-def _head(about: CampaignTable | None) -> Iterator[tuple[str, str]]:
-    """Whose part it is, and which, as far as the campaign says so."""
-    for key, value in (about.report if about else {}).items():
-        yield key.replace("_", " ").capitalize(), value
+            grid = numbers(table, *headers) / [[1.0], [length], [unit]]
+            yield of_points(found.result, place, grid, rigs, measured, None)
 
 
 def _bodies(result: Result) -> Iterator[tuple[str, str]]:
@@ -141,7 +136,7 @@ def conditions(stated: Iterable[Mapping[str, str | float]]) -> Iterator[tuple[st
             yield name, "not stated"
 
 
-def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str]:
+def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str | int]:
     """A test in a row of a table: its range, and how well the model meets it."""
     unit, factor = DISPLAYS[test.unit]
     met = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
@@ -156,82 +151,48 @@ def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str]:
         "place": test.place,
         "frequency": told("Hz", *test.frequency_Hz),
         "amplitude": told(unit, *(factor * end for end in test.amplitude)),
-        "rows": f"{test.rows}",
+        "rows": test.rows,
         "conditions": ", ".join(stated),
         "nrmse": f"{number(100 * met.nrmse, 2)} %" if met else "",
-        "chi": number(met.reduced_chi_square, 2) if met else "",
-        "fitted": "" if met is None or met.fitted else "not fitted",
+        "chi": number(met.reduced_chi_square, 2) + " (not fitted)" * (not met.fitted) if met else "",
     }
 
 
-def _usable(place: Usable) -> dict[str, Any]:
-    return {
-        "place": place.place,
-        "stiffness": f"{number(100 * place.stiffness, 2)} %",
-        "loss": number(place.loss_factor, 2),
-        "points": f"{place.points}",
-        "held_out": place.held_out,
-    }
-
-
-def _effect(effect: EffectEntry) -> dict[str, Any]:
-    """An effect that was named, with its sizes as people read them."""
-    sizes = []
+def _sizes(effect: EffectEntry) -> Iterator[tuple[str, str, str]]:
+    """Name, value and interval of the parameters of an effect that was named, as people read them."""
     for name, size in effect["parameters"].items():
         unit, factor = for_people(size["unit"], 1.0, size["value"])
         value, *ends = alike([factor * x for x in (size["value"], *(size["ci95"] or ()))], 4, least=2)
-        sizes.append({"name": name, "value": f"{value} {unit}".removesuffix(" -"), "interval": " to ".join(ends)})
-    return {"found": effect, "sizes": sizes}
+        yield name, f"{value} {unit}".removesuffix(" -"), " to ".join(ends)
 
 
-def _plain(found: Checked) -> dict[str, str]:
-    """Values of the plain fit by parameter, where another model is to be used."""
-    rows = parameter_rows(found.plain) if found.plain else ()
-    return {row.name: row.value for row in rows}
-
-
-def _quality(result: Result) -> dict[str, str]:
-    quality = result.quality
-    if quality is None:
-        return {}
-    return {
-        "nrmse": f"{number(100 * quality.nrmse, 2)} %",
-        "chi": number(quality.reduced_chi_square, 3),
-        "points": f"{quality.points}",
-        "noise": f"{number(100 * quality.noise, 2)} %",
-    }
-
-
-def _files(found: Checked) -> list[tuple[str, str]]:
+def _files(found: ReportData) -> list[tuple[str, str]]:
     """Every file behind the result with its hash: the campaign, its tests, fitted or not, and what else was fitted."""
-    about = found.about
-    named = [(about.file, about.sha256), *((test.file, test.sha256) for test in about.tests)] if about else []
+    named = ((file.file, file.sha256) for file in ([found.campaign] if found.campaign else []) + [*found.tests])
     inputs = ((str(source.file), source.sha256) for source in found.result.inputs)
     return list(dict.fromkeys((file, sha256) for file, sha256 in (*named, *inputs) if file and sha256))
 
 
-def _gaps(found: Checked) -> list[tuple[str, str, str]]:
-    """Root mean square of what is left, in units of noise: held out first."""
-    if found.diagnosis is None:
-        return []
-    gap = found.diagnosis["gap"]
+def _gaps(gap: GapEntry) -> list[tuple[str, str, str]]:
+    """Root mean square of what is left before and after, in units of noise: held out first."""
+
+    def cells(sizes: BeforeAfter | None) -> tuple[str, str]:
+        if sizes is None:
+            return "not testable", ""
+        before, after = (
+            f"{each:.2f}" if each is not None else "not known" for each in (sizes["before"], sizes["after"])
+        )
+        return before, after
+
     return [
-        ("held out, predicted from the other tests", *_change(gap["heldout"])),
-        ("data fitted", *_change(gap["calibration"])),
+        ("held out, predicted from the other tests", *cells(gap["heldout"])),
+        ("data fitted", *cells(gap["calibration"])),
     ]
 
 
-def _change(gap: BeforeAfter | None) -> tuple[str, str]:
-    """A gap before and after."""
-    if gap is None:
-        return "not testable", ""
-    before, after = (f"{each:.2f}" if each is not None else "not known" for each in (gap["before"], gap["after"]))
-    return before, after
-
-
-def _tabled(result: Result, tables: Tables) -> list[tuple[str, ...]]:
+def _tabled(found: ReportData) -> list[tuple[str, ...]]:
     """Predicted values at some corners of the grid of each place, their bands, and what was measured there."""
-    places = [(tables[name], place) for name, place in places_of(result, tables).items() if name in tables]
+    places = [(found.tables[name], place) for name, place in found.places.items() if name in found.tables]
     frequencies = min(max(_ROWS // max(_AMPLITUDES * len(places), 1), 1), _FREQUENCIES)
     return [row for table, place in places[:MOST_PLACES] for row in _corners(table, place, frequencies)]
 
