@@ -7,13 +7,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from discrepancies import Bench
-from kinds import KINDS, Place, sized
+from held_back_kinds import HELD_BACK
+from kinds import Bench, Place, sized
 from numpy.random import Generator
 from scipy.signal import lfilter
 from time_rig import DIRECTIONS, SAMPLES, Array, Bushing, Change, Response, Rubber, Tests, respond
 from visible import CYCLES, Noise, seen
+from working_kinds import WORKING
 
+#: Every kind by name.
+KINDS = WORKING | HELD_BACK
 #: The class of the rig: gain, and phase [rad], of which each run has errors.
 CLASS = (5e-3, float(np.radians(0.25)))
 #: A rig without errors.
@@ -108,7 +111,7 @@ def campaign(kind: str, size: float, seed: int, folder: Path, *, silent: bool = 
         silent: whether the rig makes no errors in it.
     """
     random = np.random.default_rng([seed, 2007])
-    bushing, rubber = _specimen(random)
+    bushing, rubber = a_specimen(random)
     needs = KINDS[kind].needs if kind else ()
     plan = _plan(random, needs) if kind else awkward(_plan(random, ()), random)
     tests = _tests(bushing, plan, random)
@@ -123,7 +126,8 @@ def campaign(kind: str, size: float, seed: int, folder: Path, *, silent: bool = 
     return answer
 
 
-def _specimen(random: Generator) -> tuple[Bushing, Rubber]:
+def a_specimen(random: Generator) -> tuple[Bushing, Rubber]:
+    """A bushing and a rubber as there are many."""
     inner = float(f"{random.uniform(6e-3, 22e-3):.3g}")
     outer = float(f"{inner * random.uniform(1.4, 2.3):.3g}")
     mu = float(np.exp(random.uniform(*np.log((0.6e6, 1.8e6)))))
