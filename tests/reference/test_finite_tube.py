@@ -119,7 +119,7 @@ def test_the_papers_bushing() -> None:
 
 
 def test_the_correction_on_kept_shapes() -> None:
-    judge(kept_shapes(11, 3))
+    judge(kept_shapes(11, 1))
 
 
 @pytest.mark.slow

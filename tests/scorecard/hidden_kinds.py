@@ -27,10 +27,9 @@ from typing import Any, Literal
 import click
 import numpy as np
 from click.testing import CliRunner, Result
-from judging import Judged, acceptable
+from judging import Judged, acceptable, against_truth
 from kinds import SIZES
 from lab_campaign import HELD_BACK, WORKING, Answer, campaign
-from observer import against_truth
 from scipy.stats import binomtest
 
 from bushfit.cli import cli
