@@ -97,16 +97,6 @@ def test_bands_cover(paper_model: Model, seeds: int, widest: float) -> None:
     np.testing.assert_allclose(each, 0.95, atol=widest)
 
 
-def test_bands_carry_the_correlation(result: Result) -> None:
-    """Far narrower than if the parameters' errors were independent."""
-    free = replace(result, covariance=Covariance(result.covariance.names, np.diag(np.diag(result.covariance.matrix))))
-    widths = [
-        np.mean(p.stiffness.high - p.stiffness.low)
-        for p in (predict(r, Direction.AXIAL, FREQUENCIES, AMPLITUDES) for r in (result, free))
-    ]
-    assert widths[0] < 0.5 * widths[1]
-
-
 def test_instrument_effects_are_left_out_and_component_ones_kept(paper_model: Model) -> None:
     rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7}).with_effect(
         "inertia", {"inertia.mass": 0.2}

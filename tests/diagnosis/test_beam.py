@@ -31,14 +31,6 @@ def test_what_is_there_is_all_but_sure(diagnosed: Diagnosed, truth: Effects) -> 
     assert diagnosis.calibration[1] < 1.1 < 1.2 < diagnosis.calibration[0]
 
 
-def test_a_model_that_was_found_is_then_consistent(measured: Measured, diagnosed: Diagnosed) -> None:
-    found = diagnosed(TWO, SHARED).result.model
-    again = asked(measured(TWO, SHARED), found)
-    assert (again.verdict, again.result.model.effects) == ("consistent", found.effects)
-    for name, value in found.values.items():
-        assert again.result.model.values[name] == pytest.approx(value, rel=2e-3)
-
-
 @pytest.mark.parametrize(
     ("tamper", "place"),
     [
@@ -129,12 +121,3 @@ def test_chance_alone_names_nothing_however_small_a_gap_counts(measured: Measure
     diagnosis = asked(measured({}, SHARED), tolerance=0.0)
     assert max(judged.score for judged in diagnosis.candidates) > 1.0
     assert said(diagnosis) == "consistent "
-
-
-@pytest.mark.slow
-def test_the_order_of_tests_does_not_matter(measured: Measured, diagnosed: Diagnosed) -> None:
-    campaign = measured(TWO, SHARED)
-    turned = replace(campaign, loops=campaign.loops[::-1], sweeps=campaign.sweeps[::-1])
-    one, other = diagnosed(TWO, SHARED), asked(turned)
-    assert names(one) == names(other)
-    assert one.odds.told[0][1] == pytest.approx(other.odds.told[0][1], abs=0.01)

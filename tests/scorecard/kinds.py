@@ -81,6 +81,7 @@ class Bench:
 
 #: What changes by an amount, which is about the share of |K| that changes at most.
 Sized = Callable[[float], Change]
+Made = Callable[[Bench], Sized]
 
 
 @dataclass(frozen=True)
@@ -96,15 +97,20 @@ class Kind:
     """
 
     sentence: str
-    made: Callable[[Bench], Sized]
+    made: Made
     right: tuple[str, ...] = ()
     place: tuple[Place, ...] = ()
     needs: tuple[Literal["both", "loop", "repeats"], ...] = ()
 
     @classmethod
-    def into(cls, kinds: dict[str, Kind], sentence: str, **said: Any) -> Callable[[Callable[[Bench], Sized]], None]:
+    def into(cls, kinds: dict[str, Kind], sentence: str, **said: Any) -> Callable[[Made], Made]:
         """A decorator of how a kind is made, which puts the kind under that name among others."""
-        return lambda made: kinds.update({made.__name__: cls(sentence, made, **said)})
+
+        def register(made: Made) -> Made:
+            kinds[made.__name__] = cls(sentence, made, **said)
+            return made
+
+        return register
 
 
 def gain(factor: Array) -> Change:
