@@ -95,15 +95,6 @@ def test_a_wild_row_is_a_warning(measured: Measured, effects: Effects, factor: f
     assert "left out of the fit" in note
 
 
-def test_what_is_adopted_or_left_out_is_no_candidate(measured: Measured) -> None:
-    campaign = measured(INERTIA, SHARED)
-    adopted, without = asked(campaign, adopt=("inertia",)), asked(campaign, without=("inertia",))
-    assert (adopted.verdict, adopted.result.model.effects) == ("consistent", (*BASE, "inertia"))
-    assert without.verdict != "consistent"
-    for each in (adopted, without):
-        assert "inertia" not in {judged.name for judged in each.candidates} | names(each)
-
-
 @pytest.mark.slow
 def test_limits_of_what_is_added_and_of_what_counts(measured: Measured) -> None:
     none = asked(measured(INERTIA, SHARED), max_effects=0)
