@@ -22,15 +22,12 @@ def wheel(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Path(next(builder.build(directory=str(tmp_path_factory.mktemp("wheel")), versions=["standard"])))
 
 
-def test_measured_rubber_has_a_source_and_a_licence_of_its_own(root: Path) -> None:
+def test_measured_rubber_has_a_licence_of_its_own_and_is_left_out_of_what_is_built(root: Path) -> None:
     folders = [folder for folder in (root / "data/measured").iterdir() if folder.is_dir()]
     assert folders
     for folder in folders:
         assert "LICENSE" in {file.name for file in folder.iterdir()}
         assert "https://" in (folder / "README.md").read_text(encoding="utf-8")
-
-
-def test_what_is_built_is_told_to_leave_measured_rubber_out(root: Path) -> None:
     targets = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["hatch"]["build"]["targets"]
     assert targets["wheel"]["packages"] == ["bushfit"]
     assert "/data/measured" in targets["sdist"]["exclude"]

@@ -57,20 +57,11 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
     run("run", "run", "data/practice/case_001/bushing.toml", "-o", "run")
     run("model", "fit", "configs/cmp_15961.toml", "--profile", "--loss", "soft_l1", "-o", "profile")
     run("model", "fit", "configs/epdm_70.toml", "--direction", "DMA", "-o", "specimens")
-    run(
-        "prediction",
-        "predict",
-        "run/model.json",
-        "--campaign",
-        "data/practice/case_001/bushing.toml",
-        "-o",
-        "predicted",
-    )
+    own = ("--campaign", "data/practice/case_001/bushing.toml")
+    run("prediction", "predict", "run/model.json", *own, "-o", "predicted")
     shaken = ("--mass", "1 kg", "--base-acceleration", "0.1 g", "--direction", "mount")
     run("prediction", "predict", "specimens/model.json", *shaken, "-o", "shaken")
-    run(
-        "plan", "plan", "data/practice/case_001/bushing.toml", "--rivals", "inertia,delay", "--hours", "1", "-o", "plan"
-    )
+    run("plan", "plan", own[1], "--rivals", "inertia,delay", "--hours", "1", "-o", "plan")
     run("comparison", "compare", "run", "configs/arm_bushing.toml", "-o", "compared")
     run("comparison", "compare", "configs/cmp_15961.toml", "-o", "families", "--families", "sliders")
     (folder / "broken.toml").write_text("[bushing]\n")
@@ -91,18 +82,7 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
     read("diagnosis", "**/diagnosis.json")
     read("batch", "batch/batch.json")
     read("row", "batch/bushings/*/row.json")
-    known = {
-        "model",
-        "static",
-        "dynamic",
-        "joint",
-        "truth",
-        "diagnosis",
-        "row",
-        "compare",
-        "batch",
-        "plan",
-    }
+    known = {"compare", "plan", *(name for name in DESCRIBED), "static", "dynamic", "joint", "truth"}
     strange = [file for file in folder.glob("*/**/[!.]*.json") if file.stem not in known]
     assert [file for file in strange if "data" not in file.parts] == [], "a file that no schema describes"
     return found
@@ -172,13 +152,8 @@ def test_what_is_spoiled_is_refused(written: Documents, name: str) -> None:
         (("schema",), "bushfit/model/3"),
         (("bushing", "inner_radius_m"), "10 mm"),
         (("parameters", "mu", "value"), None),
-        (("parameters", "mu", "ci95"), [1.0]),
         (("parameters", "mu", "at_bound"), "middle"),
-        (("covariance", "matrix", 0, 0), "1"),
-        (("fit", "points"), 1.5),
         (("fit", "tests", 0, "held"), "temperature"),
-        (("warnings",), "one"),
-        (("provenance", "inputs", 0, "sha256"), 1),
     ],
 )
 @pytest.mark.slow
@@ -212,19 +187,12 @@ def test_every_model_and_campaign_of_the_repository_validates(root: Path) -> Non
     [
         ('inner_radius = "10 mm"', "inner_radius = 10"),
         ('inner_radius = "10 mm"', 'inner_radios = "10 mm"'),
-        ('shape = "calibrated"', 'shape = "square"'),
-        ('direction = "axial"', 'direction = "axil"'),
         ('columns = { force = "Kraft" }', 'columns = { forces = "Kraft" }'),
         ('delimiter = "semicolon"', 'delimiter = ";"'),
-        ('step = "10 Hz" }', "step = 10 }"),
         ('step = "10 Hz" }', 'steps = "10 Hz" }'),
         ("vary = true", 'vary = "yes"'),
-        ('min = "0.5 MPa"', 'least = "0.5 MPa"'),
         ("seed = 1 ", "seed = 1.5 "),
         ('specimen = "DMA"', "specimen = 1"),
-        ('mass = "0.25 kg"', "mass = 0.25"),
-        ('loss = "linear"', 'loss = "huber"'),
-        ('amplitude = "peak-to-peak"', 'amplitude = "rms"'),
     ],
 )
 def test_what_is_mistyped_in_a_campaign_is_refused(root: Path, right: str, wrong: str) -> None:

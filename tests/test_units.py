@@ -18,21 +18,13 @@ from bushfit.errors import UnitError
     [
         (1.09e6, "Pa", "1.09 MPa"),
         (0.19e6, "Pa*s^alpha", "0.19 MPa*s^alpha"),
-        (9.9e4, "Pa*s^alpha", "0.099 MPa*s^alpha"),
         (1.46e4, "Pa", "14.6 kPa"),
         (-1.46e4, "Pa", "-14.6 kPa"),
-        (12.0, "Pa", "12 Pa"),
-        (64.6, "Pa*s", "64.6 Pa*s"),
         (5e-5, "m", "0.05 mm"),
         (1.41e-8, "m/N", "0.0141 mm/kN"),
         (1.2e-4, "s", "0.12 ms"),
-        (20.0, "s", "20 s"),
-        (3.1e6, "N/m", "3100 N/mm"),
         (3.1e7, "N/m", "31 kN/mm"),
-        (9000.0, "N", "9000 N"),
-        (20e3, "N*m", "20 kN*m"),
         (0.0, "Pa", "0 Pa"),
-        (0.1, "kg", "0.1 kg"),
         (0.24, "1", "0.24 -"),
     ],
 )
@@ -46,26 +38,26 @@ def test_units_that_people_read(value: float, unit: str, shown: str) -> None:
 @pytest.mark.parametrize(
     ("text", "expected", "value"),
     [
-        ("10 mm", "m", 0.01),
         ("18mm", "m", 0.018),
         ("-1e2 µm", "m", -1e-4),
-        ("0.5 deg", "rad", math.radians(0.5)),
         ("2 °", "rad", math.radians(2)),
         ("0.5 %", "1", 0.005),
-        ("3 -", "1", 3.0),
-        ("5 Hz", "Hz", 5.0),
         ("60 1/min", "Hz", 1.0),
         ("10 mm/min", "m/s", 1e-2 / 60),
-        ("1.2 kN", "N", 1200.0),
-        ("3 Nm", "N*m", 3.0),
         ("3 kNmm", "N*m", 3.0),
         ("1 kN·mm⁻¹", "N/m", 1e6),
         ("1 N mm^-1", "N/m", 1e3),
         ("1 Nm/deg", "N*m/rad", math.degrees(1)),
-        ("1.09 MPa", "Pa", 1.09e6),
+        ("1 N/mm2", "Pa", 1e6),
+        ("1 kp/mm", "N/m", 9806.65),
+        ("1 kgf/cm2", "Pa", 98066.5),
+        ("1 Ncm", "N*m", 1e-2),
+        ("2 Inch", "m", 0.0508),
+        ("30 RPM", "rad/s", 3.141592653589793),
     ],
 )
 def test_quantity_in_si(text: str, expected: str, value: float) -> None:
+    """In the spellings of rigs and data sheets, too."""
     assert units.quantity(text, expected) == pytest.approx(value, rel=1e-14)
 
 
@@ -81,17 +73,12 @@ def test_quantity_takes_the_unit_that_fits() -> None:
         ("10", "m", ["without a unit", 'write "10 mm"']),
         (0.5, "1", ["without a unit", "%"]),
         (True, "m", ["no quantity", "True"]),
-        (None, "m", ["no quantity", "10 mm"]),
         ("mm", "m", ["no quantity", "mm"]),
         ("10,5 mm", "m", ["no quantity", "decimal point"]),
         ("10 kg", "m", ["does not fit", "kg", "a length"]),
         ("10 deg", "1", ["does not fit", "a ratio"]),
-        ("10 %", "rad", ["does not fit", "an angle"]),
-        ("10 rad/s", "Hz", ["does not fit", "a frequency"]),
         ("10 N m", "N*m/rad", ["does not fit", "a torsional stiffness"]),
         ("10 dB", "1", ["unknown unit", "dB"]),
-        ("10 degC", "1", ["unknown unit", "degC"]),
-        ("10 foo", "m", ["unknown unit", "foo"]),
         ("10 mm + 3 mm", "m", ["unknown unit"]),
         ("10 mm^9^9^9", "m", ["unknown unit"]),
         ("1e999 m", "m", ["too large"]),
@@ -126,9 +113,7 @@ def test_quantity_is_number_times_unit(number: float, unit: tuple[str, str, floa
     [
         ("force [N]", ("force", "N")),
         (" force (kN) ", ("force", "kN")),
-        ("loss factor [-]", ("loss factor", "-")),
         ("force_N", ("force_N", None)),
-        ("force", ("force", None)),
         ("force (cell 2) [N]", ("force (cell 2)", "N")),
     ],
 )
@@ -151,30 +136,18 @@ def test_units_of_the_field_are_as_large_as_in_the_whole_list_of_pint() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "expected", "value"),
+    ("unit", "expected", "said"),
     [
-        ("1 N/mm2", "Pa", 1e6),
-        ("1 kp/mm", "N/m", 9806.65),
-        ("1 kgf/cm2", "Pa", 98066.5),
-        ("1 Ncm", "N*m", 1e-2),
-        ("2 Inch", "m", 0.0508),
-        ("30 RPM", "rad/s", 3.141592653589793),
+        ("mil", "m", r"two ways(.|\n)*thou"),
+        ("mils", "m", r"two ways(.|\n)*mrad"),
+        ("grad", "m", r"two ways(.|\n)*gon"),
+        *((unit, "N", 'a pound of force is "lbf"') for unit in ("lb", "lbs/in", "in-lb")),
     ],
 )
-def test_spellings_of_rigs_and_data_sheets(text: str, expected: str, value: float) -> None:
-    assert units.quantity(text, expected) == pytest.approx(value, rel=1e-12)
-
-
-@pytest.mark.parametrize(("unit", "said"), [("mil", "thou"), ("mils", "mrad"), ("grad", "gon")])
-def test_units_of_two_readings_are_refused(unit: str, said: str) -> None:
-    with pytest.raises(UnitError, match=rf"two ways(.|\n)*{said}"):
-        units.factor(unit, "m")
-
-
-@pytest.mark.parametrize("unit", ["lb", "lbs/in", "in-lb"])
-def test_pounds_of_mass_are_told_from_pounds_of_force(unit: str) -> None:
-    with pytest.raises(UnitError, match='a pound of force is "lbf"'):
-        units.factor(unit, "N")
+def test_units_of_two_readings_are_refused(unit: str, expected: str, said: str) -> None:
+    """As pounds of mass where a force has to stand."""
+    with pytest.raises(UnitError, match=said):
+        units.factor(unit, expected)
 
 
 @pytest.mark.parametrize("unit", units._EVERYDAY)
@@ -187,14 +160,10 @@ def test_everyday_units_are_what_pint_says(unit: str) -> None:
     [
         (3.294e4, 4, "32940"),
         (32943.0, 2, "33000"),
-        (100.4, 2, "100"),
-        (0.3, 4, "0.3"),
         (-1e-9, 2, "-1e-9"),
         (1.0949e8, 3, "1.09e8"),
         (9.9999, 3, "10"),
-        (0.0, 3, "0"),
         (-0.0, 3, "0"),
-        (math.inf, 3, "inf"),
         (math.nan, 3, "nan"),
     ],
 )
@@ -217,7 +186,6 @@ def test_a_number_keeps_its_digits(value: float, digits: int) -> None:
         ((0.3, -4.54e-6), 4, 0, ["0.3000", "0"]),
         ((370.0, 0.0213, 6.2e6, 3e9), 2, 2, ["370", "0.021", "6200000", "3e9"]),
         ((0.0, 12.34), 3, 0, ["0", "12.3"]),
-        ((99.96, 9.0), 3, 0, ["100", "9"]),
     ],
 )
 def test_numbers_that_stand_together_end_alike(

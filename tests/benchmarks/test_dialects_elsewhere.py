@@ -10,7 +10,9 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,12 +25,10 @@ from bushfit.reading.numerals import Numerals
 
 pytestmark = pytest.mark.slow
 
-_REASON = "the group bench is not installed"
-chardet = pytest.importorskip("chardet", reason=_REASON)
-charset_normalizer = pytest.importorskip("charset_normalizer", reason=_REASON)
-clevercsv = pytest.importorskip("clevercsv", reason=_REASON)
-duckdb = pytest.importorskip("duckdb", reason=_REASON)
-polars = pytest.importorskip("polars", reason=_REASON)
+chardet, charset_normalizer, clevercsv, duckdb, polars = (
+    pytest.importorskip(name, reason="the group bench is not installed")
+    for name in ("chardet", "charset_normalizer", "clevercsv", "duckdb", "polars")
+)
 
 #: Typographic separators, as the plain ones that they count as.
 SEPARATORS = {"\u00a0": " ", "\u202f": " ", "\u2019": "'"}
@@ -36,34 +36,17 @@ SEPARATORS = {"\u00a0": " ", "\u202f": " ", "\u2019": "'"}
 Rows = Iterable[Sequence[object]]
 
 
-def rows_by_csv_sniffer(file: Path) -> Rows:
+def rows_by_sniffing(sniffed: Any, file: Path) -> Rows:
     text = file.read_text("utf-8-sig")
-    return csv.reader(io.StringIO(text), csv.Sniffer().sniff(text))
-
-
-def rows_by_clevercsv(file: Path) -> Rows:
-    text = file.read_text("utf-8-sig")
-    return clevercsv.reader(io.StringIO(text), clevercsv.Sniffer().sniff(text))
-
-
-def rows_by_duckdb(file: Path) -> Rows:
-    return duckdb.sql(f"select * from read_csv('{file}', all_varchar = true)").fetchall()
-
-
-def rows_by_polars(file: Path) -> Rows:
-    return polars.read_csv(file, infer_schema=False).rows()
-
-
-def rows_by_pandas(file: Path) -> Rows:
-    return pd.read_csv(file, sep=None, engine="python", dtype=str).to_numpy().tolist()
+    return sniffed.reader(io.StringIO(text), sniffed.Sniffer().sniff(text))
 
 
 CANDIDATES: dict[str, Callable[[Path], Rows]] = {
-    "csv.Sniffer": rows_by_csv_sniffer,
-    "clevercsv": rows_by_clevercsv,
-    "DuckDB": rows_by_duckdb,
-    "polars": rows_by_polars,
-    "pandas": rows_by_pandas,
+    "csv.Sniffer": partial(rows_by_sniffing, csv),
+    "clevercsv": partial(rows_by_sniffing, clevercsv),
+    "DuckDB": lambda file: duckdb.sql(f"select * from read_csv('{file}', all_varchar = true)").fetchall(),
+    "polars": lambda file: polars.read_csv(file, infer_schema=False).rows(),
+    "pandas": lambda file: pd.read_csv(file, sep=None, engine="python", dtype=str).to_numpy().tolist(),
 }
 
 

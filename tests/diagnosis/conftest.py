@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rigged import PLAN, Diagnosed, Effects, Fitted, Measured
+from rigged import PLAN, SHARED, Diagnosed, Effects, Fitted, Measured
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.rig_errors import scattering_alone
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, effect_named
 from bushfit.fitting.data import Data
@@ -76,3 +77,9 @@ def fitted() -> Fitted:
         return fit(Model.started(campaign.bushing, (*kept, *effects), start), data_sets, (), {})
 
     return evidence
+
+
+@pytest.fixture(scope="session")
+def bare(measured: Measured, fitted: Fitted) -> Evidence:
+    """The paper's model fitted to a clean campaign, its residuals in units of what scatters from point to point."""
+    return scattering_alone(fitted(measured(plan=SHARED)))

@@ -38,6 +38,7 @@ Effects = Mapping[str, Mapping[str, float]]
 Measured = Callable[..., Campaign]
 Diagnosed = Callable[..., Diagnosis]
 Fitted = Callable[..., Evidence]
+Tamper = Callable[[Campaign], Campaign]
 
 
 def in_closed_form(truth: Model, plan: SimulateSettings) -> Undisturbed:
@@ -73,3 +74,23 @@ def changed(campaign: Campaign, number: int, factor: Array | complex) -> Campaig
     """A campaign with the stiffness of one sweep multiplied."""
     sweep = campaign.sweeps[number]
     return with_sweep(campaign, number, replace(sweep, stiffness=sweep.stiffness * np.asarray(factor)))
+
+
+def off(number: int, factor: complex, **where: float | tuple[float, ...]) -> Tamper:
+    """Some points of a sweep off by a factor: those at these frequencies, amplitudes and repeats; else all."""
+
+    def made(campaign: Campaign) -> Campaign:
+        sweep = campaign.sweeps[number]
+        rows = [np.isin(getattr(sweep, name), values) for name, values in where.items()]
+        return changed(campaign, number, np.where(np.all(rows, axis=0), factor, 1.0))
+
+    return made
+
+
+def both(one: Tamper, other: Tamper) -> Tamper:
+    return lambda campaign: one(other(campaign))
+
+
+def loop_too_strong(campaign: Campaign) -> Campaign:
+    first, second = campaign.loops
+    return replace(campaign, loops=(first, replace(second, force=1.06 * second.force)))

@@ -2,9 +2,11 @@
 
 from dataclasses import astuple, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from rigged import LEVELS, cut
 from tries import some
 
 from bushfit.campaign.campaign import Campaign, load_campaign
@@ -22,7 +24,6 @@ PAPER = Model.started(
     ("elastic", "springpot", "friction"),
     dict(zip(FIVE, (1.09e6, 0.2e6, 0.24, 14.6e3, 0.013), strict=True)),
 )
-LEVELS = (1e-4, 2e-4, 5e-4)
 POINTS = 900
 SCATTER = 0.01
 
@@ -43,17 +44,20 @@ def data_of(*sweeps: Sweep) -> Data:
     return Data.of(Campaign("long", Path("long.toml"), PAPER.bushing, sweeps=sweeps))
 
 
-def _some(sweep: Sweep, chosen: Array) -> Sweep:
-    columns = (sweep.frequency[chosen], sweep.amplitude[chosen], sweep.stiffness[chosen], sweep.repeat[chosen])
-    return Sweep(sweep.name, sweep.direction, *columns)
+def silent(frequency: Array, amplitude: Array, stepped: Any = "frequency") -> Sweep:
+    """A sweep without noise."""
+    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
+    return Sweep("silent", Direction.AXIAL, frequency, amplitude, stiffness, stepped=stepped)
 
 
-def _joined(*sweeps: Sweep) -> Sweep:
-    frequency, amplitude, stiffness, repeat = (
-        np.concatenate([getattr(each, name) for each in sweeps])
-        for name in ("frequency", "amplitude", "stiffness", "repeat")
-    )
-    return Sweep(sweeps[0].name, sweeps[0].direction, frequency, amplitude, stiffness, repeat)
+def grid(levels: Array) -> Sweep:
+    """Four frequencies at each of many levels, without noise."""
+    return silent(np.tile([5.0, 20.0, 60.0, 150.0], levels.size), np.repeat(levels, 4))
+
+
+def joined(*sweeps: Sweep) -> Sweep:
+    columns = ("frequency", "amplitude", "stiffness", "repeat")
+    return replace(sweeps[0], **{name: np.concatenate([getattr(each, name) for each in sweeps]) for name in columns})
 
 
 def off(sweep: Sweep) -> Array:
@@ -70,7 +74,6 @@ def test_means_are_as_sharp_as_their_points() -> None:
     (sweep,), said = condensed(data_of(swept(PAPER)))[0].sweeps, condensed(data_of(swept(PAPER)))[1]
     assert said == ("swept: 5400 points are diagnosed as 600 means over narrow bands",)
     expected = SCATTER / np.sqrt(POINTS / 100)
-    print(f"{np.std(off(sweep.sweep).real):.5f}, {sweep.relative_noise:.5f}, expected {expected:.5f}")
     assert np.std(off(sweep.sweep).real) == pytest.approx(expected, rel=0.1)
     assert sweep.relative_noise == pytest.approx(expected, rel=0.1)
     assert abs(np.mean(off(sweep.sweep))) < 4.0 * expected / np.sqrt(600)
@@ -99,15 +102,52 @@ def test_short_runs_beside_long_ones_stay_points_and_rows_without_weight_count_n
     assert not banded.sweeps[2].weights.any()
 
 
-def test_of_very_many_levels_some_are_diagnosed() -> None:
-    amplitude, frequency = np.repeat(np.geomspace(1e-5, 1e-3, 300), 4), np.tile([5.0, 20.0, 60.0, 150.0], 300)
-    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
-    banded, said = condensed(data_of(Sweep("grid", Direction.AXIAL, frequency, amplitude, stiffness)))
+def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten() -> None:
+    """Rows of levels that are not looked at were measured all the same, and the rubber remembers them."""
+    levels = np.random.default_rng(1).permutation(np.geomspace(1e-5, 1e-3, 300))
+    data = data_of(grid(levels))
+    banded, said = condensed(data)
     sweep = banded.sweeps[0].sweep
-    assert said == ("grid: 40 of its 300 runs at one level, or frequency, are diagnosed, evenly spread",)
+    assert said == ("silent: 40 of its 300 runs at one level, or frequency, are diagnosed, evenly spread",)
     assert sweep.frequency.size == 160
-    assert {sweep.amplitude.min(), sweep.amplitude.max()} == {amplitude.min(), amplitude.max()}
+    assert {sweep.amplitude.min(), sweep.amplitude.max()} == {levels.min(), levels.max()}
     assert np.abs(off(sweep)).max() < 1e-12
+    before, after = data.sweeps[0], banded.sweeps[0]
+    for point in range(0, 160, 7):
+        same = (before.sweep.amplitude == sweep.amplitude[point]) & (before.sweep.frequency == sweep.frequency[point])
+        assert astuple(after.under.at(point)) == astuple(before.under.at(int(np.flatnonzero(same)[0])))
+
+
+def test_levels_without_weight_are_no_levels() -> None:
+    data = data_of(grid(np.geomspace(1e-5, 1e-3, 80)))
+    few = replace(data, sweeps=(data.sweeps[0].without(np.flatnonzero(np.arange(320) // 4 % 16)),))
+    assert condensed(few) == (few, ())
+
+
+UP = np.geomspace(5.0, 60.0, 450)
+BENT = [1.0 + 9.0 / (1.0 + (f - middle) ** 2) for f, middle in ((UP, 25.0), (UP[::-1], 18.0))]
+
+
+@pytest.mark.parametrize(
+    ("sweep", "largest"),
+    [
+        (silent(np.linspace(0.5, 200.0, 6000), np.full(6000, 2e-4)), 2e-3),
+        (silent(np.linspace(5.0, 200.0, 6000), np.full(6000, 2e-4)), 2e-3),
+        (silent(np.concatenate((UP, UP[::-1])), 1e-4 * np.concatenate(BENT), stepped=None), 2e-3),
+        (silent(np.repeat([10.0, 100.0], 600), np.tile(np.geomspace(1e-5, 1e-3, 600), 2), stepped="amplitude"), 1e-3),
+    ],
+    ids=["from 0.5 Hz", "from 5 Hz", "up and down through a resonance", "amplitudes"],
+)
+def test_means_lie_on_the_curve(sweep: Sweep, largest: float) -> None:
+    """Evenly in frequency the first bands are wide in its logarithm; where neither is held, points at one frequency may
+    have amplitudes far apart, and are taken in turn."""
+    made = condensed(data_of(sweep))[0].sweeps[0].sweep
+    assert made.frequency.size < sweep.frequency.size
+    assert np.abs(off(made)).max() < largest
+    if sweep.stepped == "frequency":
+        assert np.abs(np.mean(off(made))) < 2e-5
+    if sweep.stepped == "amplitude":
+        assert made.frequency.tolist() == [10.0] * 100 + [100.0] * 100
 
 
 @pytest.mark.parametrize("stated", ["campaign", "file"])
@@ -124,9 +164,8 @@ def test_stated_noise_falls_with_the_points_of_a_band(stated: str) -> None:
 def test_lines_keep_their_own_noise_beside_means() -> None:
     """A short level in a long sweep, and a short sweep beside one: 1 % stays 1 %, stated or found."""
     few = swept(PAPER, points=30, repeats=1, seed=5)
-    top = few.amplitude == LEVELS[2]
     whole = swept(PAPER)
-    mixed = _joined(_some(whole, whole.amplitude < LEVELS[2]), _some(few, top))
+    mixed = joined(cut(whole, whole.amplitude < LEVELS[2]), cut(few, few.amplitude == LEVELS[2]))
     in_means = SCATTER / np.sqrt(POINTS / 100)
     for stated in (None, SCATTER):
         data = data_of(replace(mixed, noise=stated), replace(few, name="short", noise=stated))
@@ -138,67 +177,6 @@ def test_lines_keep_their_own_noise_beside_means() -> None:
         assert found["short", LEVELS[0]] == pytest.approx(SCATTER, rel=0.25)
 
 
-@pytest.mark.parametrize("seeds", some((2, 6), {2}))
-def test_a_short_sweep_beside_a_long_one_raises_no_alarm(seeds: int) -> None:
-    verdicts = [
-        diagnose(data_of(swept(PAPER, seed=seed), replace(swept(PAPER, 30, 1, 100 + seed), name="short"))).verdict
-        for seed in range(seeds)
-    ]
-    assert verdicts == ["consistent"] * seeds
-
-
-def test_what_the_rubber_had_seen_before_is_not_forgotten() -> None:
-    """Rows of levels that are not looked at were measured all the same."""
-    levels = np.random.default_rng(1).permutation(np.geomspace(1e-5, 1e-3, 300))
-    amplitude, frequency = np.repeat(levels, 4), np.tile([5.0, 20.0, 60.0, 150.0], 300)
-    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
-    data = data_of(Sweep("grid", Direction.AXIAL, frequency, amplitude, stiffness))
-    before, after = data.sweeps[0], condensed(data)[0].sweeps[0]
-    for point in range(0, 160, 7):
-        row = np.flatnonzero((amplitude == after.sweep.amplitude[point]) & (frequency == after.sweep.frequency[point]))
-        assert astuple(after.under.at(point)) == astuple(before.under.at(int(row[0])))
-
-
-@pytest.mark.parametrize("low", [0.5, 5.0])
-def test_means_of_an_evenly_stepped_sweep_lie_on_the_curve(low: float) -> None:
-    """Without noise: evenly in frequency the first bands are wide in its logarithm."""
-    frequency = np.linspace(low, 200.0, 6000)
-    amplitude = np.full(6000, 2e-4)
-    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
-    sweep = condensed(data_of(Sweep("even", Direction.AXIAL, frequency, amplitude, stiffness)))[0].sweeps[0].sweep
-    assert np.abs(off(sweep)).max() < 2e-3
-    assert np.abs(np.mean(off(sweep))) < 2e-5
-
-
-def test_up_and_down_through_a_resonance_is_taken_in_turn() -> None:
-    """Where neither is held, points at one frequency may have amplitudes far apart."""
-    up = np.geomspace(5.0, 60.0, 450)
-    amplitude = 1e-4 * np.concatenate(
-        (1.0 + 9.0 / (1.0 + (up - 25.0) ** 2), 1.0 + 9.0 / (1.0 + (up[::-1] - 18.0) ** 2))
-    )
-    frequency = np.concatenate((up, up[::-1]))
-    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
-    data = data_of(Sweep("up and down", Direction.AXIAL, frequency, amplitude, stiffness, stepped=None))
-    assert np.abs(off(condensed(data)[0].sweeps[0].sweep)).max() < 2e-3
-
-
-def test_levels_without_weight_are_no_levels() -> None:
-    amplitude, frequency = np.repeat(np.geomspace(1e-5, 1e-3, 80), 4), np.tile([5.0, 20.0, 60.0, 150.0], 80)
-    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
-    data = data_of(Sweep("grid", Direction.AXIAL, frequency, amplitude, stiffness))
-    few = replace(data, sweeps=(data.sweeps[0].without(np.flatnonzero(np.arange(320) // 4 % 16)),))
-    assert condensed(few) == (few, ())
-
-
-def test_runs_over_amplitudes_keep_their_frequency() -> None:
-    amplitude, frequency = np.tile(np.geomspace(1e-5, 1e-3, 600), 2), np.repeat([10.0, 100.0], 600)
-    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
-    banded = condensed(data_of(Sweep("a", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")))[0]
-    sweep = banded.sweeps[0].sweep
-    assert sweep.frequency.tolist() == [10.0] * 100 + [100.0] * 100
-    assert np.abs(off(sweep)).max() < 1e-3  # a mean of logarithms over a hundredth of a decade
-
-
 def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told() -> None:
     lagging = PAPER.with_effect("delay", {"delay.tau": 2e-4})
     found = diagnose(data_of(swept(lagging)))
@@ -208,11 +186,13 @@ def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told() -> None:
     assert low < 2e-4 < high
 
 
-@pytest.mark.parametrize("seeds", some((2, 8), {2}))
-def test_a_clean_long_sweep_is_consistent(seeds: int) -> None:
+@pytest.mark.parametrize("seeds", some((1, 7), {1}))
+@pytest.mark.parametrize("beside", [False, True], ids=["alone", "beside a short one"])
+def test_a_clean_long_sweep_is_consistent(seeds: int, beside: bool) -> None:
     """The noise is white and of the fit's own kind, which proves half."""
-    verdicts = [diagnose(data_of(swept(PAPER, seed=seed))).verdict for seed in range(seeds)]
-    assert verdicts == ["consistent"] * seeds
+    for seed in range(seeds):
+        short = [replace(swept(PAPER, 30, 1, 100 + seed), name="short")] * beside
+        assert diagnose(data_of(swept(PAPER, seed=seed), *short)).verdict == "consistent"
 
 
 def test_means_that_a_robust_fit_leaves_out_are_told() -> None:
@@ -229,10 +209,7 @@ def test_means_that_a_robust_fit_leaves_out_are_told() -> None:
     assert not any("left out" in note for note in diagnose(Data.of(as_it_was)).notes)
 
 
-@pytest.mark.parametrize(
-    ("most", "kept"),
-    [(6.0, "012345"), (5.0, "01235"), (4.1, "0125"), (3.2, "015"), (2.2, "15"), (0.1, "15")],
-)
+@pytest.mark.parametrize(("most", "kept"), [(6.0, "012345"), (5.0, "01235"), (4.1, "0125"), (3.2, "015"), (0.1, "15")])
 def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_repeated(
     root: Path, monkeypatch: pytest.MonkeyPatch, most: float, kept: str
 ) -> None:
@@ -267,7 +244,6 @@ def test_points_left_out_meet_at_their_own_frequency_in_runs_that_are_diagnosed_
     factor = np.ones(sweep.frequency.size)
     factor[rows] += np.where(np.arange(rows.size) % 2, 0.2, -0.2)
     diagnosis = diagnose(data_of(replace(sweep, stiffness=sweep.stiffness * factor)))
-    print(rows.size, diagnosis.verdict, diagnosis.summary)
     assert rows.size > 3
     assert diagnosis.verdict == "unexplained"
     assert f"{sweep.frequency[200]:.4g} Hz in axial ({rows.size} points left out)" in diagnosis.summary

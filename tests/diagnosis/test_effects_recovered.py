@@ -91,9 +91,8 @@ def test_a_small_effect_is_not_taken_for_one_at_rest_on_its_bound(measured: Meas
 def test_what_the_data_push_below_zero_rests_on_its_bound(measured: Measured) -> None:
     """Loss that shrinks in proportion to frequency, as of a late force, is no dashpot."""
     campaign = measured()
-    late = [np.exp(-2j * np.pi * sweep.frequency * 1e-4) for sweep in campaign.sweeps]
-    for number, factor in enumerate(late):
-        campaign = changed(campaign, number, factor)
+    for number, sweep in enumerate(campaign.sweeps):
+        campaign = changed(campaign, number, np.exp(-2j * np.pi * sweep.frequency * 1e-4))
     result = fit_joint(Data.of(campaign), effects=(*BASE, "viscous"), directions=BOTH)
     assert result.model.values["viscous.eta"] == pytest.approx(0.0, abs=1e-6)
     assert any("viscous.eta ended at the edge" in line for line in result.warnings)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import cast
 
 import numpy as np
 import pytest
 from asking import INERTIA, no_loops, no_repeats, no_sweeps
-from rigged import LEVELS, SHARED, Fitted, Measured, changed
+from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_strong, off
 
-from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.currency import Ledger
 from bushfit.diagnosis.evidence import Evidence
@@ -23,13 +22,7 @@ from bushfit.effects.contract import Array, Values
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.model.model import Model
 
-Tamper = Callable[[Campaign], Campaign]
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
-
-
-@pytest.fixture(scope="module")
-def bare(measured: Measured, fitted: Fitted) -> Evidence:
-    return scattering_alone(fitted(measured(plan=SHARED)))
 
 
 def best(evidence: Evidence, every: Sequence[Explanation]) -> Explanation:
@@ -43,38 +36,19 @@ def best(evidence: Evidence, every: Sequence[Explanation]) -> Explanation:
     return max(zip(known, worths, strict=True), key=lambda pair: pair[1].log_evidence)[0]
 
 
-def at(number: int, factor: complex, **where: float | tuple[float, ...]) -> Tamper:
-    """Some points of a sweep off: those at these frequencies, amplitudes and repeats."""
-
-    def made(c: Campaign) -> Campaign:
-        sweep = c.sweeps[number]
-        rows = np.all([np.isin(getattr(sweep, name), values) for name, values in where.items()], axis=0)
-        return changed(c, number, np.where(rows, factor, 1.0))
-
-    return made
-
-
-def loop_too_strong(c: Campaign) -> Campaign:
-    return replace(c, loops=(c.loops[0], replace(c.loops[1], force=1.06 * c.loops[1].force)))
-
-
-def both(one: Tamper, other: Tamper) -> Tamper:
-    return lambda c: one(other(c))
-
-
 @pytest.mark.parametrize(
     ("tamper", "kind", "words"),
     [
-        (at(1, 1.0 + 0.05j, frequency=75.0), "frequency", "75 Hz in radial, at every amplitude"),
+        (off(1, 1.0 + 0.05j, frequency=75.0), "frequency", "75 Hz in radial, at every amplitude"),
         (
-            both(at(0, 1.0 + 0.05j, frequency=75.0), at(1, 1.0 + 0.05j, frequency=75.0)),
+            both(off(0, 1.0 + 0.05j, frequency=75.0), off(1, 1.0 + 0.05j, frequency=75.0)),
             "frequency",
             "75 Hz in all directions, at every amplitude",
         ),
-        (at(0, 0.96, frequency=(65.0, 75.0)), "frequency", "65 to 75 Hz in axial, at every amplitude"),
-        (at(0, 1.05, amplitude=LEVELS[1]), "level", "the axial level 0.2 mm"),
-        (at(0, 1.1, amplitude=LEVELS[1], repeat=2), "repeat", "repeat 2 of the axial level 0.2 mm"),
-        (at(1, 1.06, repeat=3), "repeat", "repeat 3 of the radial sweep sweep_radial"),
+        (off(0, 0.96, frequency=(65.0, 75.0)), "frequency", "65 to 75 Hz in axial, at every amplitude"),
+        (off(0, 1.05, amplitude=LEVELS[1]), "level", "the axial level 0.2 mm"),
+        (off(0, 1.1, amplitude=LEVELS[1], repeat=2), "repeat", "repeat 2 of the axial level 0.2 mm"),
+        (off(1, 1.06, repeat=3), "repeat", "repeat 3 of the radial sweep sweep_radial"),
         (loop_too_strong, "loop", "the loop loop_axial_2"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
@@ -124,9 +98,9 @@ def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) ->
         group = made[f"{how} axial"].group
         assert group is not None
         own = group.columns[:, bare.place[sweep]].reshape(len(group.columns), 2, -1)[:, 0] / point
-        off = np.exp(-0.5 * (distance / length) ** 2) - (own.T @ own)[np.ix_(same, same)]
-        assert np.linalg.eigvalsh(off).min() > -0.01
-        assert off.max() < short
+        apart = np.exp(-0.5 * (distance / length) ** 2) - (own.T @ own)[np.ix_(same, same)]
+        assert np.linalg.eigvalsh(apart).min() > -0.01
+        assert apart.max() < short
         assert not group.columns[:, : bare.place[sweep].start].any()
 
 

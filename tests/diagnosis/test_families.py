@@ -15,6 +15,7 @@ from bushfit.diagnosis.families import FittedFamily, fit_families, known_familie
 from bushfit.effects import BASE
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import DataSet
 from bushfit.model.model import Model
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
@@ -29,22 +30,24 @@ TRUTHS: dict[str, dict[str, float]] = {
 NAMES = ("kraus", "sliders", "fractional_zener", "intrinsic_time")
 
 
-def families(model: Model, truth: str, values: Mapping[str, float], seed: int = 0) -> dict[str, FittedFamily]:
+def begun(model: Model, campaign: Campaign) -> tuple[Model, list[DataSet]]:
+    """The plain model as a fit begins, and the tests."""
+    data = Data.of(campaign)
+    tests = [*data.loops, *data.sweeps]
+    return Model.started(model.bushing, BASE, data.start(tests, {})), tests
+
+
+def families(model: Model, truth: str, values: Mapping[str, float]) -> dict[str, FittedFamily]:
     made = model if truth == "paper" else model.with_effect(truth, {f"{truth}.{k}": v for k, v in values.items()})
     harmonic = any(effect.harmonic_only for effect in made.records)
     clean = in_closed_form(made, PLAN) if harmonic else undisturbed(made, PLAN)
-    data = Data.of(measure(clean, PLAN).campaign())
-    tests = [*data.loops, *data.sweeps]
-    start = Model.started(model.bushing, BASE, data.start(tests, {}))
-    return {family.name: family for family in fit_families(start, tests, NAMES, (), {})[0]}
+    fitted, _ = fit_families(*begun(model, measure(clean, PLAN).campaign()), NAMES, (), {})
+    return {family.name: family for family in fitted}
 
 
 @pytest.mark.parametrize("truth", some(TRUTHS, {"kraus", "intrinsic_time", "paper"}))
 def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model: Model, truth: str) -> None:
     found = families(paper_model, truth, TRUTHS[truth])
-    for family in found.values():
-        shown = f"chi2 {family.evidence.reduced:.3f}, held out {family.held.after:.3f}, odds {family.probability:.3g}"
-        print(f"{truth}: {family.name}, {shown}")
     assert list(found) == ["paper", *NAMES]
     assert found[truth].evidence.reduced == pytest.approx(1.0, abs=0.05)
     assert min(found, key=lambda name: found[name].evidence.bic) == truth
@@ -61,16 +64,15 @@ def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model:
         assert found["kraus"].words.endswith("worse by more than chance")
 
 
+@pytest.mark.slow
 def test_the_interval_of_the_gain_is_that_of_noise(paper_model: Model) -> None:
     """Two wrong families: redrawn noise moves the gain of one over the other as its interval says."""
     gains = []
     made = paper_model.with_effect("intrinsic_time", {"intrinsic_time.d": 1.0})
     clean = undisturbed(made, PLAN)
     for seed in range(12):
-        data = Data.of(measure(clean, replace(PLAN, seed=seed)).campaign())
-        tests = [*data.sweeps, *data.loops]
-        start = Model.started(paper_model.bushing, BASE, data.start(tests, {}))
-        (_, other), _ = fit_families(start, tests, ["fractional_zener"], (), {})
+        made = begun(paper_model, measure(clean, replace(PLAN, seed=seed)).campaign())
+        (_, other), _ = fit_families(*made, ["fractional_zener"], (), {})
         assert other.gain is not None
         gains.append(other.gain)
     value, low, high = np.array(gains).T
@@ -91,15 +93,12 @@ def test_known_families_are_each_law_of_rate_with_each_of_amplitude(paper_model:
     assert not any("kraus" in name or "sliders" in name for name in known_families(kraus, tests))
 
 
+@pytest.mark.slow
 def test_the_likeliest_of_all_families_are_held_out(paper_model: Model) -> None:
     """Kraus' law with a spring in series with the springpot: it leads, or what leads has both in it."""
     made = paper_model.with_effect("kraus", {f"kraus.{key}": value for key, value in TRUTHS["kraus"].items()})
     made = made.with_effect("fractional_zener", {"fractional_zener.c": 0.5})
-    data = Data.of(measure(in_closed_form(made, PLAN), PLAN).campaign())
-    tests = [*data.loops, *data.sweeps]
-    start = Model.started(paper_model.bushing, BASE, data.start(tests, {}))
-    found, left = fit_families(start, tests, (), (), {})
-    print({family.name: round(family.probability, 4) for family in found}, f"others {sum(left.values()):.1e}")
+    found, left = fit_families(*begun(paper_model, measure(in_closed_form(made, PLAN), PLAN).campaign()), (), (), {})
     assert 2 <= len(found) <= 6
     assert found[0].name == "paper"
     assert sum(family.probability for family in found) + sum(left.values()) == pytest.approx(1.0)
@@ -107,7 +106,6 @@ def test_the_likeliest_of_all_families_are_held_out(paper_model: Model) -> None:
 
 
 def test_two_effects_in_place_of_one_branch_are_no_family(paper_model: Model) -> None:
-    data = Data.of(measure(undisturbed(paper_model, PLAN), PLAN).campaign())
-    start = Model.started(paper_model.bushing, BASE, data.start(data.sweeps, {}))
+    made = begun(paper_model, measure(undisturbed(paper_model, PLAN), PLAN).campaign())
     with pytest.raises(ModelError, match="what this effect stands in place of is not in the model"):
-        fit_families(start, data.sweeps, ["kraus+sliders"], (), {})
+        fit_families(*made, ["kraus+sliders"], (), {})

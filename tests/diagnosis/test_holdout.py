@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from asking import INERTIA, one_loop
 from rigged import SHARED, Fitted, Measured
 
 from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.holdout import hold_out, parts
 from bushfit.fitting.coordinates import residual
-
-INERTIA = {"inertia": {"mass": 0.06}}
 
 
 def test_parts_and_gaps(measured: Measured, fitted: Fitted) -> None:
@@ -61,8 +60,7 @@ def test_what_cannot_be_predicted_is_told_with_the_reason(measured: Measured, fi
 
 
 def test_nothing_to_hold_out_is_nothing_tested(measured: Measured, fitted: Fitted) -> None:
-    campaign = measured()
-    evidence = fitted(replace(campaign, sweeps=(), loops=campaign.loops[:1]))
+    evidence = fitted(one_loop(measured()))
     found = hold_out(evidence, evidence, {})
     assert found.parts == ()
     assert found.before is found.after is None

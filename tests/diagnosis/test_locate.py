@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from rigged import LEVELS, SHARED, Diagnosed, Fitted, Measured, changed, cut
+from asking import INERTIA, SLIP
+from rigged import LEVELS, SHARED, Effects, Fitted, Measured, both, cut, off
 
 from bushfit.diagnosis.locate import largest_smooth_misfit, locate
 from bushfit.diagnosis.record import Where
+
+DELAY = {"delay": {"tau": 1e-4}}
 
 
 def one(found: tuple[Where, ...], direction: str, component: str) -> Where:
@@ -26,21 +29,31 @@ def test_a_clean_campaign_has_no_place(measured: Measured, fitted: Fitted) -> No
     assert largest_smooth_misfit(evidence) < 0.01
 
 
+@pytest.fixture(scope="module")
+def where_of(measured: Measured, fitted: Fitted) -> Callable[[Effects], tuple[Where, ...]]:
+    return lambda effects: locate(fitted(measured(effects, SHARED)))
+
+
 @pytest.mark.parametrize(
-    ("effect", "key", "size", "direction", "component", "way", "trend"),
+    ("effects", "direction", "component", "trend"),
     [
-        ("inertia", "mass", 0.06, "axial", "storage", "below", "the square of frequency"),
-        ("delay", "tau", 1e-4, "axial", "loss", "below", "in proportion to frequency"),
-        ("delay", "tau", 1e-4, "radial", "loss", "below", "in proportion to frequency"),
+        (INERTIA, "axial", "storage", "the square of frequency"),
+        (DELAY, "axial", "loss", "in proportion to frequency"),
+        (DELAY, "radial", "loss", "in proportion to frequency"),
     ],
 )
 def test_trends(
-    diagnosed: Diagnosed, effect: str, key: str, size: float, direction: str, component: str, way: str, trend: str
+    where_of: Callable[[Effects], tuple[Where, ...]], effects: Effects, direction: str, component: str, trend: str
 ) -> None:
-    where = one(diagnosed({effect: {key: size}}, SHARED).where, direction, component)
+    """The worst comes first, and all are real."""
+    found = where_of(effects)
+    excess = [where.excess for where in found]
+    assert excess == sorted(excess, reverse=True)
+    assert min(excess) > 2.0
+    where = one(found, direction, component)
     part = {"storage": "stiffness", "loss": "loss"}[component]
     assert where.reading.startswith(f"measured {direction} {part} is up to ")
-    assert f"% of |K| {way} the model" in where.reading
+    assert "% of |K| below the model" in where.reading
     assert trend in where.reading
     assert "at every amplitude" in where.reading
     assert where.frequency[1] == pytest.approx(155.0)
@@ -48,42 +61,25 @@ def test_trends(
     assert where.amplitude == pytest.approx((LEVELS[0], LEVELS[-1]))
 
 
-def test_the_worst_comes_first_and_all_are_real(diagnosed: Diagnosed) -> None:
-    found = diagnosed({"delay": {"tau": 1e-4}}, SHARED).where
-    excess = [where.excess for where in found]
-    assert excess == sorted(excess, reverse=True)
-    assert len(found) > 2
-    assert min(excess) > 2.0
-
-
-@pytest.mark.slow
-def test_slip_shows_at_the_smallest_amplitude_and_in_odd_harmonics(diagnosed: Diagnosed) -> None:
-    found = diagnosed({"interface_slip": {"force": 6.0}}, SHARED).where
+def test_slip_shows_at_the_smallest_amplitude_and_in_odd_harmonics(
+    where_of: Callable[[Effects], tuple[Where, ...]],
+) -> None:
+    found = where_of(SLIP)
     loss = one(found, "axial", "loss")
     assert loss.amplitude == pytest.approx((LEVELS[0], LEVELS[0]))
     assert "at 0.1 mm" in loss.reading
-    loops = [where for where in found if where.kind == "loop"]
-    assert any("third harmonic" in where.reading for where in loops)
+    assert any("third harmonic" in where.reading for where in found if where.kind == "loop")
 
 
-@pytest.mark.parametrize(
-    ("effect", "key", "size", "words"),
-    [
-        ("force_offset", "offset", 15.0, "a constant force"),
-        pytest.param("asymmetry", "c2", 2.0, "a constant force", marks=pytest.mark.slow),
-    ],
-)
-def test_loops_alone(diagnosed: Diagnosed, effect: str, key: str, size: float, words: str) -> None:
-    found = diagnosed({effect: {key: size}}, SHARED).where
-    print("; ".join(where.reading for where in found))
+@pytest.mark.parametrize("effects", [{"force_offset": {"offset": 15.0}}, {"asymmetry": {"c2": 2.0}}])
+def test_loops_alone(where_of: Callable[[Effects], tuple[Where, ...]], effects: Effects) -> None:
+    found = where_of(effects)
     assert {where.kind for where in found} == {"loop"}
-    assert all(words in where.reading for where in found)
+    assert all("a constant force" in where.reading for where in found)
 
 
 def test_a_level_off_by_itself_is_the_level_that_is_read(measured: Measured, fitted: Fitted) -> None:
-    campaign = measured(plan=SHARED)
-    level = campaign.sweeps[1].amplitude == LEVELS[1]
-    where = one(locate(fitted(changed(campaign, 1, np.where(level, 1.06, 1.0)))), "radial", "storage")
+    where = one(locate(fitted(off(1, 1.06, amplitude=LEVELS[1])(measured(plan=SHARED)))), "radial", "storage")
     assert "at 0.2 mm" in where.reading
     assert "above the model" in where.reading
     assert "much the same at every frequency" in where.reading
@@ -91,7 +87,7 @@ def test_a_level_off_by_itself_is_the_level_that_is_read(measured: Measured, fit
 
 
 def test_levels_may_have_different_points(measured: Measured, fitted: Fitted) -> None:
-    campaign = measured({"inertia": {"mass": 0.06}}, SHARED)
+    campaign = measured(INERTIA, SHARED)
     gone = (campaign.sweeps[0].amplitude == LEVELS[0]) & (campaign.sweeps[0].frequency > 100.0)
     sweeps = (cut(campaign.sweeps[0], ~gone), campaign.sweeps[1])
     found = locate(fitted(replace(campaign, sweeps=sweeps)))
@@ -100,11 +96,8 @@ def test_levels_may_have_different_points(measured: Measured, fitted: Fitted) ->
 
 def test_a_region_that_lies_on_either_side_of_the_model_says_so(measured: Measured, fitted: Fitted) -> None:
     """One level above, another below: the sentence names both, as the map shows them."""
-    campaign = measured(plan=SHARED)
-    amplitude = campaign.sweeps[1].amplitude
-    off = np.where(amplitude == LEVELS[0], 1.06, np.where(amplitude == LEVELS[2], 0.95, 1.0))
-    reading = one(locate(fitted(changed(campaign, 1, off))), "radial", "storage").reading
-    print(reading)
+    tampered = both(off(1, 1.06, amplitude=LEVELS[0]), off(1, 0.95, amplitude=LEVELS[2]))(measured(plan=SHARED))
+    reading = one(locate(fitted(tampered)), "radial", "storage").reading
     assert "above the model" in reading
     assert "most at 0.1 mm, there much the same at every frequency" in reading
     assert reading.endswith("; below it at 0.5 mm")

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from asking import asked, names
-from rigged import SHARED, Measured, changed
+from rigged import LEVELS, SHARED, Measured, both, changed, off
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.diagnosis.explanations import meetings
@@ -83,9 +83,5 @@ def test_odds_that_no_float_holds_are_large_ones(left: tuple[Data, Model]) -> No
 
 
 def test_two_rows_that_went_wrong_apart_are_no_gap(measured: Measured) -> None:
-    campaign = measured({}, SHARED)
-    for number, frequency in enumerate((35.0, 85.0)):
-        sweep = campaign.sweeps[number]
-        row = int(np.flatnonzero(sweep.frequency == frequency)[0])
-        campaign = changed(campaign, number, np.where(np.arange(sweep.frequency.size) == row, 1.15, 1.0))
-    assert asked(campaign).verdict == "consistent"
+    rows = [off(number, 1.15, frequency=f, amplitude=LEVELS[0], repeat=1) for number, f in enumerate((35.0, 85.0))]
+    assert asked(both(*rows)(measured({}, SHARED))).verdict == "consistent"

@@ -49,23 +49,15 @@ def misread(clean: Undisturbed, reached: float, seen: float = 1.0) -> Undisturbe
     return replace(clean, sweeps=((axial, kept[0]), (radial, kept[1])))
 
 
-def asked(tests: Undisturbed, seeds: int = 3) -> list[Diagnosis]:
-    return [diagnose(Data.of(measure(tests, replace(PLAN, seed=seed)).campaign())) for seed in range(1, seeds + 1)]
-
-
-def told(label: str, found: list[Diagnosis]) -> None:
-    for diagnosis in found:
-        names = [" or ".join((named.label, *named.alternatives)) for named in diagnosis.effects]
-        print(f"{label}: {diagnosis.verdict} {' and '.join(names)} | {diagnosis.next_test}")
+def asked(tests: Undisturbed) -> list[Diagnosis]:
+    return [diagnose(Data.of(measure(tests, replace(PLAN, seed=seed)).campaign())) for seed in (1, 2, 3)]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("reached", "seen"), [(0.9, 1.0), (1.1, 1.0), (0.3, 0.3)])
 def test_a_level_of_another_amplitude_is_to_be_measured_again(clean: Undisturbed, reached: float, seen: float) -> None:
     """Moved by 10 % less or more than was read; and run at 0.15 mm, read rightly and filed under 0.5 mm."""
-    found = asked(misread(clean, reached, seen))
-    told(f"moved by {reached} of 0.5 mm, read as {seen}", found)
-    for diagnosis in found:
+    for diagnosis in asked(misread(clean, reached, seen)):
         assert diagnosis.verdict in ("unexplained", "ambiguous")
         assert "the radial level 0.5 mm" in diagnosis.next_test
         assert all(diagnosis.verdict == "ambiguous" and named.alternatives for named in diagnosis.effects)
@@ -76,19 +68,15 @@ def test_a_level_of_another_amplitude_is_to_be_measured_again(clean: Undisturbed
 def test_a_wrong_strain_scale_is_named(truth: Model, scale: float) -> None:
     """0.74: what finite elements of this shape say of Eq. 8."""
     found = asked(undisturbed(truth.with_effect(SCALE, {SCALE: scale}), PLAN, steps_per_cycle=STEPS))
-    told(f"strain scale {scale}", found)
     seen = [diagnosis for diagnosis in found if diagnosis.effects]
     assert 2 * len(seen) >= len(found)
     for diagnosis in seen:
-        sets = [{named.name, *named.alternatives} for named in diagnosis.effects]
-        assert len(sets) == 1
-        assert SCALE in sets[0]
+        (named,) = diagnosis.effects
+        assert SCALE in (named.name, *named.alternatives)
         assert "level" not in diagnosis.summary
         if diagnosis.verdict == "named":
-            ends = diagnosis.result.interval(SCALE)
-            assert ends is not None
-            print(f"  {diagnosis.result.model.values[SCALE]:.3f}, 95 % {ends[0]:.3f} to {ends[1]:.3f}")
-            assert ends[0] - 0.02 <= scale <= ends[1] + 0.02
+            low, high = diagnosis.result.interval(SCALE) or (np.inf, 0.0)
+            assert low - 0.02 <= scale <= high + 0.02
 
 
 @pytest.mark.parametrize("label", some(("level", "scale"), {"level"}))
@@ -97,6 +85,4 @@ def test_what_is_too_small_to_show_is_left_alone(truth: Model, clean: Undisturbe
     small = misread(clean, 0.8, 0.8)
     if label == "scale":
         small = undisturbed(truth.with_effect(SCALE, {SCALE: 0.9}), PLAN, steps_per_cycle=STEPS)
-    found = asked(small)
-    told(f"small {label}", found)
-    assert {diagnosis.verdict for diagnosis in found} == {"consistent"}
+    assert {diagnosis.verdict for diagnosis in asked(small)} == {"consistent"}

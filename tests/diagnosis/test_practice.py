@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import time
+import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
-from tries import some
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.diagnosis.record import Diagnosis, Settings
@@ -77,10 +76,6 @@ def right(truth: dict[str, Any], diagnosis: Diagnosis) -> bool:
     return everything and len(sets) == len(truth["truth"]) and diagnosis.verdict in ("named", "ambiguous")
 
 
-def alone(truth: dict[str, Any], diagnosis: Diagnosis) -> bool:
-    return diagnosis.verdict == "named" and {effect.name for effect in diagnosis.effects} == set(truth["truth"])
-
-
 def said(diagnosis: Diagnosis) -> str:
     sets = [" or ".join((effect.name, *effect.alternatives)) for effect in diagnosis.effects]
     return f"{diagnosis.verdict}: {' and '.join(sets)}" if sets else diagnosis.verdict
@@ -95,50 +90,27 @@ def test_nothing_is_nothing_and_the_unknown_is_unknown(truths: Truths, found: Fo
 
 
 @pytest.mark.slow
-def test_at_most_one_of_sixteen_is_wrong(truths: Truths, found: Found) -> None:
-    print(f"{'case':9} {'truth':32} {'said':38} {'fitted':>12} {'held out':>12}")
+def test_at_most_one_of_sixteen_is_wrong_and_plain_effects_are_named_alone(truths: Truths, found: Found) -> None:
+    """From a gain of 200 in chi-square on a set would be too little; a name closes the gap where nothing was fitted."""
+    wrong, plain = [], []
     for case, truth in truths.items():
         diagnosis = found[case]
-        (before, after), held = diagnosis.calibration, diagnosis.holdout
-        name = " + ".join(truth["truth"]) or truth["out_of_library"] or "none"
-        gaps = f"{before:5.2f} {after:5.2f}  {held.before:5.2f} {held.after:5.2f}"
-        print(f"{case:9} {name:32} {said(diagnosis):38} {gaps} {'' if right(truth, diagnosis) else 'WRONG'}")
-    wrong = [case for case, truth in truths.items() if not right(truth, found[case])]
+        names = {effect.name for effect in diagnosis.effects}
+        print(case, truth["truth"] or truth["out_of_library"], said(diagnosis), diagnosis.calibration)
+        wrong += [case] * (not right(truth, diagnosis))
+        if diagnosis.verdict == "named":
+            assert names <= set(truth["truth"]), case
+            assert (diagnosis.holdout.after or 9.9) <= 1.1, case
+        if truth["truth"] and diagnosis.before.chi_square - diagnosis.after.chi_square >= 200.0:
+            plain.append(diagnosis.verdict == "named" and names == set(truth["truth"]))
     assert len(truths) == 16
     assert len(wrong) <= 1, wrong
-
-
-@pytest.mark.slow
-def test_plain_effects_are_named_alone(truths: Truths, found: Found) -> None:
-    """From a gain of 200 in chi-square on, a set would be too little."""
-    plain = [
-        case
-        for case, truth in truths.items()
-        if truth["truth"] and found[case].before.chi_square - found[case].after.chi_square >= 200.0
-    ]
-    single = [case for case in plain if alone(truths[case], found[case])]
-    print(f"{len(single)} of {len(plain)} plain cases named alone")
     assert len(plain) >= 10
-    assert len(single) >= 0.9 * len(plain)
+    assert sum(plain) >= 0.9 * len(plain)
 
 
 @pytest.mark.slow
-def test_no_confident_wrong_name(truths: Truths, found: Found) -> None:
-    every = {case: found[case] for case in truths}
-    named = {case: {effect.name for effect in d.effects} for case, d in every.items() if d.verdict == "named"}
-    assert named
-    assert [case for case, names in named.items() if names - set(truths[case]["truth"])] == []
-
-
-@pytest.mark.slow
-def test_the_gap_closes_where_it_was_not_fitted(truths: Truths, found: Found) -> None:
-    every = {case: found[case] for case in truths}
-    held = {case: d.holdout.after or 9.9 for case, d in every.items() if d.verdict == "named"}
-    print("held out: " + ", ".join(f"{case} {gap:.2f}" for case, gap in held.items()))
-    assert max(held.values()) <= 1.1
-
-
-@pytest.mark.parametrize("name", some(SIZES, {"interface_slip.force"}))
+@pytest.mark.parametrize("name", SIZES)
 def test_sizes(root: Path, truths: Truths, found: Found, name: str) -> None:
     effect, (theirs, key) = name.partition(".")[0], SIZES[name]
     cases = [case for case, truth in truths.items() if truth["truth"] and theirs in truth["effects"]]
@@ -154,20 +126,13 @@ def test_sizes(root: Path, truths: Truths, found: Found, name: str) -> None:
         value, stderr, ends = result.model.values[name], result.covariance.stderr(name), result.interval(name)
         assert stderr is not None
         assert ends is not None
-        z = (value - truth) / stderr
-        print(f"{case} {name} = {value:.5g} +- {stderr:.2g}, truth {truth:.5g}, z {z:+.2f}")
-        assert ends[0] <= truth <= ends[1] or abs(z) <= 3.0
+        assert ends[0] <= truth <= ends[1] or abs(value - truth) <= 3.0 * stderr, (case, value, stderr, truth)
 
 
 @pytest.mark.slow
 def test_the_answers_are_not_needed(root: Path, tmp_path: Path, found: Found) -> None:
-    """A case copied away from answers.json is diagnosed the same, in seconds."""
-    place = tmp_path / "elsewhere"
-    place.mkdir()
-    for file in (root / "data/practice/case_001").iterdir():
-        (place / file.name).write_bytes(file.read_bytes())
-    started = time.perf_counter()
-    again = diagnose(Data.of(load_campaign(place / "bushing.toml")))
-    print(f"{time.perf_counter() - started:.2f} s")
+    """A case copied away from answers.json is diagnosed the same."""
+    shutil.copytree(root / "data/practice/case_001", tmp_path / "elsewhere")
+    again = diagnose(Data.of(load_campaign(tmp_path / "elsewhere/bushing.toml")))
     assert said(again) == said(found["case_001"])
     assert again.after.model.values == found["case_001"].after.model.values

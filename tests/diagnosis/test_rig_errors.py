@@ -22,11 +22,6 @@ RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 RUN, LEVEL, WAVE, LOOP = range(4)
 
 
-@pytest.fixture(scope="module")
-def bare(measured: Measured, fitted: Fitted) -> Evidence:
-    return scattering_alone(fitted(measured(plan=SHARED)))
-
-
 def off(evidence: Evidence, sweep: SweepData, change: Callable[[SweepData], Array]) -> Array:
     """What a small relative change of the measured stiffness does to the residuals, per unit of it."""
     step = 1e-6

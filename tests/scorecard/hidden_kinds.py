@@ -3,7 +3,7 @@
     python tests/scorecard/hidden_kinds.py --seed 1 --campaigns 80 --set working
 
 The rig is that of time_rig.py, which shares no law with bushfit. What is visible there, and what may be said of it,
-stands in lab_campaign.py and kinds.py.
+stands in lab_campaign.py, working_kinds.py and held_back_kinds.py.
 """
 
 from __future__ import annotations
@@ -27,11 +27,10 @@ from typing import Any, Literal
 import click
 import numpy as np
 from click.testing import CliRunner, Result
-from judging import Judged, acceptable
-from kinds import KINDS, SIZES
-from lab_campaign import Answer, campaign
-from observer import against_truth
-from scipy.stats import beta
+from judging import Judged, acceptable, against_truth
+from kinds import SIZES
+from lab_campaign import HELD_BACK, WORKING, Answer, campaign
+from scipy.stats import binomtest
 
 from bushfit.cli import cli
 
@@ -51,7 +50,9 @@ AIMS = {
 #: ln likelihood of the truth over what was told, from which on an observer who knows both, and takes both for equally
 #: likely beforehand, would not have told it: 97 in 100.
 DENIED = float(np.log(0.97 / 0.03))
+#: Campaigns of either half of the kinds, or of none.
 SETS = ("working", "held_back", "clean")
+KINDS_OF = {"working": WORKING, "held_back": HELD_BACK}
 
 
 @dataclass(frozen=True)
@@ -125,10 +126,9 @@ def hidden(kind: str, size: float, seed: int) -> Outcome:
 
 def asked(chosen: str, seed: int) -> Iterator[tuple[str, float, int]]:
     """Kind, size and seed of one campaign after the other, each kind as often as any other."""
-    names = [name for name, kind in KINDS.items() if kind.held_back == (chosen == "held_back")]
     random = np.random.default_rng([seed, SETS.index(chosen)])
     while True:
-        for name in [""] if chosen == "clean" else random.permutation(names).tolist():
+        for name in [""] if chosen == "clean" else random.permutation(list(KINDS_OF[chosen])).tolist():
             size = float(random.choice(SIZES)) if name else 0.0
             yield name, size, int(random.integers(2**31))
 
@@ -163,8 +163,8 @@ def rates(outcomes: Sequence[Outcome]) -> dict[str, tuple[int, int]]:
 
 def interval(count: int, of: int) -> tuple[float, float]:
     """Ends of the 95 % interval of a share (Clopper and Pearson)."""
-    low = float(beta.ppf(0.025, count, of - count + 1)) if count else 0.0
-    return low, float(beta.ppf(0.975, count + 1, of - count)) if count < of else 1.0
+    ends = binomtest(count, of).proportion_ci()
+    return ends.low, ends.high
 
 
 def aimed(name: str, count: int, of: int) -> Literal["met", "open", "missed"]:

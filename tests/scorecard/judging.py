@@ -1,11 +1,22 @@
-"""Whether what diagnose says of a campaign is acceptable, by the keys of its diagnosis.json alone."""
+"""Whether what diagnose says of a campaign is acceptable, by the keys of its diagnosis.json alone; and what a perfect
+observer could know: how much likelier the tests are by the truth than by the model that was told."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from lab_campaign import Answer
+
+from bushfit.campaign.campaign import load_campaign
+from bushfit.fitting.coordinates import residual
+from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, with_gains
+from bushfit.fitting.solve import solve
+from bushfit.model.file import load_result
 
 #: Verdicts under which names stay in the model.
 _KEEPING = ("named", "partly")
@@ -41,12 +52,14 @@ def acceptable(answer: Answer, diagnosis: Mapping[str, Any]) -> Judged:
     may be called consistent.
     """
     verdict = str(diagnosis["verdict"])
-    claims = [_claim(effect) for effect in diagnosis["effects"] if effect["name"] != UNNAMED]
-    kept = [claim for claim in claims if verdict in _KEEPING or (verdict == "ambiguous" and not claim.others)]
-    sets = [claim for claim in claims if verdict == "ambiguous" and claim.others]
-    wrong_name = any(not _true(answer, claim.names) for claim in kept)
-    wrong_set = any(
-        not _true(answer, (*claim.names, *claim.others)) or len(claim.others) >= _LARGEST_SET for claim in sets
+    told = [effect for effect in diagnosis["effects"] if effect["name"] != UNNAMED]
+    names = [(effect["name"], *effect.get("twins", ())) for effect in told]
+    others = [tuple(effect.get("alternatives", ())) for effect in told]
+    claims = list(zip(names, others, strict=True))
+    open_ = verdict == "ambiguous"
+    wrong_name = any(not _true(answer, own) for own, rest in claims if verdict in _KEEPING or (open_ and not rest))
+    wrong_set = open_ and any(
+        not _true(answer, (*own, *rest)) or len(rest) >= _LARGEST_SET for own, rest in claims if rest
     )
     seen = verdict != "consistent"
     passed_over = answer.visible and not seen
@@ -54,28 +67,46 @@ def acceptable(answer: Answer, diagnosis: Mapping[str, Any]) -> Judged:
     return Judged(not (wrong_name or wrong_set or passed_over or false_alarm), passed_over, wrong_name, seen, wrong_set)
 
 
-class _Claim(NamedTuple):
-    """Names that an effect goes by: its own and its twins; and what it cannot be told from."""
-
-    names: tuple[str, ...]
-    others: tuple[str, ...]
-
-
-def _claim(effect: Mapping[str, Any]) -> _Claim:
-    return _Claim((effect["name"], *effect.get("twins", ())), tuple(effect.get("alternatives", ())))
+#: Words by which a place at fault is told, after "fault: ".
+_WORDS = {"frequency": " Hz", "level": "level", "repeat": "repeat", "loop": "loop", "direction": ""}
 
 
 def _true(answer: Answer, names: Sequence[str]) -> bool:
     """Whether one of the names, or of a pair of names, tells the kind truly, or a place of its sort is among them."""
     parts = [part for name in names for part in name.split(" + ")]
-    return any(part.partition(".")[0] in answer.right or part in answer.right for part in parts) or any(
-        _is_place(answer, part) for part in parts
+    families = {part.partition(".")[0] for part in parts}
+    places = [part for part in parts if part.startswith("fault")]
+    return bool(families.union(parts) & {*answer.right}) or any(
+        _WORDS[place] in part for part in places for place in answer.place
     )
 
 
-#: Words by which a place at fault is told, after "fault: ".
-_WORDS = {"frequency": " Hz", "level": "level", "repeat": "repeat", "loop": "loop", "direction": ""}
+def against_truth(folder: Path, silent: Path, model: Path) -> float:
+    """Logarithm of the likelihood of a campaign's tests by the truth over that by a model that was fitted to them.
+
+    Args:
+        folder, silent: of the campaign with the rig's errors, and of the same without any.
+        model: the file of the model.
+
+    Notes:
+        Both by the noise that bushfit estimates, with the errors of its class. A model that
+        is as good as the truth comes out at minus half the number of its parameters.
+    """
+    told = load_result(model).model
+    tests, true = (Data.of(load_campaign(each / "bushing.toml")) for each in (folder, silent))
+    data_sets = with_gains((*tests.loops, *tests.sweeps), weigh=True)
+    told = solve(told, data_sets, tuple(told.values)).model
+    off = residual(told, data_sets)
+    as_true = [_with(one, other) for one, other in zip(data_sets, (*true.loops, *true.sweeps), strict=True)]
+    noise = off - residual(told, as_true)  # residuals are linear in what was measured: here the model falls out
+    return float(off @ off - noise @ noise) / 2.0
 
 
-def _is_place(answer: Answer, name: str) -> bool:
-    return name.startswith("fault") and any(_WORDS[place] in name for place in answer.place)
+def _with(test: DataSet, true: DataSet) -> DataSet:
+    """A test, its weights and its noise as they are, with what another one measured."""
+    if isinstance(test, LoopData) and isinstance(true, LoopData):
+        force = np.interp(test.drive.phase, true.drive.phase, true.drive.force)
+        return replace(test, drive=replace(test.drive, force=force))
+    assert isinstance(test, SweepData)
+    assert isinstance(true, SweepData)
+    return replace(test, sweep=replace(test.sweep, stiffness=true.sweep.stiffness))

@@ -1,19 +1,20 @@
-"""Kinds of discrepancy that no page of bushfit lists: of rig, record, rubber and the software between them.
+"""What a kind of discrepancy is made for and of: by a bench, what changes in rig, rubber, software or record.
 
-Each is brought to one of three sizes, in shares of |K| at its largest. Half of them are held back: no verdict on those
-is looked at while anything is tuned.
+The kinds themselves, which no page of bushfit lists, stand in working_kinds.py and, held back, in held_back_kinds.py:
+no verdict on those is looked at while anything is tuned. Each is brought to one of three sizes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import Any, Literal
 
-import discrepancies as made
 import numpy as np
-from discrepancies import Bench, Sized
-from time_rig import Change, Response, respond
+from numpy.random import Generator
+from numpy.typing import NDArray
+from time_rig import Array, Change, Complex, Response, Rubber, Tests, projected, respond
 
 #: Shares of |K| to which a kind is brought: hardly seen, plain, gross.
 SIZES = (0.015, 0.04, 0.10)
@@ -21,6 +22,66 @@ SIZES = (0.015, 0.04, 0.10)
 _TRIES, _NEAR = 14, 0.05
 
 Place = Literal["level", "frequency", "repeat", "loop", "direction"]
+Mask = NDArray[np.bool_]
+Rows = NDArray[np.int_]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What a kind is made for: the tests, the rubber, and draws that are its own."""
+
+    tests: Tests
+    rubber: Rubber
+    random: Generator
+
+    @cached_property
+    def clean(self) -> Response:
+        return respond(self.tests, self.rubber)
+
+    @cached_property
+    def size(self) -> Array:
+        """|K| of every point [N/m]."""
+        return np.abs(self.clean.stiffness)
+
+    @property
+    def sweeps(self) -> Mask:
+        return ~self.tests.loop
+
+    @property
+    def steps(self) -> Array:
+        return np.unique(self.tests.frequency[self.sweeps])
+
+    @property
+    def force(self) -> float:
+        """Middle of the force amplitudes of the sweeps [N]."""
+        return float(np.median((self.size * self.tests.amplitude)[self.sweeps]))
+
+    def direction(self) -> int:
+        """A direction that has sweeps."""
+        return int(self.random.choice(np.unique(self.tests.direction[self.sweeps])))
+
+    def level(self, least: int = 0) -> Mask:
+        """The points of one level of one direction, all repeats of it; least is the lowest that may be."""
+        mine = self.sweeps & (self.tests.direction == self.direction())
+        levels = np.unique(self.tests.level[mine])
+        return mine & (self.tests.level == self.random.choice(levels[min(least, levels.size - 1) :]))
+
+    def runs_of_a_level(self) -> list[Rows]:
+        chosen = self.level()
+        return [rows for rows in self.tests.runs() if chosen[rows].all()]
+
+    def strain(self) -> float:
+        """A strain that the largest of the sweeps pass, and the smallest do not."""
+        strains = (self.tests.strain[:, 0] * self.tests.amplitude)[self.sweeps]
+        return float(self.random.uniform(0.35, 0.65) * strains.max())
+
+    def sign(self) -> float:
+        return float(self.random.choice([-1.0, 1.0]))
+
+
+#: What changes by an amount, which is about the share of |K| that changes at most.
+Sized = Callable[[float], Change]
+Made = Callable[[Bench], Sized]
 
 
 @dataclass(frozen=True)
@@ -29,7 +90,6 @@ class Kind:
 
     Args:
         sentence: what happened.
-        held_back: whether its verdicts are left alone until the end.
         made: by a bench, what changes by an amount.
         right: effects of the library that describe it truly; a family, such as "stiffness_factor", is all its places.
         place: parts of the tests that alone are off.
@@ -37,76 +97,42 @@ class Kind:
     """
 
     sentence: str
-    held_back: bool
-    made: Callable[[Bench], Sized]
+    made: Made
     right: tuple[str, ...] = ()
     place: tuple[Place, ...] = ()
     needs: tuple[Literal["both", "loop", "repeats"], ...] = ()
 
+    @classmethod
+    def into(cls, kinds: dict[str, Kind], sentence: str, **said: Any) -> Callable[[Made], Made]:
+        """A decorator of how a kind is made, which puts the kind under that name among others."""
 
-_GIVES = ("sleeve_compliance", "rig_compliance")
-_FACTOR = ("stiffness_factor", "transducer_gain", "preload_stiffening")
+        def register(made: Made) -> Made:
+            kinds[made.__name__] = cls(sentence, made, **said)
+            return made
 
-#: Every kind by name; which are held back was fixed before any was diagnosed.
-KINDS: dict[str, Kind] = {
-    "range_switch": Kind(
-        "the amplifier of one direction has another gain above a force", False, made.range_switch, (), ("level",)
-    ),
-    "guide_sticks": Kind("a guide rubs at one level of one direction", False, made.guide_sticks, (), ("level",)),
-    "mains_hum": Kind("mains hum leaks into the force near its frequencies", False, made.hum, (), ("frequency",)),
-    "loosening": Kind("a clamp loosens from the middle of the session on", False, made.loosening, ("drift",)),
-    "row_shift": Kind(
-        "the stiffness column of one level slipped down some rows", False, made.row_shift, (), ("level",)
-    ),
-    "rounded_stiffness": Kind(
-        "the stiffness of one file was rounded", False, made.rounded_stiffness, (), ("direction",)
-    ),
-    "adhesive": Kind("the adhesive flexes in series, with a springpot of its own", False, made.adhesive, _GIVES),
-    "buckling": Kind("in one sense the rubber softens beyond a strain", False, made.buckling, ("asymmetry",)),
-    "ageing": Kind(
-        "the rubber aged before its second direction",
-        False,
-        made.ageing,
-        (*_FACTOR, "elastic_preload"),
-        ("direction",),
-        ("both",),
-    ),
-    "orifice": Kind(
-        "liquid is pressed through an orifice: a force that goes with the square of the speed", False, made.orifice
-    ),
-    "leakage": Kind("records with an offset are cut off within a cycle", False, made.leakage, (), ("frequency",)),
-    "detrended": Kind(
-        "a straight line was taken off the force of few cycles", False, made.detrended, (), ("frequency",)
-    ),
-    "too_much_mass": Kind("the software makes up for more mass than moves", False, made.too_much_mass),
-    "noise_floor": Kind("noise counts as displacement", False, made.noise_floor, (), ("level",)),
-    "anti_alias": Kind("the force alone goes through a low-pass", True, made.anti_alias, ("delay",)),
-    "thermal_repeat": Kind(
-        "one repeat warms up while it runs", True, made.thermal_repeat, (), ("repeat",), ("repeats",)
-    ),
-    "overshoot": Kind(
-        "the controller overshoots in a band, and the command is recorded", True, made.overshoot, (), ("frequency",)
-    ),
-    "tilted": Kind(
-        "the specimen of one direction was clamped tilted", True, made.tilted, _FACTOR, ("direction",), ("both",)
-    ),
-    "rounded_phase": Kind("phases were rounded", True, made.rounded_phase),
-    "reversed_rows": Kind(
-        "some rows of one level stand in reverse", True, made.reversed_rows, (), ("level", "frequency")
-    ),
-    "cole_cole": Kind(
-        "the second phase of a blend relaxes over a broad band", True, made.cole_cole, ("maxwell", "second_springpot")
-    ),
-    "edge_slip": Kind("the bonded edges slip beyond a strain", True, made.edge_slip, ("sliders",)),
-    "crystals": Kind("slow tests have time to crystallise beyond a strain", True, made.crystals),
-    "smoothed_across": Kind("the columns were smoothed across the ends of runs", True, made.smoothed_across),
-    "peak_picking": Kind("peaks of the force are read off few samples", True, made.peak_picking),
-    "loop_filter": Kind(
-        "the force of the loops alone was averaged over some samples", True, made.loop_filter, (), ("loop",), ("loop",)
-    ),
-    "too_much_compliance": Kind("the software makes up for more give than there is", True, made.too_much_compliance),
-    "late_specimen": Kind("the top level was tested on another specimen", True, made.late_specimen, (), ("level",)),
-}
+        return register
+
+
+def gain(factor: Array) -> Change:
+    """The force of each point times a factor, (n,)."""
+    return Change(force=lambda _, force: force * factor[:, None])
+
+
+def read(factor: Array | Complex) -> Change:
+    """What the software makes of each sweep's point times a factor, (n,)."""
+    return Change(reading=lambda motion, force: projected(motion, force) * factor)
+
+
+def reordered(runs: Sequence[Rows], order: Callable[[int], Rows]) -> Change:
+    """The stiffness of some runs with its rows in another order, by their number."""
+
+    def record(stiffness: Complex) -> Complex:
+        made = stiffness.copy()
+        for rows in runs:
+            made[rows] = stiffness[rows[order(rows.size)]]
+        return made
+
+    return Change(record=record)
 
 
 def largest(bench: Bench, response: Response, change: Change) -> float:

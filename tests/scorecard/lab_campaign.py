@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from discrepancies import Bench
-from kinds import KINDS, Place, sized
+from held_back_kinds import HELD_BACK
+from kinds import Bench, Place, sized
 from numpy.random import Generator
 from scipy.signal import lfilter
 from time_rig import DIRECTIONS, SAMPLES, Array, Bushing, Change, Response, Rubber, Tests, respond
 from visible import CYCLES, Noise, seen
+from working_kinds import WORKING
 
+#: Every kind by name.
+KINDS = WORKING | HELD_BACK
 #: The class of the rig: gain, and phase [rad], of which each run has errors.
 CLASS = (5e-3, float(np.radians(0.25)))
+#: Scatter of an amplitude that was reached.
+_REACHED = 0.02
 #: A rig without errors.
 _NONE = Noise(0.0, 0.0, 0.0, (0.0, 0.0), 0.0)
 #: Scatter of a loop's displacement, of its amplitude.
@@ -24,20 +30,6 @@ _JITTER = 2e-4
 _LEVELS, _PLANNED = ((0.2, 0.4), (0.1, 0.3), (0.25, 0.5, 0.7), (0.4,)), (0.5, 0.2, 0.2, 0.1)
 #: Strain of the top level, frequency of a loop [Hz], and scatter of a point and of a loop's force.
 _STRAIN, _LOOP, _SCATTER, _FORCE = (0.03, 0.06), 0.1, (0.003, 0.006), (0.002, 0.004)
-#: What people plan who have no time, or another habit, and how many of these come together at most.
-AWKWARD = (
-    "few_steps",
-    "one_repeat",
-    "heavy_tails",
-    "as_reached",
-    "strain_sweep",
-    "level_missing",
-    "one_way",
-    "no_loop",
-)
-_TOGETHER = 3
-#: Degrees of freedom of heavy tails; scatter of an amplitude that was reached; amplitudes of a strain sweep.
-_TAILS, _REACHED, _STRAINS = 3, 0.02, 10
 
 
 @dataclass(frozen=True)
@@ -108,7 +100,7 @@ def campaign(kind: str, size: float, seed: int, folder: Path, *, silent: bool = 
         silent: whether the rig makes no errors in it.
     """
     random = np.random.default_rng([seed, 2007])
-    bushing, rubber = _specimen(random)
+    bushing, rubber = a_specimen(random)
     needs = KINDS[kind].needs if kind else ()
     plan = _plan(random, needs) if kind else awkward(_plan(random, ()), random)
     tests = _tests(bushing, plan, random)
@@ -123,7 +115,8 @@ def campaign(kind: str, size: float, seed: int, folder: Path, *, silent: bool = 
     return answer
 
 
-def _specimen(random: Generator) -> tuple[Bushing, Rubber]:
+def a_specimen(random: Generator) -> tuple[Bushing, Rubber]:
+    """A bushing and a rubber as there are many."""
     inner = float(f"{random.uniform(6e-3, 22e-3):.3g}")
     outer = float(f"{inner * random.uniform(1.4, 2.3):.3g}")
     mu = float(np.exp(random.uniform(*np.log((0.6e6, 1.8e6)))))
@@ -166,29 +159,32 @@ def _plan(random: Generator, needs: Sequence[str]) -> Plan:
     )
 
 
+def _few_steps(plan: Plan, count: int) -> Array:
+    """So many of a plan's frequencies, evenly spread."""
+    return plan.steps[np.linspace(0, plan.steps.size - 1, count).round().astype(int)]
+
+
+#: What people plan who have no time, or another habit.
+HABITS: dict[str, Callable[[Plan, Generator], dict[str, Any]]] = {
+    "few_steps": lambda plan, random: {"steps": _few_steps(plan, int(random.integers(3, 6)))},
+    "one_repeat": lambda *_: {"repeats": 1},
+    "heavy_tails": lambda *_: {"tails": 3},
+    "as_reached": lambda *_: {"reached": _REACHED},
+    "strain_sweep": lambda plan, _: {
+        "by_amplitude": True,
+        "levels": tuple(np.geomspace(0.03, 1.0, 10).tolist()),
+        "steps": _few_steps(plan, 3),
+    },
+    "level_missing": lambda *_: {"missing": True},
+    "one_way": lambda plan, _: {"directions": plan.directions[:1]},
+    "no_loop": lambda *_: {"loops": ()},
+}
+
+
 def awkward(plan: Plan, random: Generator) -> Plan:
     """The plan with one to three habits of real ones."""
-    count = int(random.integers(1, _TOGETHER + 1))
-    for habit in random.choice(AWKWARD, count, replace=False):
-        if habit == "few_steps":
-            chosen = np.linspace(0, plan.steps.size - 1, int(random.integers(3, 6))).round().astype(int)
-            plan = replace(plan, steps=plan.steps[chosen])
-        elif habit == "strain_sweep":
-            levels = tuple(np.geomspace(0.03, 1.0, _STRAINS).tolist())
-            chosen = np.linspace(0, plan.steps.size - 1, 3).round().astype(int)
-            plan = replace(plan, by_amplitude=True, levels=levels, steps=plan.steps[chosen])
-        elif habit == "one_way":
-            plan = replace(plan, directions=plan.directions[:1])
-        elif habit == "as_reached":
-            plan = replace(plan, reached=_REACHED)
-        elif habit == "heavy_tails":
-            plan = replace(plan, tails=_TAILS)
-        elif habit == "one_repeat":
-            plan = replace(plan, repeats=1)
-        elif habit == "no_loop":
-            plan = replace(plan, loops=())
-        else:
-            plan = replace(plan, missing=True)
+    for habit in random.choice(list(HABITS), int(random.integers(1, 4)), replace=False):
+        plan = replace(plan, **HABITS[habit](plan, random))
     return plan
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from discrepancies import Bench
-from hidden_kinds import aimed, asked, diagnosed_all, hidden, rates, table
-from judging import acceptable
-from kinds import KINDS, SIZES, largest, sized
-from lab_campaign import Answer, campaign
+from hidden_kinds import KINDS_OF, aimed, asked, diagnosed_all, hidden, rates, table
+from judging import Judged, acceptable
+from kinds import SIZES, Bench, largest, sized
+from lab_campaign import KINDS, Answer, campaign
 from time_rig import Bushing, Rubber, Tests, respond
 
 from bushfit.campaign.campaign import load_campaign
@@ -34,11 +33,12 @@ def a_session() -> Tests:
 
 
 def test_half_of_the_kinds_are_held_back_and_none_is_an_effect() -> None:
-    assert len(KINDS) == 28
-    assert sum(kind.held_back for kind in KINDS.values()) == 14
+    assert [len(kinds) for kinds in KINDS_OF.values()] == [14, 14]
     assert not set(KINDS) & LIBRARY.keys()
     families = {name.partition(".")[0] for name in LIBRARY}
     assert {name for kind in KINDS.values() for name in kind.right} <= families
+    for chosen, kinds in KINDS_OF.items():
+        assert {name for name, *_ in islice(asked(chosen, 1), 14)} == kinds.keys()
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -51,7 +51,7 @@ def test_a_kind_comes_in_three_sizes(name: str) -> None:
         assert 0.5 * size < found < 2.0 * size
 
 
-@pytest.mark.parametrize("name", ["", "row_shift", "buckling"])
+@pytest.mark.parametrize("name", ["", "row_shift"])
 def test_the_same_seed_writes_the_same_campaign(name: str, tmp_path: Path) -> None:
     first, second = (campaign(name, 0.04, 3, tmp_path / each) for each in "ab")
     assert first == second
@@ -59,7 +59,7 @@ def test_the_same_seed_writes_the_same_campaign(name: str, tmp_path: Path) -> No
         assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes()
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_bushfit_reads_what_is_written(seed: int, tmp_path: Path) -> None:
     campaign("", 0.0, seed, tmp_path)
     read = load_campaign(tmp_path / "bushing.toml")
@@ -67,57 +67,42 @@ def test_bushfit_reads_what_is_written(seed: int, tmp_path: Path) -> None:
     assert all(np.all(np.abs(sweep.stiffness.imag) < sweep.stiffness.real) for sweep in read.sweeps)
 
 
-def diagnosis(verdict: str, *effects: dict[str, Any]) -> dict[str, Any]:
-    return {"verdict": verdict, "effects": [{"twins": [], "alternatives": [], **effect} for effect in effects]}
-
-
 PLAIN = Answer("tilted", 0.1, ("stiffness_factor",), ("level",), 0.05, 300.0)
 HARDLY = Answer("tilted", 0.015, ("stiffness_factor",), ("level",), 0.01, 300.0)
 CLEAN = Answer("", 0.0)
 
 
+WRONG = Judged(False, passed_over=False, wrong_name=True, seen=True, wrong_set=False)
+WRONG_SET = WRONG._replace(wrong_name=False, wrong_set=True)
+SEEN = Judged(True, passed_over=False, wrong_name=False, seen=True, wrong_set=False)
+SILENT = SEEN._replace(seen=False)
+
+
 @pytest.mark.parametrize(
-    ("answer", "said", "judged"),
+    ("answer", "verdict", "name", "alternatives", "judged"),
     [
-        (PLAIN, diagnosis("consistent"), (False, True, False, False, False)),
-        (HARDLY, diagnosis("consistent"), (True, False, False, False, False)),
-        (CLEAN, diagnosis("consistent"), (True, False, False, False, False)),
-        (CLEAN, diagnosis("described", {"name": "unnamed"}), (False, False, False, True, False)),
-        (PLAIN, diagnosis("unexplained"), (True, False, False, True, False)),
-        (PLAIN, diagnosis("partly", {"name": "unnamed"}), (True, False, False, True, False)),
-        (PLAIN, diagnosis("named", {"name": "stiffness_factor.radial"}), (True, False, False, True, False)),
-        (PLAIN, diagnosis("named", {"name": "inertia"}), (False, False, True, True, False)),
-        (HARDLY, diagnosis("named", {"name": "inertia"}), (False, False, True, True, False)),
-        (
-            PLAIN,
-            diagnosis("named", {"name": "inertia", "twins": ["stiffness_factor.axial"]}),
-            (True, False, False, True, False),
-        ),
-        (PLAIN, diagnosis("ambiguous", {"name": "inertia"}), (False, False, True, True, False)),
-        (
-            PLAIN,
-            diagnosis("ambiguous", {"name": "inertia", "alternatives": ["delay + stiffness_factor.radial"]}),
-            (True, False, False, True, False),
-        ),
-        (
-            PLAIN,
-            diagnosis("ambiguous", {"name": "inertia", "alternatives": ["delay"]}),
-            (False, False, False, True, True),
-        ),
-        (
-            PLAIN,
-            diagnosis("ambiguous", {"name": "inertia", "alternatives": ["fault: the 0.1 mm level of axial"]}),
-            (True, False, False, True, False),
-        ),
-        (
-            PLAIN,
-            diagnosis("ambiguous", {"name": "stiffness_factor.radial", "alternatives": ["a", "b", "c", "d"]}),
-            (False, False, False, True, True),
-        ),
+        (PLAIN, "consistent", "", [], SILENT._replace(acceptable=False, passed_over=True)),
+        (HARDLY, "consistent", "", [], SILENT),
+        (CLEAN, "consistent", "", [], SILENT),
+        (CLEAN, "described", "unnamed", [], SEEN._replace(acceptable=False)),
+        (PLAIN, "unexplained", "", [], SEEN),
+        (PLAIN, "partly", "unnamed", [], SEEN),
+        (PLAIN, "named", "stiffness_factor.radial", [], SEEN),
+        (PLAIN, "named", "inertia", [], WRONG),
+        (HARDLY, "named", "inertia", [], WRONG),
+        (PLAIN, "ambiguous", "inertia", [], WRONG),
+        (PLAIN, "ambiguous", "inertia", ["delay + stiffness_factor.radial"], SEEN),
+        (PLAIN, "ambiguous", "inertia", ["delay"], WRONG_SET),
+        (PLAIN, "ambiguous", "inertia", ["fault: the 0.1 mm level of axial"], SEEN),
+        (PLAIN, "ambiguous", "stiffness_factor.radial", ["a", "b", "c", "d"], WRONG_SET),
     ],
 )
-def test_what_is_acceptable(answer: Answer, said: dict[str, Any], judged: tuple[bool, ...]) -> None:
-    assert tuple(acceptable(answer, said)) == judged
+def test_what_is_acceptable(answer: Answer, verdict: str, name: str, alternatives: list[str], judged: Judged) -> None:
+    effects = [{"name": name, "twins": [], "alternatives": alternatives}] if name else []
+    assert acceptable(answer, {"verdict": verdict, "effects": effects}) == judged
+    if name == "inertia":  # a twin that is true makes the name so
+        twin = {"name": name, "twins": ["stiffness_factor.axial"], "alternatives": alternatives}
+        assert acceptable(answer, {"verdict": verdict, "effects": [twin]}) == SEEN
 
 
 def test_a_campaign_is_diagnosed_as_typed() -> None:
@@ -125,12 +110,6 @@ def test_a_campaign_is_diagnosed_as_typed() -> None:
     assert outcome.judged
     assert outcome.answer.visible
     assert outcome.judged.seen
-
-
-@pytest.mark.parametrize(("chosen", "held_back"), [("working", False), ("held_back", True)])
-def test_every_kind_of_a_set_comes_once_a_round(chosen: str, held_back: bool) -> None:
-    names = [name for (name, *_), _ in zip(asked(chosen, 1), range(14), strict=False)]
-    assert set(names) == {name for name, kind in KINDS.items() if kind.held_back is held_back}
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,13 @@
-"""What counts as right and as wrong on a card."""
+"""What counts as right and as wrong on a card, and what its rows and its table of confusions count."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import pytest
-from cards.card import card
+from cards.card import Row, card, confusion
 from cards.hidden import Sealed
 from cards.outcome import Outcome, Task
 
@@ -16,9 +17,14 @@ EVERYWHERE, EITHER = ("sleeve_compliance",), ("sleeve_compliance", "sleeve_compl
 def said(
     verdict: str, *sets: tuple[str, ...], truths: tuple[str, ...] = (), kind: str = "fault", **more: Any
 ) -> Outcome:
-    hidden = truths if kind in ("alone", "two") else ()
+    """What was said of a campaign of a kind; in a fault the truths are not hidden effects."""
+    hidden = () if kind == "fault" else truths
     sealed = Sealed(truths, {}, more.pop("visible", 0.05), False, 1)
-    return Outcome(Task(kind, 1, hidden), sealed, verdict, sets, **more)
+    return Outcome(Task(kind, 1, hidden, without=hidden if kind == "lacking" else ()), sealed, verdict, sets, **more)
+
+
+def rows_of(outcomes: Sequence[Outcome], family: Any) -> dict[str, Row]:
+    return {row.measure.strip(): row for row in card(outcomes, family)}
 
 
 @pytest.mark.parametrize(
@@ -50,9 +56,8 @@ def test_every_wrong_name_counts(outcome: Outcome, kept: tuple[str, ...], wrong_
 
 
 def test_a_level_that_stays_open_counts_as_told() -> None:
-    twin = said("named", ("interface_slip",), truths=("guide_friction",), kind="alone")
-    assert twin.truth_in_sets
-    assert not said("named", ("inertia",), truths=("guide_friction",), kind="alone").truth_in_sets
+    for name, right in (("interface_slip", True), ("inertia", False)):
+        assert said("named", (name,), truths=("guide_friction",), kind="alone").truth_in_sets is right
 
 
 def test_what_a_session_settles() -> None:
@@ -68,7 +73,7 @@ def test_what_a_session_settles() -> None:
     twin = said("named", ("interface_slip",), truths=("guide_friction",))
     assert [each.left_open for each in (was, twin, said("named", ("delay",)))] == [True, True, False]
     outcomes = [replace(was, settled=settled) for settled in (*then, "elsewhere")]
-    rows = {row.measure.strip(): row for row in card([*outcomes, replace(twin, settled="elsewhere")], "faults")}
+    rows = rows_of([*outcomes, replace(twin, settled="elsewhere")], "faults")
     assert rows["ambiguous, settled rightly by a session"].figure.startswith("25.0 %")
     assert rows["settled wrongly"].over == 4
     assert rows["ambiguous, and no session would tell"].figure.startswith("20.0 %")
@@ -81,7 +86,6 @@ def test_a_target_is_met_where_the_whole_interval_is_within_it() -> None:
     for count, alarms, met in ((130, 0, None), (400, 0, True), (60, 3, False), (400, 4, None)):
         outcomes = [clean] * (count - alarms) + [said("unexplained", kind="awkward")] * alarms
         row = card(outcomes, "awkward")[0]
-        print(row)
         assert (row.over, row.target, row.met) == (count, "<= 1 %", met)
 
 
@@ -118,7 +122,7 @@ def test_told_odds_are_counted() -> None:
     ]
     outcomes += [said("consistent", kind="alone", nothing=0.995, visible=0.004)] * 3
     outcomes += [said("consistent", kind="alone", nothing=0.995)]
-    rows = {row.measure: row for row in card(outcomes, "library")}
+    rows = rows_of(outcomes, "library")
     told = [rows[f"the likeliest, told {words}: right"] for words in ("0.5 to 0.8", "0.8 to 0.97", "0.97 to 1")]
     assert [(row.over, row.target, row.met) for row in told] == [
         (100, "60 %", True),
@@ -134,7 +138,7 @@ def test_the_card_of_what_the_library_lacks() -> None:
     whole = said("unexplained", kind="law", before=3.0, heldout=3.0)
     silent = said("consistent", kind="law", before=1.02, heldout=1.02)
     wrong = said("partly", ("delay",), kind="three", before=2.0, heldout=1.1, truths=("inertia",))
-    rows = {row.measure: row for row in card([halved, whole, silent, wrong], "outside")}
+    rows = rows_of([halved, whole, silent, wrong], "outside")
     assert rows["physics the library lacks: a wrong name or part kept"].figure.startswith("25.0 %")
     closed = rows["excess of the held-out gap at least halved, where it shows"]
     assert (closed.figure[:6], closed.over) == ("66.7 %", 3)
@@ -144,6 +148,52 @@ def test_the_card_of_the_library_asks_of_what_is_visible_alone() -> None:
     named = said("named", ("delay",), truths=("delay",), kind="alone")
     missed = said("unexplained", truths=("delay", "inertia"), kind="two")
     unseen = said("consistent", truths=("delay",), kind="alone", visible=0.01)
-    rows = {row.measure: row for row in card([named, missed, unseen], "library")}
+    rows = rows_of([named, missed, unseen], "library")
     told = rows["where visible: named, level unresolved, or in a set of three"]
     assert (told.figure[:6], told.over) == ("50.0 %", 2)
+
+
+def test_the_card_counts() -> None:
+    made = [
+        said("named", ("inertia",), truths=("inertia",), kind="single", covered=(True,), gain=500.0),
+        said("named", ("delay",), truths=("inertia",), kind="single", gain=500.0),
+        said("ambiguous", ("delay", "inertia", "viscous"), truths=("inertia",), kind="single", gain=500.0),
+        said("ambiguous", ("delay", "inertia", "viscous", "maxwell"), truths=("inertia",), kind="single", gain=20.0),
+        said("consistent", kind="clean"),
+        said("ambiguous", ("delay", "viscous"), kind="clean"),
+        said("named", ("inertia",), truths=("inertia", "delay"), kind="pair", gain=500.0),
+        said("named", ("delay",), truths=("inertia",), kind="lacking", gain=500.0),
+    ]
+    rows = rows_of(made, "effects")
+    expected = {
+        "false alarm on clean campaigns": "50.0 % (1.3 to 98.7)",  # one of two, after Clopper and Pearson
+        "truth named alone or in a set of at most three": "50.0 %",
+        "a single, confident, wrong name": "20.0 %",
+        "single name where the effect is plain": "33.3 %",
+        "two effects at once, both named": "0.0 %",
+        "outside the list: no confident name": "0.0 %",
+        "of these a disturbance of the rig": "no case",
+        "95 % interval covers the truth, where named": "100.0 %",
+    }
+    assert [name for name, figure in expected.items() if not rows[name].figure.startswith(figure)] == []
+    assert rows["false alarm on clean campaigns"].met is False
+    assert rows["of these a disturbance of the rig"].met is None
+    assert rows["processor time of one diagnosis, median / longest"].met is True
+    assert confusion([made[0], made[2], made[4], made[7]]) == {
+        "inertia": {"named: inertia": 1, "ambiguous: delay|inertia|viscous": 1},
+        "inertia (library lacks it)": {"named: delay": 1},
+        "none": {"consistent": 1},
+    }
+
+
+def test_another_mistake_counts_as_wrong() -> None:
+    label = "inch:sweep_axial"
+    right = said("named", (label,), truths=(label,), kind="mistake", matters=True)
+    wrong = replace(right, sets=(("pound_per_inch:sweep_axial",),))
+    assert right.mistake_alone
+    assert wrong.single_wrong
+    assert not any((wrong.mistake_told, wrong.mistake_alone))
+    assert (
+        rows_of([wrong, said("consistent", kind="clean")], "mistakes")["another mistake or an effect named"].met
+        is False
+    )

@@ -14,26 +14,10 @@ from bushfit.simulation.measured import Simulated
 from cards.hidden import FORCE_NOISE, NOISE
 from cards.recipe import Bench, Recipe
 
-#: Amplitudes of a strain sweep.
-_STEPS = 12
-#: The least of them, relative to the largest.
-_LEAST_STRAIN = 0.03
-#: The same where sweeps begin at any strain.
-_SMALLEST_STRAIN = 0.01
-#: Least and largest of the lowest, and of the highest frequency [Hz] of three.
-_FREQUENCIES = ((1.0, 10.0), (50.0, 150.0))
 #: Frequencies of a strain sweep, and of a sweep with three of them only [Hz].
 _THREE = (5.0, 35.0, 155.0)
-#: Frequencies of a dense sweep [Hz].
-_DENSE = tuple(float(f) for f in range(5, 156, 2))
-#: Cycles of a long loop.
-_LONG = 25
-#: What a wild point is off by, relative to |K|.
-_WILD = 0.04
 #: Standard deviation of the amplitude reached, relative to that asked for.
 _REACHED = 0.02
-#: Cut-off of a loop's noise after a low-pass, relative to half the sampling rate.
-_CUT_OFF = 0.03
 #: Degrees of freedom of Student's t for noise with heavy tails.
 _TAILS = 3
 
@@ -50,11 +34,11 @@ def _sweeps(**changes: object) -> Callable[[Bench], SimulateSettings]:
     )
 
 
-def _strain_sweeps(bench: Bench, least: float = _LEAST_STRAIN, reached: float = _REACHED) -> SimulateSettings:
+def _strain_sweeps(bench: Bench, least: float = 0.03, reached: float = _REACHED) -> SimulateSettings:
     """Amplitudes from a share of the largest on, stepped at three frequencies, one to three repeats."""
 
     def turned(test: SimulatedSweep) -> SimulatedSweep:
-        amplitudes = tuple((np.geomspace(least, 1.0, _STEPS) * max(test.amplitudes)).tolist())
+        amplitudes = tuple((np.geomspace(least, 1.0, 12) * max(test.amplitudes)).tolist())
         return replace(test, amplitudes=amplitudes, frequencies=_THREE, stepped="amplitude", reached=reached)
 
     sweeps = tuple(turned(test) for test in bench.plan.sweeps)
@@ -64,8 +48,8 @@ def _strain_sweeps(bench: Bench, least: float = _LEAST_STRAIN, reached: float = 
 def _any_strain_sweeps(bench: Bench) -> SimulateSettings:
     """The same at any three frequencies, in one direction or two, with a loop or without."""
     random = bench.random
-    plan = _strain_sweeps(bench, _SMALLEST_STRAIN, random.uniform(0.0, 1.5 * _REACHED))
-    low, high = (bench.between(*ends) for ends in _FREQUENCIES)
+    plan = _strain_sweeps(bench, 0.01, random.uniform(0.0, 1.5 * _REACHED))
+    low, high = bench.between(1.0, 10.0), bench.between(50.0, 150.0)
     frequencies = tuple(np.round(np.geomspace(low, high, 3), 1).tolist())
     sweeps = tuple(replace(test, frequencies=frequencies) for test in plan.sweeps[: 1 + (random.random() < 0.7)])
     return replace(plan, sweeps=sweeps, loops=plan.loops[: int(random.random() < 0.5)])
@@ -77,14 +61,6 @@ def _level_missing(bench: Bench) -> SimulateSettings:
     kept = [x for number, x in enumerate(sweeps[which].amplitudes) if number != level]
     sweeps[which] = replace(sweeps[which], amplitudes=tuple(kept))
     return replace(bench.plan, sweeps=tuple(sweeps))
-
-
-def _long(bench: Bench) -> SimulateSettings:
-    return replace(bench.plan, loops=tuple(replace(test, cycles=_LONG) for test in bench.plan.loops))
-
-
-def _one_direction(bench: Bench) -> SimulateSettings:
-    return replace(bench.plan, sweeps=bench.plan.sweeps[:1])
 
 
 def each_loop(measured: Simulated, change: Callable[[Loop], Loop]) -> Simulated:
@@ -116,15 +92,14 @@ def _filtered(measured: Simulated, bench: Bench, numerator: Array, denominator: 
     return _noisy_loops(measured, bench, noise)
 
 
+def _loop_noise(sentence: str, numerator: Array, denominator: Array) -> Recipe:
+    noise = partial(_filtered, numerator=numerator, denominator=denominator)
+    return Recipe(sentence, plan=_changed(force_noise=0.0), file=noise)
+
+
 def _coloured(rho: float) -> Recipe:
-    noise = partial(_filtered, numerator=np.array([1.0]), denominator=np.array([1.0, -rho]))
-    return Recipe(
-        f"loop noise of which a row keeps {rho} of the one before", plan=_changed(force_noise=0.0), file=noise
-    )
-
-
-def _low_pass(measured: Simulated, bench: Bench) -> Simulated:
-    return _filtered(measured, bench, *butter(2, _CUT_OFF))
+    sentence = f"loop noise of which a row keeps {rho} of the one before"
+    return _loop_noise(sentence, np.array([1.0]), np.array([1.0, -rho]))
 
 
 def _heavy_tails(measured: Simulated, bench: Bench) -> Simulated:
@@ -172,7 +147,7 @@ def wild(measured: Simulated, bench: Bench, count: int, size: float) -> Simulate
 AWKWARD: dict[str, Recipe] = {
     "coloured_noise_90": _coloured(0.9),
     "coloured_noise_98": _coloured(0.98),
-    "low_pass_noise": Recipe("loop noise after a low-pass", plan=_changed(force_noise=0.0), file=_low_pass),
+    "low_pass_noise": _loop_noise("loop noise after a low-pass", *butter(2, 0.03)),
     "heavy_tails": Recipe(
         "noise of Student's t with three degrees of freedom",
         plan=_changed(noise=0.0, force_noise=0.0),
@@ -185,13 +160,16 @@ AWKWARD: dict[str, Recipe] = {
     ),
     "level_errors_one": Recipe("1 % of gain that all repeats of a level share", file=partial(_levels_off, error=0.01)),
     "low_frequency_scatter": Recipe("scatter that grows towards low frequency", file=_low_frequency_scatter),
-    "wild_point": Recipe("one point 4 % off", file=partial(wild, count=1, size=_WILD)),
+    "wild_point": Recipe("one point 4 % off", file=partial(wild, count=1, size=0.04)),
     "strain_sweeps": Recipe("the amplitude stepped at three frequencies", plan=_strain_sweeps),
     "level_missing": Recipe("one level of one direction missing", plan=_level_missing),
     "as_reached": Recipe("amplitudes as they were reached", plan=_sweeps(reached=_REACHED)),
-    "dense": Recipe("76 frequencies", plan=_sweeps(frequencies=_DENSE)),
-    "long": Recipe("loops of 25 cycles", plan=_long),
-    "one_direction": Recipe("axial tests alone", plan=_one_direction),
+    "dense": Recipe("76 frequencies", plan=_sweeps(frequencies=tuple(np.arange(5.0, 156.0, 2.0).tolist()))),
+    "long": Recipe(
+        "loops of 25 cycles",
+        plan=lambda bench: replace(bench.plan, loops=tuple(replace(test, cycles=25) for test in bench.plan.loops)),
+    ),
+    "one_direction": Recipe("axial tests alone", plan=lambda bench: replace(bench.plan, sweeps=bench.plan.sweeps[:1])),
     "three_frequencies": Recipe("three frequencies", plan=_sweeps(frequencies=_THREE)),
 }
 #: Clean amplitude sweeps of any plan.

@@ -19,9 +19,8 @@ from bushfit.report.contents import Formats
 from bushfit.report.folder import check_free, to_json
 from bushfit.validation import plain
 from cards.card import card, confusion
-from cards.document import Asked, Scorecard
 from cards.families import CARD_SEEDS, FAMILIES, tasks
-from cards.ledger import LEDGER, ledger
+from cards.ledger import LEDGER, Asked, Scorecard, ledger
 from cards.outcome import Outcome, Task
 from cards.scorecard import run
 

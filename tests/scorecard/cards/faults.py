@@ -14,21 +14,6 @@ from bushfit.simulation.measured import Simulated
 from cards.awkward import each_loop, each_sweep, wild
 from cards.recipe import MIDDLE, Around, Bench, Recipe
 
-#: Times the largest amplitude at which a bushing is preloaded.
-_PRELOAD = 3.0
-#: Factors of a loop's clock, least and largest.
-_CLOCK = (2.0, 30.0)
-#: Share of the largest force of the sweeps at which an amplifier saturates, least and largest.
-_RAILS = (0.85, 0.97)
-#: Factors of the amplitude of a level with a wrong label.
-_LABELS = (0.5, 0.6, 1.6, 2.0)
-#: Cycles of a band's centre in a time step, above which nothing of it is in a record.
-_MOST_TURN = 0.2
-#: Rounds in which the motion that a rig lets through is found: each leaves a tenth of the error.
-_ROUNDS = 5
-#: Widths at half height of a narrow resonance [Hz], least and largest.
-_WIDTH = (3.0, 6.0)
-
 
 def _late(bench: Bench) -> Around:
     """The true motion is ahead of that which is recorded."""
@@ -52,7 +37,7 @@ def _only(direction: Direction, fault: Around) -> Around:
 
 def _preload(bench: Bench) -> Around:
     """Stiffening with the cube of the displacement, around a preload of the radial tests."""
-    preload = _PRELOAD * bench.levels(Direction.RADIAL).max()
+    preload = 3.0 * bench.levels(Direction.RADIAL).max()
     slope = bench.size * bench.stiffness(Direction.RADIAL) / (3.0 * preload**2)
     return _only(
         Direction.RADIAL,
@@ -84,7 +69,7 @@ def _compliance(bench: Bench) -> Around:
 
     def around(below: ForceBelow, history: History, _: Setting) -> Array:
         reached = history
-        for _round in range(_ROUNDS):
+        for _round in range(5):  # each leaves a tenth of the error
             reached = history.with_value(history.value - compliance * below(reached))
         return below(reached)
 
@@ -104,9 +89,9 @@ def _charge_amplifier(bench: Bench) -> Around:
 
 
 def _saturation(bench: Bench) -> Around:
-    """Rails of the dynamic chain: the loops have one of their own."""
+    """Rails of the dynamic chain a little below its largest force: the loops have one of their own."""
     largest = max(bench.stiffness(place) * bench.levels(place).max() for place in (Direction.AXIAL, Direction.RADIAL))
-    limit = bench.between(*_RAILS) * largest
+    limit = bench.between(0.85, 0.97) * largest
     return lambda below, history, setting: (
         below(history) if setting.kind == "loop" else np.clip(below(history), -limit, limit)
     )
@@ -114,7 +99,7 @@ def _saturation(bench: Bench) -> Around:
 
 def _mislabelled(bench: Bench) -> Around:
     """One level of one sweep ran at another amplitude than its label says."""
-    direction, factor = _either(bench), float(bench.random.choice(_LABELS))
+    direction, factor = _either(bench), float(bench.random.choice((0.5, 0.6, 1.6, 2.0)))
     level = bench.random.choice(bench.levels(direction))
 
     def around(below: ForceBelow, history: History, setting: Setting) -> Array:
@@ -143,7 +128,7 @@ def band(history: History, centre: float, width: float) -> Array:
 
     Nothing passes where the samples are too few for the centre, as in a slow loop.
     """
-    if centre * history.step > _MOST_TURN:
+    if centre * history.step > 0.2:
         return np.zeros(history.value.shape)
     warped = 2.0 / history.step * np.tan(np.pi * centre * history.step)
     scale, loss = 2.0 / history.step, 2.0 * np.pi * width
@@ -154,7 +139,7 @@ def band(history: History, centre: float, width: float) -> Array:
 
 
 def _resonance(bench: Bench) -> Around:
-    centre, width = bench.random.uniform(25.0, 135.0), bench.random.uniform(*_WIDTH)
+    centre, width = bench.random.uniform(25.0, 135.0), bench.random.uniform(3.0, 6.0)
 
     def around(below: ForceBelow, history: History, _: Setting) -> Array:
         force = below(history)
@@ -176,7 +161,7 @@ def _drift(measured: Simulated, bench: Bench) -> Simulated:
 
 
 def _clock(measured: Simulated, bench: Bench) -> Simulated:
-    factor = bench.between(*_CLOCK) ** float(bench.random.choice([-1.0, 1.0]))
+    factor = bench.between(2.0, 30.0) ** float(bench.random.choice([-1.0, 1.0]))
     return each_loop(measured, lambda loop: replace(loop, time=factor * loop.time))
 
 

@@ -1,21 +1,59 @@
-"""The outcomes of a card on disk, a line each as they come, so that a run that is stopped goes on where it was."""
+"""What a score card writes, key by key; its outcomes go to disk a line each as they come, so that a run that is stopped
+goes on where it was."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import TypeAdapter, ValidationError
+from typing_extensions import TypedDict
 
 from bushfit.errors import OutputError
 from bushfit.report import disk
+from cards.card import Row
+from cards.families import Family
 from cards.outcome import Outcome, Task
 
 #: File of the outcomes: what was asked for on the first line, then an outcome a line.
 LEDGER = "outcomes.jsonl"
 
 _LINES = TypeAdapter(Outcome)
+
+
+class Asked(TypedDict):
+    """What a score card is made of: the first line of outcomes.jsonl, and part of scorecard.json.
+
+    Args:
+        schema: of this file.
+        version: of bushfit that made it.
+        families: of hidden campaigns.
+        campaigns: how many of each family.
+        seed: of everything random.
+        session: hours of the session that is planned, and simulated, where effects are left open; null for none.
+    """
+
+    schema: Literal["bushfit/scorecard/2"]
+    version: str
+    families: list[str]
+    campaigns: int
+    seed: int
+    session: float | None
+
+
+class Scorecard(Asked):
+    """How often diagnose is right on hidden campaigns.
+
+    Args:
+        card: the measures of each family, with their targets.
+        confusion: of each family: by what was hidden, how often which verdict with which names was given.
+        outcomes: every campaign.
+    """
+
+    card: dict[Family, list[Row]]
+    confusion: dict[Family, dict[str, dict[str, int]]]
+    outcomes: list[Outcome]
 
 
 @contextmanager

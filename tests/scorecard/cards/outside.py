@@ -21,8 +21,6 @@ from cards.recipe import Around, Bench, Recipe, Rigged
 
 #: Frequencies [Hz] at which a law is looked at, to find its largest share of |K|.
 _LOOKED_AT = (5.0, 25.0, 45.0, 65.0, 85.0, 105.0, 155.0)
-#: Time steps of a cycle, and cycles before, when it is looked at: its size alone is asked for.
-_LOOK = (256, 4)
 
 #: Stress of any size by the history of the strain.
 Stress = Callable[[History], Array]
@@ -113,20 +111,6 @@ def _root_damper(_: Scale) -> Stress:
     return lambda history: history.sense * np.sqrt(np.abs(history.rate))
 
 
-#: The laws: name, what it is in a sentence, its stress. None may ever enter the library.
-LAWS: tuple[tuple[str, str, Callable[[Scale], Stress]], ...] = (
-    ("velocity_weakening_slip", "A slip whose force falls with its speed.", _weakening),
-    ("rate_threshold", "A damper that acts above a strain rate only.", _threshold),
-    ("logarithmic_creep", "A stress that grows with the logarithm of the strain rate (Eyring).", _creep),
-    ("shortening_relaxation", "A Maxwell arm whose relaxation time falls with the amplitude.", _shortening),
-    ("resonance_in_the_band", "A mode inside the rubber, inside the band.", _resonance),
-    ("stick_slip", "A slider whose sticking force is higher than its sliding force.", _stick_slip),
-    ("quartic_stiffening", "A stress that grows with |e|^3 e.", _quartic),
-    ("bouc_wen", "The hysteresis of Bouc (1967) and Wen (1976).", _bouc_wen),
-    ("root_damper", "A damper whose stress grows with the square root of the strain rate.", _root_damper),
-)
-
-
 def _outside_of(law: Callable[[Scale], Stress]) -> Callable[[Bench], Around]:
     """A law of which the largest share of |K| that any test sees is the size of the bench."""
 
@@ -146,8 +130,8 @@ def _outside_of(law: Callable[[Scale], Stress]) -> Callable[[Bench], Around]:
         swept = [(f, float(x)) for f in _LOOKED_AT for x in bench.levels()]
         looped = [(test.frequency, test.amplitude) for test in bench.plan.loops]
         points = np.array([*swept, *looped]).T
-        steps, run_in = _LOOK
-        seen = rig.dynamic_stiffness(alone, Direction.AXIAL, *points, run_in=run_in, steps_per_cycle=steps)
+        # its size alone is asked for, so that few steps and cycles are enough
+        seen = rig.dynamic_stiffness(alone, Direction.AXIAL, *points, run_in=4, steps_per_cycle=256)
         scale = bench.size / float(np.max(np.abs(seen / model.stiffness(Direction.AXIAL, *points))))
 
         def around(below: ForceBelow, history: History, setting: Setting) -> Array:
@@ -158,5 +142,18 @@ def _outside_of(law: Callable[[Scale], Stress]) -> Callable[[Bench], Around]:
     return in_rig
 
 
-#: Every law as a kind of campaign.
-OUTSIDE_LAWS: dict[str, Recipe] = {name: Recipe(sentence, rig=_outside_of(law)) for name, sentence, law in LAWS}
+#: Every law as a kind of campaign, by name; none may ever enter the library.
+OUTSIDE_LAWS: dict[str, Recipe] = {
+    name: Recipe(sentence, rig=_outside_of(law))
+    for name, (sentence, law) in {
+        "velocity_weakening_slip": ("A slip whose force falls with its speed.", _weakening),
+        "rate_threshold": ("A damper that acts above a strain rate only.", _threshold),
+        "logarithmic_creep": ("A stress that grows with the logarithm of the strain rate (Eyring).", _creep),
+        "shortening_relaxation": ("A Maxwell arm whose relaxation time falls with the amplitude.", _shortening),
+        "resonance_in_the_band": ("A mode inside the rubber, inside the band.", _resonance),
+        "stick_slip": ("A slider whose sticking force is higher than its sliding force.", _stick_slip),
+        "quartic_stiffening": ("A stress that grows with |e|^3 e.", _quartic),
+        "bouc_wen": ("The hysteresis of Bouc (1967) and Wen (1976).", _bouc_wen),
+        "root_damper": ("A damper whose stress grows with the square root of the strain rate.", _root_damper),
+    }.items()
+}

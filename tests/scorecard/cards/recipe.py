@@ -72,14 +72,6 @@ class Bench:
         return float(abs(self.bushing.stiffness(direction, MIDDLE, float(np.median(self.levels(direction))))))
 
 
-def _same_plan(bench: Bench) -> SimulateSettings:
-    return bench.plan
-
-
-def _same_file(measured: Simulated, _: Bench) -> Simulated:
-    return measured
-
-
 @dataclass(frozen=True)
 class Recipe:
     """One kind of campaign.
@@ -94,9 +86,9 @@ class Recipe:
 
     sentence: str
     truths: tuple[str, ...] = ()
-    plan: Callable[[Bench], SimulateSettings] = _same_plan
+    plan: Callable[[Bench], SimulateSettings] = lambda bench: bench.plan
     rig: Callable[[Bench], Around] | None = None
-    file: Callable[[Simulated, Bench], Simulated] = _same_file
+    file: Callable[[Simulated, Bench], Simulated] = lambda measured, _: measured
 
 
 def cooked(recipe: Recipe, seed: int) -> tuple[Simulated, Sealed]:

@@ -26,7 +26,7 @@ from bushfit.effects.mistakes import mistake_named
 from bushfit.errors import MeasurementError
 from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
-from bushfit.report.contents import Contents, Formats
+from bushfit.report.contents import Formats
 from bushfit.report.folder import write_files
 from bushfit.report.page.readback import read_results
 from bushfit.simulation.files import to_files
@@ -97,7 +97,8 @@ def _worked(task: Task, folder: Path, hours: float | None) -> Outcome:
         data = Data.of(load_campaign(place / "campaign.toml"))
         found = Diagnose(Settings(without=task.without)).run(data)
         diagnosis, seconds = found.diagnosis, time.process_time() - started
-        _through_files(found.contents, place / "results")
+        write_files(place / "results", Formats(pictures=False).files(found.contents), force=True)
+        read_results(place / "results")  # as `bushfit report` reads back what `bushfit diagnose` wrote
         truth = _SEALED.validate_json(sealed_file.read_bytes())
         outcome = _outcome(task, truth, diagnosis, seconds)
         return _settled(outcome, truth, data.campaign, simulated, diagnosis.next_test, hours) if hours else outcome
@@ -107,12 +108,6 @@ def _worked(task: Task, folder: Path, hours: float | None) -> Outcome:
         return Outcome(task, sealed, REFUSED, matters=True)
     except Exception as wrong:  # one campaign that fails is one row of the card, and is shown there
         return _failed(task, wrong)
-
-
-def _through_files(contents: Contents, folder: Path) -> None:
-    """Write the results as `bushfit diagnose` does, and read them back as `bushfit report` does."""
-    write_files(folder, Formats(pictures=False).files(contents), force=True)
-    read_results(folder)
 
 
 def _settled(
