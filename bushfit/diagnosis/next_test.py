@@ -60,18 +60,30 @@ def deciding_test(models: Sequence[Model], odds: Sequence[float], data_sets: Seq
     Args:
         models: that explain the tests so far, each with its probability in `odds`.
 
-    Notes: of mixtures of normal distributions with the distances d the information is at least
-        -sum_i p_i ln sum_j p_j exp(-d_ij/8) (Kolchinsky and Tracey, 2017), and never more than the entropy of the odds.
-        A distance is that of complex stiffness over the test's points, in units of noise.
+    A distance is that of complex stiffness over the test's points, in units of noise.
     """
     if len(models) < 2:
         return ""
-    p = np.array(odds) / np.sum(odds)
     swept = {sweep.direction for sweep in parted(data_sets)[1]}
     menu = [entry for entry in MENU if entry.direction not in swept]
-    told = [-float(p @ np.log(np.exp(-_distances(entry, models, data_sets) / 8.0) @ p)) for entry in menu]
+    nothing = entropy_left(odds, np.zeros((len(models), len(models))))
+    told = [float(nothing - entropy_left(odds, _distances(entry, models, data_sets))) for entry in menu]
     best = max(range(len(menu)), key=lambda place: told[place] / menu[place].effort)
     return menu[best].words if told[best] > _TELLS_SOMETHING else ""
+
+
+def entropy_left(odds: Sequence[float] | Array, distances: Array) -> Array:
+    """How open it is, at the most, which of several explanations is right once tests are done [nats], (...).
+
+    Args:
+        odds: of each explanation before, in any unit, (r,).
+        distances: chi-square between what any two expect of the tests, (..., r, r).
+
+    Notes: of mixtures of normal distributions the tests tell at least -sum_i p_i ln sum_j p_j exp(-d_ij/8)
+        (Kolchinsky and Tracey, 2017) of the entropy of the odds; this is the rest.
+    """
+    p = np.asarray(odds) / np.sum(odds)
+    return np.asarray(np.log(np.exp(-distances / 8.0) @ p / p) @ p)
 
 
 def _distances(entry: MenuEntry, models: Sequence[Model], data_sets: Sequence[DataSet]) -> Array:

@@ -73,6 +73,7 @@ class Knowledge:
         noise: of the rig.
         source: where all this comes from, in words.
         rivals: what is known if another model is the right one, this one's model first; none where there is no doubt.
+        probability: of this model among its rivals.
         strain: largest equivalent strain amplitude measured so far; None where nothing was.
         specimens: bodies of the compound that can be tested in place of the bushing.
         tests: of the campaign so far.
@@ -86,6 +87,7 @@ class Knowledge:
     source: str
     noise: Noise = field(default_factory=Noise)
     rivals: tuple[Knowledge, ...] = ()
+    probability: float = 1.0
     strain: float | None = None
     specimens: tuple[Specimen, ...] = ()
     tests: tuple[Test, ...] = ()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bushfit.diagnosis.next_test import entropy_left
 from bushfit.effects.contract import Array
 from bushfit.planning.contract import Knowledge
 from bushfit.planning.sensitivity import Grid, Information, relative_slopes
@@ -72,14 +73,14 @@ class Criterion:
         views: the likeliest model's, whose further columns are effects that it lacks; then those of its rivals.
         weight: of the parameters' covariance in the variance that is wanted small, (k, k); None where rivals are to be
             told apart.
-        pairs: of rivals that are to be told apart, by their numbers, (2, pairs).
+        odds: of the rivals, as probable as they are now, (rivals,).
         least: noncentrality of each effect that the tests are to reach at least, (e,); 0 where none is asked for.
         penalty: weight of the logarithm of each lack of it, beside the logarithm of the variance that is wanted small.
     """
 
     views: Sequence[View]
     weight: Array | None
-    pairs: Array
+    odds: Array
     least: Array
     penalty: float
 
@@ -93,7 +94,7 @@ class Criterion:
 
     def _of(self, found: Sequence[Information]) -> Array:
         if self.weight is None:
-            aim = -np.log(np.maximum(distances(found[1:])[:, *self.pairs].min(axis=1), np.finfo(float).tiny))
+            aim = np.log(np.maximum(entropy_left(self.odds, distances(found[1:])), np.finfo(float).tiny))
         else:
             aim = np.log(np.einsum("tij,ij->t", self.views[0].off(found[0]), self.weight))
         asked = self.least > 0.0
@@ -109,7 +110,7 @@ def noncentrality_of(found: Information) -> Array:
 def distances(found: Sequence[Information]) -> Array:
     """Expected chi-square between any two rivals after the best refit of either, (tests, rivals, rivals)."""
     each = [noncentrality_of(one) for one in found]
-    one_way = np.stack([np.insert(row, place, np.inf, axis=1) for place, row in enumerate(each)], axis=1)
+    one_way = np.stack([np.insert(row, place, 0.0, axis=1) for place, row in enumerate(each)], axis=1)
     return np.minimum(one_way, np.swapaxes(one_way, 1, 2))
 
 

@@ -94,7 +94,10 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
             plain = _each_added(plain, [name], held, data.bounds).get(name, plain)
     rivalling = _each_added(plain, names, held, data.bounds)
     _check_rivals(names, rivalling)
-    every = [known(rivalling[name]) for name in names]
+    told = zip(found.odds.labels, found.odds.told, strict=True)
+    odds = {name: share for label, (_, share) in told for name in label.split(" + ")}
+    least = min(odds.values(), default=1.0)
+    every = [replace(known(rivalling[name]), probability=odds.get(name, least)) for name in names]
     return replace(every[0], rivals=tuple(every))
 
 

@@ -222,7 +222,8 @@ class _Planner:
         return min(freedom.values(), default=0)
 
     def _criterion(self, penalty: float) -> Criterion:
-        return Criterion(self.views, self.weight, self._tellable, self.least, penalty)
+        odds = np.array([rival.probability for rival in self.known.rivals])
+        return Criterion(self.views, self.weight, odds, self.least, penalty)
 
     @cached_property
     def strict(self) -> Criterion:

@@ -6,7 +6,7 @@ import pytest
 from asking import one_direction
 from rigged import Measured
 
-from bushfit.diagnosis.next_test import MENU, deciding_test
+from bushfit.diagnosis.next_test import MENU, deciding_test, entropy_left
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet
 from bushfit.model.model import Model
@@ -72,3 +72,17 @@ def test_a_test_without_the_rig_parts_nothing_inside_the_rubber(paper_model: Mod
     found = deciding_test(models, EVEN, data_sets)
     assert found in WORDS
     assert not any(words in found for words in ("fixture", "dummy"))
+
+
+@pytest.mark.parametrize("odds", [(1.0, 1.0), (0.8, 0.2)])
+def test_what_stays_open_is_bounded_from_above(odds: tuple[float, float]) -> None:
+    """Against the entropy that is left of two normal distributions a distance apart, by integration."""
+    p, x = np.array(odds) / sum(odds), np.linspace(-12.0, 20.0, 20_001)
+    for distance in (0.0, 0.5, 3.0, 8.0):
+        weighed = p[:, None] * np.exp(-0.5 * np.square(x - np.array([[0.0], [distance]]))) / np.sqrt(2.0 * np.pi)
+        share = weighed / weighed.sum(axis=0)
+        left = -float(np.trapezoid((weighed * np.log(np.maximum(share, 1e-300))).sum(axis=0), x))
+        bound = float(entropy_left(odds, distance**2 * (1.0 - np.eye(2))))
+        print(f"{distance:g} apart: {left:.4f} nats stay open, at most {bound:.4f}")
+        assert left - 1e-6 <= bound <= left + 0.2
+    assert entropy_left(odds, np.zeros((2, 2))) == pytest.approx(-float(p @ np.log(p)))
