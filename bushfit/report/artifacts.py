@@ -60,7 +60,7 @@ def prediction_contents(
         curves = predict(result, prediction.direction, *grid)
         rig = predict(result, prediction.direction, *grid, rig=True) if rig_effects(result) else None
         bare = result.model.without(Level.INSTRUMENT)
-        note = plots.style.few(warnings_of(result, [], (*prediction.warnings, *notes)))
+        note = plots.style.first_sentences(warnings_of(result, [], (*prediction.warnings, *notes)))
         title = result.name if isinstance(prediction.direction, Direction) else str(prediction.direction)
         return plots.prediction.prediction_figure(
             prediction, measured, title, curves=curves, rig=rig, model=bare, note=note

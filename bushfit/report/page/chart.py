@@ -300,6 +300,6 @@ def span_of(values: Array) -> str:
     return f"{number(float(known.min()), 3)} to {number(float(known.max()), 3)}" if known.size else "nothing"
 
 
-def thin(count: int, most: int) -> slice:
+def every_nth(count: int, most: int) -> slice:
     """Every so many-th of some rows, at most so many."""
     return slice(None, None, max(1, -(-count // most)))

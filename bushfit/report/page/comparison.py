@@ -14,7 +14,7 @@ from bushfit.model.file import read_document
 from bushfit.report.compare_document import ComparedEntry
 from bushfit.report.compared import FAMILY_HEADS, Heads, Panel, SideBySide, Sides, chance, parameter_cells, signed
 from bushfit.report.contents import Contents
-from bushfit.report.page.chart import DASHES, MOST_PLACES, Rule, Series, chart, colors, span_of, thin
+from bushfit.report.page.chart import DASHES, MOST_PLACES, Rule, Series, chart, colors, every_nth, span_of
 from bushfit.report.page.chart import Panel as PlacePanel
 from bushfit.report.page.report import MOST, conditions, corners, tube
 from bushfit.report.page.sweeps import LOG_FREQUENCIES
@@ -125,7 +125,7 @@ def _picture(sides: Sides, panel: Panel, looks: dict[str, str], most: int) -> Ma
     unit = (unit or "").removesuffix("-")
     series, words = [], []
     for line in panel.lines:
-        at = thin(line.x.size, most)
+        at = every_nth(line.x.size, most)
         name = f"{line.label}, {sides.levels[line.level]}"
         x, value, low, high = (each[at] for each in (line.x, line.value, line.low, line.high))
         alone = (x, value) if x.size == 1 else None

@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place
-from bushfit.report.page.chart import MOST_LEVELS, MOST_PLACES, Panel, Rule, Series, chart, colors, span_of, thin
+from bushfit.report.page.chart import MOST_LEVELS, MOST_PLACES, Panel, Rule, Series, chart, colors, every_nth, span_of
 from bushfit.report.page.readback import ReportData
 from bushfit.report.tables import columns_of, complete, moved_of, numbers, spread
 
@@ -27,7 +27,7 @@ def loop_panels(found: ReportData) -> list[Panel]:
     panels = list[Panel]()
     for place, rows in tested:
         if loops := dict(_last_cycles(place, rows, frequencies)):
-            steps = {name: thin(loop.shape[1], most) for name, loop in loops.items()}
+            steps = {name: every_nth(loop.shape[1], most) for name, loop in loops.items()}
             every = max(step.step for step in steps.values())
             rarely = f", one row in {every}" if every > 1 else ""
             notes = [f"The last cycle of each loop. Points: measured{rarely}. Lines: model."]

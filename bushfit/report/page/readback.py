@@ -52,7 +52,7 @@ class ReportData:
     Args:
         result: the model to use.
         plain: the plain fit, where another model is to be used.
-        about: the campaign.
+        campaign: the campaign.
         has_odds: whether the diagnosis tells probabilities, as that of an older version does not.
         versions: of bushfit and of the packages that the numbers rest on.
         tables: by name, as their files give them back.
@@ -60,7 +60,7 @@ class ReportData:
 
     result: Result
     plain: Result | None
-    about: CampaignTable | None
+    campaign: CampaignTable | None
     diagnosis: DiagnosisFile | None
     has_odds: bool
     versions: Mapping[str, str]
@@ -86,11 +86,11 @@ class ReportData:
             require_schema(diagnosis, at.get("diagnosis"), "a diagnosis", *DIAGNOSES, hint=hint)
             diagnosis = diagnosis if has_odds else {**diagnosis, **_ODDS}
             diagnosis = check_tables(diagnosis, at.get("diagnosis"), DiagnosisFile, kind=ModelError)
-        about, provenance = model.get("campaign"), model.get("provenance", {})
+        campaign, provenance = model.get("campaign"), model.get("provenance", {})
         return cls(
             result,
             from_document(plain, at.get(PLAIN)) if plain else None,
-            check_tables(about, at.get(name), CampaignTable, "campaign", kind=ModelError) if about else None,
+            check_tables(campaign, at.get(name), CampaignTable, "campaign", kind=ModelError) if campaign else None,
             diagnosis,
             has_odds,
             {"bushfit": provenance.get("bushfit") or "", **provenance.get("packages", {})},
@@ -100,7 +100,7 @@ class ReportData:
     @property
     def tests(self) -> Sequence[TestTable]:
         """The tests of the campaign, as far as they are known."""
-        return self.about.tests if self.about else ()
+        return self.campaign.tests if self.campaign else ()
 
     @cached_property
     def places(self) -> dict[str, Place]:

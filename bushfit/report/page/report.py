@@ -43,12 +43,12 @@ MOST = 12
 
 def report_context(found: ReportData) -> dict[str, Any]:
     """All that the template of a report asks for."""
-    result, diagnosis, about, tests = found.result, found.diagnosis, found.about, found.tests
+    result, diagnosis, campaign, tests = found.result, found.diagnosis, found.campaign, found.tests
     gaps = _gaps(diagnosis["gap"]) if diagnosis else []
     return {
-        "name": about.name if about else result.name,
+        "name": campaign.name if campaign else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
-        "facts": [*_head(about), *_bodies(result), *conditions(test.conditions for test in tests)],
+        "facts": [*_head(campaign), *_bodies(result), *conditions(test.conditions for test in tests)],
         "tests": [_tested(test, result.tests) for test in tests[:MOST]],
         "conditioned": any(test.conditions for test in tests),
         "more_tests": max(0, len(tests) - MOST),
@@ -74,7 +74,7 @@ def report_context(found: ReportData) -> dict[str, Any]:
         "gaps": gaps,
         "added": any(before != after for _, before, after in gaps if after),
         "warnings": warnings_of(result, _of_tables(found), diagnosis["warnings"] if diagnosis else ()),
-        "about": about,
+        "campaign": campaign,
         "files": _files(found),
         "versions": found.versions,
     }
@@ -97,9 +97,9 @@ def _of_tables(found: ReportData) -> Iterator[Iterator[str]]:
             yield of_points(found.result, place, grid, rigs, measured, None)
 
 
-def _head(about: CampaignTable | None) -> Iterator[tuple[str, str]]:
+def _head(campaign: CampaignTable | None) -> Iterator[tuple[str, str]]:
     """Whose part it is, and which, as far as the campaign says so."""
-    for key, value in (about.report if about else {}).items():
+    for key, value in (campaign.report if campaign else {}).items():
         yield key.replace("_", " ").capitalize(), value
 
 
@@ -142,7 +142,7 @@ def conditions(stated: Iterable[Mapping[str, str | float]]) -> Iterator[tuple[st
             yield name, "not stated"
 
 
-def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str]:
+def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str | int]:
     """A test in a row of a table: its range, and how well the model meets it."""
     unit, factor = DISPLAYS[test.unit]
     met = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
@@ -157,11 +157,10 @@ def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str]:
         "place": test.place,
         "frequency": told("Hz", *test.frequency_Hz),
         "amplitude": told(unit, *(factor * end for end in test.amplitude)),
-        "rows": f"{test.rows}",
+        "rows": test.rows,
         "conditions": ", ".join(stated),
         "nrmse": f"{number(100 * met.nrmse, 2)} %" if met else "",
-        "chi": number(met.reduced_chi_square, 2) if met else "",
-        "fitted": "" if met is None or met.fitted else "not fitted",
+        "chi": number(met.reduced_chi_square, 2) + " (not fitted)" * (not met.fitted) if met else "",
     }
 
 
@@ -175,7 +174,7 @@ def _sizes(effect: EffectEntry) -> Iterator[tuple[str, str, str]]:
 
 def _files(found: ReportData) -> list[tuple[str, str]]:
     """Every file behind the result with its hash: the campaign, its tests, fitted or not, and what else was fitted."""
-    named = ((file.file, file.sha256) for file in ([found.about] if found.about else []) + [*found.tests])
+    named = ((file.file, file.sha256) for file in ([found.campaign] if found.campaign else []) + [*found.tests])
     inputs = ((str(source.file), source.sha256) for source in found.result.inputs)
     return list(dict.fromkeys((file, sha256) for file, sha256 in (*named, *inputs) if file and sha256))
 

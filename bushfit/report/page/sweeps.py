@@ -10,7 +10,7 @@ from markupsafe import Markup
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place
 from bushfit.model.document import TestTable
-from bushfit.report.page.chart import DASHES, MOST_LEVELS, MOST_PLACES, Panel, Series, chart, colors, span_of, thin
+from bushfit.report.page.chart import DASHES, MOST_LEVELS, MOST_PLACES, Panel, Series, chart, colors, every_nth, span_of
 from bushfit.report.page.readback import ReportData
 from bushfit.report.tables import IF_RIGS, columns_of, complete, numbers, spread
 from bushfit.units import split_header, told
@@ -135,7 +135,7 @@ def _sweeps_at(
             there = mine[mine[held] == level].sort_values(along)
             if stepped:
                 there = there.groupby(along, as_index=False)[headers[1:]].mean()
-            points = numbers(there, *headers)[:, thin(len(there), most)]
+            points = numbers(there, *headers)[:, every_nth(len(there), most)]
             line = _predicted(predicted, along, held, level, names) if stepped else None
             curves.append(_Curve(level_name(level, held), points[:3], *(line or (points[[0, 3, 4]],))))
         yield _Sweeps(place, stepped, along, curves, len(levels) - len(curves))

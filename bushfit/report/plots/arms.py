@@ -12,8 +12,6 @@ from bushfit.units import for_people
 
 #: Factor by which the picture goes beyond the band, to show how arms end.
 _BEYOND = 4.0
-#: Points over the frequencies.
-_POINTS = 400
 
 
 def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
@@ -21,7 +19,7 @@ def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
     figure = style.new_figure(title, style.ROW)
     moduli, errors = figure.subplots(1, 2)
     low, high = arms[0].band
-    omega = 2.0 * np.pi * np.geomspace(low / _BEYOND, high * _BEYOND, _POINTS)
+    omega = 2.0 * np.pi * np.geomspace(low / _BEYOND, high * _BEYOND, 400)
     frequency = omega / (2.0 * np.pi)
     inside = (frequency >= low) & (frequency <= high)
     wholes = [part_modulus(model, part.size, omega, part.under) for part in arms]
@@ -34,10 +32,10 @@ def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
             moduli.plot(frequency, factor * share(made), color=look.color, lw=1.1, ls=dashes)
         off = 100.0 * np.abs(made / whole - 1.0)[inside]
         errors.plot(frequency[inside], off, color=look.color, lw=1.1)
-    style.dress(moduli, "frequency [Hz]", f"modulus [{unit}]")
-    style.dress(errors, "frequency [Hz]", "error of the modulus [%]")
+    style.label_axes(moduli, "frequency [Hz]", f"modulus [{unit}]")
+    style.label_axes(errors, "frequency [Hz]", "error of the modulus [%]")
     for axes in (moduli, errors):
-        style.readable(axes, frequency)
+        style.log_if_wide(axes, frequency)
     moduli.axvspan(low, high, color="#ebebeb", lw=0, zorder=0)
     errors.set_ylim(bottom=0.0)
     style.explain(

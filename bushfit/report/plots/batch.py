@@ -20,28 +20,14 @@ _OUT = "#c1272d"
 _GOOD = "#31688e"
 #: Up to this many bushings are drawn as single points; beyond, as a cloud with its histogram.
 _CLOUD = 200
-#: Points of a cloud that cover each other as much as is still read, of this many at full strength.
-_OPAQUE = 1500
-#: Most bushings that a panel names: more names cover the points.
-_MOST_NAMED = 4
-#: Most bushings whose names stand along x: more do not fit along a panel.
-_MOST_ALONG = 40
-#: Most letters of a name along x: longer ones are higher than their panel.
-_MOST_LETTERS_ALONG = 32
-#: Letters of a name along x for which a figure has room as it is.
-_SHORT_NAME = 16
-#: Height that each further letter of the longest name takes [inch].
-_ALONG_LETTER = 0.12 / style.CM
-#: Most letters of a name within a panel: longer ones are half as wide as the panel.
-_MOST_LETTERS = 24
-#: Width of a letter, as a share of the panel's.
-_LETTER = 0.021
-#: Height of a line [point].
-_LINE = 8.5
+#: Most bushings whose names stand along x, and most letters of these: more do not fit along a panel.
+_MOST_ALONG, _MOST_LETTERS_ALONG = 40, 32
+#: Most bushings that a panel names, and most letters of these, which then are half as wide as the panel.
+_MOST_NAMED, _MOST_LETTERS = 4, 24
+#: Width of a letter in a panel, as a share of the panel's, and height of a line [point].
+_LETTER, _LINE = 0.021, 8.5
 #: Values further out than this many robust standard deviations are drawn at the edge.
 _FURTHEST = 12.0
-#: A panel shows at least this share of the median on either side: less is rounding.
-_LEAST = 5e-4
 #: Panels side by side.
 _COLUMNS = 2
 #: Most panels of a picture: it is then a metre high.
@@ -76,7 +62,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
     along = [_short(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
     lines = math.ceil(len(drawn) / _COLUMNS)
     height = style.ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * style.FRAME
-    height += _ALONG_LETTER * max(0, max(map(len, along), default=0) - _SHORT_NAME)
+    height += 0.12 * max(0, max(map(len, along), default=0) - 16)  # there is room for 16 letters as it is
     figure = style.new_figure(f"{title}: {len(names)} bushings", height)
     grid = figure.subplots(lines, _COLUMNS, sharex=True, squeeze=False)
     for axes in grid.flat[len(drawn) :]:
@@ -114,7 +100,7 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     shown = np.clip(values, low, high)
     bad = np.isin(place, list(panel.missed))
     cloud = values.size > _CLOUD
-    good_style = {**style.DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, _OPAQUE / values.size))} if cloud else style.POINT
+    good_style = {**style.DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, 1500 / values.size))} if cloud else style.POINT
     if ends is not None and not cloud:
         axes.vlines(place + 1, *ends, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
     for chosen, color, look, order in (
@@ -129,7 +115,7 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     axes.axhline(float(np.median(values)), color=style.GREY, lw=0.9, zorder=1)
     for limit in filter(math.isfinite, panel.allowed):
         axes.axhline(limit, color=_OUT, lw=0.9, ls=(0, (5, 2)), zorder=3)
-    style.dress(axes, "", "")
+    style.label_axes(axes, "", "")
     margin = 0.08 * (high - low)
     axes.set_ylim(low - margin, high + margin)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
@@ -152,7 +138,8 @@ def _reach(values: Array, allowed: Sequence[float], ends: Array | None) -> tuple
     near = values[np.abs(values - middle) <= spread] if spread > 0.0 else values
     half = np.ptp(ends, axis=0) / 2.0 if ends is not None else np.empty(0)
     half = half[np.isfinite(half)]
-    least = max(float(np.median(half)) if half.size else 0.0, _LEAST * abs(middle)) or 1.0
+    rounding = 5e-4 * abs(middle)
+    least = max(float(np.median(half)) if half.size else 0.0, rounding) or 1.0
     return min(float(near.min()), *limits, middle - least), max(float(near.max()), *limits, middle + least)
 
 

@@ -11,8 +11,6 @@ from bushfit.report.plots import style
 _LINE = 1.3
 #: Dashes of the smallest and of the largest value that is held.
 _DASHES = ("-", (0, (4, 1.5)))
-#: Strength of a band: those of several results lie on each other.
-_BAND = 0.18
 #: Markers on a line, or fewer: they tell lines apart in grey print.
 _MARKS = 5
 
@@ -31,8 +29,8 @@ def comparison_figure(found: SideBySide) -> Figure:
         for axes, panel in zip(grid[2 * i : 2 * i + 2].flat, sides.panels, strict=True):
             for line in panel.lines:
                 _draw(axes, looks[line.label], line)
-            style.dress(axes, sides.along, panel.header if panel.least else f"{sides.place} {panel.header}")
-            style.readable(axes, panel.lines[0].x)
+            style.label_axes(axes, sides.along, panel.header if panel.least else f"{sides.place} {panel.header}")
+            style.log_if_wide(axes, panel.lines[0].x)
             if panel.least:
                 axes.axhline(0.0, color=looks[first].color, lw=_LINE)
                 style.least_span(axes, panel.least)
@@ -54,4 +52,6 @@ def _draw(axes: Axes, look: style.Style, line: Line) -> None:
     """A line with its band."""
     drawn = {"color": look.color, "ls": _DASHES[line.level], "lw": _LINE, "marker": look.marker}
     axes.plot(line.x, line.value, markevery=max(line.x.size // _MARKS, 1), **drawn, **style.POINT)
-    axes.fill_between(line.x, line.low, line.high, color=look.color, alpha=_BAND, lw=0)
+    axes.fill_between(
+        line.x, line.low, line.high, color=look.color, alpha=0.18, lw=0
+    )  # bands of several results lie on each other

@@ -21,27 +21,21 @@ from bushfit.report.plots.points import (
     Points,
     by_direction,
     by_kind,
-    held_beside,
+    held_with,
     means,
     outliers,
     over_sectors,
-    turn,
+    phase_after_turn,
 )
-from bushfit.report.plots.prediction import FINE, draw, draw_as_it_came, points_note
+from bushfit.report.plots.prediction import FINE, draw, draw_unheld, points_note
 from bushfit.units import for_people, told
 
-#: Height of a panel of residuals [inch].
-_STRIP = 2.6 / style.CM
+#: Height of a panel of residuals [cm].
+_STRIP = 2.6
 #: Most rows of a loop that are drawn: a panel is some 400 pixels wide, and a loop crosses it several times.
 _MOST_ROWS = 1600
-#: Amplitudes that were stepped over more than this ratio lie on a logarithmic axis: chosen, half a decade.
-_DECADES = 3.0
-#: Height of the panels of loops over that of others: a hysteresis loop wants a square.
-_LOOPS_HEIGHT = 1.25
-
 _RESIDUALS = "Residuals: model less measured in units of noise; 95 % of them should lie in the grey."
 _OUTLIERS = "Crosses: outliers, at the edge where they lie beyond it."
-_MEANS = f"Lines there: means over {360 // SECTORS} deg."
 
 
 def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> Figure:
@@ -55,9 +49,9 @@ def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> F
     grid = figure.subplots(2 * len(kinds), 2, squeeze=False, height_ratios=[style.ROW, _STRIP] * len(kinds))
     for (kind, mine), pair, strips in zip(kinds.items(), grid[::2], grid[1::2], strict=True):
         if kind.stepped is None:
-            draw_as_it_came(pair, kind.place, model, mine)
+            draw_unheld(pair, kind.place, model, mine)
         else:
-            points, held = means(mine), held_beside(kind.axis)
+            points, held = means(mine), held_with(kind.axis)
             levels = np.unique(getattr(points, held))
             as_measured = means([sweep.noise_free(model) for sweep in mine]) if model.knows_circumstances else None
             lines = as_measured or _model_lines(model, kind.place, points, kind.axis)
@@ -80,12 +74,12 @@ def _draw_residuals(
             marker = style.DOT | {"color": look.color, "alpha": 0.8}
             strip.plot(x[place][at], residuals[place][at], look.marker, **marker)
         strip.sharex(panel)
-        style.dress(strip, panel.get_xlabel(), f"{name} residual\n/ noise")
+        style.label_axes(strip, panel.get_xlabel(), f"{name} residual\n/ noise")
         reach = np.concatenate(x)
-        if kind.axis == "amplitude" and reach.max() > _DECADES * reach.min():
+        if kind.axis == "amplitude" and reach.max() > 3.0 * reach.min():  # half a decade
             style.logarithmic(strip, reach)
         else:
-            style.readable(strip, reach)
+            style.log_if_wide(strip, reach)
         panel.tick_params(labelbottom=False)
         panel.set_xlabel("")
         style.noise_band(strip)
@@ -101,7 +95,7 @@ def _looks(data_sets: Sequence[SweepData], kind: Kind) -> Iterator[tuple[style.S
         for place, look in enumerate(style.styles(len(data_sets), "loop")):
             yield look._replace(marker="o"), place, data_sets[place].weights > 0.0
         return
-    held = held_beside(kind.axis)
+    held = held_with(kind.axis)
     levels = np.unique(np.concatenate([getattr(data_set.standing(), held) for data_set in data_sets]))
     for place, data_set in enumerate(data_sets):
         for look, level in zip(style.styles(levels.size, held), levels, strict=True):
@@ -115,7 +109,7 @@ def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Fig
     rig, since loops hold them.
     """
     directions = by_direction(data_sets)
-    figure = style.new_figure(title, _LOOPS_HEIGHT * style.ROW * len(directions))
+    figure = style.new_figure(title, 1.25 * style.ROW * len(directions))  # a hysteresis loop wants a square
     grid = figure.subplots(len(directions), 2, squeeze=False, width_ratios=[1.15, 1.0])
     for (direction, mine), (loop_panel, phase_panel) in zip(directions.items(), grid, strict=True):
         _draw_loops(loop_panel, model, direction, mine)
@@ -123,7 +117,11 @@ def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Fig
         loops_legend(phase_panel, mine, besides={"model": Line2D([], [], color=style.INK, lw=0.8)})
     note = _OUTLIERS if any(data_set.drive.outliers["force"].rows.size for data_set in data_sets) else ""
     style.explain(
-        figure, "Left: measured force over the motion cleared of noise; black: model.", _RESIDUALS, _MEANS, note
+        figure,
+        "Left: measured force over the motion cleared of noise; black: model.",
+        _RESIDUALS,
+        f"Lines there: means over {360 // SECTORS} deg.",
+        note,
     )
     return figure
 
@@ -134,7 +132,7 @@ def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[
     largest = max(float(np.abs(data_set.drive.force).max()) for data_set in data_sets)
     force_unit, factor = for_people(*force_units, largest)
     motion_name, force_name, _ = direction.motion.words
-    style.dress(axes, f"{motion_name} [{unit}]", f"{direction} {force_name} [{force_unit}]")
+    style.label_axes(axes, f"{motion_name} [{unit}]", f"{direction} {force_name} [{force_unit}]")
     for data_set, look in zip(data_sets, style.styles(len(data_sets), "loop"), strict=True):
         drive, rows = data_set.drive, _drawn_rows(data_set)
         phase = drive.phase[rows]
@@ -149,10 +147,10 @@ def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[
 
 def _draw_over_phase(axes: Axes, model: Model, data_sets: Sequence[LoopData]) -> None:
     """Residuals of one direction's loops over the phase of the cycle, and their means."""
-    style.dress(axes, "phase after the upper turn [deg]", "residual / noise")
+    style.label_axes(axes, "phase after the upper turn [deg]", "residual / noise")
     for data_set, look in zip(data_sets, style.styles(len(data_sets), "loop"), strict=True):
         rows, residual = _drawn_rows(data_set), data_set.misfit(model)
-        axes.plot(turn(data_set)[rows], residual[rows], ".", color=look.color, alpha=0.4, **style.DOT)
+        axes.plot(phase_after_turn(data_set)[rows], residual[rows], ".", color=look.color, alpha=0.4, **style.DOT)
         middle, shares = over_sectors(data_set)
         axes.plot(middle, shares @ residual, color=look.color, ls=look.dashes, lw=1.4)
     style.noise_band(axes)
@@ -180,7 +178,7 @@ def loop_labels(data_sets: Sequence[LoopData]) -> list[str]:
 
 def _model_lines(model: Model, direction: Place, points: Points, axis: Axis) -> Points:
     """The model over what was stepped through at each value that was held meanwhile, as far as it was measured."""
-    along, held = getattr(points, axis), getattr(points, held_beside(axis))
+    along, held = getattr(points, axis), getattr(points, held_with(axis))
     levels = np.unique(held)
     spans = [along[held == level] for level in levels]
     stepped = np.concatenate([np.geomspace(span.min(), span.max(), FINE) for span in spans])

@@ -25,58 +25,25 @@ from bushfit.report.plots.points import SECTORS, Kind, by_direction, by_kind
 from bushfit.report.plots.prediction import axis_label
 from bushfit.units import told
 
-#: Height of a row of a map [inch].
-_LEVEL = 0.6 / style.CM
-#: Least height of a map [inch]: its name needs two lines.
-_LEAST_MAP = 1.7 / style.CM
-#: Largest height of a map [inch]: six of them, of three directions, just fill a page.
-_LARGEST_MAP = 4.2 / style.CM
-#: Height of the panels of loops, with their legend [inch].
-_LOOPS = 4.4 / style.CM
-#: Height of a line of the loops' legend [inch].
-_LEGEND_LINE = 0.42 / style.CM
-#: Lines of legend for which the panels of loops have room.
-_LEGEND_LINES = 4
-#: Most columns of the loops' legend over the width of a figure.
-_LEGEND_COLUMNS = 4
-#: Letters of the loops' legend over the width of a figure.
-_LEGEND_LETTERS = 96
-#: Letters for which the handle of a legend's entry has room.
-_HANDLE_LETTERS = 7
-#: Height of the scale of colours [inch].
-_SCALE = 2.6 / style.CM
-#: Height of a line of the summary [inch].
-_LINE = 0.42 / style.CM
+#: Height of a row of a map; least and largest height of a map, whose name needs two lines, and six of which, of three
+#: directions, just fill a page; height of the scale of colours [cm].
+_LEVEL, _LEAST_MAP, _LARGEST_MAP, _SCALE = 0.6, 1.7, 4.2, 2.6
+#: Height of the panels of loops [cm], with a legend of so many lines.
+_LOOPS, _LEGEND_LINES = 4.4, 4
+#: Columns and letters of the loops' legend over the width of a figure; letters that the handle of an entry takes.
+_LEGEND_COLUMNS, _LEGEND_LETTERS, _HANDLE_LETTERS = 4, 96, 7
 #: Where the colour changes, in units of noise: about 1, 2, 5 in each decade.
 _EDGES = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
-#: Fewest edges of a scale, so that what lies within the noise never looks like a find.
-_LEAST_EDGES = 4
 #: Share of the points that may lie beyond the end of the scale: some outliers, so that they do not stretch it.
 _BEYOND = 0.02
-#: Of more edges, below and above, every other one bears its number: all would run together.
-_MOST_EDGES = 14
-#: The first colour off white, as a share of the way to the darkest: it is just seen.
-_FAINT = 0.12
 #: Cells this far below the model bear a bar, in units of noise: red and blue are one grey in a print without colours.
 _BARRED = 3.0
-#: Share of a cell's width that a bar leaves free on either side.
-_BAR_INSET = 0.3
-#: A step this many times its neighbour is a point that was left out, not a coarse grid.
-_HOLE = 1.75
 #: Loops further off than this, in units of noise, are drawn on a scale that is logarithmic in the end.
 _FAR = 40.0
 #: Up to where that scale is linear, in units of noise: a little more than a right model scatters.
 _NEAR = 5.0
-#: Shade of what is measured and within the noise: nothing that was measured is white.
-_WITHIN = 0.92
-#: Most labels of a map's rows.
-_MOST_LABELS = 10
-#: Letters in a line of the summary, as many as the width of a figure holds.
-_SUMMARY_LETTERS = 92
 #: How the name of a row stands left of its ticks.
 _LEVEL_NAME: dict[str, Any] = {"rotation": 0, "ha": "right", "va": "center", "ma": "center"}
-#: Letters in a line of a column's heading, as many as half the width holds.
-_COLUMN_LETTERS = 40
 
 
 def gap_figure(
@@ -104,8 +71,8 @@ def gap_figure(
     levels = [np.unique(sides[0].maps[kind].points.held).size for kind, _ in rows]
     heights = [min(max(_LEVEL * count, _LEAST_MAP), _LARGEST_MAP) for count in levels]
     heights += [_loops_height(mine, len(sides)) for mine in loops.values()]
-    lines = textwrap.wrap(summary, _SUMMARY_LETTERS)
-    figure = style.new_figure(title, sum(heights) + _SCALE * bool(rows) + _LINE * (len(lines) + 2))
+    lines = textwrap.wrap(summary, 92)  # as many letters as the width of a figure holds
+    figure = style.new_figure(title, sum(heights) + _SCALE * bool(rows) + style.LINE * (len(lines) + 2))
     body: SubFigure = figure.subfigures(1, 1, squeeze=False)[0, 0]
     body.suptitle("\n".join(lines), fontsize=style.TEXT, color=style.INK, family=style.fonts(), parse_math=False)
     grid = body.subplots(len(heights), len(sides), squeeze=False, height_ratios=heights)
@@ -128,7 +95,7 @@ def _loops_height(data_sets: Sequence[LoopData], sides: int) -> float:
     labels = loop_labels(data_sets)
     entries = min(len(labels), style.MOST_NAMED + 1)  # one more says how many are not named
     lines = math.ceil(entries / _legend_columns(labels, sides)) * len(labels[0].splitlines())
-    return _LOOPS + _LEGEND_LINE * max(0, lines - _LEGEND_LINES)
+    return _LOOPS + style.LINE * max(0, lines - _LEGEND_LINES)
 
 
 def _legend_columns(labels: Sequence[str], sides: int) -> int:
@@ -147,10 +114,10 @@ def _scale(sides: Sequence[Side]) -> tuple[Array, ScalarMappable]:
         np.concatenate([part for side in sides for drawn in side.maps.values() for part in (drawn.storage, drawn.loss)])
     )
     needed = int(np.searchsorted(_EDGES, np.quantile(values, 1.0 - _BEYOND))) + 1
-    edges = np.array(_EDGES[: max(needed, _LEAST_EDGES)])
-    shades = np.linspace(_FAINT, 1.0, edges.size) / 2.0
+    edges = np.array(_EDGES[: max(needed, 4)])  # with fewer, what lies within the noise would look like a find
+    shades = np.linspace(0.12, 1.0, edges.size) / 2.0  # the first is just seen
     colors = colormaps["RdBu_r"](0.5 + np.concatenate((-shades[::-1], [0.0], shades)))
-    colors[edges.size, :3] = _WITHIN
+    colors[edges.size, :3] = 0.92  # within the noise: nothing that was measured is white
     both = np.concatenate((-edges[::-1], edges))
     return both, ScalarMappable(BoundaryNorm(both, len(colors), extend="both"), ListedColormap(colors))
 
@@ -172,7 +139,7 @@ def _draw_map(axes: Axes, kind: Kind, drawn: Map, part: str, colors: ScalarMappa
         PolyCollection(list(cells), array=values, norm=colors.norm, cmap=colors.cmap, ec="face", lw=0.2), autolim=False
     )
     below = values < -_BARRED
-    inset = _BAR_INSET * (high - low)[below]
+    inset = 0.3 * (high - low)[below]
     axes.hlines(row[below], low[below] + inset, high[below] - inset, color="white", lw=1.1)
     axes.hlines(np.arange(1, levels.size) - 0.5, low.min(), high.max(), color="white", lw=1.5)
     axes.set(ylim=(-0.5, levels.size - 0.5))
@@ -181,7 +148,7 @@ def _draw_map(axes: Axes, kind: Kind, drawn: Map, part: str, colors: ScalarMappa
     axes.set_xlim(low.min(), high.max())
     axes.tick_params(labelsize=style.SMALL, colors=style.INK)
     axes.spines[:].set_color(style.GREY)
-    axes.set_yticks(np.arange(0, levels.size, math.ceil(levels.size / _MOST_LABELS)))
+    axes.set_yticks(np.arange(0, levels.size, math.ceil(levels.size / 10)))
 
 
 def _evenly(along: Array) -> bool:
@@ -202,7 +169,8 @@ def _cells(along: Array, *, logarithmic: bool) -> tuple[Array, Array]:
     x = np.log(along) if logarithmic else along
     steps = np.diff(x) if x.size > 1 else np.array([0.2 if logarithmic else 0.2 * x[0]])
     left, right = (np.concatenate(ends)[: x.size] for ends in ((steps[:1], steps), (steps, steps[-1:])))
-    left, right = np.where(left > _HOLE * right, right, left), np.where(right > _HOLE * left, left, right)
+    far = 1.75  # a step so many times its neighbour is a point that was left out, not a coarse grid
+    left, right = np.where(left > far * right, right, left), np.where(right > far * left, left, right)
     low, high = x - left / 2.0, x + right / 2.0
     return (np.exp(low), np.exp(high)) if logarithmic else (np.maximum(low, 0.0), high)
 
@@ -217,7 +185,7 @@ def _label_maps(row: Sequence[Axes], kind: Kind, part: str, drawn: Map, sweeps: 
         axes.tick_params(labelleft=axes is row[0], labelbottom=part == "loss")
         if part == "loss":
             axes.set_xlabel(axis_label(kind.place, kind.axis), **style.NAMES)
-    style.name_left(row[0], f"{kind.place}\n{part}", **_LEVEL_NAME)
+    style.label_left(row[0], f"{kind.place}\n{part}", **_LEVEL_NAME)
 
 
 def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
@@ -225,7 +193,7 @@ def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
     legend = row[0].get_legend()
     height = legend.get_window_extent().height * 72.0 / row[0].figure.dpi if legend else 0.0
     for axes, side in zip(row, sides, strict=True):
-        lines = [*textwrap.wrap(side.title, _COLUMN_LETTERS * (3 - len(sides))), f"data fitted {side.gap:.2f} x noise"]
+        lines = [*textwrap.wrap(side.title, 80 // len(sides)), f"data fitted {side.gap:.2f} x noise"]
         axes.set_title(
             "\n".join(lines), fontsize=style.TEXT, color=style.INK, weight="bold", pad=height + 7.0, parse_math=False
         )
@@ -234,7 +202,7 @@ def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
 def _draw_scale(figure: SubFigure, maps: Sequence[Axes], edges: Array, colors: ScalarMappable) -> None:
     """Draw the scale of colours below the maps."""
     bar = figure.colorbar(colors, ax=maps, location="bottom", shrink=0.76, aspect=42, pad=0.03, extendfrac=0.04)
-    every = 1 if edges.size <= _MOST_EDGES else 2
+    every = 1 if edges.size <= 14 else 2  # numbers of more would run together
     from_end = np.minimum(np.arange(edges.size), np.arange(edges.size)[::-1])
     numbers = ["" if place % every else f"{edge:g}" for edge, place in zip(edges, from_end, strict=True)]
     bar.ax.set_xticks(edges, numbers, **style.WORDS)
@@ -254,7 +222,7 @@ def _draw_loops(
     """Draw what is left of one direction's loops over the phase of the cycle, before and after on one scale."""
     furthest = max(float(np.abs(curve.values).max()) for curves in sides for curve in curves)
     for axes, curves in zip(row, sides, strict=True):
-        style.dress(axes, "phase after the upper turn [deg]", "")
+        style.label_axes(axes, "phase after the upper turn [deg]", "")
         for curve, look in zip(curves, style.styles(len(curves), "loop"), strict=True):
             axes.plot(curve.phase, curve.values, color=look.color, ls=look.dashes, lw=1.3)
         if furthest > _FAR:
@@ -269,7 +237,7 @@ def _draw_loops(
     for axes in row:
         axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
         axes.tick_params(labelleft=axes is row[0])
-    style.name_left(row[0], f"{direction}\nloops\n/ noise", **_LEVEL_NAME)
+    style.label_left(row[0], f"{direction}\nloops\n/ noise", **_LEVEL_NAME)
     loops_legend(
         row[0],
         data_sets,

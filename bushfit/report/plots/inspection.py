@@ -10,7 +10,7 @@ from matplotlib.gridspec import SubplotSpec
 from bushfit.inspection.record import Inspected
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.plots import style
-from bushfit.report.plots.points import BINS, Kind, Repeats, held_beside, ranges
+from bushfit.report.plots.points import BINS, Kind, Repeats, held_with, ranges
 from bushfit.report.plots.prediction import axis_label
 from bushfit.units import for_people, told
 
@@ -18,19 +18,15 @@ from bushfit.units import for_people, told
 _COLOR = "#3b528b"
 #: Most rows of a loop that are drawn over the displacement: more are not told apart.
 _MOST_ROWS = 6000
-#: Height of a row's title [inch].
-_TITLE = 0.7 / style.CM
-#: Most letters of a file's name in a row's title: what is said of the file follows it on the same line.
-_NAME_LETTERS = 48
 
 
 def inspection_figure(files: Sequence[Inspected]) -> Figure:
     """A row a file: a loop over displacement and over time, a sweep over frequency, a history over time."""
-    figure = style.new_figure("Test files as they are", (style.ROW + _TITLE) * len(files))
+    figure = style.new_figure("Test files as they are", (style.ROW + 0.7) * len(files))
     grid = figure.add_gridspec(len(files), 1)
     for row, seen in enumerate(files):
         place = grid[row, 0]
-        name = style.file_name(seen.label, _NAME_LETTERS)
+        name = style.file_name(seen.label, letters=48)  # what is said of the file stands on the same line
         words = f"{seen.kind}, {seen.direction or 'direction unknown'}"
         words += ", force turned" * (seen.entry.get("force_sign") == -1)
         title = f"{name}: {words}" + (f", {len(seen.looked.odd)} odd" if seen.looked.odd else "")
@@ -61,7 +57,7 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
             axes.plot(history.time, values, lw=0.8, color=_COLOR)
         else:
             axes.fill_between(*ranges(history.time, values), step="post", color=_COLOR, lw=0.6)
-        style.dress(axes, "time [s]" if history.timed else "time rebuilt [s]", label)
+        style.label_axes(axes, "time [s]" if history.timed else "time rebuilt [s]", label)
     figure.align_ylabels(over_time)
     over_time[0].tick_params(labelbottom=False)
     over_time[0].set_xlabel("")
@@ -70,7 +66,7 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
     axes = figure.add_subplot(grid[:, 0])
     step = max(1, -(-history.time.size // _MOST_ROWS))
     axes.plot(motion[::step], load[::step], ".", ms=1.2, mew=0, color=_COLOR, alpha=0.7)
-    style.dress(axes, f"{names[0]} [{length}]", f"{names[1]} [{force}]")
+    style.label_axes(axes, f"{names[0]} [{length}]", f"{names[1]} [{force}]")
     return axes
 
 
@@ -80,7 +76,7 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
     stiffness, factor = for_people(*units.stiffness, float(np.abs(sweep.stiffness).max()))
     pair = place.subgridspec(1, 2).subplots(squeeze=False)[0]
     axis = Kind(sweep.direction, sweep.stepped).axis
-    held = held_beside(axis)
+    held = held_with(axis)
     scales = {"frequency": ("Hz", 1.0), "amplitude": units.displacement}
     (_, x_factor), (unit, length) = scales[axis], scales[held]
     x, at_level = x_factor * getattr(sweep, axis), sweep.held
@@ -96,8 +92,8 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
             points = Repeats.at(x[at], at_level[at])
             axes.plot(points.along, points.mean(values[at]), color=look.color, ls=look.dashes, lw=0.8)
             axes.plot(x[at], values[at], look.marker, color=look.color, alpha=0.75, **style.POINT)
-        style.dress(axes, axis_label(sweep.direction, axis), label)
-        style.readable(axes, x)
+        style.label_axes(axes, axis_label(sweep.direction, axis), label)
+        style.log_if_wide(axes, x)
     labels = [told(unit, length * level) for level in levels]
     if sweep.stepped:
         style.name_levels(pair[-1], labels, held, [True] * levels.size)

@@ -46,8 +46,8 @@ def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> F
                 axes.plot(*points, "o", color=look.color, **style.DOT)
             axes.plot(frequency, part(line), color=style.INK, lw=1.1, zorder=3)
             style.logarithmic(axes, reach)
-        style.dress(stiffness, "reduced frequency f a_T [Hz]", f"{place}\n|{words(place)[2]}| [{unit}]")
-        style.dress(loss, "reduced frequency f a_T [Hz]", "loss factor [-]")
+        style.label_axes(stiffness, "reduced frequency f a_T [Hz]", f"{place}\n|{words(place)[2]}| [{unit}]")
+        style.label_axes(loss, "reduced frequency f a_T [Hz]", "loss factor [-]")
         style.name_levels(loss, [f"{degree:g}" for degree in degrees], "temperature", [True] * len(degrees))
     style.explain(
         figure,
@@ -71,8 +71,8 @@ def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -
         axes.fill_between(fine - CELSIUS, base - Z95 * error, base + Z95 * error, color="#ebebeb", lw=0)
         axes.plot(fine - CELSIUS, base, color=style.INK, lw=1.1)
         axes.errorbar(kelvin - CELSIUS, points, Z95 * unsure, fmt="o", color=color, lw=0.8, **style.POINT)
-    style.dress(factors, "temperature [degC]", "log10 a_T [-]")
-    style.dress(off, "temperature [degC]", "log10 a_T, own less law [-]")
+    style.label_axes(factors, "temperature [degC]", "log10 a_T [-]")
+    style.label_axes(off, "temperature [degC]", "log10 a_T, own less law [-]")
     style.explain(
         figure,
         f"Line: the law, with a shift of {number(result.model.values[SHIFT], 3)} 1/K at 23 degC, grey its 95 % band.",

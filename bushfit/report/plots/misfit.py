@@ -9,7 +9,7 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.geometry import Place
 from bushfit.model.model import Model
-from bushfit.report.plots.points import Kind, Repeats, held_beside, over_sectors
+from bushfit.report.plots.points import Kind, Repeats, held_with, over_sectors
 
 #: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
 _MOST_ROWS = 24
@@ -85,7 +85,7 @@ def _map(model: Model, kind: Kind, data_sets: Sequence[SweepData]) -> Map:
     Repeats differ by what scatters from point to point and by what each block shares: both average out.
     """
     repeated = bool(Repeats.of(data_sets).count.max() > 1)
-    axes = kind.axis, held_beside(kind.axis)
+    axes = kind.axis, held_with(kind.axis)
     along, held = (np.concatenate([getattr(data_set, name) for data_set in data_sets]) for name in axes)
     if kind.stepped is None:
         held = np.repeat(np.arange(1.0, len(data_sets) + 1.0), [data_set.frequency.size for data_set in data_sets])

@@ -14,6 +14,7 @@ from bushfit.effects.contract import Array
 from bushfit.geometry import Place
 from bushfit.planning.contract import Plan, Programme, Test, operating_points
 from bushfit.report.plots import style
+from bushfit.report.tables import spread
 from bushfit.units import number
 
 #: Colours of the plan, of the standard programme and of what is known before: apart in grey print too.
@@ -22,12 +23,6 @@ _COLORS = {"planned": "#1b6ca8", "standard programme": "#d98324", "known now": s
 _MARKERS = {False: "o", True: "D"}
 #: Diameter of the marker of one run [point]; that of n runs grows with the root of n, so that its area counts them.
 _ONE_RUN = 2.8
-#: Numbers of runs whose markers are explained at most.
-_MOST_SIZES = 4
-#: Markers on a line, or a few more.
-_MARKS = 5
-#: Room around the outermost points, as a factor on a logarithmic axis.
-_ROOM = 1.6
 
 
 def plan_figure(plan: Plan) -> Figure:
@@ -42,7 +37,7 @@ def plan_figure(plan: Plan) -> Figure:
         ends = np.concatenate([_points(test) for test in tests if test.direction == place])
         for axes, (name, programme) in zip(row, programmes.items(), strict=True):
             _draw(axes, [test for test in programme.tests if test.direction == place], _COLORS[name])
-            _dress(axes, place, ends)
+            _label_axes(axes, place, ends)
     for axes, (name, programme) in zip(grid[0], programmes.items(), strict=True):
         title = f"{name}: {len(programme.tests)} runs in {number(programme.hours, 2)} h"
         axes.set_title(title, loc="left", **style.NAMES)
@@ -73,16 +68,16 @@ def _draw(axes: Axes, tests: Sequence[Test], color: str) -> None:
         axes.plot(*_points(test).T, marker=_MARKERS[loop], ms=diameter, **drawn)
 
 
-def _dress(axes: Axes, place: Place, ends: Array) -> None:
-    style.dress(axes, "frequency [Hz]", f"{place} amplitude [{place.display.displacement.name}]")
+def _label_axes(axes: Axes, place: Place, ends: Array) -> None:
+    style.label_axes(axes, "frequency [Hz]", f"{place} amplitude [{place.display.displacement.name}]")
     for along, values in zip(("x", "y"), ends.T, strict=True):
         style.logarithmic(axes, values, along)  # type: ignore[arg-type]
-        axes.set(**{f"{along}lim": (values.min() / _ROOM, values.max() * _ROOM)})
+        axes.set(**{f"{along}lim": (values.min() / 1.6, values.max() * 1.6)})
 
 
 def _name_sizes(axes: Axes, sizes: Sequence[int]) -> None:
     """Say what markers stand for."""
-    shown = [sizes[place] for place in np.unique(np.linspace(0, len(sizes) - 1, _MOST_SIZES).round().astype(int))]
+    shown = [sizes[place] for place in spread(len(sizes), 4)]
     looks: dict[str, Any] = {"color": style.GREY, "ls": "", "mec": "white", "mew": 0.3}
     handles = [Line2D([], [], marker="o", ms=_ONE_RUN * np.sqrt(size), **looks) for size in shown]
     words = [f"sweep, {size} run{'s' * (size > 1)}" for size in shown]
@@ -96,7 +91,7 @@ def _draw_errors(axes: Axes, plan: Plan, programmes: dict[str, Programme]) -> No
     places = np.arange(len(plan.knowledge.names))
     for (name, values), marker in zip(errors.items(), "os^", strict=True):
         axes.plot(100.0 * values, places, marker, color=_COLORS[name], label=name, **style.POINT)
-    style.dress(axes, "standard error [%]", "")
+    style.label_axes(axes, "standard error [%]", "")
     axes.set_yticks(places, plan.knowledge.names, **style.WORDS)
     axes.invert_yaxis()
     style.logarithmic(axes, 100.0 * np.concatenate(list(errors.values())))
@@ -107,9 +102,9 @@ def _draw_stiffness(axes: Axes, programmes: dict[str, Programme]) -> None:
     for (name, programme), marker in zip(programmes.items(), "os", strict=True):
         values = 100.0 * np.sort(programme.stiffness)
         share = 100.0 * (np.arange(values.size) + 0.5) / values.size
-        each = max(values.size // _MARKS, 1)
+        each = max(values.size // 5, 1)
         axes.plot(share, values, color=_COLORS[name], lw=1.3, marker=marker, markevery=each, **style.POINT)
-    style.dress(axes, "share of the points wanted [%]", "error of stiffness [%]")
+    style.label_axes(axes, "share of the points wanted [%]", "error of stiffness [%]")
     axes.set_ylim(bottom=0.0)
     marks = zip(_COLORS.items(), "os^", strict=True)
     handles = [Line2D([], [], color=color, marker=mark, ls="", **style.POINT) for (_, color), mark in marks]

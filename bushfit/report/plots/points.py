@@ -53,7 +53,7 @@ def by_kind(data_sets: Sequence[SweepData]) -> dict[Kind, list[SweepData]]:
     return kinds
 
 
-def held_beside(axis: Axis) -> Axis:
+def held_with(axis: Axis) -> Axis:
     """What is held while the other is stepped through."""
     return "amplitude" if axis == "frequency" else "frequency"
 
@@ -141,7 +141,7 @@ def ranges(time: Array, values: Array) -> tuple[Array, Array, Array]:
     return time[first], np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
 
 
-def turn(data_set: LoopData) -> Array:
+def phase_after_turn(data_set: LoopData) -> Array:
     """Phase of each row after the upper turn of the motion [deg], (n,)."""
     drive = data_set.drive
     return 360.0 * ((drive.phase + np.angle(drive.coefficients[1]) / (2.0 * np.pi)) % 1.0)
@@ -149,6 +149,6 @@ def turn(data_set: LoopData) -> Array:
 
 def over_sectors(data_set: LoopData) -> tuple[Array, Array]:
     """Middle [deg] of each sector of the cycle that holds rows, (k,), and the share of each row in its mean, (k, n)."""
-    sector = (turn(data_set) * (SECTORS / 360.0)).astype(int) % SECTORS
+    sector = (phase_after_turn(data_set) * (SECTORS / 360.0)).astype(int) % SECTORS
     filled, count = np.unique(sector, return_counts=True)
     return (filled + 0.5) * (360.0 / SECTORS), (sector == filled[:, None]) / count[:, None]

@@ -15,35 +15,25 @@ from bushfit.prediction import Band, Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
-from bushfit.report.plots.points import Axis, Points, held_beside, means
+from bushfit.report.plots.points import Axis, Points, held_with, means
 from bushfit.report.tables import IF_RIGS, spread, words
 from bushfit.units import for_people, told
 
 #: Points of a model's line: chosen, no corner is seen at the size of a panel.
 FINE = 60
-#: Most amplitudes over the frequency, as lines: more bands cover each other.
-_MOST_AMPLITUDES = 6
-#: Most frequencies over the amplitude, as lines: the curves of near frequencies lie on each other.
-_MOST_FREQUENCIES = 4
+#: Most amplitudes over the frequency, and frequencies over the amplitude, as lines: more bands cover each other.
+_MOST_AMPLITUDES, _MOST_FREQUENCIES = 6, 4
 #: Width of a model's line [point].
 _LINE = 1.3
-#: Width of the stroke that stands for a line of one point [point].
-_STROKE = 14.0
 #: Width of a line with the rig's effects [point].
 _THIN = 0.6
-#: Width of the white core that makes a line of the other reading a double one [point].
-_CORE = 0.7
-#: Width of such a line [point].
-_DOUBLE = 2.4
+#: Width of a double line, which shows the other reading, and of its white core [point].
+_DOUBLE, _CORE = 2.4, 0.7
 #: A measured point belongs to a predicted level if it, or the level it shares with other tests, is as near as this,
 #: relative: a rig that misses its set point.
 _SAME = 0.01
 #: Relative error that a file states of a point, from which it is not drawn; chosen: such points hide the others.
 _WORST_DRAWN = 0.05
-#: Least span of the axis of stiffness, relative to the largest: a flat curve shall look flat.
-_LEAST_STIFFNESS_SPAN = 0.04
-#: Least span of the axis of the loss factor [-].
-_LEAST_LOSS_SPAN = 0.01
 
 
 def fine_grid(prediction: Prediction) -> tuple[Array, Array]:
@@ -102,7 +92,7 @@ def prediction_figure(
     drawn = [draw(pair, prediction.direction, lines, points, *row, rig, lines.if_rigs) for pair, row in pairs]
     laid = any(drawn)
     if free and model:
-        draw_as_it_came(grid[0], prediction.direction, model, free)
+        draw_unheld(grid[0], prediction.direction, model, free)
     banded = np.any(lines.stiffness.high > lines.stiffness.low)
     shade = "; shaded: its 95 % band, where that is wider than the line" if banded else ""
     through = " Thin lines: the same with what belongs to the rig, as the points were measured." if laid and rig else ""
@@ -136,7 +126,7 @@ def draw(
     `levels` are what is held, (k,): amplitudes [m or rad] or frequencies [Hz]; `rig` is the model with what belongs to
     the rig, as thin lines where there are points; `if_rigs` the other reading of what is unresolved, as double lines.
     """
-    held, units = held_beside(axis), direction.display
+    held, units = held_with(axis), direction.display
     scales = {"frequency": ("Hz", 1.0), "amplitude": units.displacement}
     _, scale = scales[axis]
     x, where = scale * getattr(lines, axis), scale * getattr(points, axis)
@@ -160,9 +150,9 @@ def draw(
                 if rig is not None:
                     axes.plot(x[at], factor * getattr(rig, kind).value[at], color=look.color, lw=_THIN)
                 _draw_points(axes, look, where, point, spots)
-        style.dress(axes, axis_label(direction, axis), name)
-        style.readable(axes, x)
-        style.least_span(axes, _LEAST_STIFFNESS_SPAN * line.high.max() if kind == "stiffness" else _LEAST_LOSS_SPAN)
+        style.label_axes(axes, axis_label(direction, axis), name)
+        style.log_if_wide(axes, x)
+        style.least_span(axes, 0.04 * line.high.max() if kind == "stiffness" else 0.01)  # flat curves shall look flat
     bushing = Line2D([], [], color=style.INK, lw=_LINE)
     besides: dict[str, Line2D | tuple[Line2D, ...]] = {}
     if laid and rig:
@@ -195,7 +185,7 @@ def _scaled(band: Band, factor: float) -> Band:
 def _draw_line(axes: Axes, look: style.Style, x: Array, band: Band, at: Array) -> None:
     """A line with its band; a stroke where it has but one point."""
     marker = "_" if at.sum() == 1 else ""
-    axes.plot(x[at], band.value[at], color=look.color, ls=look.dashes, lw=_LINE, marker=marker, ms=_STROKE)
+    axes.plot(x[at], band.value[at], color=look.color, ls=look.dashes, lw=_LINE, marker=marker, ms=14.0)
     axes.fill_between(x[at], band.low[at], band.high[at], color=look.color, alpha=0.22, lw=0)
 
 
@@ -219,7 +209,7 @@ def axis_label(place: Place, axis: Axis) -> str:
     return "frequency [Hz]" if axis == "frequency" else f"{words(place)[0]} [{place.display.displacement.name}]"
 
 
-def draw_as_it_came(pair: Sequence[Axes], place: Place, model: Model, data_sets: Sequence[SweepData]) -> None:
+def draw_unheld(pair: Sequence[Axes], place: Place, model: Model, data_sets: Sequence[SweepData]) -> None:
     """Draw sweeps that held nothing over the frequency: points as measured, and the model at the same points."""
     factor, names = pair_labels(place, max(float(np.abs(data_set.measured).max()) for data_set in data_sets))
     looks = style.styles(len(data_sets), "loop")
@@ -231,7 +221,7 @@ def draw_as_it_came(pair: Sequence[Axes], place: Place, model: Model, data_sets:
             measured, modelled = (scale * quantity(k)[rising] for k in (data_set.measured, data_set.stiffness(model)))
             axes.plot(frequency[known], measured[known], "o", color=look.color, alpha=0.5, **style.DOT)
             axes.plot(frequency, modelled, color=look.color, lw=_LINE)
-        style.dress(axes, "frequency [Hz]", name)
+        style.label_axes(axes, "frequency [Hz]", name)
     handles = [Line2D([], [], color=look.color, lw=_LINE) for look in looks]
     style.legend(pair[-1], handles, [style.file_name(data_set.name) for data_set in data_sets], "test")
 

@@ -14,16 +14,10 @@ from bushfit.report.plots.points import ranges
 from bushfit.report.plots.prediction import pair_labels
 from bushfit.units import told
 
-#: Height of a history [inch].
-_STRIP = 2.7 / style.CM
-#: Height of the panels of noise and distortion [inch].
-_NOISE_ROW = 4.2 / style.CM
+#: Height of a history, and of the panels of noise and distortion [cm].
+_STRIP, _NOISE_ROW = 2.7, 4.2
 #: Most histories that are drawn: with more the figure leaves the page.
 _MOST_HISTORIES = 4
-#: Most letters of a history's name above its panel, as many as fit on a line.
-_NAME_LETTERS = 100
-#: Colour of what was not used.
-_UNUSED = "#c8c8c8"
 
 
 def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str) -> Figure:
@@ -41,9 +35,8 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
         strip = figure.add_subplot(grid[row, :])
         _draw_history(strip, history, reduction, looks)
         if len(histories) > 1:  # the title names one
-            strip.set_title(
-                style.file_name(history.name, _NAME_LETTERS), fontsize=style.SMALL, loc="left", color=style.GREY, pad=2
-            )
+            name = style.file_name(history.name, letters=100)  # as many as fit on a line
+            strip.set_title(name, fontsize=style.SMALL, loc="left", color=style.GREY, pad=2)
     points = [figure.add_subplot(grid[len(shown), column]) for column in range(2)]
     _draw_points(points, reduction, steps, looks)
     quality = [figure.add_subplot(grid[len(shown) + 1, column], sharex=points[0]) for column in range(2)]
@@ -62,13 +55,13 @@ def _draw_history(axes: Axes, history: Loop, reduction: Reduction, looks: dict[f
     """Displacement over time; what was used has the colour of its level."""
     unit, factor = reduction.direction.display.displacement
     time, low, high = ranges(history.time, factor * history.displacement)
-    axes.fill_between(time, low, high, color=_UNUSED, lw=0.4, step="post")
+    axes.fill_between(time, low, high, color="#c8c8c8", lw=0.4, step="post")
     for level, look in looks.items():
         mine = [step for step in reduction.steps if step.name == history.name and step.level == level]
         inside = [(time >= step.start) & (time <= step.end) for step in mine]
         used = np.any([np.zeros(time.shape, dtype=bool), *inside], axis=0)
         axes.fill_between(time, low, high, where=used, color=look.color, lw=0.4, step="post")
-    style.dress(axes, "time [s]", f"{reduction.direction.motion.words[0]}\n[{unit}]")
+    style.label_axes(axes, "time [s]", f"{reduction.direction.motion.words[0]}\n[{unit}]")
     axes.margins(x=0.01)
 
 
@@ -88,9 +81,9 @@ def _draw_points(
             axes.vlines(frequency, value - 2 * error, value + 2 * error, color=look.color, lw=0.9)
             axes.plot(frequency, value, look.marker, color=look.color, **style.POINT)
     for axes, name in zip(pair, names, strict=True):
-        style.dress(axes, "", name)
+        style.label_axes(axes, "", name)
         axes.tick_params(labelbottom=False)
-        style.readable(axes, steps["frequency"].to_numpy())
+        style.log_if_wide(axes, steps["frequency"].to_numpy())
     handles = [look.handle(True) for look in looks.values()]
     style.legend(pair[-1], handles, [told(unit, length * level, digits=4) for level in looks], "amplitude")
 
@@ -109,6 +102,6 @@ def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, 
         for axes, share, words in drawn:
             axes.plot(mine["frequency"], 100 * share, look.marker, color=look.color, **words)
     for axes, name in zip(pair, ("noise [%]", "distortion [%]"), strict=True):
-        style.dress(axes, "frequency [Hz]", name)
+        style.label_axes(axes, "frequency [Hz]", name)
         axes.set_ylim(bottom=0.0)
-        style.readable(axes, steps["frequency"].to_numpy())
+        style.log_if_wide(axes, steps["frequency"].to_numpy())

@@ -23,7 +23,7 @@ def resonance_figure(found: Resonance, title: str) -> Figure:
     )
     for axes, values, label in upper:
         axes.plot(found.frequency, values, "o", color=color, **style.DOT)
-        style.dress(axes, "", label)
+        style.label_axes(axes, "", label)
         style.logarithmic(axes, values, "y")
     ratio.plot(found.test.frequency, np.abs(found.test.transmissibility), color=style.GREY, lw=0.7, zorder=1)
     frequency, largest = found.peak
@@ -39,8 +39,8 @@ def resonance_figure(found: Resonance, title: str) -> Figure:
         low, high = axes.get_ylim()
         axes.vlines(found.frequency, values - error, values + error, color=color, lw=0.7, alpha=0.6)
         axes.set_ylim(low, high)
-        style.dress(axes, "frequency [Hz]", label)
-    style.readable(loss, found.test.frequency)
+        style.label_axes(axes, "frequency [Hz]", label)
+    style.log_if_wide(loss, found.test.frequency)
     least = f"Where the error of K is beyond {100 * LARGEST_ERROR:g} % there is no point."
     style.explain(
         figure,

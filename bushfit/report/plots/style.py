@@ -24,14 +24,12 @@ from bushfit.errors import CONTROL, printable
 from bushfit.model.covariance import Z95
 from bushfit.report.tables import spread
 
-#: Centimetres in an inch: lengths are written in centimetres, and matplotlib takes inches.
-CM = 2.54
-#: Width of a figure [inch]: the text of a page of A4.
-WIDTH = 16.0 / CM
-#: Height of a panel [inch]: two in a row are a little wider than high.
-ROW = 5.4 / CM
-#: Height that title and explanation take [inch].
-FRAME = 2.0 / CM
+#: Width of a figure [cm]: the text of a page of A4.
+_WIDTH = 16.0
+#: Height of a panel [cm]: two in a row are a little wider than high.
+ROW = 5.4
+#: Height that title and explanation take, and a line of text [cm].
+FRAME, LINE = 2.0, 0.42
 #: Size of the labels of axes [point].
 TEXT = 8.5
 #: Size of ticks, legends and explanations [point]: the smallest that still reads well in print.
@@ -47,16 +45,12 @@ GREY = "#595959"
 #: How a figure's own words are written: names of axes, and what is smaller.
 NAMES: dict[str, Any] = {"fontsize": TEXT, "color": INK}
 WORDS: dict[str, Any] = {"fontsize": SMALL, "color": INK}
-#: Colour of outliers.
-OUTLIER = "#c1121f"
 #: Resolution of a picture [dots per inch]: sharp in a report, and small enough to be mailed.
 _DPI = 150
 #: By format: what it would say of when and by which version it was written.
 _UNSAID = {"png": ["Software"], "svg": ["Creator", "Date"], "pdf": ["Creator", "Producer", "CreationDate"]}
 #: Most lines that a legend names: more do not fit beside a panel, and more colours are not told apart.
 MOST_NAMED = 8
-#: Most letters of a file's name in a legend: three legend columns of such names fill the width of a figure.
-_NAME_LETTERS = 20
 #: Right of the panel, in matplotlib's words.
 _LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "frameon": False, "handlelength": 3.2}
 #: Colours of what a figure tells apart: a scale each, so that no colour means two things. Loops stay off black.
@@ -72,14 +66,9 @@ _MARKERS = "os^Dv<p>"
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2, 1.2)), (0, (9, 2)))
 #: An axis that spans more than this ratio is logarithmic: chosen, a decade and a half.
 _LOG_RATIO = 40.0
-#: Letters in a line of the title, as many as the width of a figure holds.
-_TITLE_LETTERS = 64
-#: Height of each further line of the title [inch].
-_TITLE_LINE = 0.42 / CM
-#: Letters in a line of a panel's name at its left, as many as the height of a panel holds.
-_LABEL_LETTERS = 27
-#: Letters in a line of the explanation, as many as the width of a figure holds.
-_NOTE_LETTERS = 112
+#: Letters in a line of the title and of the explanation, as many as the width of a figure holds, and of the name of a
+#: panel at its left, as many as its height holds.
+_TITLE_LETTERS, _NOTE_LETTERS, _LABEL_LETTERS = 64, 112, 27
 #: Letters of the warnings below a picture: five lines or so, beside which the panels keep their size.
 _MOST_LETTERS = 600
 #: Fonts that help out for names beyond Latin, Greek and Cyrillic, where they are installed.
@@ -108,10 +97,10 @@ def styles(count: int, what: str) -> list[Style]:
 
 
 def new_figure(title: str, height: float) -> Figure:
-    """An empty figure as wide as a page, of so many inches for its panels, under a title of any letters."""
+    """An empty figure as wide as a page, of so many centimetres for its panels, under a title of any letters."""
     lines = textwrap.wrap(title, _TITLE_LETTERS)
-    height += FRAME + _TITLE_LINE * max(0, len(lines) - 1)
-    figure = Figure(figsize=(WIDTH, height), dpi=_DPI, layout=ConstrainedLayoutEngine(wspace=0.05))
+    height += FRAME + LINE * max(0, len(lines) - 1)
+    figure = Figure(figsize=(_WIDTH / 2.54, height / 2.54), dpi=_DPI, layout=ConstrainedLayoutEngine(wspace=0.05))
     figure.suptitle("\n".join(lines), fontsize=TEXT + 1.5, weight="bold", family=fonts(), parse_math=False)
     return figure
 
@@ -121,10 +110,10 @@ def fonts() -> list[str]:
     return ["DejaVu Sans", *sorted({font.name for font in fontManager.ttflist} & _WIDER_FONTS)]
 
 
-def dress(axes: Axes, x_label: str, y_label: str) -> None:
+def label_axes(axes: Axes, x_label: str, y_label: str) -> None:
     """Give a panel its labels, ticks and a grid behind all that is drawn."""
     axes.set_xlabel(x_label, **NAMES)
-    name_left(axes, y_label)
+    label_left(axes, y_label)
     axes.tick_params(labelsize=SMALL, colors=INK)
     axes.grid(color="#d9d9d9", lw=0.5)
     axes.set_axisbelow(True)
@@ -132,14 +121,14 @@ def dress(axes: Axes, x_label: str, y_label: str) -> None:
     axes.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))
 
 
-def name_left(axes: Axes, label: str, **place: Any) -> None:
+def label_left(axes: Axes, label: str, **place: Any) -> None:
     """Write what a panel shows at its left, in several lines where one would be longer than the panel is high."""
     whole = re.sub(r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), label)
     lines = [part for line in whole.splitlines() for part in textwrap.wrap(line, _LABEL_LETTERS)]
     axes.set_ylabel("\n".join(lines), fontsize=TEXT, color=INK, family=fonts(), parse_math=False, **place)
 
 
-def readable(axes: Axes, values: Array) -> None:
+def log_if_wide(axes: Axes, values: Array) -> None:
     """Make the x axis logarithmic where the values span decades."""
     if values.max() > _LOG_RATIO * values.min():
         logarithmic(axes, values)
@@ -172,7 +161,7 @@ def mark_outliers(axes: Axes, x: Array, y: Array) -> None:
     """Draw crosses at outliers, at the edge of the panel where they lie beyond it."""
     low, high = axes.get_ylim()
     if x.size:
-        axes.plot(x, np.clip(y, low, high), "x", color=OUTLIER, ms=4.5, mew=1.2, zorder=5, clip_on=False)
+        axes.plot(x, np.clip(y, low, high), "x", color="#c1121f", ms=4.5, mew=1.2, zorder=5, clip_on=False)
     axes.set_ylim(low, high)
 
 
@@ -226,20 +215,23 @@ def name_levels(
     bar.outline.set(edgecolor=GREY, linewidth=0.6)
 
 
-def file_name(name: str, letters: int = _NAME_LETTERS) -> str:
-    """The name of a file as text of a figure: its dollars are no formulas, and what is too long loses its middle."""
+def file_name(name: str, letters: int = 20) -> str:
+    """The name of a file as text of a figure: its dollars are no formulas, and what is too long loses its middle.
+
+    Three columns of a legend with names of twenty letters fill the width of a figure.
+    """
     if len(name) > letters:
         name = f"{name[: letters // 2 - 1]}…{name[-letters // 2 :]}"
     return name.replace("$", r"\$")
 
 
-def few(sentences: Sequence[str]) -> str:
+def first_sentences(sentences: Sequence[str]) -> str:
     """The first of some sentences, as many as leave room for the picture, and how many more there are."""
     ends = np.cumsum([len(sentence) for sentence in sentences])
     kept = max(int(np.searchsorted(ends, _MOST_LETTERS)), 1)
     more = len(sentences) - kept
-    told = [sentence[0].upper() + sentence[1:] for sentence in sentences[:kept]]
-    return ". ".join([*told, *([f"And {more} more warnings, in the model file and the report"] if more > 0 else [])])
+    shown = [sentence[0].upper() + sentence[1:] for sentence in sentences[:kept]]
+    return ". ".join([*shown, *([f"And {more} more warnings, in the model file and the report"] if more > 0 else [])])
 
 
 def explain(figure: Figure, *sentences: str) -> None:

@@ -90,11 +90,6 @@ class Tab:
         pdf = base64.b64decode(self.ask("Page.printToPDF", preferCSSPageSize=True, printBackground=True)["data"])
         return len(re.findall(rb"/Type\s*/Page\b", pdf))
 
-    def picture(self, file: Path) -> None:
-        """The whole page as PNG."""
-        shot = self.ask("Page.captureScreenshot", captureBeyondViewport=True)
-        file.write_bytes(base64.b64decode(shot["data"]))
-
 
 @contextmanager
 def tab(profile: Path) -> Iterator[Tab]:

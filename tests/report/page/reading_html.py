@@ -15,6 +15,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from bushfit.errors import BushfitError, printable
+from bushfit.jobs.report import report
+from bushfit.report.contents import pages_of
 
 #: A page at most [bytes].
 LARGEST = 500_000
@@ -161,3 +163,8 @@ def change(file: Path, **keys: object) -> None:
 
 def page_of(folder: Path) -> str:
     return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def made_of(folder: Path) -> str:
+    """The report that is made of what stands in a folder."""
+    return pages_of(report(folder))["report.html"].decode()

@@ -16,13 +16,23 @@ import pytest
 from commandline import call
 from hypothesis import given
 from hypothesis import strategies as st
-from reading_html import LARGEST, NASTY, assert_harmless, assert_page_or_error, drawn, loads, page_of, parsed, spoiled
+from reading_html import (
+    LARGEST,
+    NASTY,
+    assert_harmless,
+    assert_page_or_error,
+    drawn,
+    loads,
+    made_of,
+    page_of,
+    parsed,
+    spoiled,
+)
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
-from bushfit.jobs.report import report
-from bushfit.report.contents import Formats, pages_of
+from bushfit.report.contents import Formats
 from bushfit.report.page import report_page
 from bushfit.report.page.readback import canonical, read_results
 
@@ -41,12 +51,7 @@ def test_run_writes_a_whole_page_that_loads_nothing_and_its_folder_gives_the_sam
     assert len(described) == found.counts["svg"] >= 6
     assert min(map(len, described)) > 40
     assert not [key for _, key, _ in found.attributes if key == "style"], "a content policy would drop it"
-    assert made(results(name)) == page
-
-
-def made(folder: Path) -> str:
-    """The page of what stands in a folder."""
-    return pages_of(report(folder))["report.html"].decode()
+    assert made_of(results(name)) == page
 
 
 def test_diagnose_writes_it_too_and_its_folder_gives_the_same(root: Path, tmp_path: Path) -> None:
@@ -56,7 +61,7 @@ def test_diagnose_writes_it_too_and_its_folder_gives_the_same(root: Path, tmp_pa
     for file, content in files.items():
         (tmp_path / file).write_bytes(content)
     page = files["report.html"].decode()
-    assert made(tmp_path) == page
+    assert made_of(tmp_path) == page
     drawn_of = ("axial: stiffness", "axial: loss factor", "radial: stiffness", "axial: hysteresis")
     for words in (*drawn_of, "bushfit diagnose bushing.toml", "Lines without bands: the model at the measured points."):
         assert words in parsed(page).text
@@ -73,7 +78,7 @@ def test_other_forms_of_tables_are_read_back(results: Results, tmp_path: Path, f
             file.unlink()
         else:
             file.write_bytes(table.to_csv(index=False, sep=";", decimal=",").encode("utf-8-sig"))
-    assert made(folder) == page_of(folder)
+    assert made_of(folder) == page_of(folder)
 
 
 def test_what_it_says_is_what_the_documents_say(results: Results) -> None:
@@ -122,7 +127,7 @@ def test_loops_in_torsion_are_drawn(root: Path, tmp_path: Path) -> None:
     for command in (("simulate", "turned.toml", "-o", "tests"), ("fit-static", "tests/campaign.toml", "-o", "fit")):
         done = call(tmp_path, *command, "-q", "--no-plots")
         assert done.returncode == 0, done.stderr
-    assert "rotation [deg]" in made(tmp_path / "fit")
+    assert "rotation [deg]" in made_of(tmp_path / "fit")
 
 
 @pytest.mark.parametrize(
@@ -222,7 +227,7 @@ def test_any_cell_may_be_spoiled(thinned: Path, tmp_path_factory: Any, data: st.
     cells[column] = data.draw(st.sampled_from(["", "nan", "inf", "-1", "0", "x", "1e300", "1e-300", "axial", "'=1"]))
     lines[row] = ",".join(f'"{cell}"' for cell in cells)
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    assert_page_or_error(lambda: made(folder))
+    assert_page_or_error(lambda: made_of(folder))
 
 
 def test_the_command(root: Path, tmp_path: Path) -> None:

@@ -9,41 +9,29 @@ from pathlib import Path
 
 import pytest
 from commandline import call
-from reading_html import change, loads, page_of, parsed
-
-from bushfit.jobs.report import report
-from bushfit.report.contents import pages_of
+from reading_html import change, loads, made_of, page_of, parsed
 
 
-def test_results_of_older_versions_have_a_page(root: Path, tmp_path: Path) -> None:
-    """Without what a model says of its campaign, and with a gap of residuals alone."""
-    folder = tmp_path / "x"
-    shutil.copytree(root / "data/reports/mystery_mount", folder)
-    change(folder / "model.json", campaign=None)
-    (folder / "gap.csv").write_text("test,kind,direction,force before [noise]\na,loop,axial,1\n")
-    text = parsed(pages_of(report(folder))["report.html"].decode()).text
-    assert "Mystery mount" in text
-    assert "axial: stiffness" in text
-    (folder / "sweeps.csv").unlink()
-    assert "Lines" not in parsed(pages_of(report(folder))["report.html"].decode()).text
-
-
-def test_a_diagnosis_of_an_older_version_has_a_page_and_is_compared(root: Path, tmp_path: Path) -> None:
-    """diagnosis_2.json was written before there were probabilities."""
+def test_results_of_older_versions_have_a_page_and_are_compared(root: Path, tmp_path: Path) -> None:
+    """Without probabilities (diagnosis_2.json), what a model says of its campaign, and all but residuals of the gap."""
     folder = tmp_path / "x"
     shutil.copytree(root / "data/reports/mystery_mount", folder)
     shutil.copy(Path(__file__).with_name("diagnosis_2.json"), folder / "diagnosis.json")
-    done = call(tmp_path, "report", "x")
-    assert done.returncode == 0, done.stderr
-    text = parsed(page_of(folder)).text
-    for words in ("Verdict: named", "sleeve_compliance closes the gap", "Told without odds", "put a steel dummy"):
+    change(folder / "model.json", campaign=None)
+    (folder / "gap.csv").write_text("test,kind,direction,force before [noise]\na,loop,axial,1\n")
+    text = parsed(made_of(folder)).text
+    for words in (
+        *("Mystery mount", "axial: stiffness", "Verdict: named", "sleeve_compliance closes the gap"),
+        *("Told without odds", "put a steel dummy"),
+    ):
         assert words in text
     assert "all but sure" not in text
+    (folder / "sweeps.csv").unlink()
+    assert "Lines" not in parsed(made_of(folder)).text
     done = call(tmp_path, "compare", "x", root / "data/reports/mystery_mount", "-o", "y", "--no-plots")
     assert done.returncode == 0, done.stderr
 
 
-Results = Callable[[str], Path]
 STYLED = re.compile(r"<(style|script)>(.*?)</\1>", re.DOTALL)
 
 
@@ -64,7 +52,7 @@ def assert_current(kept: Path, made: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["cmp_15961", "mystery_mount"])
-def test_the_reports_of_the_readme_are_current(root: Path, results: Results, name: str) -> None:
+def test_the_reports_of_the_readme_are_current(root: Path, results: Callable[[str], Path], name: str) -> None:
     assert_current(root / f"data/reports/{name}.html", results(name) / "report.html")
 
 
@@ -74,16 +62,12 @@ def test_the_report_of_measured_rubber_is_current_and_says_that_the_mount_was_no
     assert_current(root / "data/measured/epdm_70/report.html", measured / "report.html")
     text = parsed(page_of(measured)).text
     assert loads(page_of(measured)) == []
-    for words in (
-        "(not fitted)",
-        "2 blocks in parallel in shear, 772 mm² each, 6 mm thick",
-        "mount 24 %",
-        "Fitted, not diagnosed",
-    ):
+    specimen = "2 blocks in parallel in shear, 772 mm² each, 6 mm thick"
+    for words in ("(not fitted)", specimen, "mount 24 %", "Fitted, not diagnosed"):
         assert words in text
 
 
-def test_the_results_to_try_it_on_are_current(root: Path, results: Results) -> None:
+def test_the_results_to_try_it_on_are_current(root: Path, results: Callable[[str], Path]) -> None:
     made = results("mystery_mount")
     kept = sorted((root / "data/reports/mystery_mount").iterdir())
     assert len(kept) == 5

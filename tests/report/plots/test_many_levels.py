@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,14 +12,15 @@ from figures import Looped, Swept, inside, legend, note, points
 from matplotlib.figure import Figure
 from tries import some
 
-from bushfit.fitting.data_sets import LoopData, loop_data, sweep_data
+from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import DataSet, SweepData, loop_data, sweep_data
 from bushfit.geometry import Direction
 from bushfit.inspection.record import Inspected, Looked
 from bushfit.jobs.grid import default_grid
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction import predict
-from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.measurement import Loop, Stepped, Sweep
 from bushfit.reduction.steps import Reduction, Step
 from bushfit.report.plots.batch import Panel, batch_figure
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
@@ -46,19 +47,23 @@ def checked(figure: Figure) -> Figure:
     return figure
 
 
-@pytest.fixture(scope="module")
-def loops(paper_model: Model, looped: Looped) -> Callable[..., list[LoopData]]:
-    def make(count: int, name: str = "loop") -> list[LoopData]:
-        one = looped(paper_model, 1e-3, cycles=2).test
-        scales = np.linspace(0.5, 2.0, count)
-        return loop_data(
-            [
-                Loop(f"{name} {k}.csv", one.direction, one.time, scale * one.displacement, scale * one.force)
-                for k, scale in enumerate(scales)
-            ]
-        )
+def measured(model: Model, frequency: Array, amplitude: Array, stepped: Stepped | None) -> list[SweepData]:
+    """An axial sweep of a model at these operating points, 1 % noise."""
+    stiffness = model.stiffness("axial", frequency, amplitude)
+    stiffness = stiffness * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(frequency.size))
+    return sweep_data([Sweep("sweep.csv", Direction.AXIAL, frequency, amplitude, stiffness, stepped=stepped)])
 
-    return make
+
+def grid(frequencies: Iterable[float], amplitudes: Iterable[float], scatter: float) -> list[Array]:
+    """Frequency and amplitude of operating points at which each amplitude was missed by a little."""
+    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(list(frequencies), list(amplitudes)))
+    return [frequency, amplitude * (1.0 + scatter * np.random.default_rng(1).standard_normal(amplitude.size))]
+
+
+def check_gaps(model: Model, data_sets: Sequence[DataSet], words: str) -> None:
+    """One column where both models respond alike, and two."""
+    for after in (model, model.with_values({"mu": 1.2 * model.values["mu"]})):
+        checked(gap_figure(model, after, data_sets, words, words))
 
 
 @pytest.mark.parametrize("count", some([2, 8, 40, 300], {40}))
@@ -86,23 +91,19 @@ def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int)
 
 @pytest.mark.slow
 def test_amplitudes_as_each_point_reached_them(paper_model: Model) -> None:
-    """Nothing was held: a line for the inside test, which meets each point at the amplitude that it reached."""
-    random = np.random.default_rng(1)
-    frequency, level = (axis.ravel() for axis in np.meshgrid(np.geomspace(5.0, 155.0, 15), [1e-4, 2e-4, 5e-4]))
-    amplitude = level * (1.0 + 0.02 * random.standard_normal(level.size))
-    stiffness = paper_model.stiffness("axial", frequency, amplitude) * (1.0 + 0.01 * random.standard_normal(level.size))
-    data_sets = sweep_data([Sweep("reached.csv", Direction.AXIAL, frequency, amplitude, stiffness, stepped=None)])
+    """Nothing was held: a line for the whole test, which meets each point at the amplitude that it reached."""
+    frequency, amplitude = grid(np.geomspace(5.0, 155.0, 15), (1e-4, 2e-4, 5e-4), 0.02)
+    data_sets = measured(paper_model, frequency, amplitude, None)
     figure = checked(sweeps_figure(paper_model, data_sets, "reached"))
     (line,) = [line for line in figure.axes[0].lines if line.get_linestyle() != "None"]
     rising = np.argsort(frequency, kind="stable")
     expected = np.abs(paper_model.stiffness("axial", frequency[rising], amplitude[rising])) / 1e3
     np.testing.assert_allclose(line.get_ydata(), expected)
-    assert legend(figure.axes[1]) == ["reached.csv"]
-    assert sum(len(line.get_xdata()) for line in points(figure.axes[0])) == 45, (
-        "each point once, however near the levels are"
-    )
+    assert legend(figure.axes[1]) == ["sweep.csv"]
+    drawn = sum(len(line.get_xdata()) for line in points(figure.axes[0]))
+    assert drawn == 45, "each point once, however near the levels are"
     gap = checked(gap_figure(paper_model, paper_model, data_sets, "reached", ""))
-    assert [text.get_text() for text in gap.axes[0].get_yticklabels()] == ["reached.csv"]
+    assert [text.get_text() for text in gap.axes[0].get_yticklabels()] == ["sweep.csv"]
     prediction = predict(Result(paper_model), Direction.AXIAL, [5.0, 50.0], [1e-4, 5e-4])
     figure = checked(prediction_figure(prediction, data_sets, "reached", model=paper_model))
     assert len(figure.axes) == 6, "a row of panels more"
@@ -113,13 +114,8 @@ def test_amplitudes_as_each_point_reached_them(paper_model: Model) -> None:
 )
 def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, ...]) -> None:
     """Amplitudes across, logarithmic; a line and a row of the map for each frequency that was held."""
-    random = np.random.default_rng(1)
-    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(frequencies, np.geomspace(2e-5, 1e-3, 15)))
-    amplitude = amplitude * (1.0 + 0.01 * random.standard_normal(amplitude.size))
-    stiffness = paper_model.stiffness("axial", frequency, amplitude) * (
-        1.0 + 0.01 * random.standard_normal(frequency.size)
-    )
-    data_sets = sweep_data([Sweep("strain", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")])
+    points_at = grid(frequencies, np.geomspace(2e-5, 1e-3, 15), 0.01)
+    data_sets = measured(paper_model, *points_at, "amplitude")
     figure = checked(sweeps_figure(paper_model, data_sets, "strain"))
     assert figure.axes[2].get_xlabel() == "amplitude [mm]"
     assert figure.axes[2].get_xscale() == "log"
@@ -127,8 +123,9 @@ def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, .
     gap = checked(gap_figure(paper_model, paper_model, data_sets, "strain", ""))
     assert gap.axes[1].get_xlabel() == "amplitude [mm]"
     assert len(gap.axes[0].get_yticklabels()) == min(len(frequencies), 8), "each, or every third of 24 rows"
+    result = Result(paper_model)
     prediction = predict(
-        Result(paper_model), Direction.AXIAL, *default_grid(Result(paper_model), Direction.AXIAL, [data_sets[0].sweep])
+        result, Direction.AXIAL, *default_grid(result, Direction.AXIAL, [data_set.sweep for data_set in data_sets])
     )
     checked(prediction_figure(prediction, data_sets, "strain", model=paper_model))
 
@@ -142,27 +139,28 @@ def test_rows_of_a_map_are_the_amplitudes_as_long_as_they_fit() -> None:
 
 
 @pytest.mark.parametrize("count", some([2, 8, 40, 300], {40}))
-def test_many_loops(paper_model: Model, loops: Callable[..., list[LoopData]], count: int) -> None:
-    data_sets = loops(count)
-    figure = checked(loops_figure(paper_model, data_sets, "mount"))
-    names = legend(figure.axes[1])
+def test_many_loops(paper_model: Model, looped: Looped, count: int) -> None:
+    one = looped(paper_model, 1e-3, cycles=2).test
+    data_sets = loop_data(
+        [
+            Loop(f"loop {k}.csv", one.direction, one.time, scale * one.displacement, scale * one.force)
+            for k, scale in enumerate(np.linspace(0.5, 2.0, count))
+        ]
+    )
+    names = legend(checked(loops_figure(paper_model, data_sets, "mount")).axes[1])
     assert names[-1] == "model"
     assert len(names) == min(count, 8) + (count > 8) + 1
     assert (f"and {count - 8} more" in names) is (count > 8)
-    other = paper_model.with_values({"mu": 1.2 * paper_model.values["mu"]})
-    for after in (paper_model, other):
-        checked(gap_figure(paper_model, after, data_sets, "mount", "A word."))
+    check_gaps(paper_model, data_sets, "mount")
 
 
 @pytest.mark.parametrize("count", some([3, 40], {3}))
-def test_twins_of_long_names(paper_model: Model, loops: Callable[..., list[LoopData]], count: int) -> None:
-    first = loops(2)[0].test
-    data_sets = loop_data([replace(first, name=f"{LONG_NAME}{k}.csv") for k in range(count)])
+def test_twins_of_long_names(paper_model: Model, looped: Looped, count: int) -> None:
+    one = looped(paper_model, 1e-3, cycles=2).test
+    data_sets = loop_data([replace(one, name=f"{LONG_NAME}{k}.csv") for k in range(count)])
     names = legend(checked(loops_figure(paper_model, data_sets, LONG_NAME)).axes[1])
     assert len(set(names)) == len(names), "a name that loses its middle is still told from others"
-    other = paper_model.with_values({"mu": 1.2 * paper_model.values["mu"]})
-    for after in (paper_model, other):
-        checked(gap_figure(paper_model, after, data_sets, LONG_NAME, LONG_NAME))
+    check_gaps(paper_model, data_sets, LONG_NAME)
 
 
 @pytest.mark.parametrize(("levels", "histories"), [(8, 40), pytest.param(300, 2, marks=pytest.mark.slow)])
