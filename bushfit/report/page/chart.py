@@ -27,8 +27,8 @@ _WIDTH = 460.0
 _PANEL, _LEFT, _RIGHT, _BELOW = 168.0, 62.0, 10.0, 42.0
 #: Height of a line of text, width of a letter, and of the stroke before a name in a legend [pixels].
 _LINE, _LETTER, _SWATCH = 17.0, 6.4, 34.0
-#: Ticks of an axis at about this count; of a logarithmic one at most so many with 1, 2 and 5 of each decade.
-_TICKS, _MOST_TICKS = 5, 7
+#: Most ticks of a logarithmic axis with 1, 2 and 5 of each decade.
+_MOST_TICKS = 7
 #: Free space beyond the data on a linear axis, as a share of their span.
 _MARGIN = 0.05
 #: Colours of levels, from cold to warm, each with a contrast of 4 to 1 and more on white.
@@ -128,7 +128,7 @@ class Axis:
         """Pixels of round values within, and how they are written."""
         values = self._decades() if self.log else []
         if len(values) < 2:
-            raw = (self.high - self.low) / _TICKS
+            raw = (self.high - self.low) / 5  # as many ticks, or a few more
             power = 10.0 ** math.floor(math.log10(raw))
             step = power * next(digit for digit in (1, 2, 5, 10) if digit * power >= raw * 0.999)
             values = [step * count for count in range(math.ceil(self.low / step), math.floor(self.high / step) + 1)]

@@ -21,20 +21,13 @@ from bushfit.report.page.sweeps import LOG_FREQUENCIES
 from bushfit.report.tables import numbers
 from bushfit.units import alike, number, split_header, told
 
-#: Curves of a page, and points of all of them, of which each has a value and a band: with these it stays below 500 kB.
-_MOST_CURVES, _MOST_POINTS = 300, 7000
-#: Curves of a place, for each result: four pictures, each at two levels.
-_CURVES = 8
-#: Fewest points of a curve, however many there are: lines are smooth.
-_FEWEST = 12
+#: Curves of a page, and points of all of them, of which each has a value and a band: with these it stays below 500 kB;
+#: but no curve has fewer than `_FEWEST`.
+_MOST_CURVES, _MOST_POINTS, _FEWEST = 300, 7000, 12
 #: Frequencies and amplitudes of a place whose values are tabled, and rows of all places together.
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 24
-#: Width of an interval, over its value, with whose digits ends of a span are told: three digits.
-_CARRIED = 0.1
 #: Conditions of tests that change a rubber.
 _CONDITIONS = ("Temperature", "Preload")
-#: What is said of a difference of two models without uncertainty.
-_NONE = "of unknown error"
 
 
 def read_comparison(folder: Path) -> Contents:
@@ -54,7 +47,8 @@ def comparison_context(found: SideBySide) -> dict[str, Any]:
     document, names = found.document, found.names
     named, *others = names.values()
     families = bool(document["families"])
-    places = found.places[: min(MOST_PLACES, _MOST_CURVES // (_CURVES * len(names)))]
+    curves = 8 * len(names)  # of a place: four pictures, each at two levels
+    places = found.places[: min(MOST_PLACES, _MOST_CURVES // curves)]
     shown = [found.sides(place) for place in places]
     entries = [_entry(entry) for entry in document["compared"]]
     body = document["compared"][0]["bushing"]
@@ -102,14 +96,13 @@ def _sizes(found: SideBySide, place: str) -> Iterator[dict[str, Any]]:
         for key, header, scale, unit in (("stiffness", heads.relative, 100.0, " %"), ("loss", heads.loss, 1.0, "")):
             (values,) = scale * numbers(table, header)
             known = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
-            ends = dict.fromkeys(signed(end, _CARRIED * max(map(abs, known))) for end in known)
+            ends = dict.fromkeys(signed(end, 0.1 * max(map(abs, known))) for end in known)
             row[key] = " to ".join(ends) + unit
             sure = int((table[f"{header}, sure"] == "yes").sum())
             count = "all" if sure == len(table) else f"{sure} of"
+            certain = np.ptp(numbers(table, f"{header}, low", f"{header}, high"), axis=0).any()
             said = f"sure at {count} {len(table)} points" if sure else "not shown"
-            row[f"{key}_sure"] = (
-                said if np.ptp(numbers(table, f"{header}, low", f"{header}, high"), axis=0).any() else _NONE
-            )
+            row[f"{key}_sure"] = said if certain else "of unknown error"
         yield row
 
 

@@ -17,10 +17,6 @@ from bushfit.units import number, split_header, told
 
 #: Most columns and rows of a map of cells: each is then some pixels wide and high.
 _MOST_COLUMNS, _MOST_ROWS = 24, 12
-#: Parts of a cycle over which what is left of a loop is averaged: 15 deg each.
-_SECTORS = 24
-#: Letters of a test's name beside a map.
-_LETTERS = 13
 
 
 def gap_panels(found: ReportData) -> list[Panel]:
@@ -57,10 +53,10 @@ def _maps_at(place: Place, gap: pd.DataFrame, tests: Sequence[TestTable]) -> Ite
         for part in ("storage", "loss"):
             yield _map(part, rows, held, x, ends)
     loops = complete(mine[mine["kind"] == "loop"], "time [s]", "frequency [Hz]", moved_of(place))
-    if len(loops):
+    if len(loops):  # means over 15 deg of the cycle
         each = (loops[loops["test"] == test] for test in dict.fromkeys(loops["test"]))
         turned = np.concatenate([_phase(place, rows) for rows in each])
-        yield _map("force", loops, "test", np.floor(turned * _SECTORS), ("upper turn", "cycle", "360 deg"))
+        yield _map("force", loops, "test", np.floor(turned * 24), ("upper turn", "cycle", "360 deg"))
 
 
 def _phase(place: Place, rows: pd.DataFrame) -> Array:
@@ -80,7 +76,9 @@ def _map(part: str, table: pd.DataFrame, held: str, along: Array, ends: tuple[st
         sums = np.bincount(cell, -np.nan_to_num(off), minlength=size)
         sides.append(np.where(count > 0, sums / np.maximum(count, 1), np.nan).reshape(len(levels), -1))
     same = np.array_equal(sides[0], sides[1], equal_nan=True)
-    return Cells(part, [_short(level_name(level, held)) for level in levels], ends, sides[:1] if same else sides)
+    names = [level_name(level, held) for level in levels]
+    short = [name if len(name) <= 13 else f"{name[:7]}…{name[-5:]}" for name in names]
+    return Cells(part, short, ends, sides[:1] if same else sides)
 
 
 def _binned(values: Any, most: int) -> tuple[Array, list[Any]]:
@@ -88,7 +86,3 @@ def _binned(values: Any, most: int) -> tuple[Array, list[Any]]:
     levels, place = np.unique(values, return_inverse=True)
     bins = np.arange(levels.size) * min(most, levels.size) // levels.size
     return bins[place], levels[np.unique(bins, return_index=True)[1]].tolist()
-
-
-def _short(test: str) -> str:
-    return test if len(test) <= _LETTERS else f"{test[: _LETTERS - 6]}…{test[-5:]}"

@@ -29,10 +29,6 @@ SCHEMA = "bushfit/batch/1"
 _MOST_CELLS, _MOST_POINTS = 4000, 400
 #: Charts at most, those with limits first.
 _MOST_CHARTS = 12
-#: Bushings whose errors are told above the table.
-_MOST_FAILED = 20
-#: Colour of what lies beyond a chart.
-_FAR = "#b4500c"
 #: Control limits, in standard deviations of the batch about its median, as on Shewhart's charts.
 _CONTROL = 3.0
 #: Bushings that a quantity must be known of for a chart.
@@ -141,7 +137,7 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
         ],
         "left_rows": len(order) - len(first),
         "tones": _TONES,
-        "failed": [(row["name"], row["error"]) for row in rows if row["status"] == "failed"][:_MOST_FAILED],
+        "failed": [(row["name"], row["error"]) for row in rows if row["status"] == "failed"][:20],
     }
     return rendered("index.html", context)
 
@@ -207,7 +203,7 @@ def _chart(column: _Column) -> Markup:
     looks = (
         ("", "#1f4e9c", ~out & ~far & thin),
         ("out of limits", LIMIT, out & _some(out)),
-        ("further out", _FAR, far & ~out & _some(far)),
+        ("further out", "#b4500c", far & ~out & _some(far)),
     )
     series = [Series(name, color, points=(at[which], shown[which])) for name, color, which in looks if which.any()]
     rules = [Rule(median, "median")]

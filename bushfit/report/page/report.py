@@ -10,7 +10,7 @@ from bushfit.caveats import of_points, warnings_of
 from bushfit.diagnosis.document import BeforeAfter, EffectEntry, GapEntry
 from bushfit.diagnosis.record import odds_in_words
 from bushfit.geometry import Bushing, Place, Specimen
-from bushfit.model.document import CampaignTable, TestTable
+from bushfit.model.document import TestTable
 from bushfit.model.result import Misfit, Result
 from bushfit.report.page.chart import MOST_PLACES
 from bushfit.report.page.gap import gap_panels
@@ -31,12 +31,8 @@ _CONDITIONS = {
     "operator": "Operator",
     "specimen_number": "Specimen no.",
 }
-#: Correlation between two parameters from which on it is shown: they trade off against each other.
-_CLOSE = 0.9
-#: Frequencies and amplitudes of a place whose predicted values are tabled.
-_FREQUENCIES, _AMPLITUDES = 3, 2
-#: Rows of predicted values of all places together.
-_ROWS = 12
+#: Frequencies and amplitudes of a place whose predicted values are tabled, and rows of all places together.
+_FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 #: Regions and tests that a page lists at most: the documents have all.
 MOST = 12
 
@@ -45,10 +41,12 @@ def report_context(found: ReportData) -> dict[str, Any]:
     """All that the template of a report asks for."""
     result, diagnosis, campaign, tests = found.result, found.diagnosis, found.campaign, found.tests
     gaps = _gaps(diagnosis["gap"]) if diagnosis else []
+    report = campaign.report if campaign else {}
+    head = {key.replace("_", " ").capitalize(): value for key, value in report.items()}
     return {
         "name": campaign.name if campaign else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
-        "facts": [*_head(campaign), *_bodies(result), *conditions(test.conditions for test in tests)],
+        "facts": [*head.items(), *_bodies(result), *conditions(test.conditions for test in tests)],
         "tests": [_tested(test, result.tests) for test in tests[:MOST]],
         "conditioned": any(test.conditions for test in tests),
         "more_tests": max(0, len(tests) - MOST),
@@ -64,7 +62,9 @@ def report_context(found: ReportData) -> dict[str, Any]:
         "quality": result.quality,
         "model_error": result.model_error is not None,
         "correlations": [
-            f"{one}/{other} {size:+.2f}" for one, other, size in result.covariance.correlations() if abs(size) > _CLOSE
+            f"{one}/{other} {size:+.2f}"
+            for one, other, size in result.covariance.correlations()
+            if abs(size) > 0.9  # they trade off against each other
         ],
         "equation": result.model.equation().splitlines()[0],
         "places": sweep_panels(found),
@@ -95,12 +95,6 @@ def _of_tables(found: ReportData) -> Iterator[Iterator[str]]:
             measured = None if measured is None else np.where(measured == 0.0, np.nan, measured)
             grid = numbers(table, *headers) / [[1.0], [length], [unit]]
             yield of_points(found.result, place, grid, rigs, measured, None)
-
-
-def _head(campaign: CampaignTable | None) -> Iterator[tuple[str, str]]:
-    """Whose part it is, and which, as far as the campaign says so."""
-    for key, value in (campaign.report if campaign else {}).items():
-        yield key.replace("_", " ").capitalize(), value
 
 
 def _bodies(result: Result) -> Iterator[tuple[str, str]]:

@@ -17,8 +17,6 @@ from bushfit.units import split_header, told
 
 #: Points of all sweeps of a page, with which it stays below 500 kB; but no curve has fewer than `_FEWEST`.
 _MOST_POINTS, _FEWEST = 3200, 24
-#: How near a predicted level lies to the measured one that it stands for, relative.
-_SAME_LEVEL = 0.02
 #: Amplitudes that were stepped over more than this ratio lie on a logarithmic axis; and frequencies over this one.
 _LOG_AMPLITUDES, LOG_FREQUENCIES = 3.0, 40.0
 
@@ -173,7 +171,7 @@ def _predicted(
     rigs = [f"{name}, {IF_RIGS}" for name in names]
     band = [f"{name}, {end}" for name in names for end in ("low", "high")]
     known = complete(table, along, held, *names, *band)
-    near = known[np.abs(known[held] - level) < _SAME_LEVEL * abs(level)].sort_values(along)
+    near = known[np.abs(known[held] - level) < 0.02 * abs(level)].sort_values(along)
     if near.empty:
         return None
     return numbers(near, along, *names), numbers(near, *band), numbers(near, *rigs) if rigs[0] in near else None

@@ -18,14 +18,12 @@ from bushfit.units import CELSIUS, for_people, number
 _FINE = 200
 #: Ratio of amplitudes that count as one level.
 _NEAR = 1.3
-#: Steps of temperature that are told apart [K].
-_SAME = 1.0
 
 
 def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> Figure:
     """Stiffness and loss factor over reduced frequency, a row a place: at the amplitude with most temperatures."""
     places = list(dict.fromkeys(each.sweep.direction for each in found))
-    degrees = _degrees(found)
+    degrees = sorted({_degree(each) for each in found})
     figure = style.new_figure(title, style.ROW * len(places))
     grid, levels = figure.subplots(len(places), 2, squeeze=False), []
     for place, (stiffness, loss) in zip(places, grid, strict=True):
@@ -89,10 +87,5 @@ def _level(found: Sequence[Shifted]) -> float:
 
 
 def _degree(found: Shifted) -> float:
-    """The temperature of a sweep [degC], as it is told apart."""
-    return float(np.round((found.temperature - CELSIUS) / _SAME) * _SAME)
-
-
-def _degrees(found: Sequence[Shifted]) -> list[float]:
-    """Of all sweeps, rising, each once."""
-    return sorted({_degree(each) for each in found})
+    """The temperature of a sweep to a degree [degC]."""
+    return float(np.round(found.temperature - CELSIUS))

@@ -138,7 +138,8 @@ def draw(
     stiffness_factor, names = pair_labels(direction, float(lines.stiffness.value.max()))
     kinds = (("stiffness", stiffness_factor), ("loss_factor", 1.0))
     for axes, name, (kind, factor) in zip(pair, names, kinds, strict=True):
-        line, point = (_scaled(getattr(one, kind), factor) for one in (lines, points))
+        bands = (getattr(one, kind) for one in (lines, points))
+        line, point = (Band(factor * band.value, factor * band.low, factor * band.high) for band in bands)
         for look, level, spots in zip(looks, levels, marked, strict=True):
             at = getattr(lines, held) == level
             _draw_line(axes, look, x, line, at)
@@ -149,22 +150,29 @@ def draw(
             if spots.any():
                 if rig is not None:
                     axes.plot(x[at], factor * getattr(rig, kind).value[at], color=look.color, lw=_THIN)
-                _draw_points(axes, look, where, point, spots)
+                axes.vlines(where[spots], point.low[spots], point.high[spots], color=look.color, lw=0.7, alpha=0.7)
+                axes.plot(where[spots], point.value[spots], look.marker, color=look.color, **style.POINT)
         style.label_axes(axes, axis_label(direction, axis), name)
         style.log_if_wide(axes, x)
         style.least_span(axes, 0.04 * line.high.max() if kind == "stiffness" else 0.01)  # flat curves shall look flat
-    bushing = Line2D([], [], color=style.INK, lw=_LINE)
-    besides: dict[str, Line2D | tuple[Line2D, ...]] = {}
-    if laid and rig:
-        thin = Line2D([], [], color=style.INK, lw=_THIN, marker="o", **style.POINT)
-        besides = {"bushing": bushing, "with the rig": thin}
-    if if_rigs:
-        double = tuple(Line2D([], [], color=color, lw=lw) for color, lw in ((style.INK, _DOUBLE), ("white", _CORE)))
-        besides |= {"bushing": bushing, IF_RIGS: double}
     unit, scale = scales[held]
-    called = [told(unit, scale * level) for level in levels]
-    style.name_levels(pair[-1], called, held, [bool(spots.any()) for spots in marked], besides)
+    names_of_levels = [told(unit, scale * level) for level in levels]
+    others = _other_lines(with_rig=laid and rig is not None, if_rigs=if_rigs is not None)
+    style.name_levels(pair[-1], names_of_levels, held, [bool(spots.any()) for spots in marked], others)
     return laid
+
+
+def _other_lines(*, with_rig: bool, if_rigs: bool) -> dict[str, Line2D | tuple[Line2D, ...]]:
+    """What a legend names beside the levels, where other lines than the bushing's are drawn."""
+    lines: dict[str, Line2D | tuple[Line2D, ...]] = {}
+    if with_rig or if_rigs:
+        lines["bushing"] = Line2D([], [], color=style.INK, lw=_LINE)
+    if with_rig:
+        lines["with the rig"] = Line2D([], [], color=style.INK, lw=_THIN, marker="o", **style.POINT)
+    if if_rigs:
+        double = ((style.INK, _DOUBLE), ("white", _CORE))
+        lines[IF_RIGS] = tuple(Line2D([], [], color=color, lw=width) for color, width in double)
+    return lines
 
 
 def _spots(held: Array, levels: Array, inside: Array) -> list[Array]:
@@ -178,21 +186,11 @@ def _spots(held: Array, levels: Array, inside: Array) -> list[Array]:
     return list((inside[:, None] & nearest & (off <= _SAME)).T)
 
 
-def _scaled(band: Band, factor: float) -> Band:
-    return Band(factor * band.value, factor * band.low, factor * band.high)
-
-
 def _draw_line(axes: Axes, look: style.Style, x: Array, band: Band, at: Array) -> None:
     """A line with its band; a stroke where it has but one point."""
     marker = "_" if at.sum() == 1 else ""
     axes.plot(x[at], band.value[at], color=look.color, ls=look.dashes, lw=_LINE, marker=marker, ms=14.0)
     axes.fill_between(x[at], band.low[at], band.high[at], color=look.color, alpha=0.22, lw=0)
-
-
-def _draw_points(axes: Axes, look: style.Style, x: Array, band: Band, at: Array) -> None:
-    """Measured points, with bars from the lowest to the highest repeat."""
-    axes.vlines(x[at], band.low[at], band.high[at], color=look.color, lw=0.7, alpha=0.7)
-    axes.plot(x[at], band.value[at], look.marker, color=look.color, **style.POINT)
 
 
 def pair_labels(place: Place, largest: float) -> tuple[float, tuple[str, str]]:
