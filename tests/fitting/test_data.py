@@ -16,7 +16,6 @@ from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE
-from bushfit.model.result import Outlier
 from bushfit.reading.measurement import Sweep
 
 
@@ -79,14 +78,6 @@ def test_what_the_campaign_gives_and_holds(measured: Data) -> None:
     assert data.free(FIVE) == tuple(name for name in FIVE if name != "alpha")
     assert data.bounds == {"mu": (None, 2e6), "alpha": (None, None)}
     assert measured.free(FIVE) == FIVE
-
-
-def test_points_that_are_left_out_have_no_weight(measured: Data) -> None:
-    name = measured.sweeps[0].name
-    without = measured.without([Outlier(name, None, 5, "stiffness", 9.0)])
-    assert without.sweeps[0].counted == measured.sweeps[0].counted - 2
-    assert np.count_nonzero(without.sweeps[0].weights == 0.0) == 1
-    assert without.sweeps[1] is measured.sweeps[1]
 
 
 def test_magnitudes_in_coarse_steps_are_told(campaign: Campaign) -> None:

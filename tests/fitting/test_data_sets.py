@@ -126,13 +126,6 @@ def test_the_right_model_of_a_loop_leaves_noise_alone(loop: LoopData, paper_mode
     assert np.max(np.abs(loop.noise_free(paper_model).residual(paper_model))) < 1e-9
 
 
-def test_a_loop_is_an_operating_point_too(loop: LoopData, paper_model: Model) -> None:
-    assert loop.frequency == pytest.approx([0.1], rel=1e-3)
-    assert loop.amplitude == pytest.approx([1e-3], rel=2e-3)
-    closed = paper_model.stiffness("axial", loop.frequency, loop.amplitude)
-    np.testing.assert_allclose(loop.measured, closed, rtol=2e-3)
-
-
 def test_of_a_loop_that_stands_on_its_first_harmonic_no_other_departs(loop: LoopData, paper_model: Model) -> None:
     """A model 3 % too stiff departs by 3 % in the slope, and in nothing that was left out."""
     fundamental = loop.fundamental()

@@ -121,21 +121,6 @@ def test_one_loop_bounds_mu_from_above_alone(rig: Rig, paper_model: Model) -> No
     assert result.profile["alpha"] == (None, None)
 
 
-@pytest.mark.parametrize(
-    ("amplitudes", "frequencies", "open_ones"),
-    [((2e-4,), FREQUENCIES, ("eps_half",)), ((1e-4, 5e-4), (50.0,), ("m",))],
-    ids=["one amplitude", "one frequency"],
-)
-def test_a_singular_campaign_has_open_ends(
-    rig: Rig, amplitudes: tuple[float, ...], frequencies: tuple[float, ...], open_ones: tuple[str, ...]
-) -> None:
-    sweep = SimulatedSweep(Direction.AXIAL, amplitudes, frequencies)
-    result = profiled(rig(1, **plan(1e-3, loops=(), sweeps=(sweep,))))
-    assert result.profile["mu"][0] is None
-    for name in open_ones:
-        assert result.profile[name] == (None, None)
-
-
 def test_a_single_parameter_has_no_profile(rig: Rig, paper_model: Model) -> None:
     held = {name: ParameterSetting(paper_model.values[name], vary=False) for name in FIVE[1:]}
     campaign = replace(rig(0, **plan(1e-3)), fit=FitSettings(parameters=held))

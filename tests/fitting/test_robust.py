@@ -154,13 +154,6 @@ def test_outliers_are_listed_by_file_and_row_and_told(rig: Rig) -> None:
     assert from_document(to_document(soft)).outliers == soft.outliers
 
 
-def test_without_repeats_an_outlier_is_found(rig: Rig) -> None:
-    campaign = rig(2, repeats=1)
-    soft = robust(with_factor(campaign, [5, 40], np.array([3.0, 0.4])))
-    assert [entry.row for entry in soft.outliers] == [6, 41]
-    assert np.max(np.abs(moved(soft, fit_joint(Data.of(campaign))))) < 1.0
-
-
 def test_an_outlier_of_the_displacement_is_said_to_be_left_out_whatever_the_loss() -> None:
     both = [Outlier("loop", None, row, column, 9.0) for row, column in ((7, "force"), (9, "displacement"))]
     followed, left = outlier_warnings(both, robust=False)
