@@ -4,6 +4,7 @@ A series of order m has real coefficients (mean, m cosines, m negative sines), (
 (m + 1,): c_k stands for Re c_k exp(2 pi i k phase). Phase counts cycles.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -140,46 +141,22 @@ class HarmonicFit:
     @classmethod
     def _at(cls, frequency: float, time: Floats, values: Floats, count: int, order: int) -> "HarmonicFit":
         """The fit over `count` cycles about time 0, with `order` harmonics or fewer, at a frequency that is given."""
-        order = max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
-        half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
-        chunks = [slice(start, start + _CHUNK_ROWS) for start in range(0, time.size, _CHUNK_ROWS)]
-
-        def columns(rows: slice, order: int) -> Floats:
-            span = time[rows] / half
-            return basis(time[rows] * frequency, order, span, 1.5 * span**2 - 0.5).T
-
-        size = _DRIFT_TERMS + 2 * order
-        gram, moments = np.zeros((size, size)), np.zeros((size, 2))
-        for rows in chunks:
-            own = columns(rows, order)
-            gram += own @ own.T
-            moments += own @ values[:, rows].T
-        scale = 1.0 / np.sqrt(np.diag(gram))
-        scale[_DRIFT_TERMS:] = np.sqrt(2.0 / time.size)  # by its own norm, a wave all but zero at the rows would pass
-        unit, most = gram * np.outer(scale, scale), order
-        kept = np.arange(size)
-        while order > 1 and np.linalg.cond(unit[np.ix_(kept, kept)]) > _WORST_CONDITION:
-            order -= 1
-            kept = np.r_[: _DRIFT_TERMS + order, _DRIFT_TERMS + most : _DRIFT_TERMS + most + order]
-        covariance = np.linalg.inv(unit[np.ix_(kept, kept)]) * np.outer(scale[kept], scale[kept])
-        solution = covariance @ moments[kept]
-
+        order, solution, covariance = _drift_and_harmonics(time, values, frequency, order)
         squares, sums, rows_in = np.zeros((2, 2)), np.zeros((2, count), dtype=complex), np.zeros(count)
-        for rows in chunks:
-            own = columns(rows, order)
-            left = values[:, rows] - solution.T @ own
+        for rows, columns in _chunks(time, frequency, order):
+            left = values[:, rows] - solution.T @ columns
             squares += left @ left.T
-            cosine, sine = own[_DRIFT_TERMS], own[_DRIFT_TERMS + order]
+            cosine, sine = columns[_DRIFT_TERMS], columns[_DRIFT_TERMS + order]
             number = np.clip(time[rows] * frequency + count / 2.0, 0, count - 1).astype(np.intp)
             rows_in += np.bincount(number, minlength=count)
             for channel in range(2):
                 sums[channel].real += np.bincount(number, left[channel] * cosine, count)
                 sums[channel].imag += np.bincount(number, left[channel] * sine, count)
         sums *= 2.0 / np.maximum(rows_in, 1.0)
-        cosines, sines = np.split(np.arange(_DRIFT_TERMS, kept.size), 2)
+        cosines, sines = np.split(np.arange(_DRIFT_TERMS, len(solution)), 2)
         coefficients = np.vstack((solution[:1], solution[cosines] + 1j * solution[sines])).T
         variance = np.diag(covariance)
-        chance, freedom = variance[cosines] + variance[sines], max(time.size - kept.size, 1)
+        chance, freedom = variance[cosines] + variance[sines], max(time.size - len(solution), 1)
         return cls(frequency, coefficients, chance, freedom, squares, sums)
 
     def errors(self) -> Floats:
@@ -210,3 +187,31 @@ class HarmonicFit:
         noise = np.outer(np.diag(self.squares) / self.freedom, self.chance)
         overtones = np.maximum((power - noise)[:, 1:].sum(axis=1), 0.0)
         return np.sqrt(overtones / power[:, 0])
+
+
+def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: int) -> tuple[int, Floats, Floats]:
+    """How many harmonics the rows tell apart, `order` at most, the drift and these of both channels, (p, 2), and the
+    covariance of that for unit variance of the values, (p, p)."""
+    most = order = max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
+    size = _DRIFT_TERMS + 2 * most
+    gram, moments = np.zeros((size, size)), np.zeros((size, 2))
+    for rows, columns in _chunks(time, frequency, most):
+        gram += columns @ columns.T
+        moments += columns @ values[:, rows].T
+    scale = 1.0 / np.sqrt(np.diag(gram))
+    scale[_DRIFT_TERMS:] = np.sqrt(2.0 / time.size)  # by its own norm, a wave all but zero at the rows would pass
+    unit, kept = gram * np.outer(scale, scale), np.arange(size)
+    while order > 1 and np.linalg.cond(unit[np.ix_(kept, kept)]) > _WORST_CONDITION:
+        order -= 1
+        kept = np.r_[: _DRIFT_TERMS + order, _DRIFT_TERMS + most : _DRIFT_TERMS + most + order]
+    covariance = np.linalg.inv(unit[np.ix_(kept, kept)]) * np.outer(scale[kept], scale[kept])
+    return order, covariance @ moments[kept], covariance
+
+
+def _chunks(time: Floats, frequency: float, order: int) -> Iterator[tuple[slice, Floats]]:
+    """Rows of each chunk, and there the drift, the cosines and the negative sines, (3 + 2 order, m)."""
+    half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
+    for start in range(0, time.size, _CHUNK_ROWS):
+        rows = slice(start, start + _CHUNK_ROWS)
+        span = time[rows] / half
+        yield rows, basis(time[rows] * frequency, order, span, 1.5 * span**2 - 0.5).T
