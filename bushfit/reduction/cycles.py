@@ -81,8 +81,8 @@ class Cycles:
         other = (change[0] > _OTHER_PERIOD) | (change[1] > _OTHER_RANGE) | hole[1:] | hole[:-1]
         return [run for run in stretches(other) if not hole[run.start]]
 
-    def fundamentals(self, run: slice, values: Floats) -> Complex:
-        """Complex fundamental of a channel, (n,), in each cycle of a run, (k,): least squares, with its mean."""
+    def fundamentals(self, run: slice, *channels: Floats) -> Complex:
+        """Complex fundamental of channels, (n,) each, in each cycle of a run, (channels, k), by least squares."""
         edges, first = self.edges[run.start : run.stop + 1], self.first_rows[run.start : run.stop + 1]
         rows, count = slice(first[0], first[-1]), np.diff(first)
         phase = (self.time[rows] - np.repeat(edges[:-1], count)) / np.repeat(np.diff(edges), count)
@@ -90,12 +90,15 @@ class Cycles:
         # the squares of the first harmonic are half the second
         n, c1, c2, s1, s2 = np.add.reduceat(columns, starts, axis=-1)
         gram = np.array([[n, c1, s1], [c1, (n + c2) / 2.0, s2 / 2.0], [s1, s2 / 2.0, (n - c2) / 2.0]]).T
-        right = np.add.reduceat(columns[[0, 1, 3]] * values[rows], starts, axis=-1).T[..., None]
+        first_columns = columns[[0, 1, 3]]
+        right = np.array([np.add.reduceat(first_columns * values[rows], starts, axis=-1) for values in channels]).T
         sound = np.abs(np.linalg.det(gram / np.maximum(count, 1)[:, None, None])) > _LEAST_DETERMINANT
-        solved = np.linalg.solve(gram[sound], right[sound])[..., 0]
-        fundamental = (self.range[run] / 2.0).astype(complex)  # for cycles of too few rows, which make no point
-        fundamental[sound] = solved[:, 1] + 1j * solved[:, 2]
-        return fundamental
+        _, cosine, sine = np.linalg.solve(gram[sound], right[sound]).T.swapaxes(0, 1)
+        found = np.tile(
+            (self.range[run] / 2.0).astype(complex), (len(channels), 1)
+        )  # where rows are too few for a point
+        found[:, sound] = cosine + 1j * sine
+        return found
 
 
 def stretches(changes: NDArray[np.bool_]) -> list[slice]:

@@ -4,11 +4,11 @@ A series of order m has real coefficients (mean, m cosines, m negative sines), (
 (m + 1,): c_k stands for Re c_k exp(2 pi i k phase). Phase counts cycles.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
 from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 from scipy.special import fdtri
@@ -32,12 +32,15 @@ _SETTLED_DRIFT = 1e-7
 _WHITE_P = 0.005
 
 
-def basis(phase: Floats, order: int) -> Floats:
-    """Columns 1, cos(2 pi k phase) and -sin(2 pi k phase) for k = 1 ... order, (n, 2 order + 1)."""
-    rows = np.ones((2 * order + 1, phase.size))
+def basis(phase: Floats, order: int, *drift: Floats) -> Floats:
+    """Columns 1, those of a drift, cos(2 pi k phase) and -sin(2 pi k phase) for k = 1 ... order, (n, columns)."""
+    first = 1 + len(drift)
+    rows = np.ones((first + 2 * order, phase.size))
+    for row, values in zip(rows[1:first], drift, strict=True):
+        row[:] = values
     turn = np.exp(2j * np.pi * phase)
     power = turn.copy()
-    for k in range(1, order + 1):  # row by row, which stays in the cache: ten times as fast as all powers at once
+    for k in range(first, first + order):  # row by row, which stays in the cache: ten times as fast as all at once
         rows[k] = power.real
         np.negative(power.imag, out=rows[order + k])
         power *= turn
@@ -86,7 +89,7 @@ def cycle_harmonics(phase: Floats, values: Floats, order: int, drift: int = 0) -
         order: harmonics that are fitted.
         drift: power of the phase up to which a drift is fitted with them.
     """
-    columns = np.column_stack((np.vander(phase, 1 + drift, increasing=True), basis(phase, order)[:, 1:]))
+    columns = basis(phase, order, *(phase**power for power in range(1, drift + 1)))
     solution = np.linalg.lstsq(columns, values, rcond=None)[0]
     fundamental = solution[1 + drift] + 1j * solution[1 + drift + order]
     return solution[0], fundamental, np.std(values - columns @ solution, axis=0)
@@ -138,46 +141,22 @@ class HarmonicFit:
     @classmethod
     def _at(cls, frequency: float, time: Floats, values: Floats, count: int, order: int) -> "HarmonicFit":
         """The fit over `count` cycles about time 0, with `order` harmonics or fewer, at a frequency that is given."""
-        order = max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
-        half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
-        chunks = [slice(start, start + _CHUNK_ROWS) for start in range(0, time.size, _CHUNK_ROWS)]
-
-        def columns(rows: slice, order: int) -> Floats:
-            drift = legvander(time[rows] / half, _DRIFT_TERMS - 1)
-            return np.vstack((drift.T, basis(time[rows] * frequency, order).T[1:]))
-
-        size = _DRIFT_TERMS + 2 * order
-        gram, moments = np.zeros((size, size)), np.zeros((size, 2))
-        for rows in chunks:
-            own = columns(rows, order)
-            gram += own @ own.T
-            moments += own @ values[:, rows].T
-        scale = 1.0 / np.sqrt(np.diag(gram))
-        scale[_DRIFT_TERMS:] = np.sqrt(2.0 / time.size)  # by its own norm, a wave all but zero at the rows would pass
-        unit, most = gram * np.outer(scale, scale), order
-        kept = np.arange(size)
-        while order > 1 and np.linalg.cond(unit[np.ix_(kept, kept)]) > _WORST_CONDITION:
-            order -= 1
-            kept = np.r_[: _DRIFT_TERMS + order, _DRIFT_TERMS + most : _DRIFT_TERMS + most + order]
-        covariance = np.linalg.inv(unit[np.ix_(kept, kept)]) * np.outer(scale[kept], scale[kept])
-        solution = covariance @ moments[kept]
-
+        order, solution, covariance = _drift_and_harmonics(time, values, frequency, order)
         squares, sums, rows_in = np.zeros((2, 2)), np.zeros((2, count), dtype=complex), np.zeros(count)
-        for rows in chunks:
-            own = columns(rows, order)
-            left = values[:, rows] - solution.T @ own
+        for rows, columns in _chunks(time, frequency, order):
+            left = values[:, rows] - solution.T @ columns
             squares += left @ left.T
-            turn = own[_DRIFT_TERMS] + 1j * own[_DRIFT_TERMS + order]  # exp(-i omega t)
+            cosine, sine = columns[_DRIFT_TERMS], columns[_DRIFT_TERMS + order]
             number = np.clip(time[rows] * frequency + count / 2.0, 0, count - 1).astype(np.intp)
             rows_in += np.bincount(number, minlength=count)
             for channel in range(2):
-                sums[channel] += np.bincount(number, left[channel] * turn.real, count)
-                sums[channel] += 1j * np.bincount(number, left[channel] * turn.imag, count)
+                sums[channel].real += np.bincount(number, left[channel] * cosine, count)
+                sums[channel].imag += np.bincount(number, left[channel] * sine, count)
         sums *= 2.0 / np.maximum(rows_in, 1.0)
-        cosines, sines = np.split(np.arange(_DRIFT_TERMS, kept.size), 2)
+        cosines, sines = np.split(np.arange(_DRIFT_TERMS, len(solution)), 2)
         coefficients = np.vstack((solution[:1], solution[cosines] + 1j * solution[sines])).T
         variance = np.diag(covariance)
-        chance, freedom = variance[cosines] + variance[sines], max(time.size - kept.size, 1)
+        chance, freedom = variance[cosines] + variance[sines], max(time.size - len(solution), 1)
         return cls(frequency, coefficients, chance, freedom, squares, sums)
 
     def errors(self) -> Floats:
@@ -208,3 +187,31 @@ class HarmonicFit:
         noise = np.outer(np.diag(self.squares) / self.freedom, self.chance)
         overtones = np.maximum((power - noise)[:, 1:].sum(axis=1), 0.0)
         return np.sqrt(overtones / power[:, 0])
+
+
+def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: int) -> tuple[int, Floats, Floats]:
+    """How many harmonics the rows tell apart, `order` at most, the drift and these of both channels, (p, 2), and the
+    covariance of that for unit variance of the values, (p, p)."""
+    most = order = max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
+    size = _DRIFT_TERMS + 2 * most
+    gram, moments = np.zeros((size, size)), np.zeros((size, 2))
+    for rows, columns in _chunks(time, frequency, most):
+        gram += columns @ columns.T
+        moments += columns @ values[:, rows].T
+    scale = 1.0 / np.sqrt(np.diag(gram))
+    scale[_DRIFT_TERMS:] = np.sqrt(2.0 / time.size)  # by its own norm, a wave all but zero at the rows would pass
+    unit, kept = gram * np.outer(scale, scale), np.arange(size)
+    while order > 1 and np.linalg.cond(unit[np.ix_(kept, kept)]) > _WORST_CONDITION:
+        order -= 1
+        kept = np.r_[: _DRIFT_TERMS + order, _DRIFT_TERMS + most : _DRIFT_TERMS + most + order]
+    covariance = np.linalg.inv(unit[np.ix_(kept, kept)]) * np.outer(scale[kept], scale[kept])
+    return order, covariance @ moments[kept], covariance
+
+
+def _chunks(time: Floats, frequency: float, order: int) -> Iterator[tuple[slice, Floats]]:
+    """Rows of each chunk, and there the drift, the cosines and the negative sines, (3 + 2 order, m)."""
+    half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
+    for start in range(0, time.size, _CHUNK_ROWS):
+        rows = slice(start, start + _CHUNK_ROWS)
+        span = time[rows] / half
+        yield rows, basis(time[rows] * frequency, order, span, 1.5 * span**2 - 0.5).T

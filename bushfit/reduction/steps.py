@@ -86,7 +86,7 @@ def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[Skipped]]:
     skipped: list[Skipped] = []
     cycles = Cycles.of(history.time, history.displacement)
     for run in cycles.runs():
-        motion, force = (cycles.fundamentals(run, values) for values in (history.displacement, history.force))
+        motion, force = cycles.fundamentals(run, history.displacement, history.force)
         edges = cycles.edges[run.start : run.stop + 1]
         parts = pieces(edges, np.log(np.abs(motion)))
         if keeps_changing(edges, parts):
