@@ -7,7 +7,7 @@ from bushfit.errors import CampaignError, naming
 from bushfit.geometry import Direction, Place, Specimen
 
 #: Keys of a table that tell it.
-KEYS = ("direction", "specimen")
+PLACE_KEYS = ("direction", "specimen")
 #: Lists of tests in [simulate].
 _LISTS = ("loops", "sweeps", "resonances")
 
@@ -50,7 +50,7 @@ def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
             return test
         with naming(place=place):
             direction = place_tested(test.get("specimen"), test.get("direction"), specimens)
-        return {**{key: value for key, value in test.items() if key not in KEYS}, "direction": direction}
+        return {**{key: value for key, value in test.items() if key not in PLACE_KEYS}, "direction": direction}
 
     if not isinstance(tables, dict):
         return tables

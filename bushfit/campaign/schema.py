@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
 from bushfit.campaign.compound import Compound
 from bushfit.campaign.files import LoopFile, SweepFile
-from bushfit.campaign.places import KEYS, with_places
+from bushfit.campaign.places import PLACE_KEYS, with_places
 from bushfit.campaign.quantities import (
     LARGEST_SHAKEN,
     SHAKEN,
@@ -206,7 +206,7 @@ class SimulatedTest:
     """
 
     direction: Annotated[Place, InstanceOf[Place], WithJsonSchema({"type": "string"})] = field(
-        metadata=standing_in_table(lambda: KEYS)
+        metadata=standing_in_table(lambda: PLACE_KEYS)
     )
     temperature: Temperature | None = field(default=None, kw_only=True)
 

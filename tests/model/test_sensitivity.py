@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.effects import BASE, History
+from bushfit.effects.contract import Array, Values
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.sensitivity import differences, force_and_slopes, stiffness_and_slopes
@@ -79,7 +80,12 @@ def test_one_sided_at_a_bound(paper_model: Model) -> None:
     """alpha = 1 may not be exceeded; the neutral mass 0 may be left both ways or one."""
     edge = paper_model.with_values({"alpha": 1.0})
     at = ("axial", FREQUENCY, AMPLITUDE)
-    _, found = differences(edge, ["alpha"], lambda values: edge.stiffness(*at, values=values))
+
+    def respond(values: Values) -> Array:
+        assert np.max(values["alpha"]) <= 1.0
+        return edge.stiffness(*at, values=values)
+
+    _, found = differences(edge, ["alpha"], respond)
     np.testing.assert_allclose(found, stiffness_and_slopes(edge, *at, ["alpha"])[1], rtol=1e-4)
     heavy = paper_model.with_effect("inertia")
     slope = stiffness_and_slopes(heavy, *at, ["inertia.mass"])[1][0]
