@@ -260,10 +260,8 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
 def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
     """Number of cycles after which to cut a run; 0 where it is one.
 
-    Args:
-        phase: of the crossings, less that of an even sine [jitter], (m + 1,).
-        level: ln of the amplitude of each cycle [spread], (m,).
-        jitter, spread: standard deviation of a crossing [periods], and of ln of an amplitude.
+    The phase of the crossings, (m + 1,), less that of an even sine, is in units of their `jitter` [periods], and the
+    level, ln of the amplitude of each cycle, (m,), in units of its `spread`.
     """
     count = level.size
     if count < 2 * _FEWEST_CYCLES:

@@ -141,14 +141,9 @@ def _unusable(cycles: Cycles, inside: slice, fewest: int) -> str:
 
 
 def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: Complex, fewest: int) -> Step | None:
-    """The operating point of one piece of cycles, less its transient; None where it is not steady.
+    """The operating point of one piece of the cycles, less its transient; None where it is not steady.
 
-    Args:
-        history: the record.
-        cycles: all cycles of the record.
-        inside: the piece, k of them.
-        motion, force: complex fundamental in each cycle of the piece [m or rad, N or N m], (k,).
-        fewest: steady cycles that make a point.
+    Motion and force are the complex fundamental in each cycle of the piece [m or rad, N or N m], (k,).
     """
     steady = mean_from_steady(motion, force / motion, fewest)
     used = slice(inside.start + steady.start, inside.start + steady.stop)

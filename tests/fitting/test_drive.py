@@ -160,7 +160,6 @@ def test_rows_that_are_missing_do_not_change_the_frequency(
     paper_model: Model, waveform: str, hole: tuple[float, float]
 ) -> None:
     drive = drive_of(with_hole(measured(paper_model, waveform=waveform, cycles=3.0), *hole))
-    print(f"{drive.frequency:.6f} Hz, {drive.notes}")
     assert drive.frequency == pytest.approx(FREQUENCY, rel=1e-3)
     assert drive.amplitude == pytest.approx(AMPLITUDE, rel=5e-3)
     if hole[1] - hole[0] > 0.4:

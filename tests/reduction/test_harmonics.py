@@ -24,7 +24,6 @@ def test_harmonics_at_half_the_rows_of_a_cycle_are_none(per_cycle: float) -> Non
     noise = 1e-4 * np.random.default_rng(0).standard_normal((2, time.size))
     fit = HarmonicFit.of(time, *(np.sin(2.0 * np.pi * time) + noise), np.arange(57.0))
     order = fit.coefficients.shape[1] - 1
-    print(f"{per_cycle} rows a cycle: order {order}, distortion {max(fit.distortion()):.1e}")
     assert order < per_cycle / 2.0
     assert max(fit.distortion()) < 1e-3
 

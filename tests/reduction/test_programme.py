@@ -97,8 +97,6 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model: Model, case: str) 
     record = recorded(paper_model, *motions)
     loops = programme(record)
     drives = [drive_of(loop) for loop in loops]
-    for drive in drives:
-        print(f"{drive.loop.name}: {1e3 * drive.amplitude:.4f} mm, {drive.frequency:.4f} Hz, {drive.notes}")
     assert [loop.name for loop in loops] == [f"loop_part_{number}" for number in range(1, len(expected) + 1)]
     assert [1e3 * drive.amplitude for drive in drives] == pytest.approx([x for x, _ in expected], rel=5e-3)
     assert [drive.frequency for drive in drives] == pytest.approx([f for _, f in expected], rel=2e-3)
@@ -169,7 +167,6 @@ def test_a_rig_that_misses_its_amplitude_makes_no_parts() -> None:
             motion = np.concatenate([cycles(1, x) for x in reached])
             loop = Loop("loop", Direction.AXIAL, STEP * np.arange(motion.size), motion, 5e5 * motion)
             rightly += len(programme(loop)) == len(sizes)
-    print(f"parted rightly {rightly} times of 40")
     assert rightly >= 39
 
 
@@ -208,7 +205,6 @@ def virgin(loop: Loop, share: float) -> Loop:
 def test_a_softening_is_told_of_each_part(paper_model: Model) -> None:
     loops = programme(virgin(recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)]), 0.12))
     found = [100.0 * (loop.softening or 0.0) for loop in loops]
-    print("first cycle stiffer by", ", ".join(f"{value:.1f} %" for value in found), "of 12 %")
     assert found == pytest.approx([12.0] * 3, abs=4.0)  # with what a springpot and friction make from rest
     assert any("stiffer than the last (Mullins)" in note for note in drive_of(loops[1]).notes)
     (one,) = programme(virgin(recorded(paper_model, cycles(5, 1)), 0.12))
