@@ -70,7 +70,7 @@ def from_document(document: object, file: Path | None = None) -> Result:
     hint = "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"
     tables = _object(document, file, "a model")
     require_schema(tables, file, "a model", *SCHEMAS, hint=hint)
-    checked = check_tables(_renamed(tables), file, ModelFile, kind=ModelError)
+    checked = check_tables(_up_to_date(_renamed(tables), file), file, ModelFile, kind=ModelError)
     with naming(file):
         return _result(checked)
 
@@ -220,6 +220,31 @@ def _renamed(document: dict[str, Any]) -> dict[str, Any]:
         if isinstance(entry.get("profile95"), list):
             entry["profile95"] = [None if end is None else 1.0 + end for end in entry["profile95"]]
     return renamed
+
+
+def _up_to_date(document: dict[str, Any], file: Path | None) -> dict[str, Any]:
+    """A document without the tilt and the peak that corrections could have once: none is read that has them."""
+    kept = dict(document)
+    for name in ("unnamed", "model_error"):
+        if not isinstance(correction := document.get(name), dict):
+            continue
+        if correction.get("tilt") or correction.get("peak"):
+            raise ModelError(
+                "a correction of a form that this version does not read",
+                file=file,
+                place=name,
+                found="a tilt or a peak",
+                expected="neither",
+                hint="bushfit diagnose finds the correction anew",
+            )
+        kept[name] = {key: value for key, value in correction.items() if key not in ("tilt", "peak")}
+        if isinstance(patches := correction.get("patches"), list):
+            once = ("peak_in_phase", "peak_in_quadrature")
+            kept[name]["patches"] = [
+                {key: value for key, value in patch.items() if key not in once} if isinstance(patch, dict) else patch
+                for patch in patches
+            ]
+    return kept
 
 
 def _uncertainty(result: Result, name: str) -> dict[str, Any]:
