@@ -1,16 +1,16 @@
-"""`python tests/effect_tables.py`: write the tables of the effects' README.md anew, from the library's records."""
+"""`python tests/effect_tables.py`: write the tables of the page on effects anew, from the library's records."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-import bushfit.effects
+import bushfit
 from bushfit.effects import LIBRARY, Effect, effect_named, qualified
 from bushfit.effects.mistakes import MISTAKES
 
 #: The page, and the comments between which its tables stand.
-PAGE = Path(bushfit.effects.__file__).with_name("README.md")
+PAGE = Path(bushfit.__file__).with_name("manual") / "effects.md"
 BEGIN = "<!-- from the records: begin -->\n"
 END = "<!-- from the records: end -->\n"
 
@@ -53,7 +53,8 @@ def _table(head: tuple[str, ...], rows: Iterable[tuple[object, ...]]) -> str:
 
 def _link(effect: Effect) -> str:
     file = f"{effect.name.partition('.')[0]}.py"
-    return f"[`{effect.name}`]({file if PAGE.with_name(file).exists() else 'library.toml'})"
+    place = file if (PAGE.parents[1] / "effects" / file).exists() else "library.toml"
+    return f"[`{effect.name}`](../effects/{place})"
 
 
 def _parameters(effect: Effect) -> str:

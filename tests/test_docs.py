@@ -79,7 +79,7 @@ def test_the_campaign_reference_is_valid_and_has_every_key(root: Path) -> None:
 
 
 def test_manifest_and_limits_are_valid_and_have_every_key(root: Path) -> None:
-    page = root / "bushfit/batch/README.md"
+    page = root / "bushfit/manual/batch.md"
     manifest, limits = (tomllib.loads(block) for block in blocks(page, "toml"))
     for schema, block in ((ManifestFile, manifest), (Limits, limits)):
         TypeAdapter(schema).validate_python(block)
@@ -88,7 +88,7 @@ def test_manifest_and_limits_are_valid_and_have_every_key(root: Path) -> None:
 
 
 def test_recipes_for_ci_are_valid_and_run_what_there_is(root: Path) -> None:
-    github, gitlab = (yaml.safe_load(block) for block in blocks(root / "bushfit/batch/README.md", "yaml"))
+    github, gitlab = (yaml.safe_load(block) for block in blocks(root / "bushfit/manual/batch.md", "yaml"))
     steps = [step["run"] for step in github["jobs"]["fit"]["steps"] if "run" in step]
     above = click.Context(cli, **cli.context_settings)
     batch = cli.get_command(above, "batch")
@@ -101,7 +101,7 @@ def test_recipes_for_ci_are_valid_and_run_what_there_is(root: Path) -> None:
 
 
 def test_json_keys_of_a_model_are_listed(root: Path) -> None:
-    page = (root / "bushfit/report/README.md").read_text(encoding="utf-8")
+    page = (root / "bushfit/manual/report.md").read_text(encoding="utf-8")
     document = json.loads((root / "data/arm_bushing/truth.json").read_text(encoding="utf-8"))
     assert [key for key in document if key != "schema" and f"`{key}`" not in page] == []
 
@@ -119,7 +119,7 @@ def test_the_page_on_diagnose_has_every_constant_that_moves_a_verdict(root: Path
             for name, value in zip(names, values, strict=True):
                 numbers = [part.value for part in ast.walk(value) if isinstance(part, ast.Constant)]
                 stated[ast.unparse(name)] = sorted(number for number in numbers if not isinstance(number, str))
-    page = (root / "bushfit/diagnosis/README.md").read_text(encoding="utf-8")
+    page = (root / "bushfit/manual/diagnosis.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `([A-Z_]+)` \| ([^|]+) \|", page, re.MULTILINE)
     assert {name: sorted(map(float, re.findall(r"[\d.]+", cell))) for name, cell in rows} == stated
     assert len(stated) <= 20
@@ -135,8 +135,23 @@ def test_the_map_of_the_code_is_the_code(root: Path) -> None:
     assert [entry for entry in shown if not (root / "bushfit" / entry).exists()] == []
 
 
+def test_the_page_of_each_folder_has_its_files_in_their_own_words(root: Path) -> None:
+    """Each file once, with the first sentence of its docstring; the effects are a file each, named after them."""
+    folders = [folder for folder in (root / "bushfit").iterdir() if (folder / "__init__.py").exists()]
+    assert len(folders) > 10
+    for folder in folders:
+        text = (folder / "README.md").read_text(encoding="utf-8")
+        assert len(text.splitlines()) <= 40, folder
+        rows = re.findall(r"^- `(\w+)\.py`: (.+)$", text, re.MULTILINE)
+        modules = {file.stem: file for file in folder.glob("*.py") if file.stem != "__init__"}
+        if folder.name == "effects":
+            modules = {name: file for name, file in modules.items() if name in dict(rows)}
+        said = {name: ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) for name, file in modules.items()}
+        assert dict(rows) == {name: " ".join((words or "").split("\n\n")[0].split()) for name, words in said.items()}
+
+
 def test_what_the_page_on_the_code_names_is_there(root: Path) -> None:
-    text = (root / "bushfit/README.md").read_text(encoding="utf-8")
+    text = (root / "bushfit/manual/code.md").read_text(encoding="utf-8")
     paths = re.findall(r"`([\w/]+(?:\.py|/))`", text)
     assert [path for path in paths if not any((place / path).exists() for place in (root / "bushfit", root))] == []
     names = re.findall(r"`([a-z]\w*(?:\.\w+)+)`", re.sub(r"`[\w/]+\.(?:py|json)`", "", text))
@@ -160,7 +175,7 @@ def is_there(name: str) -> bool:
 def test_the_steps_before_a_merge_are_the_same_wherever_they_stand(root: Path) -> None:
     """.ci/run, the page on the code, and the hooks, which leave out what is slow."""
     merged = re.findall(r"^step (?!python )(.+)$", (root / ".ci/run").read_text(encoding="utf-8"), re.MULTILINE)
-    shown = blocks(root / "bushfit/README.md", "sh")[0].splitlines()
+    shown = blocks(root / "bushfit/manual/code.md", "sh")[0].splitlines()
     hooks = yaml.safe_load((root / ".pre-commit-config.yaml").read_text(encoding="utf-8"))["repos"]
     entries = [hook["entry"] for repository in hooks for hook in repository["hooks"]]
     assert shown == merged

@@ -49,7 +49,7 @@ def test_the_wheel_is_for_every_machine_and_holds_every_file_of_the_package(root
     package = root / "bushfit"
     files = {file.relative_to(root).as_posix() for file in package.rglob("*") if file.is_file()}
     files = {file for file in files if "__pycache__" not in file}
-    assert {"bushfit/py.typed", "bushfit/units.txt", "bushfit/python.md"} <= files
+    assert {"bushfit/py.typed", "bushfit/units.txt", "bushfit/manual/python.md"} <= files
     assert {"bushfit/reading/words.toml", "bushfit/effects/library.toml"} <= files
     held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     assert held == files

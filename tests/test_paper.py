@@ -42,7 +42,7 @@ def off(root: Path) -> Callable[[Campaign], tuple[float, float]]:
 @pytest.fixture(scope="module")
 def claimed(root: Path) -> re.Match[str]:
     """What the page says: of the campaign, and median and worst of the draws [%]."""
-    page = (root / "bushfit/model/README.md").read_text(encoding="utf-8")
+    page = (root / "bushfit/manual/model.md").read_text(encoding="utf-8")
     found = re.search(r"comes out within ([\d.]+) % of .* median\s+([\d.]+) %, worst ([\d.]+) %", page, re.DOTALL)
     assert found is not None
     return found

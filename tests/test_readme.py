@@ -150,7 +150,7 @@ def test_every_example_of_the_page_on_python_runs_and_says_what_is_shown(
     for name in ("configs", "data"):
         shutil.copytree(root / name, tmp_path / name)
     monkeypatch.chdir(tmp_path)
-    page = root / "bushfit/python.md"
+    page = root / "bushfit/manual/python.md"
     blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
     test = doctest.DocTestParser().get_doctest("".join(blocks), {}, "python.md", str(page), 0)
     said: list[str] = []
