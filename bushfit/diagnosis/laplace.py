@@ -26,7 +26,7 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
     effect, names = effect_named(name), evidence.solution.coordinates.names
     data_sets, model = evidence.data_sets, evidence.model
     other = model.without(name) if effect.replaces is None else before.model
-    size = max(float(np.linalg.norm(each.off(model) - each.off(other), axis=0).max()) for each in data_sets)
+    size = max(each.change(model, other) for each in data_sets)
     density, precision, count = 0.0, {}, 0
     jacobian = evidence.solution.jacobian
     variances = np.diag(np.linalg.pinv(jacobian @ jacobian.T, rcond=1e-12, hermitian=True))

@@ -64,6 +64,10 @@ class MeasuredTest(ABC):
         """Size of the misfit of the points that carry weight, relative as `off`, for NRMSE."""
         return np.linalg.norm(self.off(model)[:, self.weights > 0.0], axis=0)
 
+    def change(self, one: Model, other: Model) -> float:
+        """Largest difference between two models, relative as `off`."""
+        return float(np.linalg.norm(self.off(one) - self.off(other), axis=0).max())
+
 
 def kept(answer: Callable[..., Array]) -> Callable[..., Array]:
     """Keeps what a data set answered to the last model; of values in place of the model's own nothing is kept."""

@@ -134,6 +134,12 @@ def test_of_a_loop_that_stands_on_its_first_harmonic_no_other_departs(loop: Loop
     assert 0.005 < fundamental.smooth_misfit(stiffer) < 0.04
 
 
+def test_the_change_between_models_is_relative_to_half_the_range(loop: LoopData, paper_model: Model) -> None:
+    stiffer = paper_model.with_values({"mu": 1.01 * paper_model.values["mu"]})
+    apart = np.max(np.abs(loop.force(stiffer) - loop.force(paper_model)))
+    assert loop.change(paper_model, stiffer) == pytest.approx(apart / (np.ptp(loop.drive.force) / 2.0), rel=0.02)
+
+
 def test_rows_without_weight_count_for_nothing_and_are_still_shown(loop: LoopData, paper_model: Model) -> None:
     light = loop.weighted(np.where(np.arange(loop.size) < 500, 0.0, 1.0))
     assert light.counted == np.count_nonzero(loop.drive.weight[500:])
