@@ -101,7 +101,7 @@ def with_contradictions(files: Sequence[Inspected]) -> list[Inspected]:
         loops = [test for test in tests if isinstance(test, Loop)]
         sweeps = [test for test in tests if isinstance(test, Sweep)]
         data_sets = [*(loop_data(loops) if len(loops) > 1 else ()), *(sweep_data(sweeps) if len(sweeps) > 1 else ())]
-        contradictions |= {id(one.test): one.beside for one in data_sets if one.beside}
+        contradictions |= {id(one.test): one.contradiction for one in data_sets if one.contradiction}
     return [
         replace(seen, odd=(*seen.odd, said)) if (said := contradictions.get(id(seen.measured))) else seen
         for seen in files

@@ -255,6 +255,6 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
         alternatives=tuple(replace(each, model=moved(each.model)) for each in result.alternatives),
     )
     sentence = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"
-    if left := ", ".join(name for name in result.model.effects if name not in model.effects):
+    if left := ", ".join(each.name for each in result.model.records if each.name not in model.effects):
         sentence += f"; left out, because they belong to {result.name} or its rig: {left}"
     return elsewhere, sentence

@@ -162,7 +162,7 @@ def test_what_is_not_as_it_was_recorded_is_said(root: Path, tmp_path: Path) -> N
 def test_reduction(paper_model: Model, direction: Direction) -> None:
     turns = direction.is_rotation
     operating = [(f, a * (30.0 if turns else 1.0)) for a in (1e-4, 4e-4) for f in (10.0, 30.0)]
-    history = stepped(paper_model, operating, direction=direction).history
+    history = stepped(paper_model, operating, direction=direction)
     reduction = reduce([history])
     figure = whole(reduction_figure(reduction, [history], "$ raw $.csv"))
     unit, length = ("deg", 180.0 / np.pi) if turns else ("mm", 1e3)
@@ -177,7 +177,7 @@ def test_reduction(paper_model: Model, direction: Direction) -> None:
 
 
 def test_reduction_of_many_histories_draws_the_first(paper_model: Model) -> None:
-    history = stepped(paper_model, [(10.0, 1e-4)]).history
+    history = stepped(paper_model, [(10.0, 1e-4)])
     histories = [Loop(str(n), history.direction, history.time, history.displacement, history.force) for n in range(6)]
     figure = whole(reduction_figure(reduce(histories), histories, "six"))
     assert len(figure.axes) == 4 + 4

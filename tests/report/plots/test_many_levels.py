@@ -15,7 +15,7 @@ from tries import some
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet, SweepData, loop_data, sweep_data
 from bushfit.geometry import Direction
-from bushfit.inspection.record import Inspected, Looked
+from bushfit.inspection.record import Inspected
 from bushfit.jobs.grid import default_grid
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -82,7 +82,7 @@ def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int)
     prediction = predict(Result(paper_model), Direction.AXIAL, [5.0, 50.0], np.geomspace(2e-5, 1e-3, count))
     curves = predict(Result(paper_model), Direction.AXIAL, *fine_grid(prediction))
     checked(prediction_figure(prediction, data_sets, "mount", curves=curves))
-    seen = Inspected(Path(f"{LONG_NAME}.csv"), "sweep", Direction.AXIAL, {}, (), Looked({}), {}, data_sets[0].sweep)
+    seen = Inspected(Path(f"{LONG_NAME}.csv"), "sweep", Direction.AXIAL, {}, (), {}, (), {}, data_sets[0].sweep)
     (left, right, *bar) = checked(inspection_figure([seen])).axes
     assert len(points(left)) == count
     assert len(bar) == (count > 8)
