@@ -18,7 +18,7 @@ from bushfit.export.fmu import export
 from bushfit.geometry import Direction, Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.prediction import predict
+from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Source
 
 #: The system that the tests run on.

@@ -15,7 +15,7 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.model.result import Result
-from bushfit.prediction import predict, predict_resonance
+from bushfit.prediction.stiffness import predict, predict_resonance
 from bushfit.reading.measurement import loss_factor
 from bushfit.reading.resonance import read_resonance
 from bushfit.reading.table import Table

@@ -13,7 +13,6 @@ from bushfit.batch.document import Found, Record
 from bushfit.batch.manifest import Row, Settings
 from bushfit.batch.quantities import Point
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.caveats import warnings_of
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import effect_named
 from bushfit.errors import BatchError, BushfitError
@@ -21,7 +20,8 @@ from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose, Diagnosed
 from bushfit.model.file import load_result
 from bushfit.model.result import End, Result
-from bushfit.prediction import Band, predict
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.stiffness import Band, predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.contents import Formats
 from bushfit.version import __version__

@@ -32,7 +32,7 @@ def tell_fit(options: Options, name: str, outcome: Fitted) -> None:
 
 def report(options: Options, title: str, result: Result) -> None:
     """The parameters of a result, its quality, and its warnings."""
-    from bushfit.caveats import warnings_of
+    from bushfit.prediction.caveats import warnings_of
 
     tell_result(options, title, result)
     options.warn(warnings_of(result))

@@ -8,7 +8,6 @@ from itertools import product
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
-from bushfit.comparison import CHANCE
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.holdout import HoldOut, Predicted, parts, predicted_parts
 from bushfit.diagnosis.laplace import laplace
@@ -21,6 +20,7 @@ from bushfit.fitting.design import with_effect
 from bushfit.fitting.model_error import log_likelihood, with_model_error
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
+from bushfit.prediction.comparison import CHANCE
 from bushfit.units import number
 
 #: Laws of rate and of amplitude beside the paper's or in their place, of which families are made, each with each.

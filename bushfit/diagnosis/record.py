@@ -6,7 +6,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from bushfit.caveats import warnings_of
 from bushfit.diagnosis.document import (
     Description,
     DiagnosisFile,
@@ -25,6 +24,7 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Alternative, Result
+from bushfit.prediction.caveats import warnings_of
 from bushfit.validation import plain
 
 #: Probability below which nothing is told of what may be else.

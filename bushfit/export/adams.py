@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.caveats import percent_off
 from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, Order
 from bushfit.export.deck import DOFS, Table, commented, directions, heading, middle, stated, tables, to_bytes
 from bushfit.export.losses import of_all, of_band
 from bushfit.geometry import ROTATION, TRANSLATION, Direction
+from bushfit.prediction.caveats import percent_off
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import number
 

@@ -4,12 +4,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from bushfit.caveats import warnings_of
 from bushfit.export.systems import UnitSystem
 from bushfit.geometry import Place
 from bushfit.model.arms import Arms
 from bushfit.model.result import Result
-from bushfit.prediction import Prediction
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import Source
 
 #: Whose bulk data the format `nastran` writes: MSC and NX Nastran's, or Altair OptiStruct's.

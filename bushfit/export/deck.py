@@ -12,7 +12,7 @@ from bushfit.errors import ModelError
 from bushfit.export.contract import Order
 from bushfit.export.systems import UnitSystem
 from bushfit.geometry import Direction
-from bushfit.prediction import Prediction
+from bushfit.prediction.stiffness import Prediction
 from bushfit.units import number
 from bushfit.version import __version__
 

@@ -16,7 +16,7 @@ from bushfit.export.losses import of_band
 from bushfit.geometry import Place
 from bushfit.model.arms import Arms, model_arms, qualified_size
 from bushfit.model.model import Model
-from bushfit.prediction import Prediction
+from bushfit.prediction.stiffness import Prediction
 from bushfit.units import number
 
 #: The tables of fmu.toml: fields of the C sources by effect, and units.

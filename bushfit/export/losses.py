@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from bushfit.caveats import percent_off
 from bushfit.effects import Level
 from bushfit.export.contract import Order
 from bushfit.export.deck import DOFS, Form, Table, directions, middle, tables
-from bushfit.prediction import Prediction
+from bushfit.prediction.caveats import percent_off
+from bushfit.prediction.stiffness import Prediction
 from bushfit.units import number
 
 #: What every law over frequency leaves out.

@@ -11,8 +11,6 @@ import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
-from bushfit.caveats import warnings_of
-from bushfit.comparison import Comparison, compare, holm, with_holm
 from bushfit.diagnosis.evidence import result_of
 from bushfit.diagnosis.families import FittedFamily, fit_families
 from bushfit.effects import Level
@@ -26,6 +24,8 @@ from bushfit.jobs.predict import columns_of
 from bushfit.model.document import BushingTable
 from bushfit.model.file import model_document, versions
 from bushfit.model.result import Result
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.comparison import Comparison, compare, holm, with_holm
 from bushfit.reading.measurement import Source, Sweep
 from bushfit.report.artifacts import comparison_contents
 from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, Family, Pair

@@ -8,10 +8,10 @@ import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
-from bushfit.caveats import MARGIN
 from bushfit.effects.contract import Array
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
 from bushfit.model.result import Result
+from bushfit.prediction.caveats import MARGIN
 from bushfit.reading.measurement import Sweep
 from bushfit.reading.runs import nominal
 from bushfit.simulation.undisturbed import PAPER_AMPLITUDES as PAPER_AMPLITUDES

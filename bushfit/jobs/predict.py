@@ -11,7 +11,6 @@ import pandas as pd
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
-from bushfit.caveats import warnings_of
 from bushfit.effects import Level
 from bushfit.effects.contract import Circumstances
 from bushfit.effects.temperature import REFERENCE
@@ -23,7 +22,8 @@ from bushfit.jobs.grid import grid_at, grid_settings
 from bushfit.model.arms import Arms, model_arms
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Result, Usable
-from bushfit.prediction import PredictedResonance, Prediction, predict, predict_resonance
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.stiffness import PredictedResonance, Prediction, predict, predict_resonance
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.report.artifacts import (
     arms_contents,

@@ -4,12 +4,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from bushfit.caveats import warnings_of
 from bushfit.errors import typed
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, SweepData
 from bushfit.model.file import to_document
 from bushfit.model.result import Result
+from bushfit.prediction.caveats import warnings_of
 
 
 def document_of(result: Result, campaign: Mapping[str, Any]) -> dict[str, Any]:

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from bushfit.campaign.naming import folder_name
-from bushfit.caveats import rig_effects, warnings_of
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import Level
 from bushfit.fitting.data_sets import LoopData, SweepData
@@ -17,7 +16,8 @@ from bushfit.geometry import Direction, Place
 from bushfit.model.arms import Arms
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.prediction import Prediction, predict
+from bushfit.prediction.caveats import rig_effects, warnings_of
+from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.report import plots, tables
 from bushfit.report.compared import SideBySide
 from bushfit.report.contents import Contents

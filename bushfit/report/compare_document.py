@@ -4,10 +4,10 @@ from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from bushfit.comparison import ParameterContrast
 from bushfit.diagnosis.holdout import Skipped
 from bushfit.model.document import BushingTable
 from bushfit.model.result import Range
+from bushfit.prediction.comparison import ParameterContrast
 from bushfit.reading.measurement import Source
 from bushfit.validation import Number
 

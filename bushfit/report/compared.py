@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from bushfit.comparison import ParameterContrast
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
+from bushfit.prediction.comparison import ParameterContrast
 from bushfit.report.compare_document import SCHEMA, ComparisonFile, Pair
 from bushfit.report.tables import numbers, required
 from bushfit.units import for_people, number, split_header, told

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bushfit.comparison import Comparison, Contrast, relative
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
@@ -17,7 +16,8 @@ from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Displa
 from bushfit.model.arms import Arms
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
-from bushfit.prediction import PredictedResonance, Prediction
+from bushfit.prediction.comparison import Comparison, Contrast, relative
+from bushfit.prediction.stiffness import PredictedResonance, Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.reduction.resonance import Resonance
 from bushfit.reduction.result import Reduction

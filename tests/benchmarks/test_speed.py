@@ -37,7 +37,7 @@ from bushfit.geometry import Direction
 from bushfit.jobs.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
-from bushfit.prediction import predict
+from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Loop, Sweep
 
 pytestmark = pytest.mark.slow

@@ -15,12 +15,12 @@ from scipy.stats import binomtest
 from test_schemas import complaints
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.caveats import caveats
 from bushfit.effects.contract import Array, Level
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
-from bushfit.prediction import predict
+from bushfit.prediction.caveats import caveats
+from bushfit.prediction.stiffness import predict
 
 FREQUENCIES, AMPLITUDES = np.geomspace(5.0, 155.0, 9), np.geomspace(1e-4, 5e-4, 5)
 #: How much stiffer the radial tests are than the axial ones predict, of the bushing or of the rig.

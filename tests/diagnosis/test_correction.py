@@ -16,7 +16,6 @@ from test_schemas import complaints
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
-from bushfit.caveats import caveats
 from bushfit.diagnosis.described import Described, describe
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.errors import ModelError
@@ -24,7 +23,8 @@ from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
-from bushfit.prediction import predict
+from bushfit.prediction.caveats import caveats
+from bushfit.prediction.stiffness import predict
 from bushfit.report.folder import to_json
 
 

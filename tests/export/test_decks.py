@@ -19,7 +19,7 @@ from bushfit.export.deck import DOFS, levels
 from bushfit.export.systems import MM_T_S_N, UnitSystem
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
-from bushfit.prediction import predict
+from bushfit.prediction.stiffness import predict
 
 #: Agreement of the model itself with the kept computation, as tests/model/test_model.py holds it.
 MODEL = 2e-4

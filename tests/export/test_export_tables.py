@@ -14,7 +14,7 @@ import pytest
 from bushfit.export.contract import Order
 from bushfit.export.systems import UnitSystem
 from bushfit.geometry import Direction, Specimen
-from bushfit.prediction import Band, predict
+from bushfit.prediction.stiffness import Band, predict
 from bushfit.reading.sweeps import read_sweep
 from bushfit.report import spreadsheets
 from bushfit.report.tables import wide_table

@@ -21,7 +21,7 @@ from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
-from bushfit.prediction import Band, predict
+from bushfit.prediction.stiffness import Band, predict
 
 SEEDS = 300
 #: Three standard errors of a share of 95 % over that many campaigns.

@@ -29,7 +29,7 @@ from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
-from bushfit.prediction import Prediction, predict
+from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.harmonics import basis
 

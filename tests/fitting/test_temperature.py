@@ -21,7 +21,7 @@ from bushfit.jobs.fits import Fit
 from bushfit.jobs.predict import Predict
 from bushfit.model.arms import arm_rows, model_arms
 from bushfit.model.model import Model
-from bushfit.prediction import predict
+from bushfit.prediction.stiffness import predict
 from bushfit.report.artifacts import temperature_contents
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed

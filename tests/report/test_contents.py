@@ -17,7 +17,7 @@ from bushfit.fitting.data import Data
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.prediction import predict
+from bushfit.prediction.stiffness import predict
 from bushfit.reading.tablefile import Form
 from bushfit.report.artifacts import fit_contents, prediction_contents
 from bushfit.report.contents import Contents, Formats, Picture

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bushfit.caveats import of_points, warnings_of
 from bushfit.diagnosis.document import BeforeAfter, EffectEntry, GapEntry
 from bushfit.diagnosis.record import odds_in_words
 from bushfit.geometry import Bushing, Place, Specimen
 from bushfit.model.document import TestTable
 from bushfit.model.result import Misfit, Result
+from bushfit.prediction.caveats import of_points, warnings_of
 from bushfit.report.page.chart import MOST_PLACES
 from bushfit.report.page.gap import gap_panels
 from bushfit.report.page.loops import loop_panels

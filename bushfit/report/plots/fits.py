@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData
 from bushfit.geometry import Place
 from bushfit.model.model import Model
-from bushfit.prediction import Band
+from bushfit.prediction.stiffness import Band
 from bushfit.report.plots import style
 from bushfit.report.plots.points import (
     SECTORS,

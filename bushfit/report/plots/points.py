@@ -11,7 +11,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData
 from bushfit.geometry import Place
-from bushfit.prediction import Band
+from bushfit.prediction.stiffness import Band
 from bushfit.reading.measurement import Stepped
 
 _T = TypeVar("_T", SweepData, LoopData)

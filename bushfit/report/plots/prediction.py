@@ -11,7 +11,7 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import SweepData
 from bushfit.geometry import Place
 from bushfit.model.model import Model
-from bushfit.prediction import Band, Prediction
+from bushfit.prediction.stiffness import Band, Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.reading.runs import nominal
 from bushfit.report.plots import style

@@ -17,7 +17,7 @@ from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.prediction import Prediction, predict
+from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.report.plots.prediction import fine_grid
 
 Swept = Callable[..., SweepData]

@@ -41,7 +41,7 @@ from bushfit.jobs.grid import default_grid
 from bushfit.model.arms import model_arms
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
-from bushfit.prediction import predict
+from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reduction.steps import reduce
 from bushfit.report.artifacts import prediction_contents

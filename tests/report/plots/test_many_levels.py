@@ -19,7 +19,7 @@ from bushfit.inspection.record import Inspected
 from bushfit.jobs.grid import default_grid
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.prediction import predict
+from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Loop, Stepped, Sweep
 from bushfit.reduction.steps import Reduction, Step
 from bushfit.report.plots.batch import Panel, batch_figure

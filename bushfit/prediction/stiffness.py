@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from bushfit.caveats import MARGIN, extrapolations, of_points, unfitted
 from bushfit.effects import Level
 from bushfit.effects.contract import Array, Circumstances, Setting
 from bushfit.errors import ModelError
@@ -24,6 +23,7 @@ from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
+from bushfit.prediction.caveats import MARGIN, extrapolations, of_points, unfitted
 from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
 from bushfit.units import number

@@ -19,7 +19,7 @@ from bushfit.effects.contract import Array
 from bushfit.geometry import Place
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.result import Result
-from bushfit.prediction import Band, Prediction, predict
+from bushfit.prediction.stiffness import Band, Prediction, predict
 from bushfit.units import alike, number, told
 
 #: Probability with which chance alone makes a difference somewhere that is said to be one.

@@ -9,7 +9,6 @@ import pytest
 from scipy.stats import binom, chi2, false_discovery_control, norm
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.comparison import Comparison, ParameterContrast, compare, holm, with_holm
 from bushfit.effects.contract import Array
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
@@ -17,6 +16,7 @@ from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
+from bushfit.prediction.comparison import Comparison, ParameterContrast, compare, holm, with_holm
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit.caveats import caveats
 from bushfit.geometry import Bushing, Direction, Shape
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
-from bushfit.prediction import predict, predict_resonance
+from bushfit.prediction.caveats import caveats
+from bushfit.prediction.stiffness import predict, predict_resonance
 
 
 def test_extrapolation_is_said(result: Result) -> None:

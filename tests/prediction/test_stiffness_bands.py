@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.schema import RigSettings, SimulatedSweep, SimulateSettings
-from bushfit.caveats import caveats
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import sweep_data
@@ -19,7 +18,8 @@ from bushfit.jobs.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES, default_grid
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result, carried
-from bushfit.prediction import predict, predict_resonance
+from bushfit.prediction.caveats import caveats
+from bushfit.prediction.stiffness import predict, predict_resonance
 from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import prediction_table, shaken_table
 from bushfit.simulation.measured import measure
