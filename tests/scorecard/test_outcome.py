@@ -129,6 +129,9 @@ def test_told_odds_are_counted() -> None:
         (100, "90 %", False),
         (3, "100 %", None),
     ]
+    risks = [row.figure[:6] for measure, row in rows.items() if measure.endswith(": wrong")]
+    assert "told 0.8 and more, 51 % of answers: wrong" in rows
+    assert risks[-3:] == ["43.3 %", "48.5 %", "0.0 % "]
     nothing = rows["nothing, told 0.99 and more: nothing to see"]
     assert (nothing.figure[:6], nothing.over, nothing.met) == ("75.0 %", 4, False)
 

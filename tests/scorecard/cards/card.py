@@ -172,7 +172,7 @@ def _of_sessions(good: Sequence[Outcome]) -> list[Row]:
 
 
 def _of_odds(good: Sequence[Outcome]) -> list[Row]:
-    """Whether probabilities are true: the share right of all that were told with about the same."""
+    """Whether probabilities are true: the share right of all that were told with about the same, and the risk taken."""
     sure = [not outcome.shows for outcome in good if outcome.nothing is not None and outcome.nothing >= _NOTHING]
     told = [(o.odds, o.leader_right is True) for o in good if o.leader and o.leader_right is not None]
     rows = []
@@ -185,6 +185,10 @@ def _of_odds(good: Sequence[Outcome]) -> list[Row]:
             wide = ends.low <= low and high <= ends.high  # the interval says no more than the bin
             row = replace(row, target=f"{100 * mean:.0f} %", met=None if wide else bool(ends.low <= mean <= ends.high))
         rows.append(row)
+    for least in _BINS[:-1]:  # what a reader risks who takes no answer below these odds
+        taken = [not right for odds, right in told if odds >= least]
+        answered = f"{100 * len(taken) / max(len(told), 1):.0f} % of answers"
+        rows.append(_share(f"told {least:g} and more, {answered}: wrong", taken))
     return [*rows, _share("nothing, told 0.99 and more: nothing to see", sure, low=0.99)]
 
 
