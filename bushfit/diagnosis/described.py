@@ -110,13 +110,15 @@ def _held_out(before: Evidence, fitted: Estimate) -> HoldOut:
     """Whole runs inside the range, in turn predicted from the others, without the correction and with it."""
     solution = before.solution
     both = (
-        LeaveOut.of(solution.jacobian, solution.residual),
+        LeaveOut.of(solution.jacobian[solution.moving], solution.residual),
         left_out(fitted.solution, fitted.minimised, fitted.solution.moving),
     )
     told = dict[str, Array]()
     for part in _inside(before.data_sets):
         rows = part.rows(before.data_sets)
         held = [np.pad(rows, (0, each.residual.size - rows.size)) for each in both]
+        if any(each.open(chosen).any() for each, chosen in zip(both, held, strict=True)):
+            continue  # the rest does not tell the model
         pairs = [each.predicted(chosen, np.arange(chosen.size)) for each, chosen in zip(both, held, strict=True)]
         told[part.name] = np.array(pairs)
     return HoldOut.of(told)

@@ -21,7 +21,10 @@ from bushfit.model.result import Result
 #: Evaluations of the model in one fit at most; a model that fits badly is then taken as it is.
 EVALUATIONS = 40
 #: What is said of a correction.
-_CORRECTED = "a smooth correction of the model closes a gap without a name: the parameters are those beside it"
+_CORRECTED = (
+    "a smooth correction of the model closes a gap without a name: the parameters are those beside it, and have taken "
+    "up what of the gap goes over more than a decade; then their intervals are invalid"
+)
 
 
 @dataclass(frozen=True, eq=False)

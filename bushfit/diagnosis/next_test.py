@@ -12,6 +12,8 @@ from bushfit.model.model import Model
 
 #: Relative noise of one point of a test that does not exist yet: that of a good servo-hydraulic rig.
 _NOISE = 5e-3
+#: Odds of an explanation, relative to the likeliest, below which it counts as if it had these.
+_LEAST_ODDS = 1e-6
 #: Information below which a test tells nothing [nats].
 _TELLS_SOMETHING = 1e-6
 
@@ -82,8 +84,10 @@ def entropy_left(odds: Sequence[float] | Array, distances: Array) -> Array:
     Notes: of mixtures of normal distributions the tests tell at least -sum_i p_i ln sum_j p_j exp(-d_ij/8)
         (Kolchinsky and Tracey, 2017) of the entropy of the odds; this is the rest.
     """
-    p = np.asarray(odds) / np.sum(odds)
-    return np.asarray(np.log(np.exp(-distances / 8.0) @ p / p) @ p)
+    p = np.maximum(odds, _LEAST_ODDS * np.max(odds))
+    p = p / p.sum()
+    others = np.exp(-distances / 8.0) * (1.0 - np.eye(p.size))  # by themselves: next to 1 they would be rounded away
+    return np.asarray(np.log1p(others @ p / p) @ p)
 
 
 def _distances(entry: MenuEntry, models: Sequence[Model], data_sets: Sequence[DataSet]) -> Array:

@@ -140,6 +140,8 @@ class Unnamed:
     patches: tuple[Patch, ...]
 
     def __post_init__(self) -> None:
+        if not self.patches:
+            raise ValueError(ModelError("a correction without values", expected="a patch for each direction"))
         if min(self.size, *self.lengths) <= 0.0:
             raise ValueError(ModelError("a correction of no size or length", expected="size and lengths above 0"))
 

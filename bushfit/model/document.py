@@ -262,7 +262,7 @@ class AlternativeTable:
 
     effects: tuple[str, ...]
     values: Mapping[str, Number]
-    probability: Number
+    probability: Annotated[Number, Field(ge=0.0, le=1.0)]
 
 
 @dataclass(frozen=True)

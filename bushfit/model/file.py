@@ -17,7 +17,7 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError, naming
 from bushfit.geometry import Bushing, Specimen
 from bushfit.model.covariance import Covariance
-from bushfit.model.document import SCHEMAS, CovarianceTable, ModelFile
+from bushfit.model.document import SCHEMAS, AlternativeTable, CovarianceTable, ModelFile
 from bushfit.model.model import Model
 from bushfit.model.result import Alternative, Quality, Range, Result
 from bushfit.reading.files import read_utf8
@@ -125,15 +125,19 @@ def _result(tables: ModelFile) -> Result:
         usable=fit.usable if fit else (),
         unresolved=tuple(name for name in tables.unresolved if name in model.effects),
         model_error=tables.model_error,
-        alternatives=tuple(
-            Alternative(Model(model.bushing, each.effects, each.values), each.probability)
-            for each in tables.alternatives
-        ),
+        alternatives=tuple(_alternative_of(each, number, model) for number, each in enumerate(tables.alternatives, 1)),
     )
     with naming(place="fit, directions"):
         for name in result.measured.directions if result.measured else ():
             result.place(name)
     return result
+
+
+def _alternative_of(table: AlternativeTable, number: int, model: Model) -> Alternative:
+    """One of the alternatives of a model, with the data of its correction where it has that too."""
+    with naming(place=f"alternatives, #{number}"):
+        unnamed = model.unnamed if UNNAMED in table.effects else None
+        return Alternative(Model(model.bushing, table.effects, table.values, unnamed), table.probability)
 
 
 def _covariance(table: CovarianceTable, parameters: Set[str]) -> Covariance:

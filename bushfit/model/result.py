@@ -156,7 +156,8 @@ class Result:
         profile: 95 % intervals by profile likelihood, where they were asked for; None is an open end.
         at_bound: parameters that came to rest on the least or largest value they may have, and on which.
         unresolved: effects of the model with a twin of the rig, which these tests cannot tell from it.
-        model_error: what the fit counted beside noise, as a share of the stiffness; None where noise was all.
+        model_error: what the fit counted beside noise, as a share of the stiffness, or what corrected the bushing that
+            a compound was carried from; None where noise was all.
         alternatives: models that explain the tests, where these cannot tell which does.
     """
 
@@ -199,6 +200,17 @@ class Result:
     def left_open(self) -> str:
         """What the first line on a result has to say of parameters that are unknown by 100 %; "" without any."""
         return self.covariance.left_open(self.model.values)
+
+    @property
+    def undecided(self) -> list[str]:
+        """A warning where the tests leave several models possible; none where they do not."""
+        if not self.alternatives:
+            return []
+        added = (sorted(set(each.model.effects) - {*self.model.effects}) for each in self.alternatives)
+        names = " or ".join(dict.fromkeys(" and ".join(each) for each in added if each))
+        lacking = f"the tests cannot tell what the model lacks, {names}: it is predicted without, and"
+        others = "the tests leave other values of the parameters possible:"
+        return [f"{lacking if names else others} low and high of predictions hold the model with each of these"]
 
     def place(self, name: str) -> Place:
         """The specimen of this name, or else the direction; a ModelError where it is neither."""
@@ -247,11 +259,11 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
         fitted=tuple(name for name in result.fitted if name in model.values),
         covariance=result.covariance.restricted([*model.values]),
         measured=measured,
-        warnings=tuple(f"{result.name}: {line}" for line in result.warnings),
+        warnings=tuple(f"{result.name}: {line}" for line in result.warnings if line not in result.undecided),
         inputs=result.inputs,
         specimens=result.specimens,
         unresolved=tuple(name for name in result.unresolved if name in model.effects),
-        model_error=result.model_error,
+        model_error=result.model_error or result.model.unnamed,
         alternatives=tuple(replace(each, model=moved(each.model)) for each in result.alternatives),
     )
     sentence = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"

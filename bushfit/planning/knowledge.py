@@ -1,5 +1,6 @@
 """What is known before tests are planned: from a campaign and its diagnosis, or from a model."""
 
+from collections import defaultdict
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
@@ -95,9 +96,12 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
     rivalling = _each_added(plain, names, held, data.bounds)
     _check_rivals(names, rivalling)
     told = zip(found.odds.labels, found.odds.told, strict=True)
-    odds = {name: share for label, (_, share) in told for name in label.split(" + ")}
+    odds = defaultdict[str, float](float)
+    for label, (_, share) in told:
+        for name in label.split(" + "):
+            odds[name] += share
     least = min(odds.values(), default=1.0)
-    every = [replace(known(rivalling[name]), probability=odds.get(name, least)) for name in names]
+    every = [replace(known(rivalling[name]), probability=odds[name] or least) for name in names]
     return replace(every[0], rivals=tuple(every))
 
 

@@ -35,7 +35,7 @@ def caveats(result: Result) -> list[str]:
     for name in result.unresolved:
         twins = " or ".join(effect_named(name).twins)
         lines.append(f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}")
-    lines += undecided(result)
+    lines += result.undecided
     if "springpot" not in result.model.effects:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:
@@ -54,17 +54,6 @@ def caveats(result: Result) -> list[str]:
             f"left out of the prediction, because they belong to the rig and not to the bushing: {', '.join(rig)}"
         )
     return lines
-
-
-def undecided(result: Result) -> Iterator[str]:
-    """A warning where the tests leave several models possible."""
-    if result.alternatives:
-        added = (set(each.model.effects) - {*result.model.effects} for each in result.alternatives)
-        names = " or ".join(dict.fromkeys(" and ".join(sorted(each)) or "other values" for each in added))
-        yield (
-            f"the tests cannot tell what the model lacks, {names}: it is predicted without, and low and high of "
-            "predictions hold the model with each of these"
-        )
 
 
 def rig_effects(result: Result) -> list[str]:
@@ -135,7 +124,7 @@ def of_points(
     """Warnings of |K| at operating points, (3, n): frequency [Hz], amplitude, |K| [SI], which may be the rig's in part,
     or was measured otherwise, (n,)."""
     frequency, amplitude, stiffness = at
-    yield from undecided(result)
+    yield from result.undecided
     yield from unfitted(result, place)
     yield from extrapolations(result, place, frequency, amplitude, temperature)
     known = set() if temperature is None else {"temperature"}

@@ -277,6 +277,11 @@ def predict_resonance(
         *unfitted(result, place),
         *extrapolations(result, place, frequency[near], found.amplitude[near], temperature, what),
     ]
+    if result.alternatives:
+        peaks = np.array([shaken(each).peak for each in _alternatives(result, rig=False)])
+        (low, least), (high, most) = peaks.min(axis=0), peaks.max(axis=0)
+        span = f"{number(low, 4)} to {number(high, 4)} Hz, |T| {number(least, 4)} to {number(most, 4)}"
+        told += [*result.undecided, f"{what}: {span}, by the models that the tests leave possible"]
     if if_rigs:
         there, largest = (number(each, 4) for each in if_rigs.peak)
         told.append(f"{what}: at {there} Hz, |T| {largest}, if {' and '.join(result.unresolved)} is the rig's")

@@ -6,6 +6,7 @@ The data are the virtual rig's, with effects in them that the model of a fit lac
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,11 +17,15 @@ from test_schemas import complaints
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.effects.contract import Array, Level
+from bushfit.effects.unnamed import Patch, Unnamed
+from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
+from bushfit.model.result import Alternative, Result, carried
 from bushfit.prediction.caveats import caveats
-from bushfit.prediction.stiffness import predict
+from bushfit.prediction.stiffness import predict, predict_resonance
+from bushfit.units import number
 
 FREQUENCIES, AMPLITUDES = np.geomspace(5.0, 155.0, 9), np.geomspace(1e-4, 5e-4, 5)
 #: How much stiffer the radial tests are than the axial ones predict, of the bushing or of the rig.
@@ -58,6 +63,41 @@ def test_bands_hold_each_model_that_may_be_right(measured: Measured) -> None:
     again = from_document(document)
     assert [each.model for each in again.alternatives] == [each.model for each in result.alternatives]
     np.testing.assert_array_equal(predict(again, Direction.RADIAL, FREQUENCIES, AMPLITUDES).stiffness.low, band.low)
+
+
+def test_they_are_told_of_a_resonance_and_stay_with_a_compound_that_is_carried(measured: Measured) -> None:
+    result = asked(changed(measured(), 1, STIFFER)).result
+    shaken = Direction.RADIAL, 50.0, 1.0, np.linspace(30.0, 80.0, 501)
+    peaks = [predict_resonance(Result(each.model), *shaken).peak[0] for each in result.alternatives]
+    (line,) = (line for line in predict_resonance(result, *shaken).warnings if "possible" in line)
+    assert f"{number(min(peaks), 4)} to {number(max(peaks), 4)} Hz" in line
+    other, _ = carried(
+        replace(result, warnings=(*result.warnings, *result.undecided)), replace(result.model.bushing, name="x")
+    )
+    said = caveats(other)
+    assert not any("cannot tell what the model lacks" in line for line in (*other.warnings, *said))
+    assert any("other values of the parameters possible" in line for line in said)
+
+
+def test_a_file_keeps_a_correction_that_alternatives_have_too(paper_model: Model) -> None:
+    rows = ((5.0, 50.0), (0.01, 0.01), (0.01, 0.02), (0.0, 0.0), (0.001, 0.001), (0.001, 0.001))
+    data = Unnamed(0.02, (0.9, 0.9), (Patch(("axial",), *rows),))
+    corrected = replace(paper_model, effects=(*paper_model.effects, "unnamed"), unnamed=data)
+    found = Result(corrected, alternatives=(Alternative(corrected.with_effect("inertia"), 0.6),))
+    document = json.loads(json.dumps(to_document(found)))
+    assert from_document(document).alternatives == found.alternatives
+    document["alternatives"][0]["values"]["mu"] = -1.0
+    with pytest.raises(ModelError, match="alternatives, #1"):
+        from_document(document)
+
+
+def test_what_was_corrected_counts_as_error_where_the_compound_is_carried(paper_model: Model) -> None:
+    rows = ((5.0, 155.0), (0.001, 0.1), (0.05, 0.05), (0.0, 0.0), (0.001, 0.001), (0.001, 0.001))
+    data = Unnamed(0.05, (2.0, 2.0), (Patch(("axial", "radial"), *rows),))
+    corrected = Result(replace(paper_model, effects=(*paper_model.effects, "unnamed"), unnamed=data))
+    other, _ = carried(corrected, replace(paper_model.bushing, name="x"))
+    band = predict(other, Direction.AXIAL, [20.0], [2e-4]).stiffness
+    assert (band.high - band.value) / band.value > 0.05
 
 
 @pytest.mark.slow

@@ -87,3 +87,5 @@ def test_what_stays_open_is_bounded_from_above(odds: tuple[float, float]) -> Non
         print(f"{distance:g} apart: {left:.4f} nats stay open, at most {bound:.4f}")
         assert left - 1e-6 <= bound <= left + 0.2
     assert entropy_left(odds, np.zeros((2, 2))) == pytest.approx(-float(p @ np.log(p)))
+    far = [float(entropy_left((*odds, 0.0), d * (1.0 - np.eye(3)))) for d in (300.0, 1000.0, 3000.0)]
+    assert far[0] > far[1] > far[2] > 0.0, "no rounding stands in for what is left"
