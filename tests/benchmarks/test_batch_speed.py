@@ -1,6 +1,6 @@
 """Many at once, against one core and against a shell loop, and the memory it takes:
 
-    pytest tests/benchmarks/test_batch_speed.py --benchmark-enable -m slow -s
+    pytest tests/benchmarks/test_batch_speed.py --benchmark-enable --dist no -m slow -s
 
 In the ordinary test run a few campaigns are taken, so that it cannot rot. BUSHFIT_MANY sets how many campaigns the
 test of memory goes up to (20000 takes minutes). No time is asserted; the ratios are printed.

@@ -1,6 +1,6 @@
 """How much faster than real time an FMU runs, on one core:
 
-    pytest tests/benchmarks/test_fmu_speed.py --benchmark-enable -m slow -s
+    pytest tests/benchmarks/test_fmu_speed.py --benchmark-enable --dist no -m slow -s
 
 In the ordinary test run it is called on little data, so that it cannot rot. No time is asserted.
 """

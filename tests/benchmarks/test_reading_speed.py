@@ -1,6 +1,6 @@
 """A loop of 10 million rows against the fastest library that loads it, and small files one by one:
 
-    pytest tests/benchmarks/test_reading_speed.py --benchmark-enable -m slow -s
+    pytest tests/benchmarks/test_reading_speed.py --benchmark-enable --dist no -m slow -s
 
 Every run is a process of its own, which tells its seconds without its imports, and its peak memory. In the ordinary
 test run the loop has some thousand rows, so that this cannot rot. The long loop needs the dependency group bench.

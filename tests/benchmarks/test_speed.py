@@ -1,6 +1,6 @@
 """How fast, as ratios within one run, one table at the end:
 
-    pytest tests/benchmarks/test_speed.py --benchmark-enable -m slow -s
+    pytest tests/benchmarks/test_speed.py --benchmark-enable --dist no -m slow -s
 
 In the ordinary test run everything is called once, so that it cannot rot. No time is asserted; the table prints what
 was found and what is wanted. Times are processor times, the least of several taken in turns, so that what else the
