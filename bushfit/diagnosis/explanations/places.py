@@ -8,7 +8,7 @@ from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import FaultyPlace
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import LoopData, SweepData, parted
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted
 
 #: Neighbouring frequencies that one disturbance covers at most: mains hum and its sidebands.
 _WIDEST = 3
@@ -30,13 +30,20 @@ def places(evidence: Evidence) -> list[FaultyPlace]:
 
 def _loop(evidence: Evidence, loop: LoopData) -> FaultyPlace:
     """A loop wrong as a whole, in gain or offset."""
-    columns = [evidence.embedded(column, loop) for column in loop.gain_and_offset()]
     ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
-    return FaultyPlace("place", "loop", f"the loop {loop.name}", _group(columns, np.eye(2)), loop.direction, *ends)
+    group = _group(evidence, [loop], np.array(loop.gain_and_offset()), np.eye(2))
+    return FaultyPlace("place", "loop", f"the loop {loop.name}", group, loop.direction, *ends)
 
 
-def _group(columns: Sequence[Array] | Array, unit: Array) -> Group:
-    return Group(np.array(columns), unit, together=True)
+def _rows(evidence: Evidence, data_sets: Sequence[DataSet]) -> slice:
+    """From the first row of some data sets to their last."""
+    places = [evidence.place[each] for each in data_sets]
+    return slice(min(place.start for place in places), max(place.stop for place in places))
+
+
+def _group(evidence: Evidence, data_sets: Sequence[DataSet], columns: Array, unit: Array) -> Group:
+    among = _rows(evidence, data_sets), evidence.residual.size
+    return Group(columns, unit, together=True, among=among)
 
 
 def _changed(columns: int, kind: str) -> Array:
@@ -50,7 +57,7 @@ def _changed(columns: int, kind: str) -> Array:
 
 
 def _place(
-    words: str, kind: str, sweeps: Sequence[SweepData], chosen: Sequence[Array], columns: Sequence[Array] | Array
+    evidence: Evidence, words: str, kind: str, sweeps: Sequence[SweepData], chosen: Sequence[Array], columns: Array
 ) -> FaultyPlace:
     """Chosen points of sweeps, (n,) bool each."""
     pairs = list(zip(sweeps, chosen, strict=True))
@@ -58,7 +65,8 @@ def _place(
         np.concatenate([getattr(sweep, axis)[mine] for sweep, mine in pairs]) for axis in ("frequency", "amplitude")
     )
     ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
-    return FaultyPlace("place", kind, words, _group(columns, _changed(len(columns), kind)), sweeps[0].direction, *ends)
+    group = _group(evidence, sweeps, columns, _changed(len(columns), kind))
+    return FaultyPlace("place", kind, words, group, sweeps[0].direction, *ends)
 
 
 def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
@@ -68,12 +76,13 @@ def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyP
             here = sweep.held == held
             words = sweep.line_words(int(np.argmax(here)))
             if every.size > 1:
-                yield _place(words, "level", [sweep], [here], _off(evidence, [sweep], [here], sloping=True))
+                columns = _off(evidence, [sweep], [here], sloping=True)
+                yield _place(evidence, words, "level", [sweep], [here], columns)
             numbers = np.unique(sweep.repeat[here])
             for number in numbers if numbers.size > 2 else ():
                 mine = here & (sweep.repeat == number)
                 columns = _off(evidence, [sweep], [mine])
-                yield _place(f"repeat {number} of {words}", "repeat", [sweep], [mine], columns)
+                yield _place(evidence, f"repeat {number} of {words}", "repeat", [sweep], [mine], columns)
 
 
 def _repeats(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
@@ -86,7 +95,7 @@ def _repeats(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Faulty
             if all(rows.any() for rows in chosen):
                 where = "every sweep" if len(scope) > 1 else f"the {scope[0].direction} sweep {scope[0].name}"
                 columns = _off(evidence, scope, chosen, sloping=True)
-                yield _place(f"repeat {number} of {where}", "repeat", scope, chosen, columns)
+                yield _place(evidence, f"repeat {number} of {where}", "repeat", scope, chosen, columns)
 
 
 def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
@@ -108,8 +117,7 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Fa
                 span = " to ".join(f"{step:.4g}" for step in dict.fromkeys((low, high)))
                 words = f"{span} Hz in {where}, at every amplitude"
                 rows = [np.any([chosen[place] for chosen in touched[window]], axis=0) for place in range(len(scope))]
-                own = [column for each in columns[window] for column in each]
-                yield _place(words, "frequency", scope, rows, own)
+                yield _place(evidence, words, "frequency", scope, rows, np.concatenate(columns[window]))
 
 
 def _scopes(sweeps: Sequence[SweepData]) -> list[Sequence[SweepData]]:
@@ -118,10 +126,14 @@ def _scopes(sweeps: Sequence[SweepData]) -> list[Sequence[SweepData]]:
 
 def _off(evidence: Evidence, sweeps: Sequence[SweepData], chosen: Sequence[Array], *, sloping: bool = False) -> Array:
     """Residuals of some points of sweeps that are off together: in gain, in phase, and if `sloping` along the step."""
-    columns = np.zeros((2 + 2 * sloping, evidence.residual.size))
+    among = _rows(evidence, sweeps)
+    columns = np.zeros((2 + 2 * sloping, among.stop - among.start))
     for sweep, rows in zip(sweeps, chosen, strict=True):
         values = [rows.astype(float), *([rows * _along(sweep.step)] if sloping else [])]
-        columns[:, evidence.place[sweep]] = [column for value in values for column in sweep.moved_together(value)]
+        own = evidence.place[sweep]
+        columns[:, own.start - among.start : own.stop - among.start] = [
+            column for value in values for column in sweep.moved_together(value)
+        ]
     return columns
 
 

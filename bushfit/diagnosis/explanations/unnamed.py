@@ -64,8 +64,9 @@ def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Ite
         of_point += [kinds.index(kind)] * (last - first)
     for direction in dict.fromkeys(name for name, _ in kinds):
         own = np.array([kinds.index(kind) for kind in dict.fromkeys(kinds) if kind[0] == direction])[:, None, None]
-        together = columns * (of_row == own), share * (np.array(of_point) == own)
-        yield direction, Group(*(each.reshape(-1, each.shape[-1]) for each in together), together=True)
+        parts = columns * (of_row == own), share * (np.array(of_point) == own)
+        moved, changed = (part.reshape(-1, part.shape[-1]) for part in parts)
+        yield direction, Group(moved, changed, together=True)
     if len({name for name, _ in kinds}) > 1:
         yield "all", Group(columns, share, together=True)
 
