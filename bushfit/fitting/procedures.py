@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -143,6 +144,7 @@ def given_static(data: Data) -> Result | None:
     return Result(Model.started(data.campaign.bushing, ("elastic", "friction"), held))
 
 
+@lru_cache(maxsize=1)  # `run` asks for it, and so does what its static fit says of the springpot
 def fit_two_step(data: Data) -> TwoStep:
     """Static and dynamic fit in turn, each holding what the other found, until they agree.
 
