@@ -6,10 +6,9 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
-from scipy import sparse
 
 from bushfit.effects.contract import Array
 
@@ -30,15 +29,9 @@ class Seen:
 
     parts: Sequence[tuple[slice, Array | None]]
 
-    @cached_property
-    def _directions(self) -> sparse.csr_array:
-        """All directions, (n, d)."""
-        found = [sparse.eye_array(own.stop - own.start) if along is None else along for own, along in self.parts]
-        return sparse.csr_array(sparse.block_diag(found))
-
-    def of(self, rows: Any) -> Any:
-        """Residuals, (..., n), sparse or not, along the directions, (..., d)."""
-        return rows @ self._directions
+    def of(self, rows: Array) -> Array:
+        """Residuals, (..., n), along the directions, (..., d)."""
+        return np.concatenate([self.of_part(i, rows[..., own]) for i, (own, _) in enumerate(self.parts)], axis=-1)
 
     def of_part(self, number: int, rows: Array) -> Array:
         """The same of the rows of one part."""
@@ -47,7 +40,11 @@ class Seen:
 
     def back(self, values: Array) -> Array:
         """Residuals, (..., n), that have values along the directions, (..., d), and nothing else."""
-        return np.asarray(values @ self._directions.T)
+        found = [
+            values[..., own] if along is None else values[..., own] @ along.T
+            for own, (_, along) in zip(self.places, self.parts, strict=True)
+        ]
+        return np.concatenate(found, axis=-1)
 
     @cached_property
     def places(self) -> list[slice]:

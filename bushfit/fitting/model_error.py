@@ -23,7 +23,7 @@ from functools import cached_property
 from itertools import chain, product
 
 import numpy as np
-from scipy import sparse
+from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
@@ -69,12 +69,12 @@ class _FittedTests:
 
     Args:
         solution: residuals and derivatives in noise alone.
-        errors: whitened residuals that one standard deviation of each of the rig's errors makes, (w, n).
+        errors: of each test, whitened residuals that one standard deviation of each of the rig's errors makes, (w, n).
     """
 
     solution: Solution
     data_sets: Sequence[DataSet]
-    errors: sparse.csr_array
+    errors: Sequence[Array]
 
     @cached_property
     def names(self) -> Array:
@@ -155,16 +155,18 @@ class _FittedTests:
     def left(self) -> tuple[Array, Array]:
         """Of what the parameters and the rig's errors make, orthonormal but for what is known of the latter, and of
         what both leave, the part that is seen, (k, d) and (d,)."""
-        k, residual = len(self.solution.jacobian), self.solution.residual
-        rows = sparse.vstack((sparse.csr_array(self.solution.jacobian), self.errors), format="csr")
-        information = (rows @ rows.T).toarray()
-        information[k:, k:] += np.eye(len(information) - k)
+        rows, residual, owns = self.solution.jacobian, self.solution.residual, rows_of(self.data_sets)
+        across = np.concatenate([rows[:, own] @ each.T for own, each in zip(owns, self.errors, strict=True)], axis=1)
+        among = block_diag(*(each @ each.T for each in self.errors))
+        information = np.block([[rows @ rows.T, across], [across.T, among + np.eye(len(among))]])
         scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         size, vectors = np.linalg.eigh(information / np.outer(scale, scale))
         known = size > ROUNDING * size.max(initial=0.0)
         mixed = (vectors[:, known] / np.sqrt(size[known])).T / scale
-        span = mixed @ self.seen.of(rows).toarray()
-        return span, self.seen.of(residual) - (mixed @ (rows @ residual)) @ span
+        seen = block_diag(*(self.seen.of_part(number, each) for number, each in enumerate(self.errors)))
+        span = mixed @ np.concatenate((self.seen.of(rows), seen))
+        along = [rows @ residual, *(each @ residual[own] for own, each in zip(owns, self.errors, strict=True))]
+        return span, self.seen.of(residual) - (mixed @ np.concatenate(along)) @ span
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,12 +342,12 @@ def _alive(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
 def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[DataSet]) -> _FittedTests:
     """A fit with its parameters at other values, and the tests in noise alone."""
     found = solution.at(solution.model.with_values(values), data_sets)
-    return _FittedTests(found, data_sets, sparse.csr_array((0, found.residual.size)))
+    return _FittedTests(found, data_sets, [np.empty((0, each.size)) for each in data_sets])
 
 
-def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> sparse.csr_array:
-    """Whitened residuals that the errors of a rig of the class make beside what is counted: the gain of each loop, and
-    gain and phase of each level, (w, n)."""
+def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> list[Array]:
+    """Whitened residuals of each test that the errors of a rig of the class make beside what is counted: the gain of a
+    loop, and gain and phase of each level, (w, n)."""
     found = []
     for each in data_sets:
         if isinstance(each, LoopData):
@@ -355,7 +357,7 @@ def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> sparse.csr_arra
             beyond = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(each.noise.level), 0.0))
             columns = level_errors_of(each)
             found.append(columns * np.tile(beyond, len(columns) // 2)[:, None])
-    return sparse.csr_array(sparse.block_diag(found))
+    return found
 
 
 def _shaped(data_sets: Sequence[DataSet], size: float) -> list[DataSet]:
