@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import median_filter
 from scipy.special import chdtri, fdtri
 
 from bushfit.effects.contract import Array
@@ -91,6 +90,8 @@ def gross_rows(values: Array) -> Array:
 
     None where these are many, even with a median over few rows: then the motion turns within so few rows.
     """
+    from scipy.ndimage import median_filter
+
     for width in (NEIGHBOURS, _FEW_NEIGHBOURS):
         level = median_filter(values, width, mode="nearest")
         off = np.abs(values - level) > _GROSS / 2.0 * float(np.ptp(level))
