@@ -11,7 +11,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
@@ -71,11 +71,19 @@ def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
 
 def _texts(column: pd.Series[Any], point: str) -> list[str]:
     """The cells of a column, (n,)."""
-    values = column.tolist()
     if column.dtype.kind == "f":  # at once: most cells are numbers, and most of the time goes into their texts
-        texts = ["" if value != value else f"{value:.7g}" for value in values]
+        texts = ["" if value != value else f"{value:.7g}" for value in column.tolist()]
         return texts if point == "." else [text.replace(".", point) for text in texts]
-    return [_cell(value, point) for value in values]
+    if column.dtype == "str":
+        return for_each_distinct(column, lambda value: _cell(value, point))
+    return [_cell(value, point) for value in column.tolist()]
+
+
+def for_each_distinct(column: pd.Series[Any], text_of: Callable[[object], str]) -> list[str]:
+    """The text of each value of a column, (n,), made once for those that are alike."""
+    place, distinct = column.factorize(use_na_sentinel=False)
+    texts = [text_of(value) for value in distinct]
+    return [texts[at] for at in place.tolist()]
 
 
 def _cell(value: object, point: str) -> str:
