@@ -39,6 +39,8 @@ _LONGEST_SHEET = 31
 _LONGEST_TEXT = 32_767
 #: When a workbook says it was made: that of its zip archive, so that the same tables are the same bytes.
 _MADE = datetime(1980, 1, 1, tzinfo=UTC)
+#: Rows whose texts are made column by column, and held, at a time.
+_ROWS_AT_ONCE = 10_000
 #: Widest column [characters].
 _WIDEST = 60
 
@@ -65,7 +67,9 @@ def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
         point, delimiter, encoding = ",", ";", "utf-8-sig"
     writer = csv.writer(text, delimiter=delimiter, lineterminator="\n")
     writer.writerow([defused(str(header)) for header in table.columns])
-    writer.writerows(zip(*(_texts(column, point) for _, column in table.items()), strict=True))
+    for start in range(0, len(table), _ROWS_AT_ONCE):
+        part = table.iloc[start : start + _ROWS_AT_ONCE]
+        writer.writerows(zip(*(_texts(column, point) for _, column in part.items()), strict=True))
     return text.getvalue().encode(encoding, "replace")
 
 
