@@ -1,6 +1,8 @@
 """Places of the tests gone wrong: a frequency, a level, a repeat, or a loop that disagrees with all the others."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 import numpy as np
 
@@ -70,12 +72,12 @@ def _place(
 
 
 def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
+    levels = Counter(str(sweep.direction) for sweep in sweeps for _ in np.unique(sweep.held))
     for sweep in sweeps:
-        every = np.unique(sweep.held)
-        for held in every:
+        for held in np.unique(sweep.held):
             here = sweep.held == held
             words = sweep.line_words(int(np.argmax(here)))
-            if every.size > 1:
+            if levels[str(sweep.direction)] > 1:  # in this file or in others
                 columns = _off(evidence, [sweep], [here], sloping=True)
                 yield _place(evidence, words, "level", [sweep], [here], columns)
             numbers = np.unique(sweep.repeat[here])
@@ -87,15 +89,14 @@ def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyP
 
 def _repeats(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
     """A repeat as a whole, of one direction or of all."""
-    for scope in _scopes(sweeps):
+    for _, which, scope in _scopes(sweeps):
         if not all(np.unique(sweep.repeat).size > 1 for sweep in scope):
             continue
         for number in sorted({int(each) for sweep in scope for each in sweep.repeat}):
             chosen = [sweep.repeat == number for sweep in scope]
             if all(rows.any() for rows in chosen):
-                where = "every sweep" if len(scope) > 1 else f"the {scope[0].direction} sweep {scope[0].name}"
                 columns = _off(evidence, scope, chosen, sloping=True)
-                yield _place(evidence, f"repeat {number} of {where}", "repeat", scope, chosen, columns)
+                yield _place(evidence, f"repeat {number} of {which}", "repeat", scope, chosen, columns)
 
 
 def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
@@ -104,10 +105,9 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Fa
     if steps.size < _FEWEST_FREQUENCIES:
         return
     bands = [part[[0, -1]] for part in np.array_split(steps, min(steps.size, _MOST_FREQUENCIES))]
-    for scope in _scopes(sweeps):
+    for where, _, scope in _scopes(sweeps):
         touched = [[(low <= sweep.frequency) & (sweep.frequency <= high) for sweep in scope] for low, high in bands]
         columns = [_off(evidence, scope, chosen) for chosen in touched]
-        where = scope[0].direction if len(scope) == 1 else "all directions"
         for width in range(1, _WIDEST + 1):
             for first in range(len(bands) - width + 1):
                 window = slice(first, first + width)
@@ -120,8 +120,23 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Fa
                 yield _place(evidence, words, "frequency", scope, rows, np.concatenate(columns[window]))
 
 
-def _scopes(sweeps: Sequence[SweepData]) -> list[Sequence[SweepData]]:
-    return [*([sweep] for sweep in sweeps), *([sweeps] if len(sweeps) > 1 else [])]
+def _scopes(sweeps: Sequence[SweepData]) -> Iterator[tuple[str, str, Sequence[SweepData]]]:
+    """Sweeps that may be off together: one alone, those of a direction in several files, and all; where that is, and
+    which sweeps these are, in words."""
+    of_directions = [(name, list(own)) for name, own in groupby(sorted(sweeps, key=_direction), _direction)]
+    for name, own in of_directions:
+        several = len(own) > 1
+        for each in own:
+            words = f"the {name} sweep {each.name}"
+            yield words if several else name, words, [each]
+        if several:
+            yield name, f"every {name} sweep", own
+    if len(of_directions) > 1:
+        yield "all directions", "every sweep", sweeps
+
+
+def _direction(sweep: SweepData) -> str:
+    return str(sweep.direction)
 
 
 def _off(evidence: Evidence, sweeps: Sequence[SweepData], chosen: Sequence[Array], *, sloping: bool = False) -> Array:
