@@ -126,19 +126,6 @@ def test_an_effect_is_plain_whether_it_was_named_or_not(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_clean_amplitude_sweeps_are_no_cause_for_alarm(tmp_path: Path) -> None:
-    """Eight of what `python -m tests.scorecard --family amplitude_sweeps --campaigns 500` counts.
-
-    Of 40 intervals 38 are expected to hold, and fewer than 34 do by chance once in 25.
-    """
-    found = run(tasks(8, SEED, "amplitude_sweeps"), tmp_path, 1, lambda _: None)
-    assert [(outcome.error, outcome.verdict) for outcome in found] == [("", "consistent")] * 8
-    covered = [hit for outcome in found for hit in outcome.covered]
-    assert len(covered) == 40
-    assert sum(covered) >= 34
-
-
-@pytest.mark.slow
 def test_mistakes_are_told_and_none_is_made_up(tmp_path: Path) -> None:
     """The most frequent of them, a clean campaign, and one that the reader refuses."""
     large = tasks(500, 7, "mistakes")
