@@ -159,16 +159,6 @@ def test_errors_of_levels_are_told(rig: Rig, paper_model: Model, error: float) -
     assert not error or 2 <= min(freedom) <= max(freedom) < 6  # six levels, less what the parameters take
 
 
-def test_what_the_class_of_the_rig_states_widens_intervals(rig: Rig) -> None:
-    campaign = rig(1)
-    rigs = RigSettings(gain_error=0.0, phase_error=0.0), RigSettings(gain_error=5e-3, phase_error=4e-3)
-    stated = (Data.of(replace(campaign, rig=rig)) for rig in rigs)
-    plain, wide = (fit_joint(data, directions=BOTH).covariance.stderr("m") for data in stated)
-    assert plain is not None
-    assert wide is not None
-    assert wide > 1.5 * plain
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("directions", [["axial"], BOTH], ids=["axial", "both"])
 @pytest.mark.parametrize("error", [0.0, 5e-3])

@@ -247,14 +247,6 @@ def test_the_command(root: Path, tmp_path: Path) -> None:
     assert (tmp_path / "page/report.html").read_bytes() == first
 
 
-def test_without_a_report(root: Path, tmp_path: Path) -> None:
-    campaign = root / "data/practice/case_000/bushing.toml"
-    assert call(tmp_path, "diagnose", campaign, "-o", "x", "--no-plots", "--no-report", "-q").returncode == 0
-    assert not (tmp_path / "x/report.html").exists()
-    assert call(tmp_path, "report", "x", "-q").returncode == 0
-    assert (tmp_path / "x/report.html").exists()
-
-
 def test_canonical_tables_are_those_of_the_files() -> None:
     table = pd.DataFrame({"test": ["=1", "a\nb"], "repeat": [1, 2], "force [N]": [np.nan, 1.23456789]})
     found = canonical(table)
