@@ -2,9 +2,9 @@
 
 Notes:
     Test files are ASCII but for a few letters of their header, too few for detectors that count letters, such as
-    charset-normalizer and chardet. Here the bytes decide, in this order: a byte order mark; zeros beside ASCII (UTF-16);
-    valid UTF-8; pairs of common Chinese characters (GB18030); and Western Latin for the rest (cp1252, or Latin-1 where it
-    has bytes that cp1252 lacks).
+    charset-normalizer and chardet. Here the bytes decide, in this order: a byte order mark; zeros beside ASCII
+    (UTF-16); valid UTF-8; pairs of common Chinese characters (GB18030); and Western Latin for the rest (cp1252, or
+    Latin-1 where it has bytes that cp1252 lacks).
 """
 
 import codecs

@@ -57,6 +57,34 @@ def test_whitening_gives_the_identity(sweep: SweepData) -> None:
     np.testing.assert_allclose(whitening @ covariance_of(sweep) @ whitening.T, np.eye(2 * n), atol=1e-12)
 
 
+def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep: SweepData) -> None:
+    """Of whitened residuals, by each variance times its standard error: scatter, what runs and what levels share."""
+    level, freedom = (3e-3, 2e-3), {"scatter": 20, "shared": 6, "level": 5}
+    noise = replace(sweep.noise, level=level, scatter_freedom=20, level_freedom=5)
+    data, n = replace(sweep, noise=noise), sweep.frequency.size
+    whitening = data.whiten(np.concatenate([np.eye(n), 1j * np.eye(n)])).T
+    influence = np.random.default_rng(1).normal(size=(3, 2 * n))
+    line = np.unique(sweep.amplitude, return_inverse=True)[1]
+    block = np.unique(np.stack((sweep.amplitude, sweep.repeat)), axis=1, return_inverse=True)[1].ravel()
+    plain = covariance_of(sweep)
+    for (_, kind, part), found in data.unsure(influence).items():
+        own = slice(part * n, part * n + n)
+        error = np.sqrt(2.0 / freedom[kind])
+        random = np.array([noise.random["sweep", float(x)][part] ** 2 for x in sweep.amplitude])
+        moved = np.diag(random * error)
+        if kind != "scatter":
+            of, variance = (block, SHARED[part] ** 2) if kind == "shared" else (line, level[part] ** 2)
+            within = np.diag(random) if kind == "shared" else plain[own, own]
+            mine = [np.flatnonzero(of == each) for each in np.unique(of)]
+            expected = [variance + 1.0 / np.linalg.inv(within[np.ix_(rows, rows)]).sum() for rows in mine]
+            moved = np.zeros((n, n))
+            for rows, size in zip(mine, expected, strict=True):
+                moved[np.ix_(rows, rows)] = min(size * error, variance)
+        whole = np.zeros((2 * n, 2 * n))
+        whole[own, own] = moved
+        np.testing.assert_allclose(found, influence @ whitening @ whole @ whitening.T, atol=1e-9, err_msg=kind)
+
+
 def test_the_right_model_of_a_sweep_leaves_no_residual(sweep: SweepData, paper_model: Model) -> None:
     assert np.max(np.abs(sweep.residual(paper_model))) < 1e-10
     assert np.max(sweep.relative(paper_model)) < 1e-12
