@@ -126,19 +126,6 @@ def test_the_documents_are_of_every_kind(written: Documents) -> None:
     assert any("joint" in document for document in written["run"])
 
 
-@pytest.mark.parametrize("name", [name for name in OUTPUTS if name != "prediction"])
-@pytest.mark.slow
-def test_what_is_spoiled_is_refused(written: Documents, name: str) -> None:
-    """Every key that has to be there taken away in turn, and every key given what is no value of it."""
-    described, document = schema(name), written[name][-1]
-    required = described.get("required", [])
-    assert required
-    for key in required:
-        assert complaints(name, {other: value for other, value in document.items() if other != key}), key
-    for key in document:
-        assert complaints(name, {**document, key: [[{}]]}), key
-
-
 def described_by(file: Path) -> str:
     """The schema of a TOML file of the repository."""
     return file.stem if file.stem == "limits" else "manifest" if file.stem == "batch" else "campaign"

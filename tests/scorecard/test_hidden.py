@@ -119,22 +119,6 @@ def test_coloured_noise_depends_on_the_row_before(name: str) -> None:
     assert np.corrcoef(noise[1:], noise[:-1])[0, 1] > 0.97
 
 
-@pytest.mark.parametrize("name", ["wild_point", "level_errors_one", "heavy_tails", "low_frequency_scatter"])
-def test_awkward_campaigns_differ_by_noise_alone(name: str) -> None:
-    silent = Recipe("silent", plan=AWKWARD[name].plan)
-    assert 0.001 < max(changes(cooked(AWKWARD[name], SEED)[0], cooked(silent, SEED)[0])[:2]) < 0.12
-
-
-def test_plans_are_as_the_kinds_say() -> None:
-    one, three, strain = (
-        cooked(AWKWARD[name], SEED)[0].sweeps for name in ("one_direction", "three_frequencies", "strain_sweeps")
-    )
-    assert len(one) == 1
-    assert len(np.unique(three[0].frequency)) == 3
-    assert strain[0].stepped == "amplitude"
-    assert strain[0].reached is not None
-
-
 def test_every_kind_of_a_family_has_its_turn() -> None:
     for family, kind in (("awkward", "awkward"), ("faults", "fault"), ("outside", "law")):
         made = [task for task in tasks(60, 8001, family) if task.kind == kind]  # type: ignore[arg-type]

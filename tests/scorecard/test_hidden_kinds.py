@@ -13,7 +13,6 @@ from kinds import SIZES, Bench, largest, sized
 from lab_campaign import KINDS, Answer, campaign
 from time_rig import Bushing, Rubber, Tests, respond
 
-from bushfit.campaign.campaign import load_campaign
 from bushfit.effects import LIBRARY
 
 RUBBER = Rubber(1.09e6, 2.0e5, 0.24, 1.46e4, 1.3e-2)
@@ -57,14 +56,6 @@ def test_the_same_seed_writes_the_same_campaign(name: str, tmp_path: Path) -> No
     assert first == second
     for file in (tmp_path / "a").iterdir():
         assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes()
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_bushfit_reads_what_is_written(seed: int, tmp_path: Path) -> None:
-    campaign("", 0.0, seed, tmp_path)
-    read = load_campaign(tmp_path / "bushing.toml")
-    assert read.sweeps
-    assert all(np.all(np.abs(sweep.stiffness.imag) < sweep.stiffness.real) for sweep in read.sweeps)
 
 
 PLAIN = Answer("tilted", 0.1, ("stiffness_factor",), ("level",), 0.05, 300.0)

@@ -82,15 +82,6 @@ def test_a_small_loop_is_that_of_the_closed_form_with_any_effect(paper_model: Mo
     assert rig.lock_in(record, 1.0) == pytest.approx(closed, rel=5e-4)
 
 
-def test_a_programme_of_one_part_is_a_loop(paper_model: Model) -> None:
-    loop, programme = (
-        SimulatedLoop(Direction.AXIAL, 1e-4, 1.0, cycles=1),
-        SimulatedLoop(Direction.AXIAL, cycles=1, frequencies=(1.0,), amplitudes=(1e-4,)),
-    )
-    one, other = (undisturbed(paper_model, SimulateSettings(loops=(each,))).loops[0][1] for each in (loop, programme))
-    np.testing.assert_array_equal(one.force, other.force)
-
-
 def test_noise_is_as_large_as_asked_for(clean: Undisturbed) -> None:
     ideal = measure(clean, PLAN)
     noisy = measure(clean, replace(PLAN, repeats=2000, noise=0.01, force_noise=0.02, displacement_noise=0.001))

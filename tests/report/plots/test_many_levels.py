@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -131,15 +130,6 @@ def test_many_loops(paper_model: Model, looped: Looped, count: int) -> None:
     assert len(names) == min(count, 8) + (count > 8) + 1
     assert (f"and {count - 8} more" in names) is (count > 8)
     check_gaps(paper_model, data_sets, "mount")
-
-
-@pytest.mark.parametrize("count", some([3, 40], {3}))
-def test_twins_of_long_names(paper_model: Model, looped: Looped, count: int) -> None:
-    one = looped(paper_model, 1e-3, cycles=2).test
-    data_sets = loop_data([replace(one, name=f"{LONG_NAME}{k}.csv") for k in range(count)])
-    names = legend(checked(loops_figure(paper_model, data_sets, LONG_NAME)).axes[1])
-    assert len(set(names)) == len(names), "a name that loses its middle is still told from others"
-    check_gaps(paper_model, data_sets, LONG_NAME)
 
 
 @pytest.mark.parametrize(("levels", "histories"), [(8, 40), pytest.param(300, 2, marks=pytest.mark.slow)])
