@@ -99,6 +99,15 @@ def test_any_text_is_a_unit_or_a_unit_error(text: str) -> None:
     assert math.isfinite(scale)
 
 
+@given(
+    st.floats(-1e5, 1e5).filter(lambda number: number == 0.0 or abs(number) > 1e-6),
+    st.sampled_from([("mm", "m", 1e-3), ("kN", "N", 1e3), ("MPa", "Pa", 1e6)]),
+)
+def test_quantity_is_number_times_unit(number: float, unit: tuple[str, str, float]) -> None:
+    text, si, scale = unit
+    assert units.quantity(f"{number!r} {text}", si) == pytest.approx(number * scale, rel=1e-14)
+
+
 @pytest.mark.parametrize(
     ("header", "parts"),
     [

@@ -27,6 +27,7 @@ from bushfit.model.result import Result
 from bushfit.simulation.measured import simulate
 
 Rig = Callable[..., Campaign]
+BAND = tuple(float(f) for f in range(5, 156, 10))
 NAMES = ("paper", "soft and long", "stiff and thin", "strongly filled")
 
 
@@ -104,6 +105,14 @@ def test_radial_sweep_follows_from_axial_tests(measured: Data, result: Result) -
     assert count.size == 48
     assert magnitude < 0.03
     assert loss < 0.01
+
+
+@pytest.mark.parametrize("waveform", ["sine", "triangle"])
+def test_either_waveform_gives_the_truth(rig: Rig, paper_model: Model, waveform: str) -> None:
+    loops = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2, waveform=waveform),)  # type: ignore[arg-type]
+    sweeps = (SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), BAND),)
+    results = [fit_joint(Data.of(rig(seed, loops=loops, sweeps=sweeps))) for seed in range(20)]
+    assert np.max(np.abs(np.mean([errors(result, paper_model.values) for result in results], axis=0))) < 0.015
 
 
 def test_passes_agree_and_settle_where_plain_passes_would(measured: Data) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 from pathlib import Path
 from typing import get_args
@@ -10,6 +11,8 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bushfit.errors import OutputError
 from bushfit.geometry import Direction
@@ -60,6 +63,15 @@ def test_a_text_that_a_spreadsheet_would_run_is_quoted_and_every_text_is_one_lin
     assert [defused(text) for text in RUN] == [f"'{text}" for text in RUN]
     assert [defused(text) for text in STAY] == STAY
     assert (defused("a\r\nb"), defused("a\r\n=1")) == ("a b", "a =1")
+
+
+@given(st.lists(st.text(), min_size=1))
+def test_no_cell_runs(texts: list[str]) -> None:
+    written = to_csv(pd.DataFrame({"text": texts, "n": range(len(texts))})).decode()
+    rows = list(csv.reader(io.StringIO(written, newline="")))[1:]
+    assert len(rows) == len(texts)
+    for row in rows:
+        assert not row[0].lstrip().startswith(("=", "+", "-", "@"))
 
 
 def test_a_workbook_has_numbers_in_full_and_texts_that_nothing_runs() -> None:
