@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import shutil
 import tomllib
@@ -14,7 +13,6 @@ import pytest
 from commandline import call
 from jsonschema import Draft202012Validator
 
-from bushfit.errors import BushfitError
 from bushfit.schemas import DESCRIBED, schema
 
 Documents = dict[str, list[Any]]
@@ -107,11 +105,6 @@ def test_a_schema_is_valid_and_says_what_every_key_holds(name: str) -> None:
     assert [*keys_without_a_word(made, name)] == []
 
 
-def test_a_schema_that_is_not_there_is_told_with_the_nearest() -> None:
-    with pytest.raises(BushfitError, match='did you mean "diagnosis"'):
-        schema("diagnoses")
-
-
 @pytest.mark.parametrize("name", OUTPUTS)
 @pytest.mark.slow
 def test_what_is_written_has_the_keys_that_are_described_and_no_others(written: Documents, name: str) -> None:
@@ -131,39 +124,6 @@ def test_the_documents_are_of_every_kind(written: Documents) -> None:
     assert any("profile95" in entry for document in written["model"] for entry in document["parameters"].values())
     assert any(document["failed"] for document in written["batch"])
     assert any("joint" in document for document in written["run"])
-
-
-@pytest.mark.parametrize("name", [name for name in OUTPUTS if name != "prediction"])
-@pytest.mark.slow
-def test_what_is_spoiled_is_refused(written: Documents, name: str) -> None:
-    """Every key that has to be there taken away in turn, and every key given what is no value of it."""
-    described, document = schema(name), written[name][-1]
-    required = described.get("required", [])
-    assert required
-    for key in required:
-        assert complaints(name, {other: value for other, value in document.items() if other != key}), key
-    for key in document:
-        assert complaints(name, {**document, key: [[{}]]}), key
-
-
-@pytest.mark.parametrize(
-    ("place", "value"),
-    [
-        (("schema",), "bushfit/model/3"),
-        (("bushing", "inner_radius_m"), "10 mm"),
-        (("parameters", "mu", "value"), None),
-        (("parameters", "mu", "at_bound"), "middle"),
-        (("fit", "tests", 0, "held"), "temperature"),
-    ],
-)
-@pytest.mark.slow
-def test_a_wrong_value_in_a_model_is_refused(written: Documents, place: tuple[Any, ...], value: object) -> None:
-    document = copy.deepcopy(written["model"][0])
-    table = document
-    for key in place[:-1]:
-        table = table[key]
-    table[place[-1]] = value
-    assert complaints("model", document)
 
 
 def described_by(file: Path) -> str:

@@ -182,7 +182,7 @@ class _Planner:
         """The runs with further repeats of sweeps, until a fit can tell their scatter from what repeats differ by, as
         far as that costs next to nothing of the aim."""
         most = self.strict.together(counts) + 0.1  # of the logarithm of a variance: a twentieth of the error
-        while (freedom := self._scatter_freedom(counts)) < _SCATTER_FREEDOM:
+        while (freedom := self._scatter_freedom(counts)) < [_SCATTER_FREEDOM]:
             again = [test for test in np.flatnonzero(counts).tolist() if _differences(self.tests[test])]
             more = [
                 runs
@@ -207,10 +207,10 @@ class _Planner:
             if self.budget.spent(runs) <= self.budget.most:
                 yield runs
 
-    def _scatter_freedom(self, counts: Array) -> int:
+    def _scatter_freedom(self, counts: Array) -> list[int]:
         """Degrees of freedom of the scatter of sweeps that repeats tell, those before and so many runs of each test.
 
-        Of several rigs, the bushing's and each specimen's, the fewest.
+        Of each rig, the bushing's and each specimen's, up to what is enough; the fewest first.
         """
         runs = Counter(self.known.tests)
         runs.update({test: int(n) for test, n in zip(self.tests, counts, strict=True) if n})
@@ -219,7 +219,7 @@ class _Planner:
             if isinstance(test, SimulatedSweep):
                 rig = test.direction if isinstance(test.direction, Specimen) else None
                 freedom[rig] += _differences(test) * (times - 1)
-        return min(freedom.values(), default=0)
+        return sorted(min(each, _SCATTER_FREEDOM) for each in freedom.values())
 
     def _criterion(self, penalty: float) -> Criterion:
         odds = np.array([rival.probability for rival in self.known.rivals])

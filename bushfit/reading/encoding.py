@@ -1,10 +1,10 @@
 """The encoding of a test file, and its text as UTF-8.
 
 Notes:
-    Test files are ASCII but for a few letters of their header, too few for detectors that count letters, as
-    tests/benchmarks/test_dialects_elsewhere.py shows of charset-normalizer and chardet. Here the bytes decide, in this
-    order: a byte order mark; zeros beside ASCII (UTF-16); valid UTF-8; pairs of common Chinese characters (GB18030);
-    and Western Latin for the rest (cp1252, or Latin-1 where it has bytes that cp1252 lacks).
+    Test files are ASCII but for a few letters of their header, too few for detectors that count letters, such as
+    charset-normalizer and chardet. Here the bytes decide, in this order: a byte order mark; zeros beside ASCII
+    (UTF-16); valid UTF-8; pairs of common Chinese characters (GB18030); and Western Latin for the rest (cp1252, or
+    Latin-1 where it has bytes that cp1252 lacks).
 """
 
 import codecs

@@ -244,28 +244,3 @@ def test_a_report_that_cannot_be_written_is_refused_before_the_work(
     assert "--output" not in done.stderr
     assert not (shop / "all").exists()
     assert (shop / "old.xml").read_text() == "old"
-
-
-@pytest.mark.slow
-def test_a_pattern_that_the_shell_has_expanded_is_the_pattern(typed: Callable[..., Any], shop: Path) -> None:
-    assert typed("batch", PATTERN, "-o", "quoted", "-q").returncode == 0
-    expanded = sorted(str(path.relative_to(shop)) for path in shop.glob(PATTERN))
-    assert typed("batch", *expanded, "-o", "bare", "-q").returncode == 0
-    assert tree(shop / "bare") == tree(shop / "quoted")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ((PATTERN, "--at", "axial 25"), "--at"),
-        ((PATTERN, "--effect", "inertai"), "did you mean inertia?"),
-        ((PATTERN, "--command", "diagnose", "--effect", "inertia"), "effects: this setting does nothing here"),
-        (("bushings",), "in quotes"),
-    ],
-)
-def test_wrong_usage(typed: Callable[..., Any], shop: Path, arguments: tuple[str, ...], words: str) -> None:
-    done = typed("batch", *arguments, "-o", "all")
-    assert done.returncode == 2
-    assert words in done.stderr
-    assert "Traceback" not in done.stderr
-    assert not (shop / "all").exists()

@@ -21,8 +21,6 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
-from bushfit.reading.loops import read_loop
-from bushfit.reading.sweeps import read_sweep
 
 pytestmark = pytest.mark.slow
 
@@ -103,15 +101,3 @@ def test_a_loop_of_ten_million_rows(benchmark: BenchmarkFixture, long_loop: tupl
     benchmark.extra_info["over the fastest reader"] = ratio
     assert {figures["found"] for figures in best.values()} == {rows}
     assert whole["peak"] < 2.0
-
-
-def test_a_small_file(benchmark: BenchmarkFixture, root: Path) -> None:
-    """Three files a campaign: a loop of 3000 rows, two sweeps of 144."""
-    folder = root / "data/cmp_15961"
-
-    def read() -> None:
-        read_loop(folder / "loop_axial_1.csv", Direction.AXIAL)
-        read_sweep(folder / "sweep_axial.csv", Direction.AXIAL)
-        read_sweep(folder / "sweep_radial.csv", Direction.RADIAL)
-
-    benchmark(read)

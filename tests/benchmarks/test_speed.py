@@ -26,18 +26,14 @@ from bushfit.campaign.campaign import load_campaign
 from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, History
-from bushfit.effects.springpot import grunwald_letnikov_weights
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import SweepData, loop_data, sweep_data
-from bushfit.fitting.procedures import STATIC, fit_dynamic, fit_joint, fit_two_step
+from bushfit.fitting.data_sets import loop_data, sweep_data
+from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction
-from bushfit.jobs.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES
 from bushfit.model.model import FIVE, Model
-from bushfit.model.result import Result
-from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Loop, Sweep
 
 pytestmark = pytest.mark.slow
@@ -63,11 +59,6 @@ def table() -> Iterator[Rows]:
 @pytest.fixture(scope="module")
 def data(root: Path) -> Data:
     return Data.of(load_campaign(root / "configs/cmp_15961.toml"))
-
-
-@pytest.fixture(scope="module")
-def static(data: Data) -> Result:
-    return fit_two_step(data).result
 
 
 def seconds(works: Sequence[Callable[[], object]], repeats: int) -> list[float]:
@@ -139,86 +130,6 @@ def test_joint_fit_against_bare_minpack(benchmark: BenchmarkFixture, data: Data,
         assert best[name] == pytest.approx(found.model.values[name], rel=1e-4)
     ours, theirs = seconds([lambda: fit_joint(data), bare], 40 if benchmark.enabled else 1)
     table.append((f"five-parameter fit, {1e3 * ours:.1f} ms, over bare MINPACK", f"{ours / theirs:.2f}", "<= 1.5"))
-
-
-def stepped(model: Model, frequency: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
-    """The paper's procedure: Eqs. 3 and 5 through a run-in and a cycle, then lock-in; all operating points at once.
-
-    Because a rig prescribes its motion, the sums over the past of all steps are had by one transform: the fastest that
-    is left, and no stepping any more. `looking_back` times what stepping has to do in its place.
-    """
-    wave = np.sin(2.0 * np.pi * np.arange((RUN_IN + 1) * STEPS + 1) / STEPS)
-    motion, rate = amplitude[:, None] * wave, frequency[:, None]
-    force = model.force(Direction.AXIAL, History(motion, 1.0 / (rate * STEPS), periodic=False, frequency=rate))
-    turn = np.exp(-2j * np.pi * np.arange(STEPS) / STEPS)
-    return (force[:, -STEPS:] @ turn) / (motion[:, -STEPS:] @ turn)
-
-
-def looking_back(points: int, alpha: float, steps: int) -> np.ndarray:
-    """The springpot's sum at every step of a run: one product of all strains so far with their weights."""
-    wave = np.sin(2.0 * np.pi * np.arange((RUN_IN + 1) * steps + 1) / steps)
-    motion, weights = np.tile(wave, (points, 1)), grunwald_letnikov_weights(alpha, wave.size)[::-1].copy()
-    sums = np.empty_like(motion)
-    for k in range(wave.size):
-        sums[:, k] = motion[:, : k + 1] @ weights[wave.size - 1 - k :]
-    return sums
-
-
-def by_time_stepping(data_set: SweepData, static: Result, start: dict[str, float]) -> tuple[dict[str, float], int]:
-    """The paper's dynamic fit, differenced by MINPACK, and how often it asks for the stiffness."""
-    points, where = np.unique(np.stack((data_set.frequency, data_set.amplitude)), axis=1, return_inverse=True)
-
-    def misfit(point: np.ndarray) -> np.ndarray:
-        values = {"m": float(np.exp(point[0])), "alpha": float(np.clip(point[1], 0.02, 1.0))}
-        stiffness = stepped(static.model.with_values(values), *points)
-        return data_set.whiten(stiffness[where.ravel()] / data_set.measured - 1.0)
-
-    unknowns = [np.log(start["m"]), start["alpha"]]
-    best, _, told, *_ = leastsq(misfit, unknowns, epsfcn=1e-6, xtol=1e-6, ftol=1e-8, full_output=True)
-    return {"m": float(np.exp(best[0])), "alpha": float(best[1])}, int(told["nfev"])
-
-
-def test_fit_dynamic_against_time_stepping(
-    benchmark: BenchmarkFixture, data: Data, static: Result, table: Rows
-) -> None:
-    data_set = data.smallest_sweep
-    start = {"m": 0.5 * static.model.values["m"], "alpha": 0.3}
-    slow_answer, asked = by_time_stepping(data_set, static, start)
-    found = benchmark(fit_dynamic, data, static)
-    apart = max(abs(found.model.values[name] / slow_answer[name] - 1.0) for name in ("m", "alpha"))
-    points, steps = np.unique(data_set.frequency).size, STEPS if benchmark.enabled else 64
-    fast, by_transform, once = seconds(
-        [
-            lambda: fit_dynamic(data, static),
-            lambda: by_time_stepping(data_set, static, start),
-            lambda: looking_back(points, found.model.values["alpha"], steps),
-        ],
-        7 if benchmark.enabled else 1,
-    )
-    what = f"fit-dynamic, {1e3 * fast:.1f} ms: times faster than time stepping"
-    table.append((f"{what}, {asked} times {once:.1f} s", f"{asked * once / fast:.0f}", ">= 300"))
-    what = f"fit-dynamic: times faster than with all steps by one transform (apart by {100 * apart:.2f} %)"
-    table.append((what, f"{by_transform / fast:.0f}", "-"))
-    assert apart < 0.005
-    assert set(STATIC) | {"m", "alpha"} == set(found.model.values)
-
-
-def test_predict_against_time_stepping(benchmark: BenchmarkFixture, static: Result, table: Rows) -> None:
-    """The paper's table with its bands: the stiffness, and its derivatives by five parameters."""
-    amplitude, frequency = (x.ravel() for x in np.meshgrid(PAPER_AMPLITUDES, PAPER_FREQUENCIES, indexing="ij"))
-
-    def slowly() -> list[np.ndarray]:
-        moved = [{name: 1.0001 * static.model.values[name]} for name in FIVE]
-        return [stepped(static.model.with_values(values), frequency, amplitude) for values in ({}, *moved)]
-
-    def ours() -> np.ndarray:
-        table = predict(static, Direction.AXIAL, PAPER_FREQUENCIES, PAPER_AMPLITUDES)
-        return table.stiffness.value
-
-    np.testing.assert_allclose(benchmark(ours), np.abs(slowly()[0]), rtol=1e-3)
-    fast, slow = seconds([ours, slowly], 5 if benchmark.enabled else 1)
-    what = f"predict with bands, {1e3 * fast:.1f} ms: times faster than time stepping"
-    table.append((what, f"{slow / fast:.0f}", ">= 300"))
 
 
 def command_seconds(*command: str) -> float:

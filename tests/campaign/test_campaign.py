@@ -157,16 +157,9 @@ def test_a_limit_beyond_what_a_parameter_can_have_is_moved_there(folder: Path) -
     ("kind", "text", "words"),
     [
         (MeasurementError, BUSHING + TESTS.replace("loop.csv", "x" * 5000), ["cannot be read", "too long"]),
-        (MeasurementError, BUSHING + TESTS.replace("loop.csv", "\\u0000"), ["no such file"]),
-        (CampaignError, BUSHING + TESTS + 'noice = "1 %"', ["sweeps #1.noice", 'mean "noise"']),
         (UnitError, BUSHING + TESTS + "noise = 0.5", ["sweeps #1.noise", "without a unit", "%"]),
         (UnitError, BUSHING + TESTS.replace("\n\n", '\nrate = "1 deg/s"\n\n'), ["loops #1.rate", "a speed"]),
         (CampaignError, SIMULATE + '[fit."inertia.mas"]\nvary = true', ["fit.inertia.mas", 'mean "inertia.mass"']),
-        (CampaignError, SIMULATE + "[fit.parameters.mu]", ["fit", "unknown key"]),
-        (CampaignError, SIMULATE + "[fit]\nmu = 3", ["fit.mu", "a table"]),
-        (UnitError, SIMULATE + '[fit."inertia.mass"]\nvalue = "1 N"', ["fit.inertia.mass.value", "kg"]),
-        (CampaignError, SIMULATE + '[fit.mu]\nmin = "2 GPa"\nmax = "3 GPa"', ["fit.mu", "within 1000 to 1e+09 Pa"]),
-        (UnitError, SIMULATE + '[predict]\nfrequencies = ["5 mm"]', ["predict.frequencies #1", "a frequency"]),
     ],
 )
 def test_what_is_wrong_has_one_clear_error_which_travels_between_processes(
@@ -226,26 +219,6 @@ def test_keys_of_fifteen_parts_are_still_read(tmp_path: Path) -> None:
     assert tomllib.loads(deep)
     with pytest.raises(CampaignError, match="a key is missing"):
         read(tmp_path, deep)
-
-
-@pytest.mark.parametrize(
-    ("name", "folder"),
-    [
-        ("CMP 15 961", "CMP 15 961"),
-        ("Buchse Ø 36", "Buchse Ø 36"),
-        ("../../etc", "_.._etc"),
-        (" .. ", "campaign"),
-        ("Mount 7. ", "Mount 7"),
-        ("a/b\\c:d", "a_b_c_d"),
-        ("nul.txt", "_nul.txt"),
-        ("console", "console"),
-        ("a\ud800b", "a_b"),
-        ("line\nbreak", "line_break"),
-        ("x" * 500, "x" * 60),
-    ],
-)
-def test_names_as_folders(name: str, folder: str) -> None:
-    assert folder_name(name) == folder
 
 
 @given(st.text(max_size=300))

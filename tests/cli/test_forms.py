@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import shutil
-import tomllib
 from collections.abc import Collection
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 import pandas as pd
 import pytest
 from shell import typing
 
 from bushfit.cli import cli
-from bushfit.geometry import Direction
-from bushfit.reading.sweeps import read_sweep
 
 CONTEXT = click.Context(cli)
 READ = {
@@ -106,22 +101,6 @@ def test_a_variable_of_the_environment_holds_for_all_commands(place: Path, monke
     done = typing(place)("reduce", *ARGUMENTS["reduce"], "-o", "none", status=2)
     assert "BUSHFIT_TABLE_FORMAT" in done.stderr
     assert not (place / "none").exists()
-
-
-@pytest.mark.parametrize("form", READ)
-def test_what_is_simulated_is_fitted(place: Path, form: str) -> None:
-    typing(place)("simulate", "model.json", "-o", f"sim-{form}", "--table-format", form)
-    typing(place)("fit", f"sim-{form}/campaign.toml", "-o", f"fitted-{form}", "--no-plots")
-
-
-@pytest.mark.parametrize("form", READ)
-def test_what_is_reduced_is_read_as_the_text_for_the_campaign_says(place: Path, form: str) -> None:
-    options = ("--no-plots", "--table-format", form)
-    told = typing(place)("reduce", *ARGUMENTS["reduce"], "-o", f"swept-{form}", *options, "--json")
-    document = json.loads(told.stdout)
-    (entry,) = tomllib.loads(document["campaign"])["sweeps"]
-    found = read_sweep(place / f"swept-{form}" / entry["file"], Direction(entry["direction"]))
-    assert np.abs(found.stiffness).tolist() == pytest.approx([1e3 * k for k in document["points"]["stiffness [N/mm]"]])
 
 
 @pytest.mark.parametrize("form", READ)

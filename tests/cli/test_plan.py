@@ -1,6 +1,8 @@
 """plan as typed: what it writes is what was planned, and the next command takes it."""
 
 import json
+from collections import Counter
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -57,3 +59,49 @@ def test_a_plan_after_tests_counts_them(bushfit: Run, tmp_path: Path) -> None:
     for reached in found["parameters"].values():
         assert reached["planned"] < reached["before"] < 0.05
     assert not (tmp_path / "plan.png").exists()
+
+
+SPECIMENS = """
+[[specimens]]
+name = "two blocks"
+kind = "shear"
+area = "772 mm^2"
+thickness = "6 mm"
+elements = 2
+
+[[specimens]]
+name = "mount"
+kind = "shear"
+area = "400 mm^2"
+thickness = "4 mm"
+
+[simulate.parameters]
+mu = "1.09 MPa"
+m = "0.2 MPa*s^alpha"
+alpha = 0.24
+sigma_fmax = "14.6 kPa"
+eps_half = 0.013
+"""
+
+
+@pytest.mark.parametrize(
+    ("hours", "fewest", "order"),
+    [("2.5", 5, ("two blocks", "mount")), ("4", 10, ("mount", "two blocks"))],
+    ids=["stated", "asked"],
+)
+def test_specimens_are_mounted_once_in_their_order_and_each_tells_its_scatter(
+    typed: Run, tmp_path: Path, hours: str, fewest: int, order: tuple[str, str]
+) -> None:
+    """As the campaign lists them, or as asked for. Each is on a rig of its own, of which repeats have to tell."""
+    (tmp_path / "plan.toml").write_text(SPECIMENS, encoding="utf-8")
+    asked = [word for name in order for word in ("--direction", name)] if order[0] == "mount" else []
+    done = typed("plan", "plan.toml", "--hours", hours, *asked, "--no-plots", "--json", "-o", "x")
+    runs = json.loads(done.stdout)["tests"]
+    assert [name for name, _ in groupby(run["place"] for run in runs)] == [*order]
+    for name in order:
+        first, *others = mine = [{**run, "minutes": 0.0} for run in runs if run["place"] == name]
+        minutes = [run["minutes"] for run in runs if run["place"] == name]
+        assert minutes[0] == pytest.approx(30.0 + minutes[1 + others.index(first)])  # to mount it
+        swept = Counter((*map(tuple, (run["amplitudes"], run["frequencies_Hz"])),) for run in mine if run["stepped"])
+        steps = {test: max(map(len, test)) for test in swept}
+        assert sum((count - 1) * (steps[test] - 1) for test, count in swept.items() if steps[test] > 2) >= fewest

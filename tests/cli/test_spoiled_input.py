@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -47,15 +46,6 @@ def assert_refused(row: Spoiled, done: Done | subprocess.CompletedProcess[str]) 
 def test_one_error_and_nothing_written(row: Spoiled, folder: Path) -> None:
     before = lay_out(folder, row)
     assert_refused(row, call(folder, *row.arguments))
-    assert {path.name for path in folder.iterdir()} == before
-
-
-@pytest.mark.parametrize("row", ROWS[:: len(ROWS) // 2], ids=lambda row: row.name)
-def test_the_same_of_the_installed_command(row: Spoiled, folder: Path) -> None:
-    before = lay_out(folder, row)
-    command = [sys.executable, "-W", "error", str(Path(sys.executable).with_name("bushfit")), *row.arguments]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, encoding="utf-8")
-    assert_refused(row, done)
     assert {path.name for path in folder.iterdir()} == before
 
 

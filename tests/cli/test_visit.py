@@ -126,21 +126,6 @@ def test_a_visit_makes_a_campaign_that_fits(
     assert fitted == pytest.approx(table_1, rel=0.04)
 
 
-def test_one_amplitude_a_file_is_read_from_the_names_and_overruled_by_the_option(
-    typed: Run, visited: Path, tmp_path: Path
-) -> None:
-    files = sorted(visited.glob("Dyn_*.csv"))
-    sweeps = {}
-    for options in ((), ("--amplitude", "peak-to-peak"), ("--at-amplitude", "0.3 mm")):
-        done = typed("init", *files, *GEOMETRY, "-o", "x", "--force", *options)
-        sweeps[options[-1:]] = load_campaign(tmp_path / "x/campaign.toml").sweeps
-        assert ("the name says 0.05 mm, the amplitude is 0.3 mm" in done.stderr) == ("0.3 mm" in options)
-    levels = {options: [sweep.amplitude[0] for sweep in tests] for options, tests in sweeps.items()}
-    assert levels[()] == pytest.approx(AMPLITUDES)
-    assert levels["peak-to-peak",] == pytest.approx([level / 2.0 for level in AMPLITUDES])
-    assert levels["0.3 mm",] == pytest.approx([3e-4] * len(files))
-
-
 def test_what_no_name_says_is_one_question(typed: Run, visited: Path, tmp_path: Path) -> None:
     (tmp_path / "axial.csv").write_bytes(next(visited.glob("Dyn_*.csv")).read_bytes())
     done = typed("init", "axial.csv", *GEOMETRY, "-o", "x", status=2)
@@ -195,11 +180,3 @@ def test_a_block_in_shear_is_a_specimen_with_its_sizes(typed: Run, tmp_path: Pat
     assert "needs --area and --thickness" in typed("init", "mount_10Hz.csv", *sizes[:2], "-o", "y", status=2).stderr
     (sweep,) = tomllib.loads(typed("inspect", "mount_10Hz.csv", *sizes, "--no-plots").stdout)["sweeps"]
     assert sweep["specimen"] == "mount"
-
-
-def test_inspect_shows_every_sheet_and_what_it_leaves_out(typed: Run, visited: Path, tmp_path: Path) -> None:
-    done = typed("inspect", visited / "Buchse 7.xlsx", "-o", "x")
-    assert "sheet Info: the columns do not make a test" in done.stderr
-    assert done.stderr.count("nothing odd") == 2
-    assert [test["sheet"] for test in tomllib.loads(done.stdout)["sweeps"]] == ["axial", "radial"]
-    assert (tmp_path / "x/inspect.png").exists()

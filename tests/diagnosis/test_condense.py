@@ -118,12 +118,6 @@ def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten() -> None:
         assert astuple(after.under.at(point)) == astuple(before.under.at(int(np.flatnonzero(same)[0])))
 
 
-def test_levels_without_weight_are_no_levels() -> None:
-    data = data_of(grid(np.geomspace(1e-5, 1e-3, 80)))
-    few = replace(data, sweeps=(data.sweeps[0].without(np.flatnonzero(np.arange(320) // 4 % 16)),))
-    assert condensed(few) == (few, ())
-
-
 UP = np.geomspace(5.0, 60.0, 450)
 BENT = [1.0 + 9.0 / (1.0 + (f - middle) ** 2) for f, middle in ((UP, 25.0), (UP[::-1], 18.0))]
 

@@ -13,7 +13,6 @@ from tries import some
 from bushfit.campaign.campaign import Campaign
 from bushfit.diagnosis.families import FittedFamily, fit_families, known_families
 from bushfit.effects import BASE
-from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet
 from bushfit.model.model import Model
@@ -103,9 +102,3 @@ def test_the_likeliest_of_all_families_are_held_out(paper_model: Model) -> None:
     assert found[0].name == "paper"
     assert sum(family.probability for family in found) + sum(left.values()) == pytest.approx(1.0)
     assert max(found, key=lambda family: family.probability).name == "fractional_zener+kraus"
-
-
-def test_two_effects_in_place_of_one_branch_are_no_family(paper_model: Model) -> None:
-    made = begun(paper_model, measure(undisturbed(paper_model, PLAN), PLAN).campaign())
-    with pytest.raises(ModelError, match="what this effect stands in place of is not in the model"):
-        fit_families(*made, ["kraus+sliders"], (), {})

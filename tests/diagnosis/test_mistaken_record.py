@@ -115,11 +115,3 @@ def test_what_all_tests_share_is_not_seen_and_not_named(measured: Measured) -> N
     campaign = in_kilograms(measured(None, SHARED))
     campaign = on_sweeps(lambda s: replace(s, stiffness=s.stiffness / 9.80665), 0, 1)(campaign)
     assert said(asked(campaign)) == "consistent "
-
-
-@pytest.mark.slow
-def test_a_mistake_can_be_left_out(measured: Measured) -> None:
-    campaign = MADE[AXIAL](measured(None, SHARED))
-    for without in ("peak_to_peak", AXIAL):
-        diagnosis = asked(campaign, without=(without,))
-        assert AXIAL not in [effect.label for effect in diagnosis.effects]

@@ -46,6 +46,7 @@ STOP = {"bump_stop.gap": 4e-4, "bump_stop.stiffness": 1e5}
         ({"viscous.eta": 60.0}, {"maxwell.mu1": 1e5, "maxwell.tau": 6e-4}, ("highest frequency",)),
         ({"strain_stiffening.c3": 0.5}, {"bump_stop.gap": 4.5e-4, "bump_stop.stiffness": 2e3}, ("largest amplitude",)),
         (SLIP, SECOND, ("smallest",)),
+        ({"interface_slip.force": 0.4}, {"viscous.eta": 8.0}, ("smallest",)),  # where slip by far outweighs the rest
     ],
     ids=lambda value: next(iter(value)).partition(".")[0] if isinstance(value, dict) else "",
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -127,12 +126,3 @@ def test_sizes(root: Path, truths: Truths, found: Found, name: str) -> None:
         assert stderr is not None
         assert ends is not None
         assert ends[0] <= truth <= ends[1] or abs(value - truth) <= 3.0 * stderr, (case, value, stderr, truth)
-
-
-@pytest.mark.slow
-def test_the_answers_are_not_needed(root: Path, tmp_path: Path, found: Found) -> None:
-    """A case copied away from answers.json is diagnosed the same."""
-    shutil.copytree(root / "data/practice/case_001", tmp_path / "elsewhere")
-    again = diagnose(Data.of(load_campaign(tmp_path / "elsewhere/bushing.toml")))
-    assert said(again) == said(found["case_001"])
-    assert again.after.model.values == found["case_001"].after.model.values

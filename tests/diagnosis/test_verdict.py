@@ -3,37 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-from asking import asked, no_loops, no_repeats, no_sweeps, one_direction, said
+from asking import asked, no_loops, no_repeats, no_sweeps, said
 from rigged import SHARED, Measured
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.next_test import MENU
 from bushfit.effects import BASE
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction
-from bushfit.jobs.diagnose import with_plan
 from bushfit.model.file import to_document
-
-
-@pytest.mark.slow
-def test_look_alikes_are_a_set_and_none_is_added(measured: Measured) -> None:
-    """A little viscosity in one direction: sets, and the test that would tell."""
-    diagnosis = asked(one_direction(measured({"viscous": {"eta": 35.0}}, SHARED)))
-    assert diagnosis.verdict == "ambiguous"
-    (leader,) = diagnosis.effects
-    assert "viscous" in (leader.name, *leader.alternatives)
-    assert 1 <= len(leader.alternatives) <= 3
-    assert diagnosis.after is diagnosis.before
-    assert diagnosis.result.model.effects == BASE
-    assert diagnosis.next_test in {entry.words for entry in MENU}
-    command = f"bushfit plan my.toml --rivals {','.join((leader.name, *leader.alternatives))} chooses"
-    assert command in with_plan(diagnosis, Path("my.toml")).next_test
-    assert all(name in diagnosis.summary for name in (leader.name, *leader.alternatives))
-    (entry,) = diagnosis.to_document()["effects"]
-    assert entry["parameters"]
 
 
 def test_what_the_tests_cannot_show_is_said_and_goes_with_the_model(measured: Measured) -> None:
@@ -99,19 +78,3 @@ def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured: Measur
     )
     proposed = {judged.name for judged in settled.candidates}
     assert not proposed & {"sleeve_compliance", "rig_compliance"}
-
-
-@pytest.mark.slow
-def test_friction_of_a_guide_is_named_as_slip_unless_the_user_tells(measured: Measured) -> None:
-    """The library has one law for both; the campaign may tell which it is."""
-    campaign = measured({"guide_friction": {"force": 6.0}}, SHARED)
-    found = asked(campaign)
-    assert said(found) == "named interface_slip"
-    assert found.result.unresolved == ("interface_slip",)
-    assert not {"guide_friction", "transducer_gain.radial"} & {judged.name for judged in found.candidates}
-    for told in ("guide_friction", "interface_slip"):
-        fit = replace(campaign.fit, effects=(told,))
-        known = asked(replace(campaign, fit=fit))
-        assert (known.verdict, known.result.unresolved) == ("consistent", ())
-        assert known.result.model.effects == (*BASE, told)
-    assert not {"interface_slip"} & {judged.name for judged in asked(campaign, without=("guide_friction",)).candidates}

@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.words import Finding, judged
@@ -102,28 +101,3 @@ def test_only_ratios_count() -> None:
     every = [one("inertia", 0.5), one("delay", 0.3), one("unnamed", 0.19), one("", 0.01)]
     far = [replace(each, log_posterior=each.log_posterior - 5000.0) for each in every]
     assert told(judged(far, TOLERANCE)) == told(judged(every, TOLERANCE))
-
-
-@pytest.mark.parametrize(
-    ("odds", "chance", "refitted", "sure"),
-    [
-        ({"": 0.98, "inertia": 0.02}, 0.5, True, True),
-        ({"": 0.5, "inertia": 0.5}, 0.5, True, False),
-        ({"": 0.98, "inertia": 0.02}, 1e-9, True, False),
-        ({"": 0.01, "inertia": 0.99}, 0.5, True, True),
-        ({"": 0.01, "inertia": 0.99}, 0.5, False, False),
-        ({"inertia": 0.5, "delay": 0.5}, 0.5, True, False),
-    ],
-    ids=str,
-)
-def test_a_search_ends_where_one_answer_is_sure_and_fits(
-    odds: dict[str, float], chance: float, refitted: bool, sure: bool
-) -> None:
-    found = [one(parts, share, chance=chance) for parts, share in odds.items()]
-    if not refitted:
-        linear: Any = SimpleNamespace(state=SimpleNamespace(effects=()), first=SimpleNamespace(chance=chance))
-        found = [replace(each, weighed=linear) for each in found]
-    asked: Any = SimpleNamespace(tolerance=TOLERANCE)
-    search: Any = SimpleNamespace(ordered=sorted(found, key=lambda each: -each.log_posterior), asked=asked)
-    search.root = SimpleNamespace(first=SimpleNamespace(chance=chance))
-    assert Search._is_sure(search) is sure

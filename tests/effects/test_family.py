@@ -252,16 +252,6 @@ def test_any_two_compose(effect: Effect, rng: np.random.Generator) -> None:
         assert gap <= 2.0 * harmonic_error(both) + 1e-6, (other, gap)
 
 
-def test_any_three_compose(rng: np.random.Generator) -> None:
-    for _ in range(60):
-        chosen = [str(name) for name in rng.choice(ADDED, size=3, replace=False)]
-        if sum(name.startswith("rig_compliance") for name in chosen) > 1:
-            continue  # a compliance within another takes its rounds in every round
-        _, model, direction, frequency, amplitude = drawn(rng, *chosen)
-        gap = harmonic_gap(model, direction, frequency, amplitude)
-        assert gap <= 2.0 * harmonic_error(model) + 1e-6, (model.effects, gap)
-
-
 def test_a_model_survives_files_and_processes(effect: Effect, rng: np.random.Generator) -> None:
     plain = random_model(rng)
     model = sized(plain, effect.name, Direction.AXIAL, 2e-4, rng)

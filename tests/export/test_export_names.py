@@ -30,7 +30,7 @@ NASTY = [
     "pyNastran: version=nx " * 9,
     "$ pyNastran: punch=False",
     "http://x.y/" + "z" * 300,
-    "\ud800 \x00 \x1b[2J",
+    "\x00 \x1b[2J",
     "Büchse 套管",
     "   ",
 ]
@@ -88,9 +88,8 @@ def test_a_workbook_runs_nothing(name: str, named: Callable[[str], Order]) -> No
     cells = [cell for sheet in book for row in sheet.iter_rows() for cell in row]
     assert {cell.data_type for cell in cells} <= {"s", "n"}
     assert not any(cell.hyperlink for cell in cells)
-    kept = name.encode("utf-8", "replace").decode()
-    if kept.isprintable() and kept.strip() == kept:
-        assert kept in {cell.value for cell in book["provenance"]["B"]}
+    if name.isprintable() and name.strip() == name:
+        assert name in {cell.value for cell in book["provenance"]["B"]}
 
 
 @nasty

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import openpyxl
@@ -15,7 +14,6 @@ from bushfit.export.contract import Order
 from bushfit.export.systems import UnitSystem
 from bushfit.geometry import Direction, Specimen
 from bushfit.prediction.stiffness import Band, predict
-from bushfit.reading.sweeps import read_sweep
 from bushfit.report import spreadsheets
 from bushfit.report.tables import wide_table
 
@@ -60,16 +58,6 @@ def test_long_and_wide_tables_hold_the_whole_grid(kind: str, order: Order, known
                 np.testing.assert_array_equal(wide[f"{name} {level:.10g} {length} [{unit}]"], here[f"{name} [{unit}]"])
     print(f"{kind}: off the kept computation {worst:.1e}")
     assert worst < MODEL
-
-
-def test_a_wide_table_is_read_as_a_sweep(order: Order, tmp_path: Path) -> None:
-    """Our own reader takes it back as it takes those of laboratories."""
-    file = tmp_path / "wide.csv"
-    file.write_bytes(spreadsheets.csv(order).files["axial_wide.csv"])
-    sweep = read_sweep(file, Direction.AXIAL)
-    exact = order.result.model.stiffness("axial", sweep.frequency, sweep.amplitude)
-    assert sweep.frequency.size == 80
-    np.testing.assert_allclose(sweep.stiffness, exact, rtol=2e-6)
 
 
 def test_parameters_and_provenance(order: Order, table_1: dict[str, float]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bushfit.errors import UnitError
-from bushfit.export.systems import MM_T_S_N, UnitSystem
+from bushfit.export.systems import UnitSystem
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
 
 #: In SI.
@@ -28,11 +28,6 @@ def test_factors(text: str, stiffness: float, torsion: float, stress: float, fre
     assert system.display(ROTATION).stiffness.factor == pytest.approx(torsion, rel=1e-9)
     assert system.display(STRAINING).stiffness.factor == pytest.approx(stress, rel=1e-9)
     assert system.frequency.factor == pytest.approx(frequency)
-
-
-def test_the_default_is_what_its_text_names() -> None:
-    assert UnitSystem.parse("mm t s N") == MM_T_S_N
-    assert str(MM_T_S_N) == "mm, t, s, N"
 
 
 @pytest.mark.parametrize(

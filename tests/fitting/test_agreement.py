@@ -136,18 +136,3 @@ def test_a_robust_fit_counts_no_outliers(campaign: Campaign) -> None:
     assert whole.nrmse < 0.02
     (place,) = result.usable
     assert place.stiffness < 0.02
-
-
-def test_what_is_held_out_is_white_by_the_error_of_its_prediction() -> None:
-    """A slope that the rest hardly tells: in units of noise the prediction is far off, by its own error it is not."""
-    random = np.random.default_rng(5)
-    time = np.linspace(-1.0, 1.0, 60)
-    out, clusters = time > 0.0, np.repeat(np.arange(20), 3)
-    found = []
-    for _ in range(200):
-        slopes = np.array([np.ones(60), np.where(out, 30.0, 1.0) * time])
-        whole = LeaveOut.of(slopes, random.standard_normal(60))
-        found.append([np.mean(np.square(gap)) for gap in whole.predicted(out, clusters)])
-    plain, white = np.mean(found, axis=0)
-    assert plain > 10.0
-    assert 0.9 < white < 1.1

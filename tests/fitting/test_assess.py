@@ -17,8 +17,9 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import LoopData
+from bushfit.fitting.data_sets import LoopData, new_loop
 from bushfit.fitting.procedures import fit_joint, fit_two_step
+from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
@@ -135,3 +136,38 @@ def test_a_modulus_of_no_rubber_is_told(small: Campaign) -> None:
         line for line in fit_joint(Data.of(replace(small, loops=loops, sweeps=axial))).warnings if "units" in line
     ]
     assert "kPa is that of no rubber" in told
+
+
+def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model: Model) -> None:
+    """One parameter from two loops of unsure noise, as P. Meier (Biometrics 9 (1953) 59) has a mean of two groups: its
+    variance grows by 4 sum p (1 - p)/f, p the weights and f the degrees of freedom; and has those of Satterthwaite."""
+    new = {400: (1e-3, 0.01), 1000: (4e-4, 0.006)}  # rows, amplitude and noise
+    loops = [new_loop(paper_model, Direction.AXIAL, 0.1, *of, cycles=2.0, rows=rows) for rows, of in new.items()]
+
+    def stated(noise: float | None) -> list[LoopData]:
+        tests = [replace(loop.test, name=f"{number}", noise=noise) for number, loop in enumerate(loops)]
+        return [replace(each, drive=replace(each.drive, loop=test)) for each, test in zip(loops, tests, strict=True)]
+
+    plain, wide = (covariance(paper_model, [Stage(("mu",), stated(noise))]) for noise in (0.01, None))
+    told = np.array([float(np.sum(np.square(loop.jacobian(paper_model, ["mu"])))) for loop in loops])
+    share, freedom = told / told.sum(), np.array([loop.counted for loop in loops])
+    print("weights", share, "of rows", freedom)
+    assert plain.matrix[0, 0] == pytest.approx(1.0 / told.sum(), rel=1e-6)
+    grown = wide.matrix[0, 0] / plain.matrix[0, 0] - 1.0
+    assert grown == pytest.approx(4.0 * np.sum(share * (1.0 - share) / freedom), rel=1e-3)
+    assert wide.freedom(np.ones((1, 1)))[0] == pytest.approx(1.0 / np.sum(share**2 / freedom), rel=0.01)
+
+
+def test_a_gain_that_does_not_weigh_moves_parameters_as_a_refit_says(small: Campaign, paper_model: Model) -> None:
+    """What its standard error adds to the covariance are the squares of how far a loop that is off by it leads."""
+    data = Data.of(small)
+    loop = replace(data.loops[0], gain_error=0.01, gain_weighs=False)
+    fitted = solve(paper_model, (*data.sweeps, loop), FIVE).model
+    off = replace(loop, drive=replace(loop.drive, force=1.01 * loop.drive.force))
+    moved = solve(fitted, (*data.sweeps, off), FIVE).model
+    shift = np.array([moved.values[name] - fitted.values[name] for name in FIVE])
+    known, unknown = (
+        covariance(fitted, [Stage(tuple(FIVE), (*data.sweeps, each))]) for each in (replace(loop, gain_error=0.0), loop)
+    )
+    added = np.sqrt(np.diag(unknown.matrix - known.matrix))
+    np.testing.assert_allclose(added, np.abs(shift), rtol=0.1, atol=0.02 * np.sqrt(np.diag(known.matrix)).min())

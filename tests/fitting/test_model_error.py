@@ -17,11 +17,13 @@ from hypothesis import strategies as st
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting
-from bushfit.effects.unnamed import Patch, Unnamed
+from bushfit.effects.unnamed import Patch, Unnamed, places_of
 from bushfit.errors import FitError
 from bushfit.fitting.assess import Stage, covariance, linear_errors
-from bushfit.fitting.common_error import CommonError
+from bushfit.fitting.common_error import CommonError, Joined
+from bushfit.fitting.coordinates import jacobian, residual
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import log_slopes, reached
 from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.robust import estimate
@@ -242,3 +244,46 @@ def test_no_length_is_told_along_an_axis_that_the_tests_do_not_have() -> None:
     line = model_error_warning(Unnamed(0.02, (0.4, 2.0), (Patch(("axial",), *rows),)))
     assert "decades of strain" in line
     assert "frequency" not in line
+
+
+@pytest.mark.parametrize("loops", [True, False], ids=["loop and sweeps", "sweeps"])
+def test_the_error_at_its_nodes_is_that_of_universal_kriging(rig: Rig, loops: bool) -> None:
+    """In full: the kernel of all points and all rows, the parameters beside them. As many degrees of freedom tell its
+    size as the expected information of its restricted likelihood has, and intervals count them."""
+    campaign = spoiled(rig(3, shared=True), waves(0.03, 3))
+    data = Data.of(campaign if loops else replace(campaign, loops=()))
+    names, data_sets = list(FIVE), data.chosen(None)
+    plain = estimate(data.started(data.effects, data_sets, {}), data_sets, names, data.bounds)
+    found, error = with_model_error(plain, data.bounds)
+    assert error is not None
+    assert isinstance(found.minimised, Joined)
+    model, tests, (patch,) = found.solution.model, found.minimised.data_sets, error.patches
+    places = places_of(*reached(model.bushing, tests)) / error.lengths
+    apart = np.sqrt(5.0) * np.linalg.norm(places[:, None] - places, axis=-1)
+    kernel = error.size**2 * (1.0 + apart + apart**2 / 3.0) * np.exp(-apart)
+    root = np.kron(np.eye(2), np.linalg.cholesky(kernel + 1e-10 * np.eye(len(kernel))))  # repeats are one place
+    rows, count = [], len(places)
+    ends = np.cumsum([0, *(each.frequency.size for each in tests)])
+    for each, first, last in zip(tests, ends[:-1], ends[1:], strict=True):
+        change = np.diag(each.noise_free(model).measured)
+        units = np.zeros((2 * count, last - first), dtype=complex)
+        units[first:last], units[count + first : count + last] = change, 1.0j * change
+        rows.append(each.moved(units, model))
+    seen, own, left = root.T @ np.hstack(rows), jacobian(model, tests, names), residual(model, tests)
+    slopes = np.hstack([log_slopes(model, each, names) for each in tests])
+    slopes = slopes * found.solution.coordinates.slopes(model.values)[:, None]
+    both = np.vstack((seen, own))
+    spread = np.linalg.inv(both @ both.T + np.diag(np.repeat([1.0, 0.0], [len(seen), len(own)])))
+    stands = np.vstack((root.T, np.hstack((slopes.real, slopes.imag))))
+    size = np.sqrt(np.einsum("ip,ij,jp->p", stands, spread, stands)).reshape(2, -1)
+    mean = (-root @ np.linalg.solve(np.eye(len(seen)) + seen @ seen.T, seen @ left)).reshape(2, -1)
+    at = np.linalg.norm(places - (patch.nodes / error.lengths)[:, None], axis=-1).argmin(axis=1)
+    np.testing.assert_allclose([patch.in_phase_error, patch.in_quadrature_error], size[:, at], rtol=0.02)
+    np.testing.assert_allclose([patch.in_phase, patch.in_quadrature], mean[:, at], atol=0.1 * size.mean())
+    inverse = np.linalg.inv(np.eye(left.size) + seen.T @ seen)
+    beside = inverse - inverse @ own.T @ np.linalg.inv(own @ inverse @ own.T) @ own @ inverse
+    freedom = float(np.sum(np.square(seen @ beside @ seen.T)))
+    assert found.minimised.freedom == pytest.approx(freedom, rel=0.05)
+    told = covariance(model, [Stage(tuple(names), found.weighed)]).freedom(np.eye(5))
+    print(f"{freedom:.1f} degrees of freedom; of the parameters:", told)
+    assert freedom < min(told) < 1.5 * freedom

@@ -52,13 +52,6 @@ def test_an_ideal_rig_gives_the_truth_within_0_2_percent(rig: Rig, models: dict[
     assert np.max(np.abs(found)) < 2e-3
 
 
-def test_the_papers_bushing_from_its_campaign(measured: Data, result: Result, table_1: dict[str, float]) -> None:
-    for found, limit in ((result, 0.04), (fit_two_step(measured).result, 0.06)):
-        print(f"cmp_15961: {shown(errors(found, table_1))}")
-        assert np.max(np.abs(errors(found, table_1))) < limit
-        assert all(low <= table_1[n] <= high for n in FIVE for low, high in [found.interval(n) or (0.0, 0.0)])
-
-
 @pytest.mark.parametrize(
     ("name", "seeds"), [(NAMES[0], 8), *(pytest.param(name, 20, marks=pytest.mark.slow) for name in NAMES)]
 )
@@ -97,15 +90,6 @@ def test_two_step_errors_are_those_of_300_campaigns(rig: Rig) -> None:
     np.testing.assert_allclose(ratio, 1.0, atol=0.12)
     chance = 3.0 * (1.0 - correlation[1] ** 2) / np.sqrt(300)  # of a correlation over so many campaigns
     assert np.all(np.abs(correlation[0] - correlation[1]) <= chance + 0.02)
-
-
-@pytest.mark.parametrize("factor", [0.1, 10.0])
-def test_start_values_of_the_campaign_do_not_matter(measured: Data, result: Result, factor: float) -> None:
-    best = result.model.values
-    start = {name: ParameterSetting(value=best[name] * (1.5 if name == "alpha" else factor)) for name in FIVE}
-    data = Data.of(replace(measured.campaign, fit=FitSettings(parameters=start)))
-    assert data.given["mu"] == best["mu"] * factor
-    assert np.max(np.abs(errors(fit_joint(data), best))) < 1e-3
 
 
 def test_radial_sweep_follows_from_axial_tests(measured: Data, result: Result) -> None:
@@ -208,12 +192,6 @@ def test_missing_tests_are_said(measured: Data, result: Result) -> None:
         fit_static(Data.of(replace(measured.campaign, loops=())))
     with pytest.raises(FitError, match="fit-dynamic needs a sweep"):
         fit_dynamic(Data.of(replace(measured.campaign, sweeps=())), result)
-
-
-def test_a_fit_leaves_its_input_alone(measured: Data, result: Result) -> None:
-    before = measured.campaign.sweeps[0].stiffness.copy()
-    assert fit_joint(measured).model == result.model
-    assert np.array_equal(measured.campaign.sweeps[0].stiffness, before)
 
 
 def test_correlations_stay_within_one_where_nothing_is_determined(rig: Rig) -> None:

@@ -15,7 +15,7 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.outliers import outlier_limit
-from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, fit_two_step
+from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static
 from bushfit.fitting.robust import outlier_warnings
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
@@ -201,13 +201,6 @@ def test_a_fit_of_one_level_names_the_row_of_the_file(rig: Rig) -> None:
     assert [entry.row for entry in dynamic.outliers] == [entry.row for entry in joint.outliers] == [down.size - 6]
     marked = data.without(dynamic.outliers).sweeps[0]
     assert marked.order[marked.weights == 0.0].tolist() == [down.size - 7]
-
-
-def test_the_two_step_procedure_is_robust_too(rig: Rig) -> None:
-    campaign = rig(5)
-    before = fit_two_step(Data.of(campaign)).result
-    after = fit_two_step(Data.of(replace(spoilt_campaign(campaign, "spikes", 5), fit=SOFT))).result
-    assert np.max(np.abs(moved(after, before))) < 1.0
 
 
 def test_the_limit_grows_with_the_rows_and_with_what_is_not_known() -> None:

@@ -17,8 +17,7 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.jobs.fits import Fit
-from bushfit.model.file import from_document, to_document
-from bushfit.model.model import FIVE, Model
+from bushfit.model.model import Model
 from bushfit.reading.measurement import Stepped, Sweep
 
 DMA = Specimen("DMA", "modulus")
@@ -58,16 +57,6 @@ def both(rig: Callable[..., Campaign], coupons: Campaign) -> Campaign:
     """The paper's tests, and those of the coupon."""
     bushing = rig(2)
     return replace(bushing, sweeps=(*bushing.sweeps, *coupons.sweeps), specimens=(DMA,))
-
-
-def test_coupons_alone_are_fitted_and_kept_in_a_file(coupons: Campaign, paper_model: Model) -> None:
-    result = fit_joint(Data.of(coupons))
-    for name in FIVE:
-        assert result.model.values[name] == pytest.approx(paper_model.values[name], rel=0.15)
-    assert result.model.bushing is None
-    back = from_document(to_document(result))
-    assert (back.specimens, back.tests, back.usable) == ((DMA,), result.tests, result.usable)
-    assert back.name == "DMA"
 
 
 def test_coupons_are_fitted_beside_the_axial_tests(both: Campaign) -> None:
@@ -118,11 +107,3 @@ def test_a_start_beyond_its_bounds_is_moved(coupons: Campaign, paper_model: Mode
     result = fit_joint(Data.of(replace(coupons, sweeps=clean)))
     assert result.quality is not None
     assert result.quality.nrmse < 1e-3
-
-
-def test_moduli_of_no_rubber_are_told_with_the_units(coupons: Campaign) -> None:
-    tests = tuple(replace(test, stiffness=1e6 * test.stiffness) for test in coupons.sweeps)
-    with pytest.raises(
-        FitError, match=r"epdm.toml: the tests are of a size that no rubber shows[\s\S]*check the units"
-    ):
-        fit_joint(Data.of(replace(coupons, sweeps=tests)))

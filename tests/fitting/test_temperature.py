@@ -21,6 +21,7 @@ from bushfit.jobs.fits import Fit
 from bushfit.jobs.predict import Predict
 from bushfit.model.arms import arm_rows, model_arms
 from bushfit.model.model import Model
+from bushfit.model.result import Result
 from bushfit.prediction.stiffness import predict
 from bushfit.report.artifacts import temperature_contents
 from bushfit.simulation.measured import measure, simulate
@@ -87,6 +88,19 @@ def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -
     assert len(factors) == len(DEGREES)
     assert len(curve) == sum(each.sweep.frequency.size for each in found)
     assert factors["log10 a_T [-]"].to_numpy() == pytest.approx([each.shift[0] / np.log(10.0) for each in found])
+    own = factors[["own log10 a_T [-]", "own log10 a_T [-], low", "own log10 a_T [-], high"]].to_numpy().T
+    half = [1.96 * each.own[1] / np.log(10.0) for each in found]
+    assert own[0] - own[1] == pytest.approx(half, rel=1e-3)
+    assert own[2] - own[0] == pytest.approx(half, rel=1e-3)
+
+
+def test_the_error_of_a_sweep_s_own_shift_factor_is_what_it_scatters_by(clean: Undisturbed, truth: Model) -> None:
+    off = []
+    for seed in range(SEEDS):
+        sweeps = Data.of(measure(clean, replace(PLAN, seed=seed)).campaign()).sweeps
+        off += [(each.own[0] - each.shift[0]) / each.own[1] for each in master_curve(Result(truth), sweeps)]
+    print(f"{len(off)} shift factors off by {np.std(off):.2f} of their standard errors")
+    assert 0.8 < np.std(off) < 1.25
 
 
 def test_a_sweep_off_the_law_says_so(truth: Model) -> None:

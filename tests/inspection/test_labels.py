@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 import pytest
 from looking import look, without
 
-from bushfit.inspection.draft import file_text
-from bushfit.inspection.opening import inspect
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.rawtable import raw_loop_table
-from bushfit.reading.tablefile import to_csv
 
 
 @pytest.mark.parametrize(
@@ -37,16 +32,3 @@ def test_label_of_a_sweep(sweep: Sweep, tmp_path: Path) -> None:
     (said,) = look(tmp_path, one, "sweep_axial_0.4mm.csv").odd
     assert "the amplitude is 0.2 mm zero-to-peak: the name may count peak-to-peak" in said
     assert look(tmp_path, one, "sweep_axial_0.4mm_pp.csv").odd == ()
-
-
-def test_what_the_user_states_goes_into_the_text(loop: Loop, tmp_path: Path) -> None:
-    table = raw_loop_table(loop).drop(columns="time [s]").set_axis(["Weg X", "Zelle 2"], axis=1)
-    (tmp_path / "loop.csv").write_bytes(to_csv(table))
-    kept: dict[str, object] = {"direction": "radial", "units": {"displacement": "mm", "force": "N"}}
-    kept |= {"frequency": "0.1 Hz", "waveform": "sine"}
-    columns = {"displacement": "Weg X", "force": "Zelle 2"}
-    needless = {"columns": {**columns, "stiffness": "k"}, "amplitude": "peak-to-peak"}
-    seen = inspect(tmp_path / "loop.csv", {**kept, **needless})
-    (written,) = tomllib.loads(file_text(seen, tmp_path))["loops"]
-    assert written == {"file": "loop.csv", "columns": columns, **kept}
-    assert seen.facts["frequency"].startswith("0.1")

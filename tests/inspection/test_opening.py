@@ -6,18 +6,16 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from looking import NOISE, SEEDS, look, plan
 
 from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
-from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 from bushfit.inspection.draft import file_text
 from bushfit.inspection.opening import inspect
 from bushfit.model.model import Model
-from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
+from bushfit.reading.measurement import Loop
+from bushfit.reading.rawtable import raw_loop_table
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed
 
@@ -53,14 +51,6 @@ def test_the_data_of_the_repository_raise_only_what_is_there(root: Path) -> None
     assert len(odd) <= 2
     assert not set(odd) & set(sound)
     assert all("loss factor below zero" in sentence for found in odd.values() for sentence in found)
-
-
-def test_a_history_points_to_reduce(root: Path) -> None:
-    seen = inspect(root / "data/cmp_15961_raw/stepped_sine_axial.csv", {})
-    assert seen.kind == "history"
-    assert "bushfit reduce" in file_text(seen, root)
-    assert tomllib.loads(file_text(seen, root)) == {}
-    assert seen.facts["frequencies"] == "5, from 10 to 155 Hz"
 
 
 @pytest.mark.parametrize(
@@ -108,57 +98,3 @@ def test_slow_loops_at_several_rates_are_no_stepped_sine(paper_model: Model, tmp
     seen = look(tmp_path, record)
     assert seen.kind == "loop"
     assert seen.facts["programme"].startswith("2 loops in one record: 0.5 mm at 0.1, 0.3 Hz")
-
-
-def damaged(values: np.ndarray, kind: int, random: np.random.Generator) -> np.ndarray:
-    """Rows of a file cut out, thinned, mixed up, or with a column that is constant, noisy, coarse or scaled."""
-    column = random.integers(values.shape[1])
-    match kind:
-        case 0:
-            return values[: random.integers(1, 60)]
-        case 1:
-            return values[:: random.integers(2, 400)]
-        case 2:
-            return values[random.integers(values.shape[0]) :]
-        case 3:
-            return values[np.sort(random.integers(0, values.shape[0], random.integers(1, 300)))]
-        case 4:
-            values[:, column] = random.choice([0.0, 1.0, -5.0, 1e30])
-        case 5:
-            values[:, column] += random.standard_normal(values.shape[0]) * 10.0 ** random.integers(-6, 4)
-        case 6:
-            values[:, column] *= np.where(random.random(values.shape[0]) < 0.01, 10.0 ** random.integers(-3, 13), 1.0)
-        case 7:
-            values[:, 1:] = values[:, 1:].round(random.integers(0, 3))
-    return values
-
-
-@pytest.mark.parametrize("tries", [24, pytest.param(96, marks=pytest.mark.slow)])
-def test_damaged_files_are_told_or_refused(root: Path, tmp_path: Path, tries: int) -> None:
-    """Whatever a file holds: a look at it, or one of bushfit's errors; no warning of NumPy's, no other exception."""
-    files = "cmp_15961/loop_axial_1.csv", "cmp_15961/sweep_axial.csv", "cmp_15961_raw/stepped_sine_axial.csv"
-    told = refused = 0
-    for seed in range(tries):
-        random = np.random.default_rng(seed)
-        table = pd.read_csv(root / "data" / files[seed % 3])
-        rows = damaged(table.to_numpy(dtype=float).copy(), seed // 3 % 8, random)
-        pd.DataFrame(rows, columns=list(table)).to_csv(tmp_path / "axial.csv", index=False, float_format="%.9g")
-        try:
-            told += bool(file_text(inspect(tmp_path / "axial.csv", {})))
-        except BushfitError:
-            refused += 1
-    assert told > 0.4 * tries
-    assert refused > 0.25 * tries
-
-
-def test_a_sweep_in_another_dialect(sweep: Sweep, tmp_path: Path) -> None:
-    table = raw_sweep_table(sweep).set_axis(
-        ["Frequenz [Hz]", "Amplitude [mm]", "Wiederholung", "Steifigkeit [N/mm]", "Verlustfaktor [-]"], axis=1
-    )
-    text = table.to_csv(index=False, sep=";", decimal=",", float_format="%.6f")
-    (tmp_path / "Kennlinie_radial.csv").write_bytes(text.encode("cp1252"))
-    seen = inspect(tmp_path / "Kennlinie_radial.csv", {})
-    assert (seen.kind, seen.direction) == ("sweep", Direction.RADIAL)
-    assert seen.written["columns parted by"] == "semicolon"
-    assert seen.written["decimal mark"] == "comma"
-    assert seen.columns[3].low == pytest.approx(pd.to_numeric(table["Steifigkeit [N/mm]"]).min(), rel=1e-5)

@@ -2,56 +2,24 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
-from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.geometry import Bushing, Direction
 from bushfit.jobs import fits
 from bushfit.jobs.compare import Compare, Entry
-from bushfit.jobs.diagnose import Diagnose
-from bushfit.jobs.fits import Fit, FitDynamic, FitStatic
+from bushfit.jobs.fits import Fit
 from bushfit.jobs.grid import common_grid, default_grid
 from bushfit.jobs.predict import Predict
 from bushfit.model.covariance import Covariance
-from bushfit.model.model import FIVE, Model
+from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
-from bushfit.report.contents import Formats, Kinds
-
-
-@pytest.mark.parametrize("job", [FitStatic(), FitDynamic(), Fit(), Diagnose()], ids=lambda job: type(job).__name__)
-def test_an_outcome_holds_the_files_that_were_named(campaign: Campaign, job: Any) -> None:
-    outcome = job.run(Data.of(campaign))
-    for formats in (Formats(pictures=False), Formats()):
-        files = formats.files(outcome.contents)
-        assert list(files) == formats.names(job.kinds(campaign))
-    documents = [json.loads(content) for name, content in files.items() if name.endswith(".json")]
-    assert json.loads(json.dumps(outcome.document)) in documents
-
-
-def test_a_fit_moves_what_it_is_for(campaign: Campaign) -> None:
-    data = Data.of(campaign)
-    assert set(FitStatic().run(data).result.fitted) == {"mu", "sigma_fmax", "eps_half"}
-    assert set(FitDynamic().run(data).result.fitted) == {"m", "alpha"}
-    added = Fit(directions=(Direction.RADIAL,), effects=("inertia",)).run(data).result
-    assert set(added.fitted) == {*FIVE, "inertia.mass"}
-    assert added.measured is not None
-    assert added.measured.directions == (Direction.RADIAL,)
-
-
-def test_a_dynamic_fit_makes_its_own_static_one_or_says_what_it_needs(campaign: Campaign) -> None:
-    titles = [title for title, _ in FitDynamic().run(Data.of(campaign)).reports]
-    assert len(titles) == 2
-    assert "no --static was given" in titles[0]
-    with pytest.raises(FitError, match="nothing says at which mu, sigma_fmax and eps_half"):
-        FitDynamic().run(Data.of(replace(campaign, loops=())))
+from bushfit.report.contents import Kinds
 
 
 def test_warnings_of_a_resonance_are_those_of_the_prediction(campaign: Campaign) -> None:
@@ -80,31 +48,10 @@ def test_a_prediction_is_over_what_was_asked_for_before_what_the_campaign_says(
     assert Predict().kinds(None, said) == found.contents.kinds == Kinds.shown(["radial"])
 
 
-def test_a_prediction_without_a_campaign_is_axial_and_radial(paper_model: Model) -> None:
-    found = Predict().run(Result(paper_model), None)
-    assert [prediction.direction for prediction in found.predictions] == [Direction.AXIAL, Direction.RADIAL]
-    table = found.document["axial"]
-    points = np.array(table["frequency [Hz]"]), np.array(table["amplitude [mm]"]) / 1e3
-    expected = np.abs(paper_model.stiffness(Direction.AXIAL, *points))
-    np.testing.assert_allclose(table["stiffness [N/mm]"], 1e-3 * expected)
-    assert found.document["warnings"] == found.warnings
-
-
 def fitted(model: Model, frequency: tuple[float, float], displacement: tuple[float, float]) -> Result:
     low, high = (x * model.unit_strain(Direction.AXIAL) for x in displacement)
     covariance = Covariance(("mu",), np.array([[1e6]]))
     return Result(model, fitted=("mu",), covariance=covariance, measured=Range(frequency, (low, high), ("axial",)))
-
-
-@pytest.mark.parametrize("families", [False, True])
-def test_a_comparison_holds_the_files_that_were_named(campaign: Campaign, families: bool) -> None:
-    job = Compare(PredictSettings(frequencies=(5.0, 50.0), amplitudes=(1e-4,)))
-    entry = job.entry(campaign, "cmp")
-    outcome = job.run_families(campaign, "cmp", ["sliders"]) if families else job.run([entry, entry])
-    files = Formats().files(outcome.contents)
-    assert list(files) == Formats().names(job.kinds(families=families))
-    assert json.loads(files["compare.json"]) == json.loads(json.dumps(outcome.document))
-    assert files["compare.png"].startswith(b"\x89PNG")
 
 
 def test_the_grid_lies_within_what_all_were_fitted_at(paper_model: Model, other_models: dict[str, Model]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -89,35 +88,3 @@ def test_the_radial_factor_of_older_files_is_read(document: dict[str, Any]) -> N
     document["parameters"]["radial_factor.factor"] = document["parameters"].pop("radial_factor.excess")
     with pytest.raises(ModelError, match=r"stiffness_factor\.radial"):
         from_document(document)
-
-
-@pytest.mark.parametrize("schema", ["bushfit/model/3", None])
-def test_an_unknown_schema_is_refused_by_name(document: dict[str, Any], schema: object) -> None:
-    with pytest.raises(ModelError, match=f"{schema}[\\s\\S]*bushfit/model/1 or bushfit/model/2"):
-        from_document(document | {"schema": schema})
-
-
-Change = Callable[[dict[str, Any]], object]
-
-DAMAGES: dict[str, Change] = {
-    "short spread": lambda d: d["covariance"]["spread"][0].pop(),
-    "spread is a number": lambda d: d["covariance"].update(spread=3.0),
-    "unknown direction": lambda d: d["fit"].update(directions=["sideways"]),
-    "range of three": lambda d: d["fit"].update(strain=[1, 2, 3]),
-    "profile of texts": lambda d: d["parameters"]["mu"].update(profile95=["1", "2"]),
-    "outlier at half a row": lambda d: d.update(
-        outliers=[{"test": "a", "file": None, "row": 1.5, "column": "force", "distance": 9}]
-    ),
-    "outliers is null": lambda d: d.update(outliers=None),
-    "provenance is text": lambda d: d.update(provenance="here"),
-}
-
-
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_damaged_content_is_one_clear_error(document: dict[str, Any], tmp_path: Path, damage: str) -> None:
-    DAMAGES[damage](document)
-    file = tmp_path / "model.json"
-    file.write_text(json.dumps(document))
-    with pytest.raises(ModelError) as caught:
-        load_result(file)
-    assert str(caught.value).startswith(str(file))

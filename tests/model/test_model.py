@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import re
 from dataclasses import FrozenInstanceError
 from pathlib import Path
 
@@ -11,8 +10,7 @@ import numpy as np
 import pytest
 
 from bushfit.effects import BASE, History
-from bushfit.errors import ModelError
-from bushfit.geometry import Bushing, Direction
+from bushfit.geometry import Direction
 from bushfit.model.model import Model
 
 
@@ -85,21 +83,3 @@ def test_equation_is_text(paper_model: Model) -> None:
     assert text.isascii()
     words = ("K = k (mu + m/2 (i omega)^alpha + (A + iB)/(2 e0)", "inertia: ", "mu = 1.09 MPa", "inertia.mass = 0.1 kg")
     assert all(each in text for each in words)
-
-
-@pytest.mark.parametrize(
-    ("effects", "changes", "words"),
-    [
-        (("elastic", "springpott", "friction"), {}, "did you mean springpot"),
-        (("elastic", "elastic"), {}, "listed twice"),
-        (BASE, {"alpha": 1.5}, "alpha: impossible value"),
-        (BASE, {"eps_half": float("nan")}, "eps_half: impossible value"),
-        (BASE, {"nu": 0.5}, "nu: unknown parameter"),
-        ((*BASE, "inertia"), {}, "inertia.mass: a parameter has no value"),
-    ],
-)
-def test_errors_say_what_is_wrong(
-    bushing: Bushing, table_1: dict[str, float], effects: tuple[str, ...], changes: dict[str, float], words: str
-) -> None:
-    with pytest.raises(ModelError, match=re.escape(words)):
-        Model(bushing, effects, {**table_1, **changes})

@@ -14,6 +14,7 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing
 from bushfit.model.covariance import Z95
+from bushfit.model.model import FIVE
 from bushfit.planning.contract import Knowledge
 from bushfit.planning.guess import gent_modulus, guess
 
@@ -64,15 +65,26 @@ def test_practice_rubbers_lie_inside(root: Path) -> None:
     assert np.mean(np.abs(every) < Z95) >= 0.95
 
 
-@pytest.mark.parametrize("rubber", ["natural", "EPDM"])
-def test_width_follows_from_the_law(rubber: Polymer) -> None:
-    """The covariance is that of values drawn as the file says: hardness moved by its error moves mu as the formula."""
+def by_the_laws(guessed: np.ndarray) -> np.ndarray:
+    """ln of the five parameters by ln G, ln q, ln alpha, ln r and ln eps_half: q at 10 Hz, G as read after 3 s."""
+    modulus, q, alpha, r, eps_half = np.exp(guessed)
+    mu = modulus / (1.0 + q * (20.0 * np.pi * 3.0) ** -alpha * np.cos(np.pi * alpha / 2.0))
+    return np.log([mu, 2.0 * q * mu * (20.0 * np.pi) ** -alpha, alpha, 2.0 * r * eps_half * mu, eps_half])
+
+
+@pytest.mark.parametrize(("rubber", "errors"), [("natural", (0.45, 0.27, 0.5, 0.4)), ("EPDM", (0.7, 0.5, 0.7, 0.5))])
+def test_width_follows_from_the_laws(rubber: Polymer, errors: tuple[float, ...]) -> None:
+    """What is guessed apart, moved by a little, moves the parameters together; hardness moves what is read."""
     known = guess(BUSHING, Compound(61, 27, rubber))
-    harder = guess(BUSHING, Compound(63.5, 27, rubber))
-    by_hardness = np.log(harder.model.values["mu"] / known.model.values["mu"])
-    assert known.errors[0] == pytest.approx(np.hypot(0.2, by_hardness), rel=0.05)
-    assert np.linalg.eigvalsh(known.covariance).min() > 0.0
-    assert known.covariance[1, 2] < 0.0  # m and alpha, told at 10 Hz, trade off
+    by_hardness = 2.5 * np.log(gent_modulus(61.5) / gent_modulus(60.5))
+    values = [known.model.values[name] for name in FIVE]
+    at = np.log([gent_modulus(61), 0.25, 0.24, values[3] / (2.0 * values[4] * values[0]), values[4]])
+    assert by_the_laws(at) == pytest.approx(np.log(values))
+    slopes = np.array([(by_the_laws(at + step) - by_the_laws(at - step)) / 2e-4 for step in 1e-4 * np.eye(5)]).T
+    wide = [np.hypot(0.2, by_hardness), *errors]
+    if rubber == "natural":  # of other densities the volume of the filler differs from the paper's, by a power unsure
+        np.testing.assert_allclose(known.covariance, slopes @ np.diag(np.square(wide)) @ slopes.T, atol=1e-6)
+    assert np.sqrt(np.diag(known.covariance))[:3] == pytest.approx(np.linalg.norm(slopes * wide, axis=1)[:3])
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import binom, chi2, false_discovery_control, norm
+from scipy.stats import binom, false_discovery_control, norm
+from scipy.stats import f as fisher
+from scipy.stats import t as student
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects.contract import Array
@@ -110,25 +112,33 @@ def test_known_differences_are_found_and_covered(fits: list[tuple[Result, Result
     assert all(seen)
 
 
-def test_figures_are_those_of_independent_normal_errors(paper_model: Model) -> None:
-    """Against scipy: the z of each parameter, and chi-square of all together with their correlations."""
+@pytest.mark.parametrize("freedom", [1e6, 12.0])
+def test_figures_are_those_of_independent_normal_errors(paper_model: Model, freedom: float) -> None:
+    """Against scipy: t of each parameter with the degrees of freedom of Welch, and Hotelling's T^2 of all together."""
     random = np.random.default_rng(1)
     values = np.array([paper_model.values[name] for name in FIVE])
     parts = [1e-2 * values[:, None] * random.standard_normal((5, 9)) for _ in range(2)]
     one, other = (part @ part.T for part in parts)
-    moved = values * list(MOVED.values())
-    found = against(known(paper_model, one), known(scaled(paper_model, **MOVED), other))
+    moved, share = values * list(MOVED.values()), np.sqrt(2.0 / freedom)
+    results = [
+        replace(each, covariance=Covariance(FIVE, matrix, (share * matrix,)))
+        for each, matrix in ((known(paper_model, one), one), (known(scaled(paper_model, **MOVED), other), other))
+    ]
+    found = against(*results)
     logarithmic = np.array([name != "alpha" for name in FIVE])
     slopes = [np.diag(np.where(logarithmic, 1.0 / at, 1.0)) for at in (values, moved)]
-    covariance = slopes[0] @ one @ slopes[0] + slopes[1] @ other @ slopes[1]
+    each = np.array([slopes[0] @ one @ slopes[0], slopes[1] @ other @ slopes[1]])
+    covariance, squares = each.sum(axis=0), np.diagonal(each, axis1=1, axis2=2)
+    welch = freedom * squares.sum(axis=0) ** 2 / np.square(squares).sum(axis=0)
     difference = np.where(logarithmic, np.log(moved / values), moved - values)
-    expected = chi2.sf(difference @ np.linalg.solve(covariance, difference), 5)
-    assert found.joint == pytest.approx((expected, 5), rel=1e-3)
+    left = welch.min() - 4.0
+    statistic = difference @ np.linalg.solve(covariance, difference) * left / (5.0 * welch.min())
+    assert found.joint == pytest.approx((fisher.sf(statistic, 5, left), 5), rel=1e-3)
     error = np.sqrt(np.diag(covariance))
     for i, name in enumerate(FIVE):
         row = rows(found)[name]
         if name != "m":
-            assert row.p == pytest.approx(2.0 * norm.sf(abs(difference[i]) / error[i]), rel=1e-3)
+            assert row.p == pytest.approx(2.0 * student.sf(abs(difference[i]) / error[i], welch[i]), rel=1e-3)
 
 
 def test_m_is_compared_at_a_frequency_where_alpha_is_free_and_alone_where_it_is_held(paper_model: Model) -> None:
@@ -155,6 +165,8 @@ def test_a_parameter_at_its_bound_is_not_tested_and_bands_widen_at_most_as_bonfe
     assert (row.note, row.p, row.holm) == ("at its min", None, None)
     points = 2 * found.contrasts[0].reference.frequency.size
     assert 1.0 < found.widening <= norm.isf(0.025 / points) / norm.isf(0.025)
+    by_hand = Result(paper_model)  # whose errors are the other's alone, whichever is the reference
+    assert against(one, by_hand).widening == pytest.approx(against(by_hand, one).widening, rel=0.02)
 
 
 def test_words_say_what_is_sure_and_how_much_may_differ_where_nothing_is(paper_model: Model) -> None:

@@ -281,15 +281,6 @@ def test_a_coupon_predicts_a_bushing_and_says_what_it_does_not_know(result: Resu
     assert line.startswith("axial: not fitted; its band holds the scatter of the DMA tests, not by how much two bodies")
 
 
-@pytest.mark.parametrize(
-    ("frequencies", "amplitudes"),
-    [([0.0], [1e-4]), ([np.nan], [1e-4]), ([5.0], [np.inf]), ([], [1e-4])],
-)
-def test_impossible_requests(result: Result, frequencies: list[float], amplitudes: list[float]) -> None:
-    with pytest.raises(ModelError, match=r"impossible (frequency|amplitude) to predict at"):
-        predict(result, Direction.AXIAL, frequencies, amplitudes)
-
-
 def test_a_prediction_is_at_the_temperature_asked_for(paper_model: Model) -> None:
     values = {"temperature.softening": 3e-3, "temperature.shift": 0.0}
     warm = Result(paper_model.with_values({"mu": 1e3}).with_effect("temperature", values))

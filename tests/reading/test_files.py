@@ -15,41 +15,12 @@ from bushfit.reading.files import read_utf8, view_bytes
 from bushfit.reading.loops import read_loop
 
 
-@pytest.mark.parametrize(
-    ("name", "words"), [("", "a folder"), ("lop.csv", 'did you mean "loop.csv"'), ("a/b", "no such")]
-)
-def test_what_is_no_file(name: str, words: str, tmp_path: Path) -> None:
-    (tmp_path / "loop.csv").touch()
-    with pytest.raises(MeasurementError, match=words):
-        read_loop(tmp_path / name, Direction.AXIAL)
-
-
 def test_bytes_come_as_they_are_up_to_a_number_and_the_error_is_of_the_kind_asked_for(tmp_path: Path) -> None:
     file = tmp_path / "x.toml"
     file.write_bytes(b"\xef\xbb\xbf1\r\n")
     assert view_bytes(file, CampaignError, largest=6) == read_utf8(file, CampaignError) == b"\xef\xbb\xbf1\r\n"
     with pytest.raises(CampaignError, match=r"too large[\s\S]*6 bytes[\s\S]*at most 5 bytes[\s\S]*give another"):
         view_bytes(file, CampaignError, largest=5, hint="give another")
-
-
-@pytest.mark.parametrize("content", [b"", b" \r\n\t", b" " * 70_000])
-def test_a_file_of_nothing_but_blanks_is_empty(content: bytes, tmp_path: Path) -> None:
-    file = tmp_path / "x.csv"
-    file.write_bytes(content)
-    with pytest.raises(MeasurementError, match="the file is empty"):
-        view_bytes(file, MeasurementError)
-    file.write_bytes(content + b"1")
-    assert view_bytes(file, MeasurementError)[:] == content + b"1"
-
-
-@pytest.mark.parametrize(("content", "place", "byte"), [(b"a\nb\xfc", 2, "0xfc"), (b"a\n\nb\0", 3, "0x00")])
-def test_bytes_that_are_no_utf8_are_named_with_their_line(
-    content: bytes, place: int, byte: str, tmp_path: Path
-) -> None:
-    file = tmp_path / "x.toml"
-    file.write_bytes(content)
-    with pytest.raises(CampaignError, match=rf"line {place}[\s\S]*not UTF-8[\s\S]*{byte}"):
-        read_utf8(file, CampaignError)
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,22 @@ def test_harmonics_at_half_the_rows_of_a_cycle_are_none(per_cycle: float) -> Non
     assert max(fit.distortion()) < 1e-3
 
 
+def test_errors_and_distortion_are_those_of_what_the_force_does_not_follow() -> None:
+    """Jitter of the motion is no error where the force follows it, and noise is no overtone."""
+    time, sigma, overtone, stiffness = np.arange(800) / 20.0, 0.05, 0.03, 3.0
+    off, distorted = [], []
+    for seed in range(40):
+        jitter, noise = np.random.default_rng(seed).standard_normal((2, time.size))
+        motion = np.sin(2.0 * np.pi * time) + overtone * np.sin(6.0 * np.pi * time) + sigma * jitter
+        fit = HarmonicFit.of(time, motion, stiffness * motion + 0.2 * sigma * noise, np.arange(41.0))
+        assert fit.errors() == pytest.approx(0.2 * sigma * np.sqrt(2.0 / time.size) / stiffness, rel=0.4)
+        k = fit.coefficients[1, 1] / fit.coefficients[0, 1]
+        off.append(abs(k / stiffness - 1.0) / np.hypot(*fit.errors()))
+        distorted.append(np.square(fit.distortion()))
+    assert np.mean(np.square(off)) == pytest.approx(1.0, rel=0.25)
+    assert np.mean(distorted, axis=0) == pytest.approx(overtone**2, rel=0.1)
+
+
 def test_rows_that_stand_for_all_keep_no_time_with_cycles() -> None:
     chosen = spread_rows(1_000_000, 1000)
     assert chosen.size == 1000

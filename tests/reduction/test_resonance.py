@@ -102,7 +102,12 @@ def wandering(random: np.random.Generator, sigma: float) -> Callable[[int], Arra
 
 @pytest.mark.parametrize(
     ("rows", "sigma", "shared", "least", "most"),
-    [(40, 0.01, False, 0.92, 0.98), (2000, 0.05, False, 0.93, 0.99), (2000, 0.01, True, 0.9, 0.98)],
+    [
+        (12, 0.003, False, 0.92, 0.98),
+        (40, 0.01, False, 0.92, 0.98),
+        (2000, 0.05, False, 0.93, 0.99),
+        (2000, 0.01, True, 0.9, 0.98),
+    ],
 )
 def test_standard_errors_cover_what_points_miss(
     paper_model: Model, rows: int, sigma: float, shared: bool, least: float, most: float

@@ -22,7 +22,7 @@ from bushfit.reading.tablefile import Form
 from bushfit.report.artifacts import fit_contents, prediction_contents
 from bushfit.report.contents import Contents, Formats, Picture
 from bushfit.report.plots.style import to_image
-from bushfit.report.tables import gap_table, loops_table, sweeps_table
+from bushfit.report.tables import loops_table, sweeps_table
 
 BEGINS = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 #: A text with markup, the end of a comment, what mathematics would be, and letters that the font lacks.
@@ -105,13 +105,3 @@ def test_sweeps_sorted_by_amplitude_repeat_and_frequency(data: Data, paper_model
     stiffness = paper_model.stiffness("axial", frequency, amplitude / 1e3)
     np.testing.assert_allclose(axial["model stiffness [N/mm]"], np.abs(stiffness) / 1e3, rtol=1e-12)
     np.testing.assert_allclose(axial["model loss factor [-]"], stiffness.imag / stiffness.real, rtol=1e-9)
-
-
-def test_a_gap_has_every_residual_before_and_after(data: Data, paper_model: Model) -> None:
-    data_sets = data.chosen(None)
-    softer = paper_model.with_values({"mu": 1.068e6})
-    table = gap_table(softer, paper_model, data_sets)
-    for when, model in (("before", softer), ("after", paper_model)):
-        residuals = table[[f"{part} {when} [noise]" for part in ("force", "storage", "loss")]].to_numpy()
-        chi_square = sum(float(np.sum(data_set.misfit(model) ** 2)) for data_set in data_sets)
-        assert np.nansum(residuals**2) == pytest.approx(chi_square, rel=1e-9)

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import os
 import stat
-import sys
-import threading
 from pathlib import Path
 
 import pytest
 
 from bushfit.errors import OutputError
-from bushfit.report import disk
 from bushfit.report.folder import write_files
 
 FILES = {"a.csv": b"1\n", "b.json": b"{}\n"}
-locking = pytest.mark.skipif(sys.platform == "win32", reason="folders are neither locked nor exchanged there")
 
 
 def contents(folder: Path, pattern: str = "*") -> dict[str, bytes]:
@@ -89,70 +85,3 @@ def test_a_record_that_is_spoiled_removes_nothing(record: bytes, tmp_path: Path)
     write_files(folder, {"b.csv": b"2"}, force=True, by="one")
     assert set(contents(folder, "[!.]*")) == {"a.csv", "b.csv"}
     assert (tmp_path / "mine.txt").read_bytes() == b"mine"
-
-
-def test_nothing_stands_where_the_last_word_fails(tmp_path: Path) -> None:
-    def closed() -> None:
-        raise OutputError("standard output cannot be written")
-
-    with pytest.raises(OutputError, match="standard output"):
-        write_files(tmp_path / "x", {"a.csv": b"1"}, force=False, before=closed)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="renameat2")
-def test_two_folders_are_exchanged_or_left_as_they_were(tmp_path: Path) -> None:
-    one, other = tmp_path / "one", tmp_path / "other"
-    for folder in (one, other):
-        folder.mkdir()
-        (folder / folder.name).touch()
-    try:
-        disk.exchange(one, other)
-    except OSError:  # a file system that cannot
-        assert [path.name for path in (*one.iterdir(), *other.iterdir())] == ["one", "other"]
-    else:
-        assert [path.name for path in (*one.iterdir(), *other.iterdir())] == ["other", "one"]
-    with pytest.raises(OSError, match="such file"):
-        disk.exchange(one, tmp_path / "none")
-    assert one.is_dir()
-
-
-@locking
-def test_a_claim_holds_until_it_is_closed(tmp_path: Path) -> None:
-    assert disk.is_abandoned(tmp_path)
-    claim = disk.claim(tmp_path)
-    assert not disk.is_abandoned(tmp_path)
-    with pytest.raises(BlockingIOError):
-        disk.claim(tmp_path, wait=False)
-    claim.close()
-    assert disk.is_abandoned(tmp_path)
-    assert list(tmp_path.iterdir()) == []
-    assert not disk.is_abandoned(tmp_path / "none"), "what is not there cannot be told to be abandoned"
-
-
-@locking
-def test_a_locked_folder_lets_one_in_after_the_other(tmp_path: Path) -> None:
-    inside: list[str] = []
-
-    def enter() -> None:
-        with disk.locked(tmp_path):
-            inside.append("second")
-
-    waiting = threading.Thread(target=enter)
-    with disk.locked(tmp_path):
-        waiting.start()
-        waiting.join(0.2)
-        assert waiting.is_alive()
-        inside.append("first")
-    waiting.join(10.0)
-    assert inside == ["first", "second"]
-
-
-@locking
-def test_open_files_are_flushed_and_closed_ones_are_an_error(tmp_path: Path) -> None:
-    descriptor = os.open(tmp_path / "a", os.O_CREAT | os.O_WRONLY)
-    disk.flush([descriptor])
-    os.close(descriptor)
-    disk.flush([])
-    with pytest.raises(OSError, match=r"[Bb]ad file descriptor"):
-        disk.flush([descriptor])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import subprocess
@@ -63,29 +62,6 @@ def test_stopped_at_every_system_call(where: str, how: str, tmp_path: Path) -> N
     assert len(states) >= 2
 
 
-PREDICT = ("--frequencies|10:20:5 Hz", ("predict", "data/arm_bushing/truth.json", "--no-plots"))
-OFTEN = [
-    (50, *PREDICT),
-    (8, "--no-report", ("run", "configs/cmp_15961.toml", "--no-plots")),
-    (12, "--format|csv", ("export", "data/arm_bushing/truth.json", "--format", "nastran")),
-]
-
-
-@pytest.mark.parametrize(
-    ("times", "otherwise", "arguments"),
-    [(10, *PREDICT), *(pytest.param(*each, marks=pytest.mark.slow) for each in OFTEN)],
-)
-def test_killed_at_random_times(
-    root: Path, tmp_path: Path, times: int, otherwise: str, arguments: tuple[str, ...]
-) -> None:
-    """With 50 in place of so few, `python tests/report/kill.py` takes minutes for `run`."""
-    command, source, *options = arguments
-    seen = script("kill.py", str(times), str(tmp_path / "x"), otherwise, command, str(root / source), *options)
-    assert sum(seen.values()) == times
-    assert sum(count for what, count in seen.items() if "killed" in what) >= times // 5
-    assert not [what for what in seen if what.endswith("mixed")]
-
-
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
     """A disk of 64 KiB."""
@@ -137,16 +113,6 @@ def test_a_folder_that_allows_no_writing() -> None:
             os._exit(status)
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
         assert contents(folder) == {}
-
-
-def test_an_error_of_the_disk_while_flushing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(files: list[int]) -> None:
-        raise OSError(errno.EDQUOT, "Disk quota exceeded")
-
-    monkeypatch.setattr(disk, "flush", full)
-    with pytest.raises(OutputError, match="Disk quota exceeded"):
-        write_files(tmp_path / "deep" / "x", NEW, force=False)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_files_are_flushed_one_by_one_where_the_system_knows_no_other_way(

@@ -7,13 +7,13 @@ import pytest
 from cards.awkward import AWKWARD
 from cards.families import RECIPES, campaign_of, tasks
 from cards.faults import FAULTS
-from cards.hidden import FIRST, hidden_campaign, hideable
+from cards.hidden import hidden_campaign
 from cards.mistaken import mistaken_campaign
 from cards.outcome import Task
 from cards.outside import OUTSIDE_LAWS
 from cards.recipe import Recipe, cooked
 
-from bushfit.effects import BASE, LIBRARY
+from bushfit.effects import BASE
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.geometry import ROTATION, Direction
 from bushfit.model.model import FIVE
@@ -61,12 +61,6 @@ def test_what_is_hidden_is_in_the_truth_and_visible(hidden: tuple[str, ...]) -> 
     assert dict(simulated.truth.values) == sealed.values
 
 
-def test_every_effect_but_the_paper_s_can_be_hidden_and_no_outside_law_is_one() -> None:
-    assert not set(hideable()) & set(BASE)
-    assert set(FIRST) <= set(hideable())
-    assert not set(OUTSIDE_LAWS) & set(LIBRARY)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, mistake in MISTAKES.items() if mistake.kinds])
 def test_a_mistake_mends_what_the_card_makes(name: str) -> None:
@@ -104,12 +98,6 @@ def test_what_is_wrong_shows_about_as_large_as_asked(name: str, plain: Simulated
     assert dict(made.truth.values) == dict(plain.truth.values) == dict(sealed.values)
 
 
-@pytest.mark.parametrize("name", ["preload", "compliance", "repeat_differs", "mislabelled_level"])
-def test_faults_of_one_direction_leave_the_other_alone(name: str, plain: Simulated) -> None:
-    axial, radial, *_ = changes(cooked(FAULTS[name], SEED)[0], plain)
-    assert min(axial, radial) == 0.0 < max(axial, radial)
-
-
 @pytest.mark.parametrize("name", ["coloured_noise_98", "low_pass_noise"])
 def test_coloured_noise_depends_on_the_row_before(name: str) -> None:
     silent = Recipe("silent", plan=AWKWARD[name].plan)
@@ -117,22 +105,6 @@ def test_coloured_noise_depends_on_the_row_before(name: str) -> None:
     noise = loop.force - quiet.force
     assert 0.002 < noise.std() / (np.ptp(quiet.force) / 2.0) < 0.004
     assert np.corrcoef(noise[1:], noise[:-1])[0, 1] > 0.97
-
-
-@pytest.mark.parametrize("name", ["wild_point", "level_errors_one", "heavy_tails", "low_frequency_scatter"])
-def test_awkward_campaigns_differ_by_noise_alone(name: str) -> None:
-    silent = Recipe("silent", plan=AWKWARD[name].plan)
-    assert 0.001 < max(changes(cooked(AWKWARD[name], SEED)[0], cooked(silent, SEED)[0])[:2]) < 0.12
-
-
-def test_plans_are_as_the_kinds_say() -> None:
-    one, three, strain = (
-        cooked(AWKWARD[name], SEED)[0].sweeps for name in ("one_direction", "three_frequencies", "strain_sweeps")
-    )
-    assert len(one) == 1
-    assert len(np.unique(three[0].frequency)) == 3
-    assert strain[0].stepped == "amplitude"
-    assert strain[0].reached is not None
 
 
 def test_every_kind_of_a_family_has_its_turn() -> None:

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hidden_kinds import KINDS_OF, aimed, asked, diagnosed_all, hidden, rates, table
+from hidden_kinds import aimed, diagnosed_all, hidden, rates, table
 from judging import Judged, acceptable
 from kinds import SIZES, Bench, largest, sized
 from lab_campaign import KINDS, Answer, campaign
 from time_rig import Bushing, Rubber, Tests, respond
-
-from bushfit.campaign.campaign import load_campaign
-from bushfit.effects import LIBRARY
 
 RUBBER = Rubber(1.09e6, 2.0e5, 0.24, 1.46e4, 1.3e-2)
 
@@ -30,15 +26,6 @@ def a_session() -> Tests:
     ]
     rows = [(0.1, 1e-3, 0, 0, 1, True), *swept]
     return Tests(Bushing(0.010, 0.018, 0.034), *(np.array(column) for column in zip(*rows, strict=True)))
-
-
-def test_half_of_the_kinds_are_held_back_and_none_is_an_effect() -> None:
-    assert [len(kinds) for kinds in KINDS_OF.values()] == [14, 14]
-    assert not set(KINDS) & LIBRARY.keys()
-    families = {name.partition(".")[0] for name in LIBRARY}
-    assert {name for kind in KINDS.values() for name in kind.right} <= families
-    for chosen, kinds in KINDS_OF.items():
-        assert {name for name, *_ in islice(asked(chosen, 1), 14)} == kinds.keys()
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -57,14 +44,6 @@ def test_the_same_seed_writes_the_same_campaign(name: str, tmp_path: Path) -> No
     assert first == second
     for file in (tmp_path / "a").iterdir():
         assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes()
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_bushfit_reads_what_is_written(seed: int, tmp_path: Path) -> None:
-    campaign("", 0.0, seed, tmp_path)
-    read = load_campaign(tmp_path / "bushing.toml")
-    assert read.sweeps
-    assert all(np.all(np.abs(sweep.stiffness.imag) < sweep.stiffness.real) for sweep in read.sweeps)
 
 
 PLAIN = Answer("tilted", 0.1, ("stiffness_factor",), ("level",), 0.05, 300.0)

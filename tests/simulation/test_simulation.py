@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign, load_campaign, model_of
+from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE, LIBRARY, effect_named, qualified
 from bushfit.errors import CampaignError, ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import loop_data, sources
 from bushfit.fitting.procedures import fit_joint
-from bushfit.geometry import Bushing, Direction, Specimen
+from bushfit.geometry import Direction, Specimen
 from bushfit.model import rig
 from bushfit.model.file import load_result
 from bushfit.model.model import FIVE, Model
@@ -81,15 +80,6 @@ def test_a_small_loop_is_that_of_the_closed_form_with_any_effect(paper_model: Mo
     closed = model.stiffness(Direction.AXIAL, 1.0, 2e-6, kind="loop")
     print(f"{name:28} {abs(rig.lock_in(record, 1.0) / closed - 1.0):.1e}")
     assert rig.lock_in(record, 1.0) == pytest.approx(closed, rel=5e-4)
-
-
-def test_a_programme_of_one_part_is_a_loop(paper_model: Model) -> None:
-    loop, programme = (
-        SimulatedLoop(Direction.AXIAL, 1e-4, 1.0, cycles=1),
-        SimulatedLoop(Direction.AXIAL, cycles=1, frequencies=(1.0,), amplitudes=(1e-4,)),
-    )
-    one, other = (undisturbed(paper_model, SimulateSettings(loops=(each,))).loops[0][1] for each in (loop, programme))
-    np.testing.assert_array_equal(one.force, other.force)
 
 
 def test_noise_is_as_large_as_asked_for(clean: Undisturbed) -> None:
@@ -273,29 +263,6 @@ def test_a_programme_is_one_file_of_several_loops(paper_model: Model, tmp_path: 
         assert [part.name for part in loops] == [f"loop_axial_1_part_{number}" for number in (1, 2, 3, 4)]
         assert [np.ptp(part.displacement) / 2.0 for part in loops] == pytest.approx([*sizes, *sizes], rel=1e-3)
     assert sources(loop_data(read)) == (read[0].source,)
-
-
-def test_a_programme_too_long_to_simulate_is_refused(paper_model: Model) -> None:
-    loop = SimulatedLoop(Direction.AXIAL, 1e-3, frequencies=(1e-3, 10.0))
-    with pytest.raises(CampaignError, match="too long to simulate"):
-        simulate(paper_model, SimulateSettings(loops=(loop,)))
-
-
-@pytest.mark.parametrize(
-    ("without", "effects", "error", "said"),
-    [
-        ("parameters", {}, CampaignError, "nothing says what to simulate"),
-        ("alpha", {}, CampaignError, r"parameters without a value[\s\S]*no alpha"),
-        ("", {"friktion": {"x": 1.0}}, ModelError, r"c.toml[\s\S]*friktion"),
-    ],
-)
-def test_what_a_simulate_table_lacks_is_said(
-    bushing: Bushing, table_1: dict[str, float], without: str, effects: Any, error: type[Exception], said: str
-) -> None:
-    values = {name: value for name, value in table_1.items() if name != without}
-    settings = None if without == "parameters" else SimulateSettings(parameters=values, effects=effects)
-    with pytest.raises(error, match=said):
-        model_of(Campaign("c", Path("c.toml"), bushing, simulate=settings))
 
 
 def test_the_rig_is_warm_and_drifts_as_planned(paper_model: Model, tmp_path: Path) -> None:

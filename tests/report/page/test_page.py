@@ -38,7 +38,7 @@ from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
 from bushfit.report.contents import Formats
 from bushfit.report.page import report_page
-from bushfit.report.page.readback import canonical, read_results
+from bushfit.report.page.readback import read_results
 
 Results = Callable[[str], Path]
 STYLED = re.compile(r"<(style|script)>(.*?)</\1>", re.DOTALL)
@@ -245,22 +245,6 @@ def test_the_command(root: Path, tmp_path: Path) -> None:
     first = (tmp_path / "page/report.html").read_bytes()
     assert call(tmp_path, "report", folder, "-o", "page", "--force").returncode == 0
     assert (tmp_path / "page/report.html").read_bytes() == first
-
-
-def test_without_a_report(root: Path, tmp_path: Path) -> None:
-    campaign = root / "data/practice/case_000/bushing.toml"
-    assert call(tmp_path, "diagnose", campaign, "-o", "x", "--no-plots", "--no-report", "-q").returncode == 0
-    assert not (tmp_path / "x/report.html").exists()
-    assert call(tmp_path, "report", "x", "-q").returncode == 0
-    assert (tmp_path / "x/report.html").exists()
-
-
-def test_canonical_tables_are_those_of_the_files() -> None:
-    table = pd.DataFrame({"test": ["=1", "a\nb"], "repeat": [1, 2], "force [N]": [np.nan, 1.23456789]})
-    found = canonical(table)
-    assert found["test"].tolist() == ["=1", "a b"]
-    assert found["force [N]"].tolist()[1] == 1.234568
-    assert np.isnan(found["force [N]"][0])
 
 
 def test_results_of_older_versions_have_a_page_and_are_compared(root: Path, tmp_path: Path) -> None:

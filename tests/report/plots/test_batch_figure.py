@@ -40,11 +40,6 @@ def test_medians_limits_and_names(count: int) -> None:
     assert other.get_ylim()[0] < 0.24 < other.get_ylim()[1]
 
 
-def test_a_panel_of_which_all_are_out() -> None:
-    values = np.array([3.0, 4.0, 5.0])
-    to_image(batch_figure([Panel("mu [Pa]", values, (1.0, 2.0), [0, 1, 2])], "x", ["a", "b", "c"]))
-
-
 def test_triangles_have_a_name_and_the_value_that_the_panel_does_not_show() -> None:
     values = np.array([1.0, 1.01, 0.99, 1.02, 0.98, 4012.0, 1.0, 30.0, 0.97, 20.0])
     figure = batch_figure([Panel("mu [MPa]", values)], "x", [f"b{n}" for n in range(10)])

@@ -8,7 +8,6 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
@@ -42,7 +41,7 @@ from bushfit.model.arms import model_arms
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
 from bushfit.prediction.stiffness import predict
-from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.measurement import Sweep
 from bushfit.reduction.steps import reduce
 from bushfit.report.artifacts import prediction_contents
 from bushfit.report.plots.arms import arms_figure
@@ -50,24 +49,7 @@ from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.inspection import inspection_figure
 from bushfit.report.plots.prediction import prediction_figure
 from bushfit.report.plots.reduction import reduction_figure
-from bushfit.report.plots.style import label_axes, to_image
-
-
-def test_same_figure_same_bytes_and_no_trace_of_when_or_with_what(paper_model: Model, swept: Swept) -> None:
-    prediction, curves = predicted(paper_model, Direction.AXIAL)
-    settings = dict(matplotlib.rcParams)
-    one, other = (
-        to_image(prediction_figure(prediction, [swept(paper_model)], "CMP 15 961", curves=curves)) for _ in range(2)
-    )
-    assert one == other
-    assert one[:8] == b"\x89PNG\r\n\x1a\n"
-    assert dict(matplotlib.rcParams) == settings
-    assert not any(chunk in one for chunk in (b"tEXt", b"iTXt", b"zTXt", b"tIME", b"Matplotlib"))
-
-
-@pytest.mark.parametrize("title", ["price in $ and 50 %, a_b^c\\", "衬套 61 Shore A", "x" * 300, ""])
-def test_any_name_can_be_a_title(paper_model: Model, title: str) -> None:
-    assert to_image(prediction_figure(predicted(paper_model, Direction.AXIAL)[0], [], title))
+from bushfit.report.plots.style import label_axes
 
 
 @pytest.mark.parametrize(
@@ -174,14 +156,6 @@ def test_reduction(paper_model: Model, direction: Direction) -> None:
     assert {"time [s]", "frequency [Hz]", "noise [%]", "distortion [%]", stiffness, moved} <= set(labels(figure))
     drawn = np.concatenate([line.get_ydata() for line in points(figure.axes[2])])
     np.testing.assert_allclose(np.sort(drawn), np.sort([step.loss_factor for step in reduction.steps]))
-
-
-def test_reduction_of_many_histories_draws_the_first(paper_model: Model) -> None:
-    history = stepped(paper_model, [(10.0, 1e-4)])
-    histories = [Loop(str(n), history.direction, history.time, history.displacement, history.force) for n in range(6)]
-    figure = whole(reduction_figure(reduce(histories), histories, "six"))
-    assert len(figure.axes) == 4 + 4
-    assert "The first 4 of 6 histories" in note(figure)
 
 
 def test_arms_are_drawn_over_what_they_stand_for(paper_model: Model) -> None:

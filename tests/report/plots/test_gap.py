@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figures import Looped, Swept, legend, note, whole
+from figures import Looped, Swept, legend, whole
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -135,33 +135,6 @@ def test_huge_gaps_of_loops_keep_what_is_small_readable(paper_model: Model, heav
     first, second = figure.axes
     assert first.get_yscale() == second.get_yscale() == "symlog"
     assert first.get_ylim() == second.get_ylim()
-
-
-@pytest.mark.slow
-def test_any_set_of_tests_is_drawn_and_nothing_lies_on_another(
-    paper_model: Model, heavier: Heavier, swept: Swept, looped: Looped
-) -> None:
-    truth, torsion = heavier(0.1), Direction.TORSION
-    many = np.geomspace(1e-5, 1e-3, 14)
-    turns = np.radians([0.5, 1.0, 2.0])
-    sets: dict[str, list[DataSet]] = {
-        "sweep alone": [swept(truth)],
-        "two frequencies": [swept(truth, frequencies=np.array([10.0, 100.0]), amplitudes=np.array([2e-4]), repeats=1)],
-        "decades": [swept(truth, frequencies=np.geomspace(0.01, 300.0, 40), amplitudes=many)],
-        "six loops": [looped(truth, (i + 1) * 5e-4) for i in range(6)],
-        "torsion": [swept(truth, torsion, amplitudes=turns), looped(truth, 0.05, direction=torsion)],
-        "missing points": [swept(truth, left_out=slice(40, 60)), swept(truth, Direction.RADIAL, repeats=1)],
-        "three directions": [
-            *(swept(truth, direction) for direction in (Direction.AXIAL, Direction.RADIAL)),
-            swept(truth, torsion, amplitudes=turns),
-            *(looped(truth, 1e-3, direction=direction) for direction in (Direction.AXIAL, Direction.RADIAL)),
-        ],
-    }
-    for words, data_sets in sets.items():
-        for after in (truth, paper_model):
-            whole(gap_figure(paper_model, after, data_sets, words, "A sentence that goes on and on. " * 8))
-    for words, said in (("missing points", True), ("sweep alone", False)):
-        assert ("White: not measured" in note(gap_figure(paper_model, truth, sets[words], "", ""))) is said
 
 
 def test_a_hole_stays_white(paper_model: Model, swept: Swept) -> None:

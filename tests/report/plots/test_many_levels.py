@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from figures import Looped, Swept, inside, legend, note, points
+from figures import Looped, Swept, inside, legend, points
 from matplotlib.figure import Figure
 from tries import some
 
@@ -22,7 +21,6 @@ from bushfit.model.result import Result
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Loop, Stepped, Sweep
 from bushfit.reduction.steps import Reduction, Step
-from bushfit.report.plots.batch import Panel, batch_figure
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.inspection import inspection_figure
@@ -89,26 +87,6 @@ def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int)
     assert bar or len(legend(right)) == count
 
 
-@pytest.mark.slow
-def test_amplitudes_as_each_point_reached_them(paper_model: Model) -> None:
-    """Nothing was held: a line for the whole test, which meets each point at the amplitude that it reached."""
-    frequency, amplitude = grid(np.geomspace(5.0, 155.0, 15), (1e-4, 2e-4, 5e-4), 0.02)
-    data_sets = measured(paper_model, frequency, amplitude, None)
-    figure = checked(sweeps_figure(paper_model, data_sets, "reached"))
-    (line,) = [line for line in figure.axes[0].lines if line.get_linestyle() != "None"]
-    rising = np.argsort(frequency, kind="stable")
-    expected = np.abs(paper_model.stiffness("axial", frequency[rising], amplitude[rising])) / 1e3
-    np.testing.assert_allclose(line.get_ydata(), expected)
-    assert legend(figure.axes[1]) == ["sweep.csv"]
-    drawn = sum(len(line.get_xdata()) for line in points(figure.axes[0]))
-    assert drawn == 45, "each point once, however near the levels are"
-    gap = checked(gap_figure(paper_model, paper_model, data_sets, "reached", ""))
-    assert [text.get_text() for text in gap.axes[0].get_yticklabels()] == ["sweep.csv"]
-    prediction = predict(Result(paper_model), Direction.AXIAL, [5.0, 50.0], [1e-4, 5e-4])
-    figure = checked(prediction_figure(prediction, data_sets, "reached", model=paper_model))
-    assert len(figure.axes) == 6, "a row of panels more"
-
-
 @pytest.mark.parametrize(
     "frequencies", some([(40.0,), tuple(np.geomspace(5.0, 150.0, 30)), (10.0, 40.0, 100.0)], {(40.0,)})
 )
@@ -154,15 +132,6 @@ def test_many_loops(paper_model: Model, looped: Looped, count: int) -> None:
     check_gaps(paper_model, data_sets, "mount")
 
 
-@pytest.mark.parametrize("count", some([3, 40], {3}))
-def test_twins_of_long_names(paper_model: Model, looped: Looped, count: int) -> None:
-    one = looped(paper_model, 1e-3, cycles=2).test
-    data_sets = loop_data([replace(one, name=f"{LONG_NAME}{k}.csv") for k in range(count)])
-    names = legend(checked(loops_figure(paper_model, data_sets, LONG_NAME)).axes[1])
-    assert len(set(names)) == len(names), "a name that loses its middle is still told from others"
-    check_gaps(paper_model, data_sets, LONG_NAME)
-
-
 @pytest.mark.parametrize(("levels", "histories"), [(8, 40), pytest.param(300, 2, marks=pytest.mark.slow)])
 def test_reduction_of_many_levels(levels: int, histories: int) -> None:
     time = np.linspace(0.0, 2.0 * levels, 4000)
@@ -177,19 +146,3 @@ def test_reduction_of_many_levels(levels: int, histories: int) -> None:
     figure = checked(reduction_figure(Reduction(Direction.AXIAL, steps, ()), records, "raw.csv"))
     (box,) = (axes for axes in figure.axes if axes.get_legend())
     assert len(legend(box)) == min(levels, 8) + (levels > 8)
-
-
-@pytest.mark.parametrize(
-    ("bushings", "quantities"),
-    [(40, 60), *(pytest.param(*size, marks=pytest.mark.slow) for size in ((10, 2), (300, 300)))],
-)
-def test_batch_of_many_quantities(bushings: int, quantities: int) -> None:
-    values = np.random.default_rng(2).normal(1.0, 0.02, bushings)
-    panels = [Panel("axial |K| at 25 Hz, 0.1 mm [N/mm]", values, (0.9, 1.1), [0])] * quantities
-    names = [f"{LONG_NAME}{k}" for k in range(bushings)]
-    figure = batch_figure(panels, LONG_NAME, names)
-    assert len(figure.axes) == min(quantities, 40)
-    assert figure.get_size_inches()[1] < 45.0
-    assert ("The first 40 of" in note(figure)) is (quantities > 40)
-    if quantities == 2:
-        checked(figure)

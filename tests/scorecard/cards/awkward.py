@@ -34,25 +34,15 @@ def _sweeps(**changes: object) -> Callable[[Bench], SimulateSettings]:
     )
 
 
-def _strain_sweeps(bench: Bench, least: float = 0.03, reached: float = _REACHED) -> SimulateSettings:
-    """Amplitudes from a share of the largest on, stepped at three frequencies, one to three repeats."""
+def _strain_sweeps(bench: Bench) -> SimulateSettings:
+    """Amplitudes from 3 % of the largest on, stepped at three frequencies, one to three repeats."""
 
     def turned(test: SimulatedSweep) -> SimulatedSweep:
-        amplitudes = tuple((np.geomspace(least, 1.0, 12) * max(test.amplitudes)).tolist())
-        return replace(test, amplitudes=amplitudes, frequencies=_THREE, stepped="amplitude", reached=reached)
+        amplitudes = tuple((np.geomspace(0.03, 1.0, 12) * max(test.amplitudes)).tolist())
+        return replace(test, amplitudes=amplitudes, frequencies=_THREE, stepped="amplitude", reached=_REACHED)
 
     sweeps = tuple(turned(test) for test in bench.plan.sweeps)
     return replace(bench.plan, sweeps=sweeps, repeats=int(bench.random.integers(1, 4)))
-
-
-def _any_strain_sweeps(bench: Bench) -> SimulateSettings:
-    """The same at any three frequencies, in one direction or two, with a loop or without."""
-    random = bench.random
-    plan = _strain_sweeps(bench, 0.01, random.uniform(0.0, 1.5 * _REACHED))
-    low, high = bench.between(1.0, 10.0), bench.between(50.0, 150.0)
-    frequencies = tuple(np.round(np.geomspace(low, high, 3), 1).tolist())
-    sweeps = tuple(replace(test, frequencies=frequencies) for test in plan.sweeps[: 1 + (random.random() < 0.7)])
-    return replace(plan, sweeps=sweeps, loops=plan.loops[: int(random.random() < 0.5)])
 
 
 def _level_missing(bench: Bench) -> SimulateSettings:
@@ -171,8 +161,4 @@ AWKWARD: dict[str, Recipe] = {
     ),
     "one_direction": Recipe("axial tests alone", plan=lambda bench: replace(bench.plan, sweeps=bench.plan.sweeps[:1])),
     "three_frequencies": Recipe("three frequencies", plan=_sweeps(frequencies=_THREE)),
-}
-#: Clean amplitude sweeps of any plan.
-SWEPT: dict[str, Recipe] = {
-    "strain_sweeps": Recipe("the amplitude stepped at any frequencies", plan=_any_strain_sweeps)
 }

@@ -93,14 +93,6 @@ def _of_mistakes(_: Sequence[Outcome], made: Sequence[Outcome], clean: Sequence[
     ]
 
 
-def _of_swept(good: Sequence[Outcome], *_: Sequence[Outcome]) -> list[Row]:
-    covered = [hit for outcome in good for hit in outcome.covered]
-    return [
-        _share("false alarm on clean amplitude sweeps", [o.seen for o in good], high=0.01),
-        _share("95 % intervals that hold the true parameter", covered, low=0.93, high=0.97),
-    ]
-
-
 def _of_awkward(good: Sequence[Outcome], *_: Sequence[Outcome]) -> list[Row]:
     return [
         _share("false alarm on clean but awkward campaigns", [o.seen for o in good], high=0.01),
@@ -148,7 +140,6 @@ def _kept(outcomes: Sequence[Outcome]) -> list[bool]:
 _ROWS: dict[Family, Callable[..., list[Row]]] = {
     "effects": _of_effects,
     "mistakes": _of_mistakes,
-    "amplitude_sweeps": _of_swept,
     "awkward": _of_awkward,
     "faults": _of_faults,
     "outside": _of_outside,

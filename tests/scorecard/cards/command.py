@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 from rich.progress import Progress
+from typing_extensions import TypedDict
 
 from bushfit import __version__
 from bushfit.cli.common import Options
@@ -18,11 +19,39 @@ from bushfit.cli.show import new_table
 from bushfit.report.contents import Formats
 from bushfit.report.folder import check_free, to_json
 from bushfit.validation import plain
-from cards.card import card, confusion
-from cards.families import CARD_SEEDS, FAMILIES, tasks
-from cards.ledger import LEDGER, Asked, Scorecard, ledger
+from cards.card import Row, card, confusion
+from cards.families import CARD_SEEDS, FAMILIES, Family, tasks
 from cards.outcome import Outcome, Task
 from cards.scorecard import run
+
+#: What a score card writes.
+SCORECARD = "scorecard.json"
+
+
+class Scorecard(TypedDict):
+    """How often diagnose is right on hidden campaigns, key by key.
+
+    Args:
+        schema: of this file.
+        version: of bushfit that made it.
+        families: of hidden campaigns.
+        campaigns: how many of each family.
+        seed: of everything random.
+        session: hours of the session that is planned, and simulated, where effects are left open; null for none.
+        card: the measures of each family, with their targets.
+        confusion: of each family: by what was hidden, how often which verdict with which names was given.
+        outcomes: every campaign.
+    """
+
+    schema: Literal["bushfit/scorecard/2"]
+    version: str
+    families: list[str]
+    campaigns: int
+    seed: int
+    session: float | None
+    card: dict[Family, list[Row]]
+    confusion: dict[Family, dict[str, dict[str, int]]]
+    outcomes: list[Outcome]
 
 
 @click.command("scorecard", context_settings={"help_option_names": ["-h", "--help"]})
@@ -46,34 +75,27 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
     """Judge `diagnose` on hidden campaigns of random bushings, and print how often it is right.
 
     The time-domain rig makes the data. Families: effects (every effect alone, pairs, none, and what the library lacks
-    or is made to lack), mistakes (in what a file says), amplitude_sweeps (clean ones), awkward (clean, with the noise
+    or is made to lack), mistakes (in what a file says), awkward (clean, with the noise
     and the plans of real rigs), faults (of rigs), outside (laws that the library never gains), library (effects of any
     size). Laws of effects in time are shared with the fit, those of outside are not. The truth is sealed in files that
     the workflow does not read, and opened afterwards.
 
     A target is met where the whole 95 % interval of the rate lies within it; told odds are true where the interval of
-    the share right holds them. With -o each outcome is written down as it comes: the same command goes on where it was
-    stopped, and ends with scorecard.json. Seeds from 77000 on are kept for cards that are shown; try and tune with
-    others.
+    the share right holds them. -o takes scorecard.json. Seeds from 77000 on are kept for cards that are shown; try and
+    tune with others.
     """
     options = Options(formats=Formats(pictures=False), **given)
     folder = options.output
     if keep and folder is None:
         raise click.UsageError("--keep needs a folder: -o/--output")
-    chosen = {each: tasks(campaigns, seed, each) for each in FAMILIES if family in (each, "all")}
-    asked: Asked = {
-        "schema": "bushfit/scorecard/2",
-        "version": __version__,
-        "families": list(chosen),
-        "campaigns": campaigns,
-        "seed": seed,
-        "session": session,
+    if folder:
+        check_free(folder, [SCORECARD], force=options.force)
+    kept = folder / "campaigns" if folder and keep else None
+    outcomes = {
+        each: _made(options, tasks(campaigns, seed, each), jobs, kept, session)
+        for each in FAMILIES
+        if family in (each, "all")
     }
-    if folder and not (folder / LEDGER).exists():
-        check_free(folder, ["scorecard.json"], force=options.force)
-    with ledger(folder, asked, force=options.force) as (done, write):
-        kept = folder / "campaigns" if folder and keep else None
-        outcomes = {name: _made(options, done, write, each, jobs, kept, session) for name, each in chosen.items()}
     cards = {name: card(found, name) for name, found in outcomes.items()}
     purpose = "kept for shown cards" if seed >= CARD_SEEDS else "for working"
     for name, rows in cards.items():
@@ -86,38 +108,28 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
         options.console.print(table)
         _tell(options, confusion(outcomes[name]), outcomes[name])
     whole: Scorecard = {
-        **asked,
+        "schema": "bushfit/scorecard/2",
+        "version": __version__,
+        "families": list(outcomes),
+        "campaigns": campaigns,
+        "seed": seed,
+        "session": session,
         "card": cards,
         "confusion": {name: {**confusion(found)} for name, found in outcomes.items()},
         "outcomes": [outcome for found in outcomes.values() for outcome in found],
     }
     document = plain(whole, Scorecard)
     if folder:
-        replace(options, force=True).write(folder, {"scorecard.json": to_json(document)}, document)
+        replace(options, force=True).write(folder, {SCORECARD: to_json(document)}, document)
     else:
         options.print_json(document)
 
 
-def _made(
-    options: Options,
-    done: Mapping[Task, Outcome],
-    write: Callable[[Outcome], None],
-    chosen: list[Task],
-    jobs: int,
-    kept: Path | None,
-    session: float | None,
-) -> list[Outcome]:
-    """The outcomes of these tasks: those that stand, and the others made now and written down as they come."""
-    left = [task for task in chosen if task not in done]
+def _made(options: Options, chosen: list[Task], jobs: int, kept: Path | None, session: float | None) -> list[Outcome]:
+    """The outcomes of these tasks."""
     with Progress(console=options.console, transient=True, disable=options.quiet) as progress:
-        bar = progress.add_task("hidden campaigns", total=len(chosen), completed=len(chosen) - len(left))
-
-        def note(outcome: Outcome) -> None:
-            write(outcome)
-            progress.advance(bar)
-
-        made = {outcome.task: outcome for outcome in run(left, kept, jobs, note, session)}
-    return [(made if task in made else done)[task] for task in chosen]
+        bar = progress.add_task("hidden campaigns", total=len(chosen))
+        return run(chosen, kept, jobs, lambda _: progress.advance(bar), session)
 
 
 def _tell(options: Options, table: Mapping[str, Any], outcomes: list[Outcome]) -> None:

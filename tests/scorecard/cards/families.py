@@ -12,7 +12,7 @@ import numpy as np
 
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.simulation.measured import Simulated
-from cards.awkward import AWKWARD, SWEPT
+from cards.awkward import AWKWARD
 from cards.faults import FAULTS
 from cards.hidden import FIRST, Sealed, hidden_campaign, hideable
 from cards.mistaken import mistaken_campaign
@@ -21,7 +21,7 @@ from cards.outside import OUTSIDE_LAWS
 from cards.recipe import Recipe, cooked
 
 #: What is hidden in the campaigns of a card.
-Family = Literal["effects", "mistakes", "amplitude_sweeps", "awkward", "faults", "outside", "library"]
+Family = Literal["effects", "mistakes", "awkward", "faults", "outside", "library"]
 #: Every family, in the order of the card.
 FAMILIES: tuple[Family, ...] = get_args(Family)
 #: The first seed of cards that are shown; chosen.
@@ -30,7 +30,6 @@ CARD_SEEDS = 77000
 KINDS: dict[Family, dict[str, float]] = {
     "effects": {"single": 0.5, "clean": 0.2, "pair": 0.1, "outside": 0.1, "lacking": 0.1},
     "mistakes": {"mistake": 0.4, "clean": 0.6},
-    "amplitude_sweeps": {"swept": 1.0},
     "awkward": {"awkward": 1.0},
     "faults": {"fault": 1.0},
     "outside": {"law": 0.9, "three": 0.1},
@@ -41,7 +40,6 @@ DISTURBANCES = ("narrow_resonance", "mislabelled_level", "velocity_weakening_sli
 #: Recipes of the kinds that are made by one.
 RECIPES: dict[str, Mapping[str, Recipe]] = {
     "awkward": AWKWARD,
-    "swept": SWEPT,
     "fault": FAULTS,
     "law": OUTSIDE_LAWS,
     "outside": {name: (FAULTS | OUTSIDE_LAWS)[name] for name in DISTURBANCES},

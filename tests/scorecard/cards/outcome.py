@@ -14,7 +14,7 @@ _LARGEST_SET = 3
 #: Verdicts under which every name stays in the model.
 _KEEPING = ("named", "partly")
 #: Kinds of campaigns in which nothing is hidden.
-CLEAN = ("clean", "awkward", "swept")
+CLEAN = ("clean", "awkward")
 
 #: What came of the planned session: one true name for each set, a wrong name, no name; or the plan knows of no test.
 Settled = Literal["rightly", "wrongly", "open", "elsewhere"]
@@ -50,8 +50,7 @@ class Outcome:
         sets: all members of each set, leader first; of a name alone that.
         gain: chi-square that the best single effect takes off, whether it was added or not.
         heldout: gap on held-out data after, in units of noise; None where nothing was held out.
-        covered: per hidden effect that was added, or per parameter of a swept campaign: whether the 95 % interval of
-            its amount holds the truth.
+        covered: per hidden effect that was added: whether the 95 % interval of its amount holds the truth.
         seconds: processor time of the diagnosis, whatever else the machine does.
         matters: of a mistake, whether it leaves more than the tolerance for a plain model, and more than 2 % of |K| or
             of a parameter.

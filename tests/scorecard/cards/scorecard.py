@@ -137,7 +137,7 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
     result, document = diagnosis.result, diagnosis.to_document()
     heldout = document["gap"]["heldout"] or {"before": None, "after": None}
     added = {name for name in task.hidden if name in result.model.effects}
-    asked = [name for name in truth.values if task.kind == "swept" or effect_of(name) in added]
+    asked = [name for name in truth.values if effect_of(name) in added]
     intervals = {name: result.interval(name) for name in asked}
     (_, odds), leader = next(zip(diagnosis.odds.told, diagnosis.odds.labels, strict=True), (("", 0.0), ""))
     covered = [ends[0] <= truth.values[name] <= ends[1] for name, ends in intervals.items() if ends is not None]
