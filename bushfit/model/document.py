@@ -23,6 +23,9 @@ from bushfit.validation import Flag, Name, Number, WholeNumber
 SchemaName = Literal["bushfit/model/1", "bushfit/model/2"]
 SCHEMAS: tuple[SchemaName, ...] = get_args(SchemaName)
 
+#: A picture as a data URI: what a page may show of a file that somebody else wrote, and nothing else.
+Logo = Annotated[str, Field(max_length=100_000, pattern=r"^data:image/(png|svg\+xml);base64,[A-Za-z0-9+/]+=*$")]
+
 Matrix = tuple[tuple[Number, ...], ...]
 #: Share of a variance by which rounding in a file may take the least eigenvalue below zero.
 _ROUNDING = 1e-6
@@ -224,7 +227,9 @@ class CampaignTable:
         sha256: of the file.
         command: with all that settles the numbers, as it would be typed beside the file.
         tests: all that the campaign has.
-        report: what stands at the head of a report: customer, part_number, drawing, compound, as far as they are known.
+        report: what stands at the head of a report: customer, part_number, drawing, compound, laboratory and date, as
+            far as they are known.
+        logo: beside it, as a data URI of a PNG or SVG; null where there is none.
     """
 
     name: str
@@ -233,6 +238,7 @@ class CampaignTable:
     command: str
     tests: tuple[TestTable, ...] = ()
     report: Mapping[str, str] = field(default_factory=dict)
+    logo: Logo | None = None
 
 
 @dataclass(frozen=True)
