@@ -17,7 +17,7 @@ from bushfit.reading.runs import nominal
 from bushfit.report.page.chart import DASHES, MOST_LEVELS, MOST_PLACES, Panel, Series, chart, colors, every_nth, span_of
 from bushfit.report.page.readback import ReportData
 from bushfit.report.tables import IF_RIGS, columns_of, complete, numbers, prediction_table, spread
-from bushfit.units import CELSIUS, SIZES, split_header, told
+from bushfit.units import CELSIUS, SIZES, number, split_header, told
 
 #: Points of all sweeps of a page, with which it stays below 500 kB; but no curve has fewer than `_FEWEST`.
 _MOST_POINTS, _FEWEST = 3200, 24
@@ -135,7 +135,7 @@ def sweeps_of(found: ReportData) -> list[Sweeps]:
     """The sweeps of every place of a page, with their curves."""
     most = max(_FEWEST, _MOST_POINTS // (MOST_LEVELS * min(len(found.places), MOST_PLACES) or 1))
     places = [*found.measured("sweep")][:MOST_PLACES]
-    every = (_sweeps_at(place, rows, found.tests, found.tables.get(name), most) for name, place, rows in places)
+    every = (_sweeps_at(found, name, place, rows, most) for name, place, rows in places)
     return [sweeps for each in every for sweeps in each if sweeps.curves]
 
 
@@ -147,7 +147,7 @@ def frequency_panels(every: Sequence[Sweeps]) -> list[Panel]:
 
 def cole_cole_panels(every: Sequence[Sweeps]) -> list[Panel]:
     """K'' over K'."""
-    notes = ["A curve a level. Lines: as above, without bands. Points: measured, mean of the repeats."]
+    notes = ["A curve for each level. Lines: as above, without bands. Points: measured, mean of the repeats."]
     return [Panel(str(sweeps.place), [sweeps.cole_cole()], notes) for sweeps in every]
 
 
@@ -171,9 +171,8 @@ def _payne(found: ReportData, place: Place, rows: pd.DataFrame) -> Sweeps | None
         return None
     mine = complete(pd.concat([mine for _, mine in kinds]), *_headers(place, along))
     if found.result.model.knows_temperature:
-        degrees = {test.test: test.conditions.get("temperature_degC") for test in found.tests}
-        warm = [name for name, at in degrees.items() if at is not None and not _at_reference(at)]
-        mine = mine[~mine["test"].isin(warm)]
+        off = mine["test"].map(_degrees(found)).astype(float) + CELSIUS - REFERENCE
+        mine = mine[~(off.abs() > SAME_TEMPERATURE)]
     amplitude, frequency = numbers(mine, along, held)
     factor = place.display.displacement.factor
     possible = (frequency > SIZES[0]) & (frequency < SIZES[1]) & (amplitude > SIZES[0]) & (amplitude < SIZES[1])
@@ -187,15 +186,12 @@ def _payne(found: ReportData, place: Place, rows: pd.DataFrame) -> Sweeps | None
     ends = mine.loc[mine[held].isin(chosen), along]
     fine = np.geomspace(ends.min(), ends.max(), _FINE) / factor
     predicted = prediction_table(predict(found.result, place, chosen, fine))
+    fewer = _MOST_POINTS // MOST_LEVELS
     curves = [
-        _curve(place, mine, along, held, level, predicted, _MOST_POINTS // MOST_LEVELS) for level in chosen.tolist()
+        _curve(place, mine[mine[held] == level], along, held, level, predicted, fewer, level_name(level, held))
+        for level in chosen.tolist()
     ]
     return Sweeps(place, "amplitude", along, curves, levels.size - chosen.size if most == MOST_LEVELS else 0)
-
-
-def _at_reference(degrees: str | float) -> bool:
-    """Whether a test was made where a prediction stands of which no temperature is asked."""
-    return isinstance(degrees, float) and abs(degrees + CELSIUS - REFERENCE) <= SAME_TEMPERATURE
 
 
 def _notes(sweeps: Sweeps) -> list[str]:
@@ -215,39 +211,53 @@ def _notes(sweeps: Sweeps) -> list[str]:
     return notes
 
 
-def _sweeps_at(
-    place: Place, rows: pd.DataFrame, tests: Sequence[TestTable], predicted: pd.DataFrame | None, most: int
-) -> Iterator[Sweeps]:
-    """The sweeps of a place by what they step through, of each curve at most so many points."""
-    for stepped, along, held, mine in by_stepped(place, rows, tests):
+def _sweeps_at(found: ReportData, name: str, place: Place, rows: pd.DataFrame, most: int) -> Iterator[Sweeps]:
+    """The sweeps of a place by what they step through, of each curve at most so many points.
+
+    Where they were made at temperatures that lie apart, each has curves of its own, and one line of a prediction at one
+    temperature would be none of them: a model that knows temperatures is drawn as it has each test.
+    """
+    for stepped, along, held, mine in by_stepped(place, rows, found.tests):
         mine = complete(mine, *_headers(place, along))
-        levels = list(dict.fromkeys(mine[held])) if stepped is None else np.unique(mine[held]).tolist()
-        chosen = [levels[at] for at in spread(len(levels), MOST_LEVELS)]
-        table = predicted if stepped else None
-        curves = [_curve(place, mine, along, held, level, table, most) for level in chosen]
+        degrees = mine["test"].map(_degrees(found)).astype(float)
+        apart = stepped is not None and bool(degrees.max() - degrees.min() > SAME_TEMPERATURE)
+        held_at = [degrees.rename("degC"), held] if apart else [held]
+        levels = [*mine.groupby(held_at, sort=stepped is not None, dropna=False)]
+        predicted = None if not stepped or (apart and found.result.model.knows_temperature) else found.tables.get(name)
+        curves = []
+        for (*warm, level), there in (levels[at] for at in spread(len(levels), MOST_LEVELS)):
+            title = ", ".join([*(f"{number(each, 3)} °C" for each in warm), level_name(level, held)])
+            curves.append(_curve(place, there, along, held, level, predicted, most, title))
         yield Sweeps(place, stepped, along, curves, len(levels) - len(curves))
+
+
+def _degrees(found: ReportData) -> dict[str, float]:
+    """Temperatures of tests [degC], as far as they are stated."""
+    stated = ((test.test, test.conditions.get("temperature_degC")) for test in found.tests)
+    return {test: degrees for test, degrees in stated if isinstance(degrees, float)}
 
 
 def _curve(
     place: Place,
-    rows: pd.DataFrame,
+    there: pd.DataFrame,
     along: str,
     held: str,
     level: float | str,
     predicted: pd.DataFrame | None,
     most: int,
+    name: str,
 ) -> _Curve:
-    """The curve of a held level, or of a test: at most so many points, and the prediction where it has the level."""
+    """The curve of the rows of a held level, or of a test, and the prediction where it has the level."""
     headers = _headers(place, along)
-    there = rows[rows[held] == level].sort_values(along)
+    there = there.sort_values(along)
     if held != "test":
         there = there.groupby(along, as_index=False)[headers[1:]].mean()
     points = numbers(there, *headers)[:, every_nth(len(there), most)]
-    known = (
-        None if predicted is None or isinstance(level, str) else _predicted(predicted, along, held, level, _four(place))
-    )
+    known = None
+    if predicted is not None and not isinstance(level, str):
+        known = _predicted(predicted, along, held, level, _four(place))
     line, band, rigs = known or (_parted(points[[0, 3, 4]]), None, None)
-    return _Curve(level_name(level, held), _parted(points[:3]), line, band, rigs, most if len(there) > most else 0)
+    return _Curve(name, _parted(points[:3]), line, band, rigs, most if len(there) > most else 0)
 
 
 def _parted(points: Array) -> Array:

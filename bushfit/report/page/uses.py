@@ -20,7 +20,7 @@ _USES = (
     (r"what is known all the same", "This combination may be used and compared, its parameters one by one may not."),
     (
         r"the tests leave .* open|ended at the edge|no different from zero",
-        "Stiffness and loss within the tested range may be used; this value may not be quoted.",
+        "Stiffness and loss within the tested range may be used; quote no more of this value than is said here.",
     ),
     (
         r"the tests cannot tell what the model lacks|leave other values of the parameters possible",
@@ -45,7 +45,6 @@ _USES = (
         r"the model was not fitted here|simulated: the values",
         "Numbers as given, for calculation; they are no test result.",
     ),
-    (r"simulated", "No test result: for practice and planning only."),
     (r"no springpot", "May be used near the frequency of the tests only, for static work; not for dynamic stiffness."),
     (
         r"m and alpha are not known yet",
@@ -69,14 +68,23 @@ _USES = (
         r"rig's class",
         "May be used; intervals are as good as this class: repeat a test, or state the class of the rig.",
     ),
-    (r"levels disagree|differ by more than a rig", "May be used; what levels differ by is in the intervals."),
+    (
+        r"rests on the m.. given in",
+        "May be used as far as this bound is known; the value is the bound, not a test result.",
+    ),
+    (r"mended by --adopt", "May be used if the records of the tests bear this out; correct the campaign then."),
+    (r"more than a rig of this class", "Find out why first: until then the intervals are not backed."),
+    (r"varies from row to row", "May be used if this column parts no tests; else name the rows, and fit again."),
+    (r"lie beyond .* of the amplitude", "Do not use before the motion of the loop is settled: its loss depends on it."),
+    (r"levels disagree", "May be used; what levels differ by is in the intervals."),
     (r"the fit was stopped", "Stiffness and loss may be used; do not quote the parameters that are open."),
     (r"not identifiable from these tests", "May be used; that these effects are absent is not shown."),
     (r"% stiffer than the last", "Numbers are of the rubber after its first strains, as in use; not of a new part."),
     (r"knows no preload", "May be used about this mean only; another preload gives another stiffness."),
     (r"repeat each other lie|it repeats", "May be used no nearer than these repeats differ; find out which is right."),
     (r"are rounded", "May be used; the steps are in the intervals."),
-    (r"rows are missing|are used|left out|are diagnosed", "May be used; the numbers rest on the part that was kept."),
+    (r"rows are missing|are used|left out", "May be used; the numbers rest on the part of the record that was kept."),
+    (r"are diagnosed", "May be used; the verdict rests on this part of the tests, or on these means."),
 )
 #: What a warning of no known kind means.
 _ELSE = "Settle this before the numbers are used for a release."

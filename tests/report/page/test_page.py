@@ -252,7 +252,7 @@ def test_every_warning_says_what_it_means_for_use(results: Results, measured: Pa
     assert _ELSE not in [use for _, use in told], "each is of a known kind"
     means = dict(told)
     (open_,) = (use for warning, use in means.items() if warning.startswith("the tests leave sigma_fmax open"))
-    assert "this value may not be quoted" in open_
+    assert "quote no more of this value" in open_
     (missed,) = (use for warning, use in means.items() if "were not fitted, and the model misses them" in warning)
     assert missed.startswith("Do not use for this place")
 
@@ -436,7 +436,7 @@ def test_the_report_of_measured_rubber_is_current_and_says_that_the_mount_was_no
     text = parsed(page_of(measured)).text
     assert loads(page_of(measured)) == []
     specimen = "2 blocks in parallel in shear, 772 mm² each, 6 mm thick"
-    for words in ("(not fitted)", specimen, "mount 24 %", "Fitted, not diagnosed"):
+    for words in ("18.4 °C, 0.151 %", "(not fitted)", specimen, "mount 24 %", "Fitted, not diagnosed"):
         assert words in text
 
 
