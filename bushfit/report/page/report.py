@@ -33,6 +33,13 @@ _CONDITIONS = {
     "operator": "Operator",
     "specimen_number": "Specimen no.",
 }
+#: What stands of them beside each test.
+_STATED = {
+    "specimen_number": "part {}",
+    "temperature_degC": "{} °C",
+    "preload": "{} preload",
+    "order": "{}. in the session",
+}
 #: Frequencies and amplitudes of a place whose predicted values are tabled, and rows of all places together.
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 #: Regions and tests that a page lists at most: the documents have all.
@@ -150,8 +157,8 @@ def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str | int]:
     unit, factor = DISPLAYS[test.unit]
     met = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
     stated = [
-        f"{value if isinstance(value, str) else number(value, 3)}{unit}"
-        for key, unit in (("temperature_degC", " °C"), ("preload", " preload"), ("order", ". in the session"))
+        words.format(value if isinstance(value, str) else number(value, 3))
+        for key, words in _STATED.items()
         if (value := test.conditions.get(key)) is not None
     ]
     return {

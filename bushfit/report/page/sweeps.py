@@ -1,7 +1,10 @@
 """Pictures of sweeps, measured and modelled: over frequency, over amplitude (the Payne curve), and Cole-Cole."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -26,6 +29,14 @@ _LOG_AMPLITUDES, LOG_FREQUENCIES = 3.0, 40.0
 #: Frequencies of a Payne curve where the tests stepped through others than amplitudes, the points of its lines, and the
 #: ratio of its amplitudes at least.
 _PAYNE, _FINE, _SPAN = 3, 25, 1.05
+
+
+class _Level(NamedTuple):
+    """A held value, or the name of a test where nothing was held, by its name in a legend, and its rows."""
+
+    name: str
+    value: float | str
+    rows: pd.DataFrame
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,8 +182,7 @@ def _payne(found: ReportData, place: Place, rows: pd.DataFrame) -> Sweeps | None
         return None
     mine = complete(pd.concat([mine for _, mine in kinds]), *_headers(place, along))
     if found.result.model.knows_temperature:
-        off = mine["test"].map(_degrees(found)).astype(float) + CELSIUS - REFERENCE
-        mine = mine[~(off.abs() > SAME_TEMPERATURE)]
+        mine = mine[~((_temperatures(found, mine) + CELSIUS - REFERENCE).abs() > SAME_TEMPERATURE)]
     amplitude, frequency = numbers(mine, along, held)
     factor = place.display.displacement.factor
     possible = (frequency > SIZES[0]) & (frequency < SIZES[1]) & (amplitude > SIZES[0]) & (amplitude < SIZES[1])
@@ -186,11 +196,9 @@ def _payne(found: ReportData, place: Place, rows: pd.DataFrame) -> Sweeps | None
     ends = mine.loc[mine[held].isin(chosen), along]
     fine = np.geomspace(ends.min(), ends.max(), _FINE) / factor
     predicted = prediction_table(predict(found.result, place, chosen, fine))
-    fewer = _MOST_POINTS // MOST_LEVELS
-    curves = [
-        _curve(place, mine[mine[held] == level], along, held, level, predicted, fewer, level_name(level, held))
-        for level in chosen.tolist()
-    ]
+    every = _levels(found, mine[mine[held].isin(chosen)], held)
+    shown = [every[at] for at in spread(len(every), MOST_LEVELS)]
+    curves = [_curve(place, along, held, level, predicted, _MOST_POINTS // MOST_LEVELS) for level in shown]
     return Sweeps(place, "amplitude", along, curves, levels.size - chosen.size if most == MOST_LEVELS else 0)
 
 
@@ -214,50 +222,59 @@ def _notes(sweeps: Sweeps) -> list[str]:
 def _sweeps_at(found: ReportData, name: str, place: Place, rows: pd.DataFrame, most: int) -> Iterator[Sweeps]:
     """The sweeps of a place by what they step through, of each curve at most so many points.
 
-    Where they were made at temperatures that lie apart, each has curves of its own, and one line of a prediction at one
-    temperature would be none of them: a model that knows temperatures is drawn as it has each test.
+    One line of a prediction at one temperature would be that of no test where these lie apart in it: a model that knows
+    temperatures is drawn as it has each test.
     """
     for stepped, along, held, mine in by_stepped(place, rows, found.tests):
         mine = complete(mine, *_headers(place, along))
-        degrees = mine["test"].map(_degrees(found)).astype(float)
-        apart = stepped is not None and bool(degrees.max() - degrees.min() > SAME_TEMPERATURE)
-        held_at = [degrees.rename("degC"), held] if apart else [held]
-        levels = [*mine.groupby(held_at, sort=stepped is not None, dropna=False)]
-        predicted = None if not stepped or (apart and found.result.model.knows_temperature) else found.tables.get(name)
-        curves = []
-        for (*warm, level), there in (levels[at] for at in spread(len(levels), MOST_LEVELS)):
-            title = ", ".join([*(f"{number(each, 3)} °C" for each in warm), level_name(level, held)])
-            curves.append(_curve(place, there, along, held, level, predicted, most, title))
+        elsewhere = found.result.model.knows_temperature and _apart(_temperatures(found, mine))
+        predicted = None if stepped is None or elsewhere else found.tables.get(name)
+        levels = _levels(found, mine, held)
+        chosen = [levels[at] for at in spread(len(levels), MOST_LEVELS)]
+        curves = [_curve(place, along, held, level, predicted, most) for level in chosen]
         yield Sweeps(place, stepped, along, curves, len(levels) - len(curves))
 
 
-def _degrees(found: ReportData) -> dict[str, float]:
-    """Temperatures of tests [degC], as far as they are stated."""
+def _levels(found: ReportData, rows: pd.DataFrame, held: str) -> list[_Level]:
+    """The levels of some sweeps, or each test where nothing was held; of tests that lie apart in temperature, or were
+    made on several parts, those of each by its own name."""
+    keys = [rows[held]]
+    if held != "test":
+        stated = {test.test: test.conditions.get("specimen_number") for test in found.tests}
+        parts = rows["test"].map({test: f"part {part or 'not stated'}" for test, part in stated.items()})
+        degrees = _temperatures(found, rows)
+        keys = [*([degrees] if _apart(degrees) else []), *([parts] if len(set(parts)) > 1 else []), rows[held]]
+    groups: Any = rows.groupby([key.to_numpy() for key in keys], sort=held != "test", dropna=False)
+    levels = list[_Level]()
+    for (*own, level), there in groups:
+        words = (each if isinstance(each, str) else f"{number(each, 3)} °C" for each in own)
+        levels.append(_Level(", ".join([*words, level_name(level, held)]), level, there))
+    return levels
+
+
+def _temperatures(found: ReportData, rows: pd.DataFrame) -> pd.Series[float]:
+    """The temperature at which each row was measured [degC], nan where it is not stated, (n,)."""
     stated = ((test.test, test.conditions.get("temperature_degC")) for test in found.tests)
-    return {test: degrees for test, degrees in stated if isinstance(degrees, float)}
+    return rows["test"].map({test: at for test, at in stated if isinstance(at, float)}).astype(float)
 
 
-def _curve(
-    place: Place,
-    there: pd.DataFrame,
-    along: str,
-    held: str,
-    level: float | str,
-    predicted: pd.DataFrame | None,
-    most: int,
-    name: str,
-) -> _Curve:
-    """The curve of the rows of a held level, or of a test, and the prediction where it has the level."""
+def _apart(degrees: pd.Series[float]) -> bool:
+    """Whether temperatures are not one."""
+    return bool(degrees.max() - degrees.min() > SAME_TEMPERATURE)
+
+
+def _curve(place: Place, along: str, held: str, level: _Level, predicted: pd.DataFrame | None, most: int) -> _Curve:
+    """The curve of a level, at most so many points, and the prediction where it has the level."""
     headers = _headers(place, along)
-    there = there.sort_values(along)
+    there = level.rows.sort_values(along)
     if held != "test":
         there = there.groupby(along, as_index=False)[headers[1:]].mean()
     points = numbers(there, *headers)[:, every_nth(len(there), most)]
     known = None
-    if predicted is not None and not isinstance(level, str):
-        known = _predicted(predicted, along, held, level, _four(place))
+    if predicted is not None and not isinstance(level.value, str):
+        known = _predicted(predicted, along, held, level.value, _four(place))
     line, band, rigs = known or (_parted(points[[0, 3, 4]]), None, None)
-    return _Curve(name, _parted(points[:3]), line, band, rigs, most if len(there) > most else 0)
+    return _Curve(level.name, _parted(points[:3]), line, band, rigs, most if len(there) > most else 0)
 
 
 def _parted(points: Array) -> Array:

@@ -163,6 +163,25 @@ def test_a_logo_that_cannot_be_shown_is_refused(root: Path, tmp_path: Path, cont
     assert not (tmp_path / "x").exists()
 
 
+def test_parts_of_one_campaign_are_told_apart_by_name(root: Path, tmp_path: Path) -> None:
+    """Two parts, one stiffer: a curve each at every level, not the mean of both under one name."""
+    text = (root / "configs/cmp_15961.toml").read_text(encoding="utf-8").replace("../data", str(root / "data"))
+    sweep = pd.read_csv(root / "data/cmp_15961/sweep_axial.csv", comment="#")
+    stiffness = next(name for name in sweep if "stiffness" in name)
+    sweep.assign(**{stiffness: 1.1 * sweep[stiffness]}).to_csv(tmp_path / "stiffer.csv", index=False)
+    own = text[text.index("[[sweeps]]") :].split("[[sweeps]]")[1]
+    text = text.replace(own, f'{own}specimen_number = "A-7"\n', 1)
+    text += '\n[[sweeps]]\nfile = "stiffer.csv"\ndirection = "axial"\nspecimen_number = "B-8"\n'
+    (tmp_path / "c.toml").write_text(text, encoding="utf-8")
+    assert call(tmp_path, "fit", "c.toml", "-o", "x", "--no-plots", "-q").returncode == 0
+    page = made_of(tmp_path / "x")
+    shown = drawn(page, "axial: stiffness")
+    assert list(shown) == [f"part {part}, {level} mm" for part in ("A-7", "B-8") for level in (0.1, 0.2, 0.5)]
+    one, other = (shown[f"part {part}, 0.2 mm"]["measured"][1] for part in ("A-7", "B-8"))
+    np.testing.assert_allclose(other / one, 1.1, rtol=5e-3)
+    assert "part B-8, 5 Hz" in drawn(page, "axial: stiffness over amplitude")
+
+
 def test_loops_in_torsion_are_drawn(root: Path, tmp_path: Path) -> None:
     """Their tables count rotation in deg, under the header that every direction has."""
     tests = '[[simulate.loops]]\ndirection = "torsion"\namplitude = "1 deg"\nfrequency = "0.1 Hz"\n'
