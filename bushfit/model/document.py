@@ -4,6 +4,7 @@ The dataclasses are the keys, for the reader and for the JSON Schema alike: pyda
 other keys alone.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, get_args
@@ -24,7 +25,7 @@ SchemaName = Literal["bushfit/model/1", "bushfit/model/2"]
 SCHEMAS: tuple[SchemaName, ...] = get_args(SchemaName)
 
 #: A picture as a data URI: what a page may show of a file that somebody else wrote, and nothing else.
-Logo = Annotated[str, Field(max_length=100_000, pattern=r"^data:image/(png|svg\+xml);base64,[A-Za-z0-9+/]+=*$")]
+_PICTURE = re.compile(r"data:image/(png|svg\+xml);base64,[A-Za-z0-9+/]+=*")
 
 Matrix = tuple[tuple[Number, ...], ...]
 #: Share of a variance by which rounding in a file may take the least eigenvalue below zero.
@@ -238,7 +239,12 @@ class CampaignTable:
     command: str
     tests: tuple[TestTable, ...] = ()
     report: Mapping[str, str] = field(default_factory=dict)
-    logo: Logo | None = None
+    logo: Annotated[str, Field(max_length=100_000)] | None = None
+
+    def __post_init__(self) -> None:
+        if self.logo is not None and not _PICTURE.fullmatch(self.logo):
+            expected = "data:image/png;base64, or data:image/svg+xml;base64, and the picture"
+            raise ValueError(ModelError("this is no picture", place="logo", found=self.logo, expected=expected))
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ def corner(result: Result) -> Markup | None:
     context = {
         "title": "Which values go together",
         "alt": "; ".join([alt, *unknown]),
-        "width": _LEFT + _PITCH * len(rows),
+        "width": _LEFT + _PITCH * len(FIVE),
         "height": _TOP + _PITCH * len(rows) + 18.0,
         "cells": cells,
         "side": _CELL,

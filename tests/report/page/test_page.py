@@ -141,6 +141,11 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
     assert "bushfit fit c.toml --direction axial --direction radial --effect inertia" in found
     (shown,) = re.findall(r'<img src="data:image/png;base64,([^"]*)" alt="Logo of Elasto Lab"', page_of(tmp_path / "x"))
     assert base64.b64decode(shown) == logo
+    model = tmp_path / "x/model.json"
+    model.write_text(model.read_text(encoding="utf-8").replace("data:image/png;base64,", "https://a.b/"))
+    refused = call(tmp_path, "report", "x", "--force")
+    assert refused.returncode == 2, "nothing is loaded from elsewhere, whatever a file says"
+    assert "campaign.logo: this is no picture" in refused.stderr
 
 
 @pytest.mark.parametrize(
