@@ -273,7 +273,8 @@ class Cells:
 
 def maps(title: str, heads: Sequence[str], shown: Sequence[Cells], alt: str) -> Markup:
     """Maps below each other, before and after side by side, one scale for all."""
-    width = (_WIDTH - _MAPS_LEFT - _RIGHT - _BETWEEN * (len(heads) - 1)) / len(heads)
+    left = max(_MAPS_LEFT, _LETTER * max(len(name) for each in shown for name in each.rows) + 6.0)
+    width = (_WIDTH - left - _RIGHT - _BETWEEN * (len(heads) - 1)) / len(heads)
     heights = [each.size * len(each.rows) + 36.0 for each in shown]
     tops = [_MAPS_TOP + sum(heights[:place]) for place in range(len(heights) + 1)]
     scale = (*_BELOW_MODEL[:0:-1], *_ABOVE)
@@ -283,7 +284,7 @@ def maps(title: str, heads: Sequence[str], shown: Sequence[Cells], alt: str) -> 
         "width": _WIDTH,
         "height": tops[-1] + 30.0,
         "heads": heads,
-        "starts": [_MAPS_LEFT + side * (width + _BETWEEN) for side in range(len(heads))],
+        "starts": [left + side * (width + _BETWEEN) for side in range(len(heads))],
         "map_width": width,
         "placed": [*zip(shown, tops[:-1], strict=True)],
         "painted": partial(_painted, width=width),

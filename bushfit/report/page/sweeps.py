@@ -31,7 +31,7 @@ _LOG_AMPLITUDES, LOG_FREQUENCIES = 3.0, 40.0
 _PAYNE, _FINE, _SPAN = 3, 25, 1.05
 
 
-class _Level(NamedTuple):
+class Level(NamedTuple):
     """A held value, or the name of a test where nothing was held, by its name in a legend, and its rows."""
 
     name: str
@@ -196,7 +196,7 @@ def _payne(found: ReportData, place: Place, rows: pd.DataFrame) -> Sweeps | None
     ends = mine.loc[mine[held].isin(chosen), along]
     fine = np.geomspace(ends.min(), ends.max(), _FINE) / factor
     predicted = prediction_table(predict(found.result, place, chosen, fine))
-    every = _levels(found, mine[mine[held].isin(chosen)], held)
+    every = levels_of(found, mine[mine[held].isin(chosen)], held)
     shown = [every[at] for at in spread(len(every), MOST_LEVELS)]
     curves = [_curve(place, along, held, level, predicted, _MOST_POINTS // MOST_LEVELS) for level in shown]
     return Sweeps(place, "amplitude", along, curves, levels.size - chosen.size if most == MOST_LEVELS else 0)
@@ -229,13 +229,13 @@ def _sweeps_at(found: ReportData, name: str, place: Place, rows: pd.DataFrame, m
         mine = complete(mine, *_headers(place, along))
         elsewhere = found.result.model.knows_temperature and _apart(_temperatures(found, mine))
         predicted = None if stepped is None or elsewhere else found.tables.get(name)
-        levels = _levels(found, mine, held)
+        levels = levels_of(found, mine, held)
         chosen = [levels[at] for at in spread(len(levels), MOST_LEVELS)]
         curves = [_curve(place, along, held, level, predicted, most) for level in chosen]
         yield Sweeps(place, stepped, along, curves, len(levels) - len(curves))
 
 
-def _levels(found: ReportData, rows: pd.DataFrame, held: str) -> list[_Level]:
+def levels_of(found: ReportData, rows: pd.DataFrame, held: str) -> list[Level]:
     """The levels of some sweeps, or each test where nothing was held; of tests that lie apart in temperature, or were
     made on several parts, those of each by its own name."""
     keys = [rows[held]]
@@ -245,10 +245,10 @@ def _levels(found: ReportData, rows: pd.DataFrame, held: str) -> list[_Level]:
         degrees = _temperatures(found, rows)
         keys = [*([degrees] if _apart(degrees) else []), *([parts] if len(set(parts)) > 1 else []), rows[held]]
     groups: Any = rows.groupby([key.to_numpy() for key in keys], sort=held != "test", dropna=False)
-    levels = list[_Level]()
+    levels = list[Level]()
     for (*own, level), there in groups:
         words = (each if isinstance(each, str) else f"{number(each, 3)} °C" for each in own)
-        levels.append(_Level(", ".join([*words, level_name(level, held)]), level, there))
+        levels.append(Level(", ".join([*words, level_name(level, held)]), level, there))
     return levels
 
 
@@ -263,7 +263,7 @@ def _apart(degrees: pd.Series[float]) -> bool:
     return bool(degrees.max() - degrees.min() > SAME_TEMPERATURE)
 
 
-def _curve(place: Place, along: str, held: str, level: _Level, predicted: pd.DataFrame | None, most: int) -> _Curve:
+def _curve(place: Place, along: str, held: str, level: Level, predicted: pd.DataFrame | None, most: int) -> _Curve:
     """The curve of a level, at most so many points, and the prediction where it has the level."""
     headers = _headers(place, along)
     there = level.rows.sort_values(along)
