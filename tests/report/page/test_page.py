@@ -178,13 +178,15 @@ def test_parts_of_one_campaign_are_told_apart_by_name(root: Path, tmp_path: Path
     text = text.replace(own, f'{own}specimen_number = "A-7"\n', 1)
     text += '\n[[sweeps]]\nfile = "stiffer.csv"\ndirection = "axial"\nspecimen_number = "B-8"\n'
     (tmp_path / "c.toml").write_text(text, encoding="utf-8")
-    assert call(tmp_path, "fit", "c.toml", "-o", "x", "--no-plots", "-q").returncode == 0
+    assert call(tmp_path, "diagnose", "c.toml", "-o", "x", "--no-plots", "-q").returncode == 0
     page = made_of(tmp_path / "x")
     shown = drawn(page, "axial: stiffness")
     assert list(shown) == [f"part {part}, {level} mm" for part in ("A-7", "B-8") for level in (0.1, 0.2, 0.5)]
     one, other = (shown[f"part {part}, 0.2 mm"]["measured"][1] for part in ("A-7", "B-8"))
     np.testing.assert_allclose(other / one, 1.1, rtol=5e-3)
     assert "part B-8, 5 Hz" in drawn(page, "axial: stiffness over amplitude")
+    (maps,) = re.findall(r"<svg(?:(?!</svg>).)*?>axial: measured less model, %</text>.*?</svg>", page, re.DOTALL)
+    assert {f">part {part}, 0.1 mm<" in maps for part in ("A-7", "B-8")} == {True}
 
 
 def test_loops_in_torsion_are_drawn(root: Path, tmp_path: Path) -> None:
