@@ -10,12 +10,12 @@ from typing import Any
 
 from bushfit.campaign.compound import Compound
 from bushfit.campaign.files import LoopFile, SweepFile
+from bushfit.campaign.head import ReportSettings, embedded
 from bushfit.campaign.places import place_tested
 from bushfit.campaign.schema import (
     CampaignFile,
     FitSettings,
     PredictSettings,
-    ReportSettings,
     RigSettings,
     SimulateSettings,
 )
@@ -47,6 +47,7 @@ class Campaign:
         name: of the campaign; default the name of the bushing, or of the first specimen.
         path: the campaign file.
         sha256: of its bytes; empty where there is no such file.
+        logo: of [report], as a data URI; None where the file names none.
         bushing: None where specimens alone were tested.
         simulate, compound: None where the file has no such table.
     """
@@ -64,6 +65,7 @@ class Campaign:
     compound: Compound | None = None
     sha256: str = ""
     report: ReportSettings = field(default_factory=ReportSettings)
+    logo: str | None = None
 
     def __repr__(self) -> str:
         kinds = {"loop": len(self.loops), "sweep": len(self.sweeps)}
@@ -98,6 +100,8 @@ def load_campaign(path: str | Path) -> Campaign:
             for name in content.predict.directions or ():
                 place_named(name, specimens)
         _check_places(content, specimens)
+    with naming(place="[report] logo"):
+        logo = embedded(path.parent / content.report.logo) if content.report.logo else None
     return Campaign(
         content.name or (bushing or specimens[0]).name,
         path,
@@ -116,6 +120,7 @@ def load_campaign(path: str | Path) -> Campaign:
         content.compound,
         hashlib.sha256(path.read_bytes()).hexdigest(),
         content.report,
+        logo,
     )
 
 

@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
 from bushfit.campaign.compound import Compound
 from bushfit.campaign.files import LoopFile, SweepFile
+from bushfit.campaign.head import ReportSettings
 from bushfit.campaign.places import PLACE_KEYS, with_places
 from bushfit.campaign.quantities import (
     LARGEST_SHAKEN,
@@ -343,23 +344,6 @@ class SimulateSettings:
     loops: tuple[SimulatedLoop, ...] = ()
     sweeps: tuple[SimulatedSweep, ...] = ()
     resonances: tuple[SimulatedResonance, ...] = ()
-
-
-@dataclass(frozen=True)
-class ReportSettings:
-    """[report]: what stands at the head of the report, as it is to be read there.
-
-    Args:
-        customer: whose part it is.
-        part_number: of the bushing.
-        drawing: its number, with the issue.
-        compound: the rubber, by its name.
-    """
-
-    customer: Name | None = None
-    part_number: Name | None = None
-    drawing: Name | None = None
-    compound: Name | None = None
 
 
 @dataclass(frozen=True)

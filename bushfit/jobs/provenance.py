@@ -27,7 +27,8 @@ def campaign_document(data: Data, command: str, options: Iterable[str] = ()) -> 
         "sha256": campaign.sha256,
         "command": command_line(command, campaign.path.name, *options, *loss),
         "tests": [_test(data_set) for data_set in data.data_sets],
-        "report": {key: value for key, value in vars(campaign.report).items() if value is not None},
+        "report": campaign.report.lines,
+        "logo": campaign.logo,
     }
 
 

@@ -83,7 +83,11 @@ class Ran:
         results = {"static": self.static and self.static.result, "dynamic": self.two_step and self.two_step.result}
         results |= {"joint": self.joint.result if self.added else None, "model": self.result}
         campaign = campaign_document(self.data, "run")
-        documents = {name: document_of(result, campaign) for name, result in results.items() if result}
+        beside = {**campaign, "logo": None}  # one of the files is enough
+        found = {name: result for name, result in results.items() if result}
+        documents = {
+            name: document_of(result, campaign if name == "model" else beside) for name, result in found.items()
+        }
         return {**documents, "diagnosis": self.diagnosed.document} if self.diagnosed else documents
 
     @property

@@ -4,6 +4,7 @@ The dataclasses are the keys, for the reader and for the JSON Schema alike: pyda
 other keys alone.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, get_args
@@ -22,6 +23,9 @@ from bushfit.validation import Flag, Name, Number, WholeNumber
 #: What the key "schema" of a model file has to say: of one with a bushing alone, and of one with specimens too.
 SchemaName = Literal["bushfit/model/1", "bushfit/model/2"]
 SCHEMAS: tuple[SchemaName, ...] = get_args(SchemaName)
+
+#: A picture as a data URI: what a page may show of a file that somebody else wrote, and nothing else.
+_PICTURE = re.compile(r"data:image/(png|svg\+xml);base64,[A-Za-z0-9+/]+=*")
 
 Matrix = tuple[tuple[Number, ...], ...]
 #: Share of a variance by which rounding in a file may take the least eigenvalue below zero.
@@ -224,7 +228,9 @@ class CampaignTable:
         sha256: of the file.
         command: with all that settles the numbers, as it would be typed beside the file.
         tests: all that the campaign has.
-        report: what stands at the head of a report: customer, part_number, drawing, compound, as far as they are known.
+        report: what stands at the head of a report: customer, part_number, drawing, compound, laboratory and date, as
+            far as they are known.
+        logo: beside it, as a data URI of a PNG or SVG; null where there is none.
     """
 
     name: str
@@ -233,6 +239,12 @@ class CampaignTable:
     command: str
     tests: tuple[TestTable, ...] = ()
     report: Mapping[str, str] = field(default_factory=dict)
+    logo: Annotated[str, Field(max_length=100_000)] | None = None
+
+    def __post_init__(self) -> None:
+        if self.logo is not None and not _PICTURE.fullmatch(self.logo):
+            expected = "data:image/png;base64, or data:image/svg+xml;base64, and the picture"
+            raise ValueError(ModelError("this is no picture", place="logo", found=self.logo, expected=expected))
 
 
 @dataclass(frozen=True)

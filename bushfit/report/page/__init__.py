@@ -50,9 +50,8 @@ def rendered(template: str, context: dict[str, Any]) -> str:
     from markupsafe import Markup
 
     style, script = (Markup((_TEMPLATES / name).read_text(encoding="utf-8")) for name in ("style.css", "script.js"))
-    allowed = (
-        f"default-src 'none'; style-src {_hash(style)}; script-src {_hash(script)}; base-uri 'none'; form-action 'none'"
-    )
+    own = f"style-src {_hash(style)}; script-src {_hash(script)}; img-src data:"
+    allowed = f"default-src 'none'; {own}; base-uri 'none'; form-action 'none'"
     page = filled(template, {"style": style, "script": script, "allowed": allowed, **context})
     return printable(page, lines=True) + "\n"
 
@@ -71,6 +70,8 @@ def _hash(text: str) -> str:
 def _environment() -> jinja2.Environment:
     import jinja2
 
+    from bushfit.report.page.uses import use_of
+
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -79,5 +80,6 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     environment.filters["number"] = number
+    environment.filters["use"] = use_of
     environment.filters["px"] = lambda pixels: f"{pixels:.1f}".removesuffix(".0")
     return environment

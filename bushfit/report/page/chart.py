@@ -27,6 +27,8 @@ _WIDTH = 460.0
 _PANEL, _LEFT, _RIGHT, _BELOW = 168.0, 62.0, 10.0, 42.0
 #: Height of a line of text, width of a letter, and of the stroke before a name in a legend [pixels].
 _LINE, _LETTER, _SWATCH = 17.0, 6.4, 34.0
+#: Room right of a chart for the axis of angles [pixels].
+_ANGLES = 44.0
 #: Most ticks of a logarithmic axis with 1, 2 and 5 of each decade.
 _MOST_TICKS = 7
 #: Free space beyond the data on a linear axis, as a share of their span.
@@ -126,13 +128,24 @@ class Axis:
     @property
     def ticks(self) -> list[tuple[float, str]]:
         """Pixels of round values within, and how they are written."""
+        return [(float(self(value)), number(value, 4)) for value in self._round_values()]
+
+    @property
+    def angles(self) -> list[tuple[float, str]]:
+        """The same of loss angles in round degrees, along an axis of loss factors, their tangents."""
+        low, high = (math.degrees(math.atan(end)) for end in (self.low, self.high))
+        degrees = Axis("", low, high, self.first, self.last)._round_values()
+        return [(float(self(math.tan(math.radians(angle)))), number(angle, 4)) for angle in degrees]
+
+    def _round_values(self) -> list[float]:
+        """Round values within."""
         values = self._decades() if self.log else []
         if len(values) < 2:
             raw = (self.high - self.low) / 5  # as many ticks, or a few more
             power = 10.0 ** math.floor(math.log10(raw))
             step = power * next(digit for digit in (1, 2, 5, 10) if digit * power >= raw * 0.999)
             values = [step * count for count in range(math.ceil(self.low / step), math.floor(self.high / step) + 1)]
-        return [(float(self(value)), number(value, 4)) for value in values]
+        return values
 
     def _decades(self) -> list[float]:
         """1, 2 and 5 of each decade within, or the decades alone where these are too many."""
@@ -161,15 +174,18 @@ def chart(
     rules: Sequence[Rule] = (),
     dot: float = 4.6,
     least: float = 0.0,
+    angles: bool = False,
 ) -> Markup:
     """Lines, bands and points over x, which is logarithmic on request, under a legend; y spans `least` or more.
 
-    `alt` tells of the picture those who do not see it; `dot` is the width of a point [pixels].
+    `alt` tells of the picture those who do not see it; `dot` is the width of a point [pixels]. With `angles`, loss
+    factors have the axis of their loss angles [deg] on the right.
     """
     legend, lines = _legend(series, rules)
     top = _LINE * (1 + lines) + 12.0
     levels = np.array([rule.value for rule in rules])
-    x = Axis.over(labels[0], (own for each in series for own in each.values(0)), _LEFT, _WIDTH - _RIGHT, log=log)
+    right = _WIDTH - (_ANGLES if angles else _RIGHT)
+    x = Axis.over(labels[0], (own for each in series for own in each.values(0)), _LEFT, right, log=log)
     ys = [*(own for each in series for own in each.values(1)), levels]
     y = Axis.over(labels[1], ys, top + _PANEL, top, least=least)
     drawn = [
@@ -182,7 +198,7 @@ def chart(
         for each in series
     ]
     size = {"width": _WIDTH, "height": top + _PANEL + _BELOW}
-    axes = {"x": x, "y": y, "legend": legend, "drawn": drawn, "rules": rules, "dot": dot}
+    axes = {"x": x, "y": y, "legend": legend, "drawn": drawn, "rules": rules, "dot": dot, "angles": angles}
     return Markup(filled("chart.html", {"title": title, "alt": alt, **size, **axes}))
 
 
@@ -257,7 +273,8 @@ class Cells:
 
 def maps(title: str, heads: Sequence[str], shown: Sequence[Cells], alt: str) -> Markup:
     """Maps below each other, before and after side by side, one scale for all."""
-    width = (_WIDTH - _MAPS_LEFT - _RIGHT - _BETWEEN * (len(heads) - 1)) / len(heads)
+    left = max(_MAPS_LEFT, _LETTER * max(len(name) for each in shown for name in each.rows) + 6.0)
+    width = (_WIDTH - left - _RIGHT - _BETWEEN * (len(heads) - 1)) / len(heads)
     heights = [each.size * len(each.rows) + 36.0 for each in shown]
     tops = [_MAPS_TOP + sum(heights[:place]) for place in range(len(heights) + 1)]
     scale = (*_BELOW_MODEL[:0:-1], *_ABOVE)
@@ -267,7 +284,7 @@ def maps(title: str, heads: Sequence[str], shown: Sequence[Cells], alt: str) -> 
         "width": _WIDTH,
         "height": tops[-1] + 30.0,
         "heads": heads,
-        "starts": [_MAPS_LEFT + side * (width + _BETWEEN) for side in range(len(heads))],
+        "starts": [left + side * (width + _BETWEEN) for side in range(len(heads))],
         "map_width": width,
         "placed": [*zip(shown, tops[:-1], strict=True)],
         "painted": partial(_painted, width=width),

@@ -8,15 +8,16 @@ import pandas as pd
 
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place
-from bushfit.model.document import TestTable
 from bushfit.report.page.chart import MOST_PLACES, Cells, Panel, maps
 from bushfit.report.page.readback import ReportData
-from bushfit.report.page.sweeps import by_stepped, level_name
+from bushfit.report.page.sweeps import Level, by_stepped, levels_of
 from bushfit.report.tables import complete, moved_of, numbers
 from bushfit.units import number, split_header, told
 
 #: Most columns and rows of a map of cells: each is then some pixels wide and high.
 _MOST_COLUMNS, _MOST_ROWS = 24, 12
+#: Letters of the name of a row at most.
+_LONGEST = 24
 
 
 def gap_panels(found: ReportData) -> list[Panel]:
@@ -26,7 +27,7 @@ def gap_panels(found: ReportData) -> list[Panel]:
         return []
     panels = list[Panel]()
     for place in list(found.places.values())[:MOST_PLACES]:
-        shown = list(_maps_at(place, gap, found.tests))
+        shown = list(_maps_at(place, gap, found))
         if shown:
             changed = any(len(cells.sides) > 1 for cells in shown)
             heads = ("before", "after") if changed else ("model and tests",)
@@ -44,19 +45,20 @@ def _in_words(place: Place, heads: Sequence[str], shown: Sequence[Cells]) -> str
     return f"Measured less model, {place}, root mean square of the cells; {'; '.join(parts)}"
 
 
-def _maps_at(place: Place, gap: pd.DataFrame, tests: Sequence[TestTable]) -> Iterator[Cells]:
+def _maps_at(place: Place, gap: pd.DataFrame, found: ReportData) -> Iterator[Cells]:
     """Maps of a place: of sweeps storage and loss, of loops the force."""
     mine = gap[gap["direction"] == str(place)]
-    for _, along, held, rows in by_stepped(place, mine[mine["kind"] == "sweep"], tests):
-        (x,), (name, unit) = numbers(rows, along), split_header(along)
-        ends = told(unit or "", float(x.min())), name, told(unit or "", float(x.max()))
+    for _, along, held, rows in by_stepped(place, mine[mine["kind"] == "sweep"], found.tests):
+        levels = levels_of(found, rows, held)
+        (x,), (name, unit) = numbers(pd.concat([level.rows for level in levels]), along), split_header(along)
+        ends = told(unit or "", float(x.min())), name.split()[0], told(unit or "", float(x.max()))
         for part in ("storage", "loss"):
-            yield _map(part, rows, held, x, ends)
+            yield _map(part, levels, x, ends)
     loops = complete(mine[mine["kind"] == "loop"], "time [s]", "frequency [Hz]", moved_of(place))
     if len(loops):  # means over 15 deg of the cycle
-        each = (loops[loops["test"] == test] for test in dict.fromkeys(loops["test"]))
-        turned = np.concatenate([_phase(place, rows) for rows in each])
-        yield _map("force", loops, "test", np.floor(turned * 24), ("upper turn", "cycle", "360 deg"))
+        levels = levels_of(found, loops, "test")
+        turned = np.concatenate([_phase(place, level.rows) for level in levels])
+        yield _map("force", levels, np.floor(turned * 24), ("upper turn", "cycle", "360 deg"))
 
 
 def _phase(place: Place, rows: pd.DataFrame) -> Array:
@@ -66,18 +68,22 @@ def _phase(place: Place, rows: pd.DataFrame) -> Array:
     return (time * frequency + np.angle(first) / (2.0 * np.pi)) % 1.0
 
 
-def _map(part: str, table: pd.DataFrame, held: str, along: Array, ends: tuple[str, str, str]) -> Cells:
-    """One map: means over the rows of the table that fall into a cell, before and after."""
-    (row, levels), (column, columns) = _binned(table[held].to_numpy(), _MOST_ROWS), _binned(along, _MOST_COLUMNS)
-    cell, size = row * len(columns) + column, len(levels) * len(columns)
+def _map(part: str, levels: Sequence[Level], along: Array, ends: tuple[str, str, str]) -> Cells:
+    """One map: means over the rows of the levels that fall into a cell, before and after; `along` of all rows, (n,)."""
+    table = pd.concat([level.rows for level in levels])
+    place = np.repeat(np.arange(len(levels)), [len(level.rows) for level in levels])
+    (row, first), (column, columns) = _binned(place, _MOST_ROWS), _binned(along, _MOST_COLUMNS)
+    cell, size = row * len(columns) + column, len(first) * len(columns)
     count = np.bincount(cell, minlength=size)
     sides = []
     for off in numbers(table, *(f"{part} {when} [%]" for when in ("before", "after"))):
         sums = np.bincount(cell, -np.nan_to_num(off), minlength=size)
-        sides.append(np.where(count > 0, sums / np.maximum(count, 1), np.nan).reshape(len(levels), -1))
+        sides.append(np.where(count > 0, sums / np.maximum(count, 1), np.nan).reshape(len(first), -1))
     same = np.array_equal(sides[0], sides[1], equal_nan=True)
-    names = [level_name(level, held) for level in levels]
-    short = [name if len(name) <= 13 else f"{name[:7]}…{name[-5:]}" for name in names]
+    names = [levels[n].name for n in first]
+    short = [
+        name if len(name) <= _LONGEST else f"{name[: _LONGEST // 2]}…{name[1 - _LONGEST // 2 :]}" for name in names
+    ]
     return Cells(part, short, ends, sides[:1] if same else sides)
 
 

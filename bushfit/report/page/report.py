@@ -1,6 +1,7 @@
 """The report of a result, in the order in which its reader asks: what was tested, the verdict, the numbers."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,15 +9,16 @@ import pandas as pd
 
 from bushfit.diagnosis.document import BeforeAfter, EffectEntry, GapEntry
 from bushfit.diagnosis.record import odds_in_words
-from bushfit.geometry import Bushing, Place, Specimen
+from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Place, Specimen
 from bushfit.model.document import TestTable
 from bushfit.model.result import Misfit, Result
 from bushfit.prediction.caveats import of_points, warnings_of
 from bushfit.report.page.chart import MOST_PLACES
+from bushfit.report.page.corner import corner
 from bushfit.report.page.gap import gap_panels
 from bushfit.report.page.loops import loop_panels
 from bushfit.report.page.readback import ReportData
-from bushfit.report.page.sweeps import sweep_panels
+from bushfit.report.page.sweeps import amplitude_panels, cole_cole_panels, frequency_panels, sweeps_of
 from bushfit.report.parameters import interval_kind, parameter_rows
 from bushfit.report.tables import DISPLAYS, IF_RIGS, columns_of, complete, numbers, spread
 from bushfit.units import alike, for_people, number, told
@@ -31,6 +33,13 @@ _CONDITIONS = {
     "operator": "Operator",
     "specimen_number": "Specimen no.",
 }
+#: What stands of them beside each test.
+_STATED = {
+    "specimen_number": "part {}",
+    "temperature_degC": "{} °C",
+    "preload": "{} preload",
+    "order": "{}. in the session",
+}
 #: Frequencies and amplitudes of a place whose predicted values are tabled, and rows of all places together.
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 #: Regions and tests that a page lists at most: the documents have all.
@@ -42,11 +51,13 @@ def report_context(found: ReportData) -> dict[str, Any]:
     result, diagnosis, campaign, tests = found.result, found.diagnosis, found.campaign, found.tests
     gaps = _gaps(diagnosis["gap"]) if diagnosis else []
     report = campaign.report if campaign else {}
-    head = {key.replace("_", " ").capitalize(): value for key, value in report.items()}
+    every = sweeps_of(found)
     return {
         "name": campaign.name if campaign else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
-        "facts": [*head.items(), *_bodies(result), *conditions(test.conditions for test in tests)],
+        "head": {key.replace("_", " ").capitalize(): value for key, value in report.items()},
+        "logo": campaign.logo if campaign else None,
+        "facts": [*_bodies(result), *conditions(test.conditions for test in tests)],
         "tests": [_tested(test, result.tests) for test in tests[:MOST]],
         "conditioned": any(test.conditions for test in tests),
         "more_tests": max(0, len(tests) - MOST),
@@ -55,7 +66,7 @@ def report_context(found: ReportData) -> dict[str, Any]:
         "has_odds": found.has_odds,
         "odds": odds_in_words(diagnosis) if diagnosis and found.has_odds else [],
         "effects": [(effect, [*_sizes(effect)]) for effect in diagnosis["effects"]] if diagnosis else [],
-        "usable": result.usable,
+        "usable": [(place, _degrees(place.loss_factor)) for place in result.usable],
         "rows": list(parameter_rows(result)),
         "interval": interval_kind(result),
         "plain": {row.name: row.value for row in parameter_rows(found.plain)} if found.plain else {},
@@ -67,7 +78,10 @@ def report_context(found: ReportData) -> dict[str, Any]:
             if abs(size) > 0.9  # they trade off against each other
         ],
         "equation": result.model.equation().splitlines()[0],
-        "places": sweep_panels(found),
+        "corner": corner(result),
+        "places": frequency_panels(every),
+        "payne": amplitude_panels(found),
+        "cole_cole": cole_cole_panels(every),
         "tabled": _tabled(found),
         "loops": loop_panels(found),
         "gap": gap_panels(found),
@@ -77,6 +91,8 @@ def report_context(found: ReportData) -> dict[str, Any]:
         "campaign": campaign,
         "files": _files(found),
         "versions": found.versions,
+        "levels": _levels(found),
+        "moduli": any(place.motion is STRAINING for place in found.places.values()),
     }
 
 
@@ -141,8 +157,8 @@ def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str | int]:
     unit, factor = DISPLAYS[test.unit]
     met = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
     stated = [
-        f"{value if isinstance(value, str) else number(value, 3)}{unit}"
-        for key, unit in (("temperature_degC", " °C"), ("preload", " preload"), ("order", ". in the session"))
+        words.format(value if isinstance(value, str) else number(value, 3))
+        for key, words in _STATED.items()
         if (value := test.conditions.get(key)) is not None
     ]
     return {
@@ -198,19 +214,38 @@ def _tabled(found: ReportData) -> list[tuple[str, ...]]:
 
 
 def _corners(table: pd.DataFrame, place: Place, frequencies: int) -> Iterator[tuple[str, ...]]:
-    """Rows of cells: place, frequency, amplitude; then of |K| and loss factor the value, its band, and as measured."""
+    """Rows of cells: place, unit, frequency, amplitude; |K| and loss angle, each with its band and as measured; loss
+    factor, K' and K''."""
     amplitude, stiffness, _ = columns_of(place)
-    names = (stiffness, "loss factor [-]")
+    names, parts = (stiffness, "loss factor [-]"), (f"storage {stiffness}", f"loss {stiffness}")
     band = [f"{name}, {end}" for name in names for end in ("low", "high")]
     (length, _), _, (unit, _) = place.display
-    known = complete(table, "frequency [Hz]", amplitude, *names, *band)
+    known = complete(table, "frequency [Hz]", amplitude, *names, *band, *parts)
     for row in corners(known, amplitude, _AMPLITUDES, frequencies):
-        cells = [str(place), f"{number(row['frequency [Hz]'], 4)} Hz", told(length, row[amplitude])]
-        for name, of in zip(names, (f" {unit}", ""), strict=True):
-            value, *ends = alike([row[name], row[f"{name}, low"], row[f"{name}, high"]], 4, least=2)
+        cells = [str(place), unit, f"{number(row['frequency [Hz]'], 4)} Hz", told(length, row[amplitude])]
+        kinds: tuple[tuple[str, int, Callable[[float], float]], ...] = ((names[0], 4, float), (names[1], 3, _degrees))
+        for name, digits, shown in kinds:
+            value, *ends = alike([shown(row[key]) for key in (name, f"{name}, low", f"{name}, high")], digits, least=2)
             measured = row.get(f"measured {name}", np.nan)
-            cells += [value + of, " to ".join(ends), "" if np.isnan(measured) else alike([measured], 4)[0]]
-        yield tuple(cells)
+            cells += [value, " to ".join(ends), "" if np.isnan(measured) else alike([shown(measured)], digits)[0]]
+        yield *cells, *(alike([row[name]], 4)[0] for name in (names[1], *parts))
+
+
+def _degrees(loss_factor: float) -> float:
+    """The loss angle of a loss factor [deg]."""
+    return math.degrees(math.atan(loss_factor))
+
+
+def _levels(found: ReportData) -> str:
+    """Levels of the predicted stiffness re 1 N/m, least and largest; "" where there is none."""
+    sizes = [
+        numbers(found.tables[name], columns_of(place)[1])[0] / place.display.stiffness.factor
+        for name, place in found.places.items()
+        if place.motion is TRANSLATION and name in found.tables
+    ]
+    known = [size for each in sizes for size in each.tolist() if size > 0.0]
+    ends = [f"{20.0 * math.log10(end):.1f}" for end in (min(known), max(known))] if known else []
+    return " to ".join(dict.fromkeys(ends))
 
 
 def corners(table: pd.DataFrame, amplitude: str, amplitudes: int, frequencies: int) -> Iterator[dict[str, Any]]:

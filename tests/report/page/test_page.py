@@ -5,11 +5,13 @@ Reports that are kept are those that are made now.
 
 from __future__ import annotations
 
+import base64
 import csv
 import json
 import re
 import shutil
 from collections.abc import Callable
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +40,8 @@ from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
 from bushfit.report.contents import Formats
 from bushfit.report.page import report_page
-from bushfit.report.page.readback import read_results
+from bushfit.report.page.readback import canonical, read_results
+from bushfit.report.page.uses import _ELSE
 
 Results = Callable[[str], Path]
 STYLED = re.compile(r"<(style|script)>(.*?)</\1>", re.DOTALL)
@@ -50,7 +53,8 @@ def test_run_writes_a_whole_page_that_loads_nothing_and_its_folder_gives_the_sam
     found = parsed(page)
     assert loads(page) == []
     sections = [value for tag, key, value in found.attributes if (tag, key) == ("section", "id")]
-    assert sections == ["tested", "verdict", "parameters", "predicted", "loops", "gap", "open", "provenance"]
+    pictured = ["predicted", "amplitude", "colecole", "loops", "gap"]
+    assert sections == ["tested", "verdict", "parameters", *pictured, "open", "terms", "provenance"]
     assert len(page.encode()) < LARGEST
     described = [value for tag, key, value in found.attributes if (tag, key) == ("svg", "aria-label")]
     assert len(described) == found.counts["svg"] >= 6
@@ -112,6 +116,9 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
     stated += 'operator = "night shift"\nspecimen_number = "A-7"\n'
     text = text.replace("[[sweeps]]\n", f"[[sweeps]]\n{stated}")
     head = '[report]\ncustomer = "Vehicle works"\npart_number = "15 961"\ndrawing = "D 7, issue C"\n'
+    head += 'laboratory = "Elasto Lab"\ndate = "20 May 2025"\nlogo = "logo.png"\n'
+    logo = b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 200
+    (tmp_path / "logo.png").write_bytes(logo)
     (tmp_path / "c.toml").write_text(f"{text}\n{head}", encoding="utf-8")
     options = ("--effect", "inertia", "--direction", "axial", "--direction", "radial")
     done = call(tmp_path, "fit", "c.toml", "-o", "x", "--no-plots", "-q", *options)
@@ -119,9 +126,67 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
     assert call(tmp_path, "report", "x", "-q").returncode == 0
     found = parsed(page_of(tmp_path / "x")).text
     conditions = ("22 °C", "150 N axial", "12 May 2025", "night shift", "A-7", "Fitted, not diagnosed")
-    for words in (*conditions, "Customer", "Vehicle works", "Part number", "15 961", "Drawing", "D 7, issue C"):
+    stated = (
+        "Customer",
+        "Vehicle works",
+        "Part number",
+        "15 961",
+        "Drawing",
+        "D 7, issue C",
+        "Elasto Lab",
+        "20 May 2025",
+    )
+    for words in (*conditions, *stated):
         assert words in found
     assert "bushfit fit c.toml --direction axial --direction radial --effect inertia" in found
+    (shown,) = re.findall(r'<img src="data:image/png;base64,([^"]*)" alt="Logo of Elasto Lab"', page_of(tmp_path / "x"))
+    assert base64.b64decode(shown) == logo
+    model = tmp_path / "x/model.json"
+    model.write_text(model.read_text(encoding="utf-8").replace("data:image/png;base64,", "https://a.b/"))
+    refused = call(tmp_path, "report", "x", "--force")
+    assert refused.returncode == 2, "nothing is loaded from elsewhere, whatever a file says"
+    assert "campaign.logo: this is no picture" in refused.stderr
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, "there is no such file"),
+        (b"GIF89a", "found: a file that begins with b'GIF89a'"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(64_000), "at most 64000 bytes"),
+    ],
+)
+def test_a_logo_that_cannot_be_shown_is_refused(root: Path, tmp_path: Path, content: bytes | None, words: str) -> None:
+    text = (root / "configs/cmp_15961.toml").read_text(encoding="utf-8").replace("../data", str(root / "data"))
+    (tmp_path / "c.toml").write_text(f'{text}\n[report]\nlogo = "logo.png"\n', encoding="utf-8")
+    if content is not None:
+        (tmp_path / "logo.png").write_bytes(content)
+    done = call(tmp_path, "fit", "c.toml", "-o", "x")
+    assert done.returncode == 2
+    assert "logo.png, [report] logo: " in done.stderr
+    assert words in done.stderr
+    assert not (tmp_path / "x").exists()
+
+
+def test_parts_of_one_campaign_are_told_apart_by_name(root: Path, tmp_path: Path) -> None:
+    """Two parts, one stiffer: a curve each at every level, not the mean of both under one name."""
+    text = (root / "configs/cmp_15961.toml").read_text(encoding="utf-8").replace("../data", str(root / "data"))
+    sweep = pd.read_csv(root / "data/cmp_15961/sweep_axial.csv", comment="#")
+    stiffness = next(name for name in sweep if "stiffness" in name)
+    sweep.assign(**{stiffness: 1.1 * sweep[stiffness]}).to_csv(tmp_path / "stiffer.csv", index=False)
+    own = text[text.index("[[sweeps]]") :].split("[[sweeps]]")[1]
+    text = text.replace(own, f'{own}specimen_number = "A-7"\n', 1)
+    text += '\n[[sweeps]]\nfile = "stiffer.csv"\ndirection = "axial"\nspecimen_number = "B-8"\n'
+    (tmp_path / "c.toml").write_text(text, encoding="utf-8")
+    assert call(tmp_path, "diagnose", "c.toml", "-o", "x", "--no-plots", "-q").returncode == 0
+    page = made_of(tmp_path / "x")
+    shown = drawn(page, "axial: stiffness")
+    assert list(shown) == [f"part {part}, {level} mm" for part in ("A-7", "B-8") for level in (0.1, 0.2, 0.5)]
+    one, other = (shown[f"part {part}, 0.2 mm"]["measured"][1] for part in ("A-7", "B-8"))
+    np.testing.assert_allclose(other / one, 1.1, rtol=5e-3)
+    assert "part B-8, 5 Hz" in drawn(page, "axial: stiffness over amplitude")
+    (maps,) = re.findall(r"<svg(?:(?!</svg>).)*?>axial: measured less model, %</text>.*?</svg>", page, re.DOTALL)
+    assert {f">part {part}, 0.1 mm<" in maps for part in ("A-7", "B-8")} == {True}
 
 
 def test_loops_in_torsion_are_drawn(root: Path, tmp_path: Path) -> None:
@@ -153,6 +218,92 @@ def test_points_and_lines_are_those_of_the_tables(results: Results, title: str, 
         np.testing.assert_allclose(points[1], means.to_numpy(), atol=reach / 10)
         there = predicted[predicted["amplitude [mm]"] == level]
         np.testing.assert_allclose(line[1], there[column], atol=reach / 10)
+
+
+def test_the_payne_curve_and_cole_cole_are_those_of_the_tables(results: Results) -> None:
+    """Points measured, over amplitude at three frequencies, and the prediction through its own table; K'' over K'."""
+    folder = results("cmp_15961")
+    sweeps, predicted = pd.read_csv(folder / "sweeps.csv"), pd.read_csv(folder / "radial.csv")
+    shown = drawn(page_of(folder), "radial: stiffness over amplitude")
+    assert list(shown) == ["5 Hz", "85 Hz", "155 Hz"]
+    mine = sweeps[sweeps["direction"] == "radial"]
+    for frequency in (5, 85, 155):
+        points, line = shown[f"{frequency} Hz"]["measured"], shown[f"{frequency} Hz"]["model"]
+        means = mine[mine["frequency [Hz]"] == frequency].groupby("amplitude [mm]")["stiffness [N/mm]"].mean()
+        np.testing.assert_allclose(points[0], means.index, rtol=2e-3)
+        np.testing.assert_allclose(points[1], means.to_numpy(), rtol=2e-3)
+        there = predicted[predicted["frequency [Hz]"] == frequency]
+        curve = np.interp(np.log(there["amplitude [mm]"]), np.log(line[0]), line[1])
+        np.testing.assert_allclose(curve, there["stiffness [N/mm]"], rtol=3e-3)
+        assert line.shape[1] >= 20, "a smooth line, not one from level to level"
+    shown = drawn(page_of(folder), "radial: Cole-Cole")
+    for level in (0.1, 0.2, 0.5):
+        there = predicted[predicted["amplitude [mm]"] == level]
+        line, points = shown[f"{level} mm"]["model"], shown[f"{level} mm"]["measured"]
+        np.testing.assert_allclose(line[0], there["storage stiffness [N/mm]"], rtol=2e-3)
+        np.testing.assert_allclose(line[1], there["loss stiffness [N/mm]"], rtol=1e-2)
+        tests = mine[mine["amplitude [mm]"] == level].groupby("frequency [Hz]")[["stiffness [N/mm]", "loss factor [-]"]]
+        size, loss = tests.mean().to_numpy().T
+        np.testing.assert_allclose(points[1], size * np.sin(np.arctan(loss)), rtol=1e-2)
+
+
+def test_ellipses_are_those_of_the_covariance(results: Results, measured: Path) -> None:
+    """Slanting as the correlation has it, 95 % of both at once; what was not told says so."""
+    folder = results("cmp_15961")
+    covariance = json.loads((folder / "model.json").read_text(encoding="utf-8"))["covariance"]
+    (picture,) = re.findall(
+        r"<svg(?:(?!</svg>).)*?>Which values go together</text>.*?</svg>", page_of(folder), re.DOTALL
+    )
+    paths = re.findall(r'<path d="([^"]*)" fill="#1f4e9c"', picture)
+    rules = re.findall(r'<path d="([^"]*)" fill="none" stroke="#8a8a8a"', picture)
+    names = ("mu", "m", "alpha", "sigma_fmax", "eps_half")
+    pairs = [(left, low) for n, low in enumerate(names) for left in names[:n]]
+    assert len(paths) == len(rules) == len(pairs) == 10
+    for path, rule, (left, low) in zip(paths, rules, pairs, strict=True):
+        x, y = np.array(re.findall(r"([\d.]+) ([\d.]+)", path), dtype=float).T
+        i, j = (covariance["names"].index(name) for name in (left, low))
+        matrix = np.array(covariance["matrix"])
+        correlation = matrix[i, j] / np.sqrt(matrix[i, i] * matrix[j, j])
+        assert -np.corrcoef(x, y)[0, 1] == pytest.approx(correlation, abs=0.01), (left, low)
+        ends = np.array(re.findall(r"M([\d.]+) [\d.]+v", rule), dtype=float)
+        ratio = np.sqrt(-2.0 * np.log(0.05)) / 1.96
+        assert np.ptp(x) / np.ptp(ends) == pytest.approx(ratio, rel=0.02), "wider than either interval alone"
+    assert "mu: at min no information" in page_of(measured)
+    assert "unknown by" in parsed(page_of(measured)).text
+
+
+def test_every_warning_says_what_it_means_for_use(results: Results, measured: Path) -> None:
+    told = [row for folder in (results("cmp_15961"), results("mystery_mount"), measured) for row in uses(folder)]
+    assert len(told) > 10
+    assert _ELSE not in [use for _, use in told], "each is of a known kind"
+    means = dict(told)
+    (open_,) = (use for warning, use in means.items() if warning.startswith("the tests leave sigma_fmax open"))
+    assert "quote no more of this value" in open_
+    (missed,) = (use for warning, use in means.items() if "were not fitted, and the model misses them" in warning)
+    assert missed.startswith("Do not use for this place")
+
+
+def uses(folder: Path) -> list[tuple[str, str]]:
+    """Each warning of a page, and what it means."""
+    found = re.findall(r'<li>([^<]*)\. <em class="use">([^<]+)</em></li>', page_of(folder))
+    return [(unescape(warning), unescape(use)) for warning, use in found]
+
+
+def test_loss_angles_are_the_arc_tangents_of_the_loss_factors(results: Results) -> None:
+    rows = re.findall(r'<td align="right" data-head="([^"]*)">([^<]*)</td>', page_of(results("cmp_15961")))
+    angles, factors = (
+        [float(cell) for head, cell in rows if head == key] for key in ("Loss angle [deg]", "Loss factor")
+    )
+    assert len(angles) == 12
+    np.testing.assert_allclose(angles, np.degrees(np.arctan(factors)), atol=0.06)
+    levels = re.search(r"predicted here ([\d.]+) to ([\d.]+) dB", page_of(results("cmp_15961")))
+    assert levels
+    sizes = np.concatenate(
+        [pd.read_csv(results("cmp_15961") / f"{place}.csv")["stiffness [N/mm]"] for place in ("axial", "radial")]
+    )
+    np.testing.assert_allclose(
+        [float(end) for end in levels.groups()], 20 * np.log10([1e3 * sizes.min(), 1e3 * sizes.max()]), atol=0.06
+    )
 
 
 def test_maps_are_measured_less_model(results: Results) -> None:
@@ -295,7 +446,7 @@ def test_the_report_of_measured_rubber_is_current_and_says_that_the_mount_was_no
     text = parsed(page_of(measured)).text
     assert loads(page_of(measured)) == []
     specimen = "2 blocks in parallel in shear, 772 mm² each, 6 mm thick"
-    for words in ("(not fitted)", specimen, "mount 24 %", "Fitted, not diagnosed"):
+    for words in ("18.4 °C, 0.151 %", "(not fitted)", specimen, "mount 24 %", "Fitted, not diagnosed"):
         assert words in text
 
 

@@ -26,7 +26,8 @@
       hint.hidden = best === null;
       if (best === null) { return; }
       const series = best.group.dataset.series;
-      hint.textContent = `${series ? series + ", " : ""}${best.of}: ${shown(back(svg.dataset.x, best.x))}, ${shown(back(svg.dataset.y, best.y))}`;
+      const y = back(svg.dataset.y, best.y), angle = svg.dataset.angles ? ` (${shown(Math.atan(y) * 180 / Math.PI)} deg)` : "";
+      hint.textContent = `${series ? series + ", " : ""}${best.of}: ${shown(back(svg.dataset.x, best.x))}, ${shown(y)}${angle}`;
       hint.style.left = `${Math.min(event.clientX + 14, innerWidth - hint.offsetWidth - 8)}px`;
       hint.style.top = `${event.clientY + 16}px`;
     });
@@ -60,7 +61,7 @@
       for (const group of groups.filter((each) => each.dataset.series === name)) { group.setAttribute("display", on ? "inline" : "none"); }
     }));
   }
-  for (const section of document.querySelectorAll("#predicted, #loops, #gap")) {
+  for (const section of document.querySelectorAll("#predicted, #amplitude, #colecole, #loops, #gap")) {
     const panels = [...section.querySelectorAll("[data-place]")];
     const names = [...new Set(panels.map((panel) => panel.dataset.place))];
     if (names.length < 2) { continue; }
