@@ -73,19 +73,10 @@ class Planned:
 
     def _targets(self) -> Iterator[tuple[str, TargetEntry]]:
         """How each target comes out."""
-        for each in self.plan.targets:
-            yield (
-                str(each.target),
-                {
-                    "asked": each.target.half,
-                    "before": each.before,
-                    "planned": each.planned,
-                    "standard": each.standard,
-                    "limit": each.limit,
-                    "met": each.why is None,
-                    "why": each.why,
-                },
-            )
+        found = self.plan
+        halves = (found.before.halves, found.planned.halves, found.standard.halves)
+        for target, why, *reached in zip(found.wanted.targets, found.missed, *halves, strict=True):
+            yield str(target), {"asked": target.half, **_reached(reached), "met": why is None, "why": why}
 
     def _root_mean_squares(self, errors: Sequence[Array]) -> Iterator[tuple[str, Reached]]:
         """Root mean square of errors at the points of each place, of each programme."""

@@ -45,24 +45,16 @@ class Reached(TypedDict):
     standard: float
 
 
-class TargetEntry(TypedDict):
-    """An interval that was asked for: half of it over the value, the widest of all points that are wanted.
+class TargetEntry(Reached):
+    """Half of a 95 % interval over its value, the widest of all points that are wanted.
 
     Args:
         asked: at most.
-        before: without further tests.
-        planned: with the tests of the plan.
-        standard: with the standard programme instead.
-        limit: with every test on offer made a thousand times.
         met: whether the planned tests meet it.
         why: what they fail by, in words; null where it is met.
     """
 
     asked: float
-    before: float
-    planned: float
-    standard: float
-    limit: float
     met: bool
     why: str | None
 

@@ -147,26 +147,6 @@ class Target:
         return self.quantity if self.place is None else f"{self.quantity}.{self.place}"
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """How wide the interval of a target comes out: half of it over its value, the widest of all points.
-
-    Args:
-        before: from what is known now.
-        planned: with the tests of the plan.
-        standard: with the standard programme instead.
-        limit: with every test on offer made a thousand times.
-        why: what the planned tests fail by, in words; None where they meet the target.
-    """
-
-    target: Target
-    before: float
-    planned: float
-    standard: float
-    limit: float
-    why: str | None
-
-
 @dataclass(frozen=True, eq=False)
 class Wanted:
     """What the plan is for.
@@ -219,6 +199,7 @@ class Programme:
         loss: the same of the loss factor, in loss factor, (n,).
         apart: expected chi-square between the two nearest rivals that any tests tell apart, after the best refit of
             either; None without rivals.
+        halves: half of the 95 % interval of each target over its value, the widest of all points.
         visible: of the effects that the standard programme can show, the smallest amount found.
         drift: largest shift of a parameter, over its standard error, by a drift of the gain of 1 % over the session.
     """
@@ -230,6 +211,7 @@ class Programme:
     stiffness: Array
     loss: Array
     apart: float | None
+    halves: tuple[float, ...]
     visible: tuple[Visible, ...]
     drift: float
 
@@ -248,7 +230,7 @@ class Plan:
         planned: the tests chosen.
         standard: the paper's tests, as often as the same hours allow.
         purposes: of each test with all its repeats, what would be lost without it, in words.
-        targets: how each of them comes out.
+        missed: by what the planned tests fail each target, in words; None where they meet it.
         enough: why hours stay free, in words; None where they are used.
         notes: what a user must know.
     """
@@ -259,7 +241,7 @@ class Plan:
     planned: Programme
     standard: Programme
     purposes: Mapping[Test, str]
-    targets: tuple[Verdict, ...] = ()
+    missed: tuple[str | None, ...] = ()
     enough: str | None = None
     notes: tuple[str, ...] = ()
 

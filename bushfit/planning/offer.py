@@ -1,6 +1,6 @@
 """What is on offer: the runs that a rig can make, what each would tell of models that may be right, and its cost."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -81,16 +81,8 @@ class Offer:
 
     @cached_property
     def endless(self) -> Array:
-        """Covariance of the parameters after every test on offer without end, (k, k): no plan leaves less."""
-        return self._endless(self.views[0])
-
-    @cached_property
-    def faultless(self) -> Array:
-        """The same of a rig without errors that all repeats of a test share."""
-        return self._endless(replace(self.views[0], level=np.zeros_like(self.views[0].level)))
-
-    def _endless(self, view: View) -> Array:
-        return np.asarray(view.off(view.together(ENDLESS * (self.budget.runs > 0)))[0])
+        """The same of all tests on offer, each again and again, (k, k): no plan leaves less."""
+        return self.off(ENDLESS * (self.budget.runs > 0))
 
     @cached_property
     def weight(self) -> Array | None:

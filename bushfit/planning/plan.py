@@ -15,7 +15,7 @@ from bushfit.errors import ModelError
 from bushfit.fitting.repeats import FEWEST_STEPS
 from bushfit.geometry import Place, Specimen
 from bushfit.planning.candidates import standard_tests
-from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Verdict, Visible, Wanted
+from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible, Wanted
 from bushfit.planning.criterion import Budget, Criterion, best_runs, filled, noncentrality_of, root_of
 from bushfit.planning.offer import FOUND, RIVALS_APART, Offer
 from bushfit.planning.order import Drifting, ordered
@@ -51,10 +51,8 @@ def plan(known: Knowledge, wanted: Wanted) -> Plan:
         )
     offer = Offer(known, wanted)
     few = [_Planner(offer, share * wanted.hours) for share in _SHARES.get(wanted.aim, ())]
-    for sighted in (
-        (True, False) if offer.goals else (False,)
-    ):  # first without a lack of what effects show, if that can be
-        least = bisect_left(few, True, key=lambda each: each.reaches and not (sighted and each.lacking))
+    for blind in (False, True) if offer.goals else (True,):  # blind for an effect only where it has to be
+        least = bisect_left(few, True, key=lambda each: each.reaches and (blind or not each.lacking))
         if least < len(few):
             return few[least].plan()
     return _Planner(offer, wanted.hours).plan()
@@ -98,9 +96,12 @@ class _Planner:
             )
         planned = self._programme(ordered(best, self.budget.place, self._drifting(best)) if best.any() else [])
         before, standard = self._programme([]), self._programme(self.standard_runs)
-        targets, reasons = tuple(self._verdicts(best)), purposes(self.offer, self.least, best)
-        enough, notes = self._enough(planned, targets), tuple(self._notes(planned, targets))
-        return Plan(self.offer.known, self.offer.wanted, before, planned, standard, reasons, targets, enough, notes)
+        missed, reasons = (
+            tuple(self._missed(best, goal) for goal in self.offer.goals),
+            purposes(self.offer, self.least, best),
+        )
+        enough, notes = self._enough(planned, missed), tuple(self._notes(planned, missed))
+        return Plan(self.offer.known, self.offer.wanted, before, planned, standard, reasons, missed, enough, notes)
 
     def _choice(self) -> Array:
         """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be."""
@@ -267,6 +268,7 @@ class _Planner:
             gain,
             phase * (1.0 + np.square(self._loss_factor())),
             float(self.offer.apart(counts, self.offer.tellable).min()) if self.offer.known.rivals else None,
+            tuple(goal.half(off) for goal in self.offer.goals),
             tuple(self._visible(noncentrality_of(found)[0], drifting.noncentrality(runs))),
             0.01 * float(np.abs(moved[:k]).max()),
         )
@@ -289,21 +291,16 @@ class _Planner:
                 )
         yield Visible("drift", "drift.gain", "1", _found(drifting))
 
-    def _verdicts(self, counts: Array) -> Iterator[Verdict]:
-        """How the targets come out by so many runs of each test, and why not as asked for."""
+    def _missed(self, counts: Array, goal: Goal) -> str | None:
+        """By what so many runs of each test fail a target; None where they meet it."""
         offer = self.offer
-        none, standard = np.zeros_like(counts), self._counts(self.standard_runs)
-        for goal in offer.goals:
-            before, planned, paper = (goal.half(self.offer.off(each)) for each in (none, counts, standard))
-            found = Verdict(goal.target, before, planned, paper, goal.half(offer.endless), None)
-            if sentence := self._untold(goal, counts):
-                which = "in the plan" if goal.target.place in offer.wanted.places else "on offer"
-                yield replace(found, why=f"no test so far or {which} is made there: {sentence}")
-            elif not goal.met(offer.endless):
-                no_test = f"no test on offer meets it, {ENDLESS} runs of each would reach {percent(found.limit)}"
-                yield replace(found, why=f"{no_test}: {goal.why_not(offer.known, offer.endless, offer.faultless)}")
-            else:
-                yield found if goal.met(offer.off(counts)) else replace(found, why=self._more_hours(counts, goal))
+        if sentence := self._untold(goal, counts):
+            which = "in the plan" if goal.target.place in offer.wanted.places else "on offer"
+            return f"no test so far or {which} is made there: {sentence}"
+        if not goal.met(offer.endless):
+            limit, why = percent(goal.half(offer.endless)), goal.why_not(offer.known, offer.endless)
+            return f"no test on offer meets it, {ENDLESS} runs of each would reach {limit}: {why}"
+        return None if goal.met(offer.off(counts)) else self._more_hours(counts, goal)
 
     def _more_hours(self, counts: Array, goal: Goal) -> str:
         """In how many hours a target would be met, at the runs that are best per minute after those planned."""
@@ -319,7 +316,7 @@ class _Planner:
         reached = percent(goal.half(self.offer.off(more)))
         return f"{hours} h would reach {reached}, and no further run would take a quarter per cent off that"
 
-    def _enough(self, planned: Programme, targets: Sequence[Verdict]) -> str | None:
+    def _enough(self, planned: Programme, missed: Sequence[str | None]) -> str | None:
         """Why hours stay free, if they do."""
         asked, left = self.offer.wanted.hours, self.offer.wanted.hours - planned.hours
         if left <= float(self.budget.minutes.max() + self.budget.setup) / 60.0:
@@ -327,22 +324,21 @@ class _Planner:
         why = "no further run would take a quarter per cent off the error"
         if self.offer.wanted.aim == "rivals" and self.hours < asked:
             why = "these tests tell the rivals apart"
-        elif targets and self.hours < asked:
-            why = "no target that can be met is missed" if any(each.why for each in targets) else "all targets are met"
+        elif missed and self.hours < asked:
+            why = "no target that can be met is missed" if any(missed) else "all targets are met"
         if not planned.tests:
-            needed = "would help" if any(each.why for each in targets) else "is needed"
+            needed = "would help" if any(missed) else "is needed"
             return f"no test {needed}: {why} by what is known, and all of the {number(asked, 3)} h stay free"
         return (
             f"{number(planned.hours, 2)} of {number(asked, 3)} h are enough: {why}, and {number(left, 2)} h stay free"
         )
 
-    def _notes(self, planned: Programme, targets: Sequence[Verdict]) -> Iterator[str]:
+    def _notes(self, planned: Programme, missed: Sequence[str | None]) -> Iterator[str]:
         """What a user must know."""
         yield from self.offer.known.warnings
-        for each in targets:
-            if each.why:
-                asked = f"{percent(each.target.half)} asked for, {percent(each.planned)} planned"
-                yield f"{each.target}: {asked}: {each.why}"
+        for target, half, why in zip(self.offer.wanted.targets, planned.halves, missed, strict=True):
+            if why:
+                yield f"{target}: {percent(target.half)} asked for, {percent(half)} planned: {why}"
         if self.offer.known.bounded:
             yield (
                 f"{' and '.join(self.offer.known.bounded)} came to rest on a bound: the errors of the others count that"

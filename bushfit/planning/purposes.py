@@ -1,7 +1,5 @@
 """What each planned test is for: what would be lost without it, of what is wanted or of what the model may lack."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from bushfit.effects.contract import Array
@@ -39,28 +37,19 @@ def _lost_of_aim(offer: Offer, counts: Array, without: Array) -> str | None:
         return far if closer * _WORTH_SAYING <= apart else None
     if offer.goals:
         lost = [goal for goal in offer.goals if goal.half(less) >= _WORTH_SAYING * goal.half(off)]
-        worst = max(lost, key=lambda goal: goal.half(less) / goal.target.half, default=None)
-        return (
-            None
-            if worst is None
-            else f"{worst.target}: {percent(worst.half(less), 3)} without it, {percent(worst.half(off), 3)} with it"
-        )
-    errors = [dict(_errors(offer, each)) for each in (off, less)]
-    growth, name = max((errors[1][name] / errors[0][name], name) for name in errors[0])
+        lost.sort(key=lambda goal: goal.half(less) / goal.target.half)
+        halves = [
+            f"{goal.target}: {percent(goal.half(less), 3)} without it, {percent(goal.half(off), 3)} with it"
+            for goal in lost[-1:]
+        ]
+        return next(iter(halves), None)
+    errors = [np.sqrt(np.diag(each)) for each in (off, less)]
+    growths = dict(zip(offer.known.names, errors[1] / errors[0], strict=False))
+    if offer.wanted.aim == "predictions":
+        growths = {"stiffness": float(np.sqrt(np.sum(less * offer.weight) / np.sum(off * offer.weight)))}
+    growth, name = max((growths[name], name) for name in growths if name in ("stiffness", *offer.wanted.parameters))
     larger = f"{name}: error {number(100.0 * (growth - 1.0), 2)} % larger without it"
     return larger if growth >= _WORTH_SAYING else None
-
-
-def _errors(offer: Offer, off: Array) -> Iterator[tuple[str, float]]:
-    """Standard errors of what is wanted by its name: of parameters, or of the stiffness at each place."""
-    if offer.wanted.aim == "parameters":
-        at = {name: place for place, name in enumerate(offer.known.names)}
-        yield from ((name, float(np.sqrt(off[at[name], at[name]]))) for name in offer.wanted.parameters)
-        return
-    ends = np.cumsum([each.frequency.size for each in offer.wanted.points])[:-1]
-    for points, slopes in zip(offer.wanted.points, np.split(offer.slopes, ends, axis=-1), strict=True):
-        variance = np.einsum("kcn,kl,lcn->", slopes, off, slopes)
-        yield f"stiffness, {points.place}", float(np.sqrt(variance / points.frequency.size))
 
 
 def _lost_of_effects(offer: Offer, least: Array, counts: Array, without: Array) -> str | None:

@@ -14,16 +14,11 @@ from bushfit.model.result import Range, Result
 from bushfit.planning.contract import Knowledge, Points, Target, Wanted
 from bushfit.prediction.caveats import unfitted
 from bushfit.prediction.stiffness import predict
-from bushfit.reading.measurement import loss_factor
 from bushfit.units import number, told
 
-#: Runs of each test that stand for no end of them; chosen: a year of the rig and more, and what scatters is gone.
+#: Runs of each test that stand for no end of them; chosen: years of the rig, in which what scatters is gone.
 ENDLESS = 1000
-#: Variance that is aimed at where a target cannot be reached, over the one that tests without end leave; chosen.
-_NEAR = 1.2
-#: The same over the variance that no test lowers: with it, the interval is a twentieth wider than without; chosen.
-_BELOW = 0.1
-#: Interval, over the one that tests without end leave, that is as near to a target beyond it as it gets; chosen.
+#: Half interval over that of endless tests, which is as near to a target beyond their reach as a plan goes; chosen.
 _NEARLY = 1.1
 
 
@@ -46,7 +41,7 @@ class Goal:
 
     def halves(self, off: Array) -> Array:
         """Half of the 95 % interval over the value at each point, (n,), of a covariance of the parameters, (k, k)."""
-        return self.open + Z95 * np.sqrt(self.variance(off) + self.own**2)
+        return self.open + Z95 * np.sqrt(self._variance(off) + self.own**2)
 
     def half(self, off: Array) -> float:
         """The widest of them."""
@@ -60,52 +55,40 @@ class Goal:
         """Whether it is met; or where not even tests without end meet it, nearly as narrow as those make it."""
         return self.met(off) or (not self.met(endless) and self.half(off) <= _NEARLY * self.half(endless))
 
-    def variance(self, off: Array) -> Array:
-        """What the parameters' errors make of the quantity, relative, (n,)."""
-        return np.asarray(np.einsum("nk,kl,nl->n", self.rows, off, self.rows))
-
     def weight(self, endless: Array) -> Array:
         """Of the parameters' covariance, (k, k): its mean variance over what the target leaves to them, or over what is
-        near the least that tests without end reach, where that is more."""
+        nearly as little as endless tests leave."""
         left = np.square(np.maximum(self.target.half - self.open, 0.0) / Z95) - self.own**2
-        floor = self.own**2 + np.square(self.open / Z95)
-        allowed = np.maximum(left, np.maximum(_NEAR * self.variance(endless), _BELOW * floor))
+        nearly = np.square(_NEARLY * self.halves(endless) / Z95) - self.own**2 - np.square(self.open / Z95)
+        allowed = np.where(self.met(endless), left, nearly)
         return np.asarray((self.rows / allowed[:, None]).T @ self.rows / len(self.rows))
 
-    def why_not(self, known: Knowledge, endless: Array, faultless: Array) -> str:
-        """By what the target fails with endless tests of the rig, and of one without errors that repeats share."""
-        halves = self.halves(endless)
-        worst = int(np.argmax(halves))
-        root = np.sqrt(np.diag(endless))
-        named = (*known.names, *known.bounded)[int(np.argmax(np.abs(self.rows[worst]) * root))]
-        parts = {
-            "own": Z95 * float(self.own[worst]),
-            "open": float(self.open[worst]),
-            "tests": Z95 * float(np.sqrt(self.variance(endless)[worst])),
-        }
-        largest, where = max(parts, key=lambda part: parts[part]), self._where(worst)
-        size = percent(parts[largest])
-        if largest == "own":
-            of_model = f"the model's own error is {size} {where}"
-            return f"{of_model}: no test lowers it, naming what it lacks may (bushfit diagnose)"
-        if largest == "open":
-            return (
-                f"what the tests so far leave undecided is {size} {where}: bushfit diagnose names the test that tells"
-            )
-        if self.variance(faultless)[worst] < 0.5 * self.variance(endless)[worst]:
-            gain, phase = known.noise.level
-            of_class = f"{number(100.0 * gain, 2)} % of gain and {number(1e3 * phase, 2)} mrad of phase"
-            return (
-                f"the class of the rig, {of_class} that all repeats of a test share, leaves {size} {where} by {named}"
-            )
-        return f"no test on offer tells {named} well enough: it leaves {size} {where}"
+    def why_not(self, known: Knowledge, endless: Array) -> str:
+        """By what the target fails even with endless tests: what is widest at the widest point."""
+        worst, variance = int(np.argmax(self.halves(endless))), self._variance(endless)
+        by = np.abs(self.rows[worst]) * np.sqrt(np.diag(endless))
+        name = (*known.names, *known.bounded)[int(np.argmax(by))]
+        gain, phase = known.noise.level
+        of_class = f"{number(100.0 * gain, 2)} % of gain and {number(1e3 * phase, 2)} mrad of phase"
+        if variance[worst] > 0.25 * self._variance(known.covariance)[worst]:
+            of_tests = f"{name}, which no test on offer tells well enough"
+        else:
+            of_tests = f"the class of the rig, {of_class} that all repeats of a test share, in {name}"
+        size, words = max(
+            (Z95 * float(self.own[worst]), "the model's own error: no test lowers it, naming what it lacks may"),
+            (float(self.open[worst]), "what the tests leave undecided: bushfit diagnose names the test that tells"),
+            (Z95 * float(np.sqrt(variance[worst])), of_tests),
+        )
+        where = ""
+        if self.points:
+            unit, factor = self.points.place.display.displacement
+            frequency, amplitude = (float(each[worst]) for each in (self.points.frequency, self.points.amplitude))
+            where = f" at {told('Hz', frequency)} and {told(unit, factor * amplitude)}"
+        return f"{percent(size)}{where} is {words}"
 
-    def _where(self, point: int) -> str:
-        if self.points is None:
-            return "of it"
-        unit, factor = self.points.place.display.displacement
-        frequency, amplitude = float(self.points.frequency[point]), float(self.points.amplitude[point])
-        return f"at {told('Hz', frequency)} and {told(unit, factor * amplitude)}"
+    def _variance(self, off: Array) -> Array:
+        """What the parameters' errors make of the quantity, relative, (n,)."""
+        return np.asarray(np.einsum("nk,kl,nl->n", self.rows, off, self.rows))
 
 
 def goals(known: Knowledge, wanted: Wanted, slopes: Array) -> Iterator[Goal]:
@@ -114,34 +97,32 @@ def goals(known: Knowledge, wanted: Wanted, slopes: Array) -> Iterator[Goal]:
     Args:
         slopes: gain and phase of the stiffness at all points wanted by relative change of the parameters, (k, 2, n).
     """
-    ends = np.cumsum([each.frequency.size for each in wanted.points])[:-1]
+    names, ends = (*known.names, *known.bounded), np.cumsum([each.frequency.size for each in wanted.points])[:-1]
     at = {each.place: (each, part) for each, part in zip(wanted.points, np.split(slopes, ends, axis=-1), strict=True)}
-    names = (*known.names, *known.bounded)
     for target in wanted.targets:
         if target.place is None:
             row = np.array([[float(name == target.quantity) for name in names]])
             yield Goal(target, row, np.zeros(1), np.zeros(1))
         else:
-            points, (gain, phase) = at[target.place][0], np.swapaxes(at[target.place][1], 0, 1)
-            yield _of_points(known, target, points, gain, phase)
+            yield _of_points(known, target, *at[target.place])
 
 
-def _of_points(known: Knowledge, target: Target, points: Points, gain: Array, phase: Array) -> Goal:
-    """The goal of a predicted quantity. With no error of its parameters, the band of `predict` is what stays open."""
+def _of_points(known: Knowledge, target: Target, points: Points, slopes: Array) -> Goal:
+    """The goal of a predicted quantity. Without errors of its parameters, the band of `predict` is what stays open."""
     exact = replace(known.result or Result(known.model), covariance=Covariance())
-    found = predict(exact, points.place, points.frequency, points.amplitude)
-    frequencies, amplitudes = np.unique(points.frequency), np.unique(points.amplitude)
-    here = np.searchsorted(amplitudes, points.amplitude) * frequencies.size
-    here += np.searchsorted(frequencies, points.frequency)
-    band = found.stiffness if target.quantity == "stiffness" else found.loss_factor
-    value = band.value[here]
+    found, sizes, rates = (
+        predict(exact, points.place, points.frequency, points.amplitude),
+        points.amplitude,
+        points.frequency,
+    )
+    here = np.searchsorted(np.unique(sizes), sizes) * np.unique(rates).size + np.searchsorted(np.unique(rates), rates)
+    loss = found.loss_factor.value[here]
+    of_stiffness = target.quantity == "stiffness"
+    band = found.stiffness if of_stiffness else found.loss_factor
+    value, wide = band.value[here], np.maximum(band.high - band.value, band.value - band.low)[here]
+    rows = slopes[:, 0] if of_stiffness else slopes[:, 1] * (1.0 + loss**2) / loss
     own = np.linalg.norm(band.root, axis=0)[here] / value
-    wide = np.maximum(band.high - band.value, band.value - band.low)[here] / value
-    rows = gain.T
-    if target.quantity != "stiffness":
-        loss = loss_factor(known.model.stiffness(points.place, points.frequency, points.amplitude))
-        rows = phase.T * ((1.0 + loss**2) / loss)[:, None]
-    return Goal(target, rows, own, np.maximum(wide - Z95 * own, 0.0), points)
+    return Goal(target, rows.T, own, np.maximum(wide / value - Z95 * own, 0.0), points)
 
 
 def untested(known: Knowledge, place: Place, tested: Iterable[str]) -> str | None:

@@ -66,14 +66,14 @@ def test_a_plan_for_targets_stops_once_they_are_met(root: Path, tmp_path: Path) 
     """In less than half of the hours, in every direction whose stiffness is asked for, and said; what is not asked for
     is not planned, and tighter targets take longer."""
     bushfit = typing(root)
-    asked = ("--target", "stiffness=1 %", "--target", "alpha = 4 %")
+    asked = ("--target", "stiffness=1 %", "--target", "alpha = 2 %")
     done = bushfit("plan", *TARGETS, *asked, "--hours", "6", "-o", tmp_path / "both")
     both = json.loads(done.stdout)
     assert set(both["targets"]) == {"stiffness.axial", "stiffness.radial", "alpha"}
     for name, target in both["targets"].items():
         assert target["met"]
         assert target["why"] is None
-        assert target["limit"] < target["planned"] <= target["asked"] == (0.04 if name == "alpha" else 0.01)
+        assert target["planned"] <= target["asked"] == (0.02 if name == "alpha" else 0.01)
         assert target["planned"] < target["before"]
     assert both["targets"]["alpha"]["planned"] == pytest.approx(1.96 * both["parameters"]["alpha"]["planned"], rel=1e-3)
     assert {run["place"] for run in both["tests"]} == {"axial", "radial"}
@@ -84,10 +84,9 @@ def test_a_plan_for_targets_stops_once_they_are_met(root: Path, tmp_path: Path) 
     assert not both["warnings"]
     reasons = pd.read_csv(tmp_path / "both/plan.csv")["what for"]
     assert reasons.str.contains("without it").sum() > len(reasons) / 2
-    assert any(words.startswith(("stiffness.", "alpha: +/-4.")) for words in reasons), "what would miss a target"
+    assert any(words.startswith(("stiffness.", "alpha: +/-2.")) for words in reasons), "what would miss a target"
     one = json.loads(bushfit("plan", *TARGETS, "--target", "alpha=4 %", "--hours", "6", "-o", tmp_path / "one").stdout)
-    few = json.loads(bushfit("plan", *TARGETS, "--target", "alpha=2 %", "--hours", "6", "-o", tmp_path / "few").stdout)
-    assert one["hours_planned"] < min(both["hours_planned"], few["hours_planned"])
+    assert one["hours_planned"] < both["hours_planned"]
     assert {run["place"] for run in one["tests"]} == {"axial"}
 
 
@@ -100,8 +99,16 @@ def test_a_plan_for_targets_stops_once_they_are_met(root: Path, tmp_path: Path) 
             "the class of the rig, 0.5 % of gain and 4.4 mrad of phase",
         ),
         ("configs/new_bushing.toml", ("mu=0.25 %", "--hours", "2"), "2 h are too few, about"),
-        ("configs/new_bushing.toml", ("stiffness.radial=5 %", "--direction", "axial"), "no test so far or on offer"),
-        ("data/practice/case_003/bushing.toml", ("stiffness.axial=1 %",), "the model's own error is +/-23 % at 155 Hz"),
+        (
+            "configs/new_bushing.toml",
+            ("stiffness.radial=5 %", "--direction", "axial"),
+            "no test so far or on offer is made there: radial: not fitted",
+        ),
+        (
+            "data/practice/case_003/bushing.toml",
+            ("stiffness.axial=1 %",),
+            "+/-23 % at 155 Hz and 0.4 mm is the model's own error",
+        ),
     ],
 )
 def test_what_keeps_a_target_from_being_met_is_named(
