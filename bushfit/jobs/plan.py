@@ -186,20 +186,14 @@ class PlanTests:
 
 def _target(name: str, half: float, known: Knowledge, points: Sequence[Points]) -> list[Target]:
     """What a target stands for: a parameter, or a quantity at one place or at all where predictions are wanted."""
-    quantity, _, where = name.partition(".")
-    at = [each.place for each in points if where in ("", str(each.place))]
-    if name in known.names:
-        return [Target(name, half)]
-    if quantity in PREDICTED and at:
-        return [Target(quantity, half, place) for place in at]
-    possible = [*PREDICTED, *(f"{each}.{here.place}" for each in PREDICTED for here in points), *known.names]
-    raise ModelError(
-        "there is no such target",
-        place="--target",
-        found=name,
-        expected=", ".join(possible),
-        hint=did_you_mean(name, possible),
-    )
+    possible = {each: [Target(each, half)] for each in known.names}
+    for quantity in PREDICTED:
+        at = [Target(quantity, half, each.place) for each in points]
+        possible |= {quantity: at, **{str(each): [each] for each in at}}
+    if name not in possible:
+        expected, hint = ", ".join(possible), did_you_mean(name, tuple(possible))
+        raise ModelError("there is no such target", place="--target", found=name, expected=expected, hint=hint)
+    return possible[name]
 
 
 def _run(test: Test, minutes: float) -> PlannedRun:

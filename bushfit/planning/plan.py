@@ -19,7 +19,6 @@ from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible,
 from bushfit.planning.criterion import Budget, Criterion, best_runs, filled, noncentrality_of, root_of
 from bushfit.planning.offer import FOUND, RIVALS_APART, Offer
 from bushfit.planning.order import Drifting, ordered
-from bushfit.planning.purposes import purposes
 from bushfit.planning.sensitivity import Information
 from bushfit.planning.targets import ENDLESS, Goal, percent, untested
 from bushfit.reading.measurement import loss_factor
@@ -32,6 +31,8 @@ _SHARES = {"rivals": (0.125, 0.1875, 0.25, 0.375, 0.5), "targets": tuple((2.0 **
 _PENALTY, _STRICT = 3.0, 30.0
 #: Degrees of freedom behind the scatter of sweeps at least; chosen: with five, errors are a tenth larger than planned.
 _SCATTER_FREEDOM = 10
+#: What a test has to be worth of an error to be made for its sake; chosen.
+_WORTH_SAYING = 1.005
 #: Minutes after which no more are asked for: months.
 _MOST_MINUTES = 60.0 * 2000.0
 
@@ -98,7 +99,7 @@ class _Planner:
         before, standard = self._programme([]), self._programme(self.standard_runs)
         missed, reasons = (
             tuple(self._missed(best, goal) for goal in self.offer.goals),
-            purposes(self.offer, self.least, best),
+            self._purposes(best),
         )
         enough, notes = self._enough(planned, missed), tuple(self._notes(planned, missed))
         return Plan(self.offer.known, self.offer.wanted, before, planned, standard, reasons, missed, enough, notes)
@@ -315,6 +316,34 @@ class _Planner:
             return f"{number(self.hours, 3)} h are too few, about {hours} h would do"
         reached = percent(goal.half(self.offer.off(more)))
         return f"{hours} h would reach {reached}, and no further run would take a quarter per cent off that"
+
+    def _purposes(self, counts: Array) -> dict[Test, str]:
+        """In words, of each test with all its repeats, what of the aim would be lost without it; of targets, what would
+        be missed."""
+        found = {}
+        for test in np.flatnonzero(counts).tolist():
+            without = np.where(np.arange(counts.size) == test, 0, counts)
+            found[self.offer.tests[test]] = self._lost(counts, without) or "shows effects that the model lacks"
+        return found
+
+    def _lost(self, counts: Array, without: Array) -> str | None:
+        """What fewer runs lose of the aim, the worst of it; None of next to nothing."""
+        offer, off, less = self.offer, self.offer.off(counts), self.offer.off(without)
+        if offer.wanted.aim == "rivals":
+            apart, closer = (float(offer.apart(runs, offer.tellable).min()) for runs in (counts, without))
+            far = f"rivals {number(closer, 2)} apart in expected chi-square without it, {number(apart, 2)} with it"
+            return far if closer * _WORTH_SAYING <= apart else None
+        if offer.goals:
+            wider = [goal for goal in offer.goals if not goal.met(less) and goal.half(less) > goal.half(off)]
+            halves = ((f"{each.target}", each.half(less), each.half(off)) for each in wider)
+            told = (f"{name}: {percent(one, 3)} without it, {percent(other, 3)} with it" for name, one, other in halves)
+            return next(told, None)
+        growths = dict(zip(offer.known.names, np.sqrt(np.diag(less) / np.diag(off)), strict=False))
+        if offer.wanted.aim == "predictions":
+            growths = {"stiffness": np.sqrt(np.sum(less * offer.weight) / np.sum(off * offer.weight))}
+        growth, name = max((growths[name], name) for name in growths if name in ("stiffness", *offer.wanted.parameters))
+        larger = f"{name}: error {number(100.0 * (growth - 1.0), 2)} % larger without it"
+        return larger if growth >= _WORTH_SAYING else None
 
     def _enough(self, planned: Programme, missed: Sequence[str | None]) -> str | None:
         """Why hours stay free, if they do."""

@@ -83,7 +83,6 @@ def test_a_plan_for_targets_stops_once_they_are_met(root: Path, tmp_path: Path) 
     assert both["enough"] in done.stderr.replace("\n", " ")
     assert not both["warnings"]
     reasons = pd.read_csv(tmp_path / "both/plan.csv")["what for"]
-    assert reasons.str.contains("without it").sum() > len(reasons) / 2
     assert any(words.startswith(("stiffness.", "alpha: +/-2.")) for words in reasons), "what would miss a target"
     one = json.loads(bushfit("plan", *TARGETS, "--target", "alpha=4 %", "--hours", "6", "-o", tmp_path / "one").stdout)
     assert one["hours_planned"] < both["hours_planned"]

@@ -27,7 +27,7 @@ def inspection_figure(every: Sequence[Inspected], first: int = 0, count: int = 5
     """A row a file: a loop over displacement and over time, a sweep over frequency, a history over time.
 
     Args:
-        every: all files that were inspected; drawn are so many of them from the `first` on.
+        every: all files that were inspected; drawn are so many of them, from the `first` on.
     """
     files, known = every[first : first + count], Counter(seen.label for seen in every)
     page = f", {first // count + 1} of {-(-len(every) // count)}" if len(every) > count else ""

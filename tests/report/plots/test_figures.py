@@ -147,11 +147,11 @@ def test_files_are_drawn_as_they_are_together_and_alone(seen: list[Inspected]) -
 
 
 def test_files_of_one_direction_are_drawn_alike_and_pictures_say_which_they_are(root: Path) -> None:
-    """Loops to 1 and 2 mm in the same scales, with their folders where names repeat; to 0.3 and 1 mm each in its own."""
+    """Loops to 1 and 2 mm in the same scales, with their folders where names repeat; others each in their own."""
     names = ("practice/case_000", "arm_bushing")
     every = [inspect(root / f"data/{name}/loop_axial_{number}.csv", {}) for name in names for number in (1, 2)]
     for page, name in enumerate(names):
-        figure = whole(inspection_figure(every, 2 * page, 2))
+        figure = inside(inspection_figure(every, 2 * page, 2))
         loops = [axes for axes in figure.axes if axes.get_xlabel() == "displacement [mm]"]
         assert figure.get_suptitle() == f"Test files as they are, {page + 1} of 2"
         assert [title.split("/")[0] for title in titles(figure)] == [name.split("/")[-1]] * 2
