@@ -52,8 +52,8 @@ def plan(known: Knowledge, wanted: Wanted) -> Plan:
         )
     offer = Offer(known, wanted)
     few = [_Planner(offer, share * wanted.hours) for share in _SHARES.get(wanted.aim, ())]
-    for blind in (False, True) if offer.goals else (True,):  # blind for an effect only where it has to be
-        least = bisect_left(few, True, key=lambda each: each.reaches and (blind or not each.lacking))
+    for sound in (True, False) if offer.goals else (False,):  # blind, or without repeats, only where it has to be
+        least = bisect_left(few, True, key=lambda each: each.reaches and (each.sound or not sound))
         if least < len(few):
             return few[least].plan()
     return _Planner(offer, wanted.hours).plan()
@@ -85,6 +85,11 @@ class _Planner:
         here = [goal for goal in offer.goals if goal.target.place in offer.wanted.places]
         return bool(offer.goals) and told and not any(self._untold(goal, self.best) for goal in here)
 
+    @property
+    def sound(self) -> bool:
+        """Whether all effects show as in the standard programme, and repeats tell the scatter."""
+        return not self.lacking and self._scatter_freedom(self.best) >= _SCATTER_FREEDOM
+
     def plan(self) -> Plan:
         """See the function."""
         best = self.best
@@ -97,10 +102,7 @@ class _Planner:
             )
         planned = self._programme(ordered(best, self.budget.place, self._drifting(best)) if best.any() else [])
         before, standard = self._programme([]), self._programme(self.standard_runs)
-        missed, reasons = (
-            tuple(self._missed(best, goal) for goal in self.offer.goals),
-            self._purposes(best),
-        )
+        missed, reasons = tuple(self._missed(best, goal) for goal in self.offer.goals), self._purposes(best)
         enough, notes = self._enough(planned, missed), tuple(self._notes(planned, missed))
         return Plan(self.offer.known, self.offer.wanted, before, planned, standard, reasons, missed, enough, notes)
 
@@ -134,8 +136,7 @@ class _Planner:
         kept, worth = nothing.copy(), self.strict.one_more(nothing) if self.offer.goals else nothing
         for goal in self.offer.goals:
             mine = np.array([test.direction == goal.target.place for test in self.offer.tests]) & (self.budget.runs > 0)
-            first = not self._tested(kept)
-            if mine.any() and (first or self._untold(goal, kept)):
+            if mine.any() and (not self._tested(kept) or self._untold(goal, kept)):
                 kept[int(np.argmin(np.where(mine, worth, np.inf)))] = 1
         return kept if self.budget.spent(kept) <= self.budget.most else nothing
 
@@ -151,13 +152,12 @@ class _Planner:
 
     def _drift_shown(self, counts: Array) -> float:
         """Noncentrality of a drift by so many runs of each test, in their best order."""
-        drifting = self._drifting(counts)
-        return drifting.noncentrality(ordered(counts, self.budget.place, drifting))
+        return (drifting := self._drifting(counts)).noncentrality(ordered(counts, self.budget.place, drifting))
 
     def _with_scatter(self, counts: Array) -> Array:
         """The runs with further repeats of sweeps, until a fit can tell their scatter from what repeats differ by, as
-        far as that costs next to nothing of the aim."""
-        most = self.strict.together(counts) + 0.1  # of the logarithm of a variance: a twentieth of the error
+        far as that costs next to nothing of the aim; for targets whatever it costs, as long as they are met."""
+        most = np.inf if self.offer.goals else self.strict.together(counts) + 0.1  # a twentieth of the error
         while (freedom := self._scatter_freedom(counts)) < _SCATTER_FREEDOM:
             again = [test for test in np.flatnonzero(counts).tolist() if _differences(self.offer.tests[test])]
             more = [
@@ -318,8 +318,7 @@ class _Planner:
         return f"{hours} h would reach {reached}, and no further run would take a quarter per cent off that"
 
     def _purposes(self, counts: Array) -> dict[Test, str]:
-        """In words, of each test with all its repeats, what of the aim would be lost without it; of targets, what would
-        be missed."""
+        """In words, of each test with all its repeats, what of the aim would be lost without it."""
         found = {}
         for test in np.flatnonzero(counts).tolist():
             without = np.where(np.arange(counts.size) == test, 0, counts)
@@ -334,16 +333,16 @@ class _Planner:
             far = f"rivals {number(closer, 2)} apart in expected chi-square without it, {number(apart, 2)} with it"
             return far if closer * _WORTH_SAYING <= apart else None
         if offer.goals:
-            wider = [goal for goal in offer.goals if not goal.met(less) and goal.half(less) > goal.half(off)]
-            halves = ((f"{each.target}", each.half(less), each.half(off)) for each in wider)
-            told = (f"{name}: {percent(one, 3)} without it, {percent(other, 3)} with it" for name, one, other in halves)
-            return next(told, None)
+            wider = [goal for goal in offer.goals if goal.half(less) >= _WORTH_SAYING * goal.half(off)]
+            for goal in sorted(wider, key=lambda goal: -goal.half(less) / goal.target.half):
+                return f"{goal.target}: {percent(goal.half(less), 3)} without it, {percent(goal.half(off), 3)} with it"
+            return None
         growths = dict(zip(offer.known.names, np.sqrt(np.diag(less) / np.diag(off)), strict=False))
         if offer.wanted.aim == "predictions":
             growths = {"stiffness": np.sqrt(np.sum(less * offer.weight) / np.sum(off * offer.weight))}
         growth, name = max((growths[name], name) for name in growths if name in ("stiffness", *offer.wanted.parameters))
-        larger = f"{name}: error {number(100.0 * (growth - 1.0), 2)} % larger without it"
-        return larger if growth >= _WORTH_SAYING else None
+        more = number(100.0 * (growth - 1.0), 2)
+        return f"{name}: error {more} % larger without it" if growth >= _WORTH_SAYING else None
 
     def _enough(self, planned: Programme, missed: Sequence[str | None]) -> str | None:
         """Why hours stay free, if they do."""
@@ -373,6 +372,8 @@ class _Planner:
                 f"{' and '.join(self.offer.known.bounded)} came to rest on a bound: the errors of the others count that"
                 " noise takes it off there half of the times"
             )
+        if missed and self._scatter_freedom(self.best) < _SCATTER_FREEDOM:
+            yield "too few repeats tell how sweeps scatter: intervals may come out half as wide again as planned"
         if self.lacking:
             yield f"the standard programme shows these effects better: {', '.join(self.lacking)}"
         tellable = {tuple(pair) for pair in self.offer.tellable.T.tolist()}
