@@ -6,7 +6,7 @@ from typing import Literal
 import click
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
-from bushfit.cli.grids import asked_for, grid_options, positive
+from bushfit.cli.grids import TEMPERATURE, asked_for, grid_options, kelvin, positive
 from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, command_called, place_option
 
 
@@ -29,6 +29,7 @@ from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, command_called,
     "axial, radial or torsion, or a specimen's name; may be given again [axial and radial, and all specimens]."
 )
 @grid_options("the campaign's")
+@TEMPERATURE
 @click.option(
     "--units", help='Length, mass, time and force that fit together [decks "mm t s N"; tables as predict; fmu SI].'
 )
@@ -40,6 +41,7 @@ def command(
     formats: tuple[str, ...],
     campaign: Path | None,
     directions: tuple[str, ...],
+    temperature: str | None,
     units: str | None,
     dialect: Literal["optistruct"] | None,
     accuracy: str,
@@ -68,7 +70,7 @@ def command(
         system = UnitSystem.parse(units) if units is not None else None
     job = Export(
         tuple(dict.fromkeys(formats)),
-        Predict(asked),
+        Predict(asked, temperature=kelvin(temperature)),
         positive(accuracy, "--accuracy", "1") or 0.0,
         system,
         dialect or "nastran",

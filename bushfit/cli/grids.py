@@ -20,6 +20,11 @@ _MOST_VALUES = 100_000
 #: SI units of the options of a grid, by their keys.
 _UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 
+#: Option of what is predicted at one temperature.
+TEMPERATURE: Parameter = click.option(
+    "--temperature", help='Of the rubber, such as "40 degC", for a model with the effect of it [23 degC].'
+)
+
 
 def grid_options(usual: str) -> Parameter:
     """Where stiffness is predicted, by the keys of [predict]; `usual` says what the grid is without them."""
@@ -59,6 +64,18 @@ def positive(text: str | None, option: str, unit: str) -> float | None:
         if not value > 0.0:
             raise UnitError("this is not positive", found=f'"{text}"', expected="a value above zero")
     return value
+
+
+def kelvin(text: str | None) -> float | None:
+    """The value of --temperature [K]; None where it was not given.
+
+    Raises:
+        UnitError: no temperature with its unit.
+    """
+    from bushfit.units import temperature
+
+    with naming(place="--temperature"):
+        return None if text is None else temperature(text)
 
 
 def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | None:

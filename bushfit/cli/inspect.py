@@ -81,9 +81,9 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         "campaign": text,
     }
     if options.formats.pictures:
-        groups = (seen[start : start + _FILES_A_PICTURE] for start in range(0, len(seen), _FILES_A_PICTURE))
         figures = {
-            page: partial(plots.inspection.inspection_figure, group) for page, group in zip(pages, groups, strict=True)
+            page: partial(plots.inspection.inspection_figure, seen, number * _FILES_A_PICTURE, _FILES_A_PICTURE)
+            for number, page in enumerate(pages)
         }
         options.write(folder, options.formats.files(Contents(pictures=figures)), document)
     else:

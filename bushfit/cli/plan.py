@@ -14,7 +14,7 @@ import click
 from rich.markup import escape
 
 from bushfit.cli.common import Options, open_source, with_options
-from bushfit.cli.grids import asked_for, grid_options
+from bushfit.cli.grids import asked_for, grid_options, positive
 from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, Size, command_called, place_option
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
@@ -34,13 +34,13 @@ _MOST_EFFECTS = 6
 _MOST_VALUES = 6
 
 
-@command_called("plan", "configs/arm_bushing.toml --hours 4", "configs/new_bushing.toml --hours 2.5 --for parameters")
+@command_called("plan", "configs/arm_bushing.toml --hours 4", 'configs/new_bushing.toml --target "stiffness=1 %"')
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
 @click.option(
     "--for",
     "aim",
     type=click.Choice(["parameters", "predictions", "rivals"]),
-    help="What the tests are to tell best: errors of parameters, of stiffness, or rivals apart [predictions].",
+    help="What the tests are to tell best: parameters, stiffness, or rivals apart [predictions].",
 )
 @click.option(
     "--hours",
@@ -51,14 +51,21 @@ _MOST_VALUES = 6
     help="Of the rig, at most.",
 )
 @place_option(
-    "axial, radial or torsion, or a specimen's name: where the rig can test; may be given again [axial and radial of a "
-    "bushing, else all specimens]."
+    "axial, radial, torsion or a specimen, where the rig can test; may be given again [axial and radial, else all "
+    "specimens]."
 )
-@click.option("--parameters", metavar="NAME,...", help="Whose errors count, with --for parameters [all].")
+@click.option("--parameters", metavar="NAME,...", help="Whose errors count [all].")
 @click.option(
     "--rivals",
     metavar="NAME,...",
     help="Effects to be told apart [those that a diagnosis of the campaign cannot tell].",
+)
+@click.option(
+    "--target",
+    "targets",
+    multiple=True,
+    metavar="NAME=SIZE",
+    help='95 % interval to reach, either way: "mu=2%", "stiffness=1%", "loss_factor.axial=5%"; may be given again.',
 )
 @grid_options("the campaign's")
 @click.option("--campaign", type=FILE, help="Of MODEL.json: take the [rig] and [predict] of this campaign.")
@@ -74,17 +81,19 @@ def command(
     directions: tuple[str, ...],
     parameters: str | None,
     rivals: str | None,
+    targets: tuple[str, ...],
     campaign: Path | None,
     count: int | None,
     seed: int,
     options: Options,
     **grids: str | None,
 ) -> None:
-    """Choose the tests that would tell most, within the hours and the limits of the rig.
+    """Choose the tests that would tell most, within what the rig can do.
 
     It starts from the tests of CAMPAIGN, from its [compound] where there are none, or from MODEL.json or a folder of
     results. A [compound] is a guess: hardness = "61 Shore A", filler = "27 phr", rubber = "natural". What the model
-    lacks shows at least as well as in the paper's tests of as many hours. Rivals take no more hours than they need.
+    lacks shows at least as well as in the paper's tests of as many hours. Rivals and targets take no more hours than
+    they need; a target that is missed is explained, with exit status 1.
 
     Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml for `bushfit simulate`.
     """
@@ -95,8 +104,13 @@ def command(
         raise click.UsageError("'--rivals' goes with '--for rivals'.")
     if aim not in (None, "parameters") and parameters:
         raise click.UsageError("'--parameters' goes with '--for parameters'.")
-    chosen = cast("Aim", aim) if aim else ("rivals" if rivals else "parameters" if parameters else "predictions")
-    job = PlanTests(chosen, hours, directions, _names(parameters), _names(rivals), asked_for((), grids))
+    if targets and (aim or rivals or parameters):
+        raise click.UsageError("'--target' is an aim of its own: without '--for', '--parameters' and '--rivals'.")
+    usual = "targets" if targets else "rivals" if rivals else "parameters" if parameters else "predictions"
+    sizes = dict(map(_target, targets))
+    job = PlanTests(
+        cast("Aim", aim or usual), hours, directions, _names(parameters), _names(rivals), sizes, asked_for((), grids)
+    )
     opened, beside = open_source(source), load_campaign(campaign) if campaign else None
     if beside and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' goes with MODEL.json.")
@@ -104,16 +118,28 @@ def command(
     with naming(source):
         outcome = job.run(opened, beside)
     _tell(options, outcome)
-    if count:
+    if count and outcome.plan.planned.tests:
         outcome = replace(outcome, check=_checked(options, outcome, count, seed))
-    files = {**options.formats.files(outcome.contents), CAMPAIGN_FILE: outcome.campaign}
+    files = {**options.formats.files(outcome.contents), **outcome.campaign}
     options.write(folder, files, outcome.document)
-    options.say(f"next: make the tests in the order of {folder / options.formats.table('plan')}")
+    if outcome.plan.planned.tests:
+        options.say(f"next: make the tests in the order of {folder / options.formats.table('plan')}")
+    if missed := [name for name, target in outcome.document["targets"].items() if not target["met"]]:
+        click.echo(f"bushfit: these targets are not met: {', '.join(missed)}", err=True)
+        click.get_current_context().exit(1)
 
 
 def _names(text: str | None) -> tuple[str, ...]:
     """Names between commas, each once."""
     return tuple(dict.fromkeys(filter(None, (name.strip() for name in (text or "").split(",")))))
+
+
+def _target(text: str) -> tuple[str, float]:
+    """Name and size of a target such as "stiffness.axial=1 %"."""
+    name, parted, size = text.rpartition("=")
+    if not parted:
+        raise click.BadParameter(f"'{text}' is no name, '=' and size, such as \"mu=2 %\".", param_hint="'--target'")
+    return name.strip(), positive(size.strip(), "--target", "1") or 0.0
 
 
 def _tell(options: Options, outcome: Planned) -> None:
@@ -129,6 +155,7 @@ def _tell(options: Options, outcome: Planned) -> None:
     for name, row in rows.items():
         table.add_row(escape(name), *(number(100.0 * row[key], 2) for key in ("before", "planned", "standard")))
     options.console.print(table)
+    _tell_targets(options, document)
     _tell_effects(options, document)
     if rivals := document["rivals"]:
         apart = ", ".join(f"{number(rivals[key], 3)} by the {key} tests" for key in ("planned", "standard"))
@@ -136,6 +163,8 @@ def _tell(options: Options, outcome: Planned) -> None:
             f"{' and '.join(rivals['effects'])}: {apart} apart in expected chi-square; from "
             f"{number(rivals['enough'], 3)} on they are told apart in nine of ten cases"
         )
+    if document["enough"]:
+        options.say(document["enough"])
     options.warn(document["warnings"])
 
 
@@ -162,6 +191,18 @@ def _listed(values: Sequence[float], factor: float) -> str:
     """Few values in full, many as their ends."""
     words = [number(factor * value, 3) for value in values]
     return ", ".join(words) if len(words) <= _MOST_VALUES else f"{words[0]} to {words[-1]} ({len(words)})"
+
+
+def _tell_targets(options: Options, document: PlanFile) -> None:
+    """Each target beside what is reached now, by the plan and by the standard programme."""
+    keys = ("asked", "before", "planned", "standard")
+    columns = ("asked for", "before", "plan", "standard", "")
+    table = new_table("targets: 95 % interval either way, the widest [%]", "of", *columns)
+    for name, target in document["targets"].items():
+        sizes = (number(100.0 * target[key], 2) for key in keys)  # type: ignore[literal-required]
+        table.add_row(escape(name), *sizes, "met" if target["met"] else "not met")
+    if table.rows:
+        options.console.print(table)
 
 
 def _tell_effects(options: Options, document: PlanFile) -> None:

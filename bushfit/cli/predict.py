@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
-from bushfit.cli.grids import asked_for, grid_options, positive
+from bushfit.cli.grids import TEMPERATURE, asked_for, grid_options, kelvin, positive
 from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, command_called, place_option
 from bushfit.cli.show import new_table, tell_tests
 
@@ -35,7 +35,7 @@ _MOST_AMPLITUDES = 8
     "specimens]."
 )
 @grid_options("the campaign's")
-@click.option("--temperature", help='Of the rubber, such as "40 degC", for a model with the effect of it [23 degC].')
+@TEMPERATURE
 @click.option("--mass", help='Predict its resonance on each place, too: such as "1.2 kg", with --base-acceleration.')
 @click.option("--base-acceleration", help='Amplitude of the base under the mass, such as "0.1 g" or "1 m/s^2".')
 @click.option("--wide", is_flag=True, help="Also <place>_wide.csv: frequency down, amplitude across, no bands.")
@@ -73,11 +73,9 @@ def command(
     --bushing carries the compound to another shape: effects of its material are kept, those of bushing and rig are not.
     """
     from bushfit.campaign.campaign import load_bushing, load_campaign
-    from bushfit.errors import naming
     from bushfit.jobs.predict import Predict
     from bushfit.model.result import carried
     from bushfit.report.contents import Kinds
-    from bushfit.units import temperature as kelvin
 
     result, notes = open_model(model), list[str]()
     if bushing:
@@ -89,10 +87,8 @@ def command(
     if (mass is None) != (base_acceleration is None):
         raise click.UsageError("'--mass' and '--base-acceleration' go together.")
     shaken = positive(mass, "--mass", "kg"), positive(base_acceleration, "--base-acceleration", "m/s^2")
-    with naming(place="--temperature"):
-        warm = None if temperature is None else kelvin(temperature)
     within = positive(arms, "--arms", "1")
-    job = Predict(asked, *shaken, warm, wide, within)
+    job = Predict(asked, *shaken, kelvin(temperature), wide, within)
     measured = Kinds(tables=("measured",) if loaded and loaded.sweeps else ())
     folder = options.free_folder((loaded or result).name, job.kinds(result, loaded) + measured)
     outcome = job.run(result, loaded, tuple(notes))

@@ -19,7 +19,7 @@ import numpy as np
 from bushfit.effects import Level as EffectLevel
 from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import Form, Level, by_dof, commented, directions, of_levels, stated, tables, to_bytes
+from bushfit.export.deck import Form, Level, by_dof, commented, directions, of_levels, real, stated, tables, to_bytes
 from bushfit.export.losses import of_tables
 from bushfit.export.systems import MM_T_S_N, UnitSystem
 from bushfit.geometry import Specimen
@@ -67,7 +67,7 @@ def _behavior(units: UnitSystem, rank: int, level: Level) -> Iterator[str]:
 def _constants(diagonal: Array, frequency: float) -> Iterator[str]:
     """The lines of one frequency: the upper triangle of a diagonal matrix, (6,), column by column."""
     triangle = np.diag(diagonal).T[np.tril_indices(6)]
-    texts = [_real(value) for value in (*triangle, frequency)]
+    texts = [*(real(value) for value in triangle), real(frequency, 10)]
     for start in range(0, _CONSTANTS + 1, _A_LINE):
         yield ", ".join(texts[start : start + _A_LINE])
 
@@ -78,17 +78,12 @@ def _materials(order: Order, units: UnitSystem) -> Iterator[str]:
     long_term = model.values[_LONG_TERM]
     for rank, table in enumerate(tables(first), start=1):
         strain = 2.0 * table.amplitude * model.unit_strain(table.direction)
-        ratio = model.stiffness(_COMPOUND, table.frequency, strain) / long_term
+        ratio = model.stiffness(_COMPOUND, table.frequency, strain, under=order.under) / long_term
         where = f"shear strain amplitude {number(100.0 * strain, 6)} %, that of {stated((table,))}"
         yield from commented("**", [f"COMPOUND_{rank}: {where}"])
         yield f"*MATERIAL, NAME=COMPOUND_{rank}"
         yield "*HYPERELASTIC, NEO HOOKE, MODULI=LONG TERM"
-        yield f"{_real(0.5 * long_term * units.stress.factor)}, 0."
+        yield f"{real(0.5 * long_term * units.stress.factor)}, 0."
         yield "*VISCOELASTIC, FREQUENCY=TABULAR"
         for f, loss, gain in zip(table.frequency * units.frequency.factor, ratio.imag, 1.0 - ratio.real, strict=True):
-            yield f"{_real(loss)}, {_real(gain)}, 0., 0., {_real(f)}"
-
-
-def _real(value: float) -> str:
-    """A real of eleven digits; nothing is 0."""
-    return f"{value:.10E}" if value else "0."
+            yield f"{real(loss)}, {real(gain)}, 0., 0., {real(f, 10)}"

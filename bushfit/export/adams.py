@@ -17,7 +17,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import DOFS, Table, commented, directions, heading, middle, stated, tables, to_bytes
+from bushfit.export.deck import DOFS, Table, commented, directions, heading, middle, real, stated, tables, to_bytes
 from bushfit.export.losses import of_all, of_band
 from bushfit.geometry import ROTATION, TRANSLATION, Direction
 from bushfit.prediction.caveats import percent_off
@@ -129,21 +129,16 @@ def _file(order: Order, elements: Sequence[_Element], kind: str, losses: Sequenc
         for dof in DOFS[element.direction]:
             damping[dof] = scale * element.damping(kind)
             curves[dof] = element.moved * displacement, element.force * force
-    values = {f"{resists.upper()}_DAMPING": _real(damping.get(dof, 0.0)) for dof, (_, resists) in enumerate(_AXES, 1)}
+    values = {f"{resists.upper()}_DAMPING": real(damping.get(dof, 0.0)) for dof, (_, resists) in enumerate(_AXES, 1)}
     yield from _block("DAMPING", values)
     for dof, (moves, resists) in enumerate(_AXES, start=1):
         curve = curves[dof] if dof in curves else (np.arange(-2.0, 3.0), np.zeros(5))  # nothing known
         yield from _block(f"{resists.upper()}_CURVE", {})
         yield f"{{{moves:>16} {resists:>17}}}"
-        yield from (f"{_real(moved):>17} {_real(resisting):>17}" for moved, resisting in zip(*curve, strict=True))
+        yield from (f"{real(moved, 10):>17} {real(resisting):>17}" for moved, resisting in zip(*curve, strict=True))
 
 
 def _block(name: str, attributes: Mapping[str, str]) -> Iterator[str]:
     """A block and its attributes."""
     yield f"[{name}]"
     yield from (f" {key} = {value}" for key, value in attributes.items())
-
-
-def _real(value: float) -> str:
-    """A real of ten digits."""
-    return f"{value:.9E}"

@@ -123,7 +123,7 @@ def heading(order: Order, units: str, losses: Iterable[str]) -> list[str]:
     bushing, source = order.result.model.bushing, order.source
     sizes = (bushing.inner_radius, bushing.outer_radius, bushing.length) if bushing else ()
     return [
-        f"written by bushfit {__version__}",
+        f"written by bushfit {__version__}{f' on {order.day}' if order.day else ''}",
         f"bushing: {order.result.name}",
         f"inner radius, outer radius, length: {', '.join(number(1e3 * size, 6) for size in sizes)} mm",
         f"model: {source.file}",
@@ -157,6 +157,11 @@ def stated(level: Iterable[Table]) -> str:
     return ", ".join(
         f"{table.direction} at {number(table.amplitude * factor, 6)} {unit}" for table, (unit, factor) in displayed
     )
+
+
+def real(value: float, digits: int = 5) -> str:
+    """A number with so many significant digits, ten for what a table goes over; nothing is 0."""
+    return f"{value:.{digits - 1}E}" if value else "0."
 
 
 def to_bytes(lines: Iterable[str]) -> bytes:

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.effects import Branch, Effect, Level, Modifier, place_of, qualified
-from bushfit.effects.contract import Array
+from bushfit.effects.contract import Array, Circumstances
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
 from bushfit.export.contract import Order
 from bushfit.export.losses import of_band
 from bushfit.geometry import Place
-from bushfit.model.arms import Arms, model_arms, qualified_size
+from bushfit.model.arms import Arms, model_arms, qualified_size, values_under
 from bushfit.model.model import Model
 from bushfit.prediction.stiffness import Prediction
 from bushfit.units import number
@@ -77,15 +77,15 @@ def in_time(order: Order) -> InTime:
     # what has no name, and what is gone once settled
     left = [effect.name for effect in model.records if effect.name == UNNAMED or effect.settles]
     kept = model.without(*left)
-    held = [effect.name for effect in kept.records if isinstance(effect, Modifier)]
+    held = [effect.name for effect in kept.records if isinstance(effect, Modifier) and not effect.shift_factor]
     for effect in kept.records:
         _check(effect)
-    arms = model_arms(kept, band(order), order.accuracy)
-    middle = [kept.values_at(p.direction, _middle(p.frequency), _middle(p.amplitude)) for p in order.predictions]
+    arms, under = model_arms(kept, band(order), order.accuracy, order.under), order.under
+    middle = [kept.values_at(p.direction, _middle(p.frequency), _middle(p.amplitude), under) for p in order.predictions]
     values, names = _values(kept, order.places, middle, arms)
     losses = [f"the whole memory of the rubber: {part.sentence}, fading below" for part in arms]
-    for prediction, own in zip(order.predictions, middle, strict=True):
-        losses += [*_lost(kept, held, left, prediction, own), *of_band(prediction)]
+    for prediction in order.predictions:
+        losses += [*_lost(kept, held, left, prediction, under), *of_band(prediction)]
     return InTime(
         order.places,
         values,
@@ -93,7 +93,7 @@ def in_time(order: Order) -> InTime:
         tuple(kept.bushing.outer_radius if kept.bushing and p.is_rotation else 1.0 for p in order.places),
         tuple(part.size for part in arms),
         tuple(
-            (k, float(modulus / kept.values[part.size]), float(time))
+            (k, float(modulus / values_under(kept, under)[part.size]), float(time))
             for k, part in enumerate(arms)
             for modulus, time in zip(part.modulus, part.time, strict=True)
         ),
@@ -182,21 +182,20 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
     return fields
 
 
-def _lost(
-    model: Model, held: list[str], left: list[str], prediction: Prediction, values: Mapping[str, float]
-) -> list[str]:
+def _lost(model: Model, held: list[str], left: list[str], prediction: Prediction, under: Circumstances) -> list[str]:
     """What it costs in steady stiffness at a place that modifiers are held, and that some effects are left out."""
     if not (held or left):
         return []
-    plain = model.without(*held)
+    middle = _middle(prediction.frequency), _middle(prediction.amplitude)
+    plain, values = model.without(*held), model.values_at(prediction.direction, *middle)
     own = plain.with_values({name: values[name] for name in plain.values})
-    found = own.stiffness(prediction.direction, prediction.frequency, prediction.amplitude)
+    found = own.stiffness(prediction.direction, prediction.frequency, prediction.amplitude, under=under)
     whole = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
     error = float(np.max(np.abs(found / whole - 1.0)))
     if error < 1e-6 and not left:  # rounding
         return []
     (length, factor), *_ = prediction.direction.display
-    frequency, amplitude = number(_middle(prediction.frequency), 3), number(factor * _middle(prediction.amplitude), 3)
+    frequency, amplitude = number(middle[0], 3), number(factor * middle[1], 3)
     said = [f"{', '.join(held)}, held as at {frequency} Hz and {amplitude} {length}"] * bool(held)
     said += [", ".join(left)] * bool(left)
     off = f"stiffness off by up to {number(100.0 * error, 2)} % over the grid"

@@ -73,7 +73,7 @@ def _between(order: Order, own: Sequence[Table], form: Form) -> float:
     for table in own:
         halfway = 0.5 * (table.frequency[1:] + table.frequency[:-1])
         lines = (0.5 * (part[1:] + part[:-1]) for part in form.parts(table.frequency, table.stiffness))
-        exact = model.stiffness(table.direction, halfway, table.amplitude)
+        exact = model.stiffness(table.direction, halfway, table.amplitude, under=order.under)
         worst = max(worst, float(np.max(np.abs(form.joined(halfway, *lines) / exact - 1.0))))
     return worst
 

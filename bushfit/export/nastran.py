@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import Form, Level, by_dof, of_levels, to_bytes
+from bushfit.export.deck import Form, Level, by_dof, of_levels, real, to_bytes
 from bushfit.export.losses import of_tables
 from bushfit.export.systems import MM_T_S_N, UnitSystem
 
@@ -64,14 +64,16 @@ def _property(dialect: _Dialect, units: UnitSystem, pid: int, level: Level) -> I
     nominal, numbers = [dict[int, str](), dict[int, str]()], [dict[int, str](), dict[int, str]()]
     for dof, _, *columns in rows:
         for part, column in enumerate(columns):
-            nominal[part][dof] = _real(column[0])
+            nominal[part][dof] = real(column[0])
             numbers[part][dof] = str(_TABLES * pid + 10 * part + dof)
     yield from _large("PBUSH*", [str(pid), *_by_dof(dialect.names, nominal)])
     if several:
         yield from _small("PBUSHT", [str(pid), *_by_dof(dialect.names, numbers)])
         for dof, frequency, *parts in rows:
             for part, column in enumerate(parts):
-                pairs = [_real(value) for pair in zip(frequency, column, strict=True) for value in pair]
+                pairs = [
+                    text for f, value in zip(frequency, column, strict=True) for text in (real(f, 10), real(value))
+                ]
                 yield from _large("TABLED1*", [numbers[part][dof], "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
 
 
@@ -81,11 +83,6 @@ def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
     for name, row in zip(names, rows, strict=True):
         fields += [*([""] if fields else []), name, *(row.get(dof, "") for dof in range(1, 7))]
     return fields
-
-
-def _real(value: float) -> str:
-    """A real of ten digits, which fills a large field even with its sign."""
-    return f"{value:.9E}"
 
 
 def _small(name: str, fields: Sequence[str]) -> Iterator[str]:

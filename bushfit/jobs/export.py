@@ -3,6 +3,7 @@
 import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -108,7 +109,8 @@ class Export:
             asked = replace(self.predict.asked, frequencies=union)
             predicted = replace(self.predict, asked=asked).run(result, campaign)
         settings = (self.accuracy, self.units, self.dialect, self.decimal_comma)
-        order = Order(result, source, tuple(predicted.predictions), *settings)
+        day = datetime.now(UTC).date().isoformat()
+        order = Order(result, source, tuple(predicted.predictions), *settings, self.predict.temperature, day)
         exported = {}
         for name in self.formats:
             module, _, function = FORMATS[name].partition(":")

@@ -55,12 +55,18 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
 
     They are those of the sweeps at this place, so that prediction and measurement stand side by side, a level that
     several sweeps reached more or less counting once; of amplitudes that were stepped, and of what swings free, at most
-    ten over their range. Without any sweep they are the paper's as far as they lie in the measured range, or an even
-    grid over that range where fewer than two do.
+    ten over their range. Without sweeps they are those that the model file lists. Without any they are the paper's as
+    far as they lie in the measured range, or an even grid over that range where fewer than two do.
     """
     mine = [sweep for sweep in sweeps if sweep.direction == direction]
     if mine:
-        return _measured(mine, "frequency"), _measured(_levelled(mine), "amplitude")
+        return measured_levels(mine, "frequency"), measured_levels(mine, "amplitude")
+    if result.campaign and (tests := [test for test in result.campaign.tests if test.place == str(direction)]):
+        frequency, amplitude = (
+            np.hstack([getattr(test, key) for test in tests]) for key in ("frequencies_Hz", "amplitudes")
+        )
+        if frequency.size and amplitude.size:
+            return _distinct(frequency), _distinct(amplitude)
     amplitudes = np.array(_AMPLITUDES_OF[direction.motion])
     frequencies = np.array(PAPER_FREQUENCIES)
     if result.measured is None:
@@ -124,8 +130,10 @@ def _levelled(sweeps: Sequence[Sweep]) -> list[Sweep]:
     return [*changed, *(sweep for sweep in sweeps if not sweep.stepped)]
 
 
-def _measured(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
-    """The values of some sweeps, rising; in place of many that were taken as they came, some that span them."""
+def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
+    """The values of some sweeps of one place, rising; in place of many that were taken as they came, some that span
+    them."""
+    sweeps = _levelled(sweeps) if axis == "amplitude" else sweeps
     parts: tuple[list[Array], list[Array]] = [], []
     for sweep in sweeps:
         as_it_came = sweep.stepped is None or sweep.stepped == axis == "amplitude"

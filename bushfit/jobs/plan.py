@@ -1,6 +1,6 @@
 """plan: which tests next, chosen for what they would tell."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -13,17 +13,20 @@ from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Place, place_named
 from bushfit.jobs.grid import grid_at, grid_settings
-from bushfit.jobs.plan_document import Checked, PlanFile, PlannedRun, Reached, Rivalry, Shown
+from bushfit.jobs.plan_document import Checked, PlanFile, PlannedRun, Reached, Rivalry, Shown, TargetEntry
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.check import Check
-from bushfit.planning.contract import Aim, Knowledge, Plan, Points, Programme, Test, Wanted, motions
+from bushfit.planning.contract import Aim, Knowledge, Plan, Points, Programme, Target, Test, Wanted, motions
 from bushfit.planning.guess import guess
 from bushfit.planning.knowledge import of_campaign, of_result, rig_of
-from bushfit.planning.plan import RIVALS_APART, plan
+from bushfit.planning.offer import RIVALS_APART
+from bushfit.planning.plan import plan
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.planned import plan_contents
 
+#: Quantities of predictions that may be targets.
+PREDICTED = ("stiffness", "loss_factor")
 #: File of the plan that `simulate` takes.
 CAMPAIGN_FILE = "campaign.toml"
 
@@ -36,9 +39,9 @@ class Planned:
     check: Check | None = None
 
     @property
-    def campaign(self) -> bytes:
-        """The plan as a campaign file for `bushfit simulate`."""
-        return campaign_toml(self.plan).encode()
+    def campaign(self) -> dict[str, bytes]:
+        """The plan as a campaign file for `bushfit simulate`, by its name; none of a plan without tests."""
+        return {CAMPAIGN_FILE: campaign_toml(self.plan).encode()} if self.plan.planned.tests else {}
 
     @cached_property
     def document(self) -> PlanFile:
@@ -52,6 +55,9 @@ class Planned:
             "tests": [_run(*pair) for pair in zip(found.planned.tests, found.planned.minutes.tolist(), strict=True)],
             "hours_planned": found.planned.hours,
             "hours_standard": found.standard.hours,
+            "hours_left": found.hours_left,
+            "enough": found.enough,
+            "targets": dict(self._targets()),
             "parameters": {
                 name: _reached([programme.errors[place] for programme in every])
                 for place, name in enumerate(known.names)
@@ -64,6 +70,13 @@ class Planned:
             "check": _checked(self.check) if self.check else None,
             "warnings": list(found.notes),
         }
+
+    def _targets(self) -> Iterator[tuple[str, TargetEntry]]:
+        """How each target comes out."""
+        found = self.plan
+        halves = (found.before.halves, found.planned.halves, found.standard.halves)
+        for target, why, *reached in zip(found.wanted.targets, found.missed, *halves, strict=True):
+            yield str(target), {"asked": target.half, **_reached(reached), "met": why is None, "why": why}
 
     def _root_mean_squares(self, errors: Sequence[Array]) -> Iterator[tuple[str, Reached]]:
         """Root mean square of errors at the points of each place, of each programme."""
@@ -102,6 +115,8 @@ class PlanTests:
     Args:
         parameters: whose errors count; none for all.
         rivals: effects to be told apart; none for those that the diagnosis cannot tell.
+        targets: half of the 95 % interval, over the value, by parameter, or by "stiffness" or "loss_factor", of all
+            places where predictions are wanted or of one, as in "stiffness.axial".
         asked: where predictions are wanted.
     """
 
@@ -110,6 +125,7 @@ class PlanTests:
     directions: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
     rivals: tuple[str, ...] = ()
+    targets: Mapping[str, float] = field(default_factory=dict)
     asked: PredictSettings = field(default_factory=PredictSettings)
 
     def kinds(self) -> Kinds:
@@ -143,7 +159,8 @@ class PlanTests:
         places = tuple(place_named(name, known.specimens) for name in self.directions) or tuple(usual)
         points = tuple(self._points(result, campaign, usual))
         rig = rig_of(campaign.rig if campaign else RigSettings(), known.noise)
-        wanted = Wanted(self.aim, self.hours, rig, places, points, self.parameters or known.names)
+        targets = tuple(target for name, half in self.targets.items() for target in _target(name, half, known, points))
+        wanted = Wanted(self.aim, self.hours, rig, places, points, self.parameters or known.names, targets)
         return Planned(plan(known, wanted))
 
     def _known(self, source: Campaign | Result | Knowledge) -> Knowledge:
@@ -165,6 +182,18 @@ class PlanTests:
             frequencies, amplitudes = grid_at(settings, result, place, campaign.sweeps if campaign else ())
             amplitude, frequency = np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
             yield Points(place, frequency.ravel(), amplitude.ravel())
+
+
+def _target(name: str, half: float, known: Knowledge, points: Sequence[Points]) -> list[Target]:
+    """What a target stands for: a parameter, or a quantity at one place or at all where predictions are wanted."""
+    possible = {each: [Target(each, half)] for each in known.names}
+    for quantity in PREDICTED:
+        at = [Target(quantity, half, each.place) for each in points]
+        possible |= {quantity: at, **{str(each): [each] for each in at}}
+    if name not in possible:
+        expected, hint = ", ".join(possible), did_you_mean(name, tuple(possible))
+        raise ModelError("there is no such target", place="--target", found=name, expected=expected, hint=hint)
+    return possible[name]
 
 
 def _run(test: Test, minutes: float) -> PlannedRun:

@@ -45,6 +45,20 @@ class Reached(TypedDict):
     standard: float
 
 
+class TargetEntry(Reached):
+    """Half of a 95 % interval over its value, the widest of all points that are wanted.
+
+    Args:
+        asked: at most.
+        met: whether the planned tests meet it.
+        why: what they fail by, in words; null where it is met.
+    """
+
+    asked: float
+    met: bool
+    why: str | None
+
+
 class Shown(TypedDict):
     """The smallest amount of an effect that a test of 5 % finds in 90 % of the cases.
 
@@ -107,7 +121,10 @@ class PlanFile(TypedDict):
         hours: of the rig, at most.
         tests: runs in their order.
         hours_planned: that they take.
-        hours_standard: that the standard programme takes, as often as it fits into the hours.
+        hours_standard: that the standard programme takes, as often as it fits into the hours that the plan needs.
+        hours_left: of those of the rig, that no test takes.
+        enough: why hours stay free, in words; null where they are used.
+        targets: 95 % intervals that were asked for, by name; none but for them.
         parameters: relative standard error of each parameter, by name.
         stiffness: root mean square relative standard error of the stiffness where it is wanted, by place.
         loss_factor: the same of the loss factor, in loss factor.
@@ -126,6 +143,9 @@ class PlanFile(TypedDict):
     tests: list[PlannedRun]
     hours_planned: float
     hours_standard: float
+    hours_left: float
+    enough: str | None
+    targets: dict[str, TargetEntry]
     parameters: dict[str, Reached]
     stiffness: dict[str, Reached]
     loss_factor: dict[str, Reached]

@@ -7,6 +7,7 @@ from typing import Any
 from bushfit.errors import typed
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, SweepData
+from bushfit.jobs.grid import measured_levels
 from bushfit.model.file import to_document
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
@@ -52,6 +53,8 @@ def _test(data_set: DataSet) -> dict[str, Any]:
         "stepped": sweep and sweep.stepped,
         "frequency_Hz": _ends(data_set.frequency),
         "amplitude": _ends(data_set.amplitude),
+        "frequencies_Hz": measured_levels([sweep], "frequency").tolist() if sweep else [],
+        "amplitudes": measured_levels([sweep], "amplitude").tolist() if sweep else [],
         "unit": data_set.direction.motion.displacement_unit,
         "repeats": int(sweep.repeat.max()) if sweep else 1,
         "rows": data_set.size // data_set.parts,

@@ -146,7 +146,7 @@ def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float
     >>> [row[0] for row in arm_rows(paper, model_arms(paper, (5.0, 155.0)))]
     ['elastic', 'springpot', 'springpot', 'springpot', 'springpot']
     """
-    values = _values(model, arms[0].under) if arms else model.values
+    values = values_under(model, arms[0].under) if arms else model.values
     at_rest = [("elastic", values["mu"], np.nan)] if "mu" in values else []
     every = ((part.stands_for, *pair) for part in arms for pair in zip(part.modulus, part.time, strict=True))
     return at_rest + [(name, float(modulus), float(time)) for name, modulus, time in every]
@@ -161,12 +161,12 @@ def qualified_size(branch: Branch) -> str:
 
 def part_modulus(model: Model, size: str, omega: Array, under: Circumstances = UNKNOWN) -> Array:
     """mu^ [Pa] of the branches of one size at angular frequencies [rad/s], (n,)."""
-    still, values, reduced = np.zeros_like(omega), _values(model, under), omega * model.shift_factor(under)
+    still, values, reduced = np.zeros_like(omega), values_under(model, under), omega * model.shift_factor(under)
     own = (branch for branch in model.viscoelastic if qualified_size(branch) == size)
     return np.asarray(sum(branch.modulus(seen_by(branch, values), reduced, still) for branch in own))
 
 
-def _values(model: Model, under: Circumstances) -> Values:
+def values_under(model: Model, under: Circumstances) -> Values:
     """The values of a model as its temperature leaves them, whatever the motion."""
     if under.temperature is None:
         return model.values

@@ -4,7 +4,6 @@ The dataclasses are the keys, for the reader and for the JSON Schema alike: pyda
 other keys alone.
 """
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, get_args
@@ -15,17 +14,16 @@ from pydantic import ConfigDict, Field
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import Shape, SpecimenKind, StatedStrain
+from bushfit.model.result import CampaignTable as CampaignTable
 from bushfit.model.result import End, Misfit, Outlier, Quality, Range, Usable
-from bushfit.reading.measurement import Source, Stepped
+from bushfit.model.result import TestTable as TestTable
+from bushfit.reading.measurement import Source
 from bushfit.units import SIZES
 from bushfit.validation import Flag, Name, Number, WholeNumber
 
 #: What the key "schema" of a model file has to say: of one with a bushing alone, and of one with specimens too.
 SchemaName = Literal["bushfit/model/1", "bushfit/model/2"]
 SCHEMAS: tuple[SchemaName, ...] = get_args(SchemaName)
-
-#: A picture as a data URI: what a page may show of a file that somebody else wrote, and nothing else.
-_PICTURE = re.compile(r"data:image/(png|svg\+xml);base64,[A-Za-z0-9+/]+=*")
 
 Matrix = tuple[tuple[Number, ...], ...]
 #: Share of a variance by which rounding in a file may take the least eigenvalue below zero.
@@ -181,70 +179,6 @@ class FitTable(Quality):
         if self.frequency_Hz is None or self.strain is None:
             return None
         return Range(self.frequency_Hz, self.strain, self.directions, self.temperature_K)
-
-
-@dataclass(frozen=True)
-class TestTable:
-    """A test of the campaign, its range, and what the campaign says of it.
-
-    Args:
-        test: its name.
-        kind: "loop" or "sweep".
-        place: direction, or specimen by its name.
-        frequency_Hz: least and largest [Hz].
-        amplitude: least and largest, zero-to-peak, in the unit.
-        unit: of the amplitude, SI; "1" of a strain.
-        rows: of a loop, or operating points.
-        repeats: of each operating point.
-        stepped: what a sweep steps through, "frequency" or "amplitude"; null of a loop.
-        file: that it was read from; null where it came from none.
-        sha256: of the file.
-        conditions: that the campaign states, such as its temperature, preload or date.
-    """
-
-    __test__ = False  # no test of pytest's
-
-    test: str
-    kind: str
-    place: str
-    frequency_Hz: tuple[Number, Number]  # noqa: N815
-    amplitude: tuple[Number, Number]
-    unit: Literal["m", "rad", "1"]
-    rows: WholeNumber
-    repeats: WholeNumber = 1
-    stepped: Stepped | None = None
-    file: str | None = None
-    sha256: str | None = None
-    conditions: Mapping[str, str | Number] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class CampaignTable:
-    """The campaign that a model comes from.
-
-    Args:
-        name: of the campaign.
-        file: its name.
-        sha256: of the file.
-        command: with all that settles the numbers, as it would be typed beside the file.
-        tests: all that the campaign has.
-        report: what stands at the head of a report: customer, part_number, drawing, compound, laboratory and date, as
-            far as they are known.
-        logo: beside it, as a data URI of a PNG or SVG; null where there is none.
-    """
-
-    name: str
-    file: str
-    sha256: str
-    command: str
-    tests: tuple[TestTable, ...] = ()
-    report: Mapping[str, str] = field(default_factory=dict)
-    logo: Annotated[str, Field(max_length=100_000)] | None = None
-
-    def __post_init__(self) -> None:
-        if self.logo is not None and not _PICTURE.fullmatch(self.logo):
-            expected = "data:image/png;base64, or data:image/svg+xml;base64, and the picture"
-            raise ValueError(ModelError("this is no picture", place="logo", found=self.logo, expected=expected))
 
 
 @dataclass(frozen=True)

@@ -125,6 +125,7 @@ def _result(tables: ModelFile) -> Result:
         usable=fit.usable if fit else (),
         unresolved=tuple(name for name in tables.unresolved if name in model.effects),
         model_error=tables.model_error,
+        campaign=tables.campaign,
         alternatives=tuple(_alternative_of(each, number, model) for number, each in enumerate(tables.alternatives, 1)),
     )
     with naming(place="fit, directions"):

@@ -1,20 +1,25 @@
 """What a fit found: a model, how uncertain its values are, and how well it meets the tests."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from bushfit.effects import Level
 from bushfit.effects.unnamed import Unnamed
+from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Place, Specimen, place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.reading.measurement import Source
+from bushfit.reading.measurement import Source, Stepped
 from bushfit.units import alike, for_people, number
 from bushfit.validation import Flag, Number, WholeNumber
 
+#: A picture as a data URI: what a page may show of a file that somebody else wrote, and nothing else.
+_PICTURE = re.compile(r"data:image/(png|svg\+xml);base64,[A-Za-z0-9+/]+=*")
 #: Largest half width, in units of the value, of which the exponential is taken: exp(300) is far beyond every bound of
 #: a parameter, and still a finite number.
 _LARGEST_EXPONENT = 300.0
@@ -144,6 +149,73 @@ class Alternative:
     probability: float
 
 
+@dataclass(frozen=True)
+class TestTable:
+    """A test of the campaign, its range, and what the campaign says of it.
+
+    Args:
+        test: its name.
+        kind: "loop" or "sweep".
+        place: direction, or specimen by its name.
+        frequency_Hz: least and largest [Hz].
+        amplitude: least and largest, zero-to-peak, in the unit.
+        unit: of the amplitude, SI; "1" of a strain.
+        rows: of a loop, or operating points.
+        repeats: of each operating point.
+        frequencies_Hz, amplitudes: levels of a sweep, rising [Hz; the unit]; none of a loop, or of an older file.
+        stepped: what a sweep steps through, "frequency" or "amplitude"; null of a loop.
+        file: that it was read from; null where it came from none.
+        sha256: of the file.
+        conditions: that the campaign states, such as its temperature, preload or date.
+    """
+
+    __test__ = False  # no test of pytest's
+
+    test: str
+    kind: str
+    place: str
+    frequency_Hz: tuple[Number, Number]  # noqa: N815
+    amplitude: tuple[Number, Number]
+    unit: Literal["m", "rad", "1"]
+    rows: WholeNumber
+    frequencies_Hz: tuple[Number, ...] = ()  # noqa: N815
+    amplitudes: tuple[Number, ...] = ()
+    repeats: WholeNumber = 1
+    stepped: Stepped | None = None
+    file: str | None = None
+    sha256: str | None = None
+    conditions: Mapping[str, str | Number] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CampaignTable:
+    """The campaign that a model comes from.
+
+    Args:
+        name: of the campaign.
+        file: its name.
+        sha256: of the file.
+        command: with all that settles the numbers, as it would be typed beside the file.
+        tests: all that the campaign has.
+        report: what stands at the head of a report: customer, part_number, drawing, compound, laboratory and date, as
+            far as they are known.
+        logo: beside it, as a data URI of a PNG or SVG; null where there is none.
+    """
+
+    name: str
+    file: str
+    sha256: str
+    command: str
+    tests: tuple[TestTable, ...] = ()
+    report: Mapping[str, str] = field(default_factory=dict)
+    logo: Annotated[str, Field(max_length=100_000)] | None = None
+
+    def __post_init__(self) -> None:
+        if self.logo is not None and not _PICTURE.fullmatch(self.logo):
+            expected = "data:image/png;base64, or data:image/svg+xml;base64, and the picture"
+            raise ValueError(ModelError("this is no picture", place="logo", found=self.logo, expected=expected))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """A fitted model, or one given by hand, as the JSON files hold it.
@@ -159,6 +231,7 @@ class Result:
         model_error: what the fit counted beside noise, as a share of the stiffness, or what corrected the bushing that
             a compound was carried from; None where noise was all.
         alternatives: models that explain the tests, where these cannot tell which does.
+        campaign: as the model file has it; None of a model that comes from none, or that no file was read for.
     """
 
     model: Model
@@ -177,6 +250,7 @@ class Result:
     unresolved: tuple[str, ...] = ()
     model_error: Unnamed | None = None
     alternatives: tuple[Alternative, ...] = ()
+    campaign: CampaignTable | None = None
 
     def __repr__(self) -> str:
         """The parameters with their standard errors, a line each, and how well the model meets its tests."""

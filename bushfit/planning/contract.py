@@ -7,6 +7,7 @@ are of relative changes of parameters, as `fitting.information` counts them.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -17,9 +18,10 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.rig_class import ASSUMED
 from bushfit.geometry import Place, Specimen
 from bushfit.model.model import Model
+from bushfit.model.result import Result
 
 #: What a plan is for.
-Aim = Literal["parameters", "predictions", "rivals"]
+Aim = Literal["parameters", "predictions", "rivals", "targets"]
 #: One run of the rig: a sweep has one amplitude and several frequencies, or one frequency and several amplitudes.
 Test = SimulatedLoop | SimulatedSweep
 
@@ -79,6 +81,7 @@ class Knowledge:
         tests: of the campaign so far.
         bounded: its b parameters at rest on a bound, off which noise takes a fit half of the times; in typical sizes.
         warnings: of the fit that tells it.
+        result: the fit itself; None of a guess.
     """
 
     model: Model
@@ -93,6 +96,7 @@ class Knowledge:
     tests: tuple[Test, ...] = ()
     bounded: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    result: Result | None = None
 
     @property
     def errors(self) -> Array:
@@ -125,12 +129,31 @@ class Points:
     amplitude: Array
 
 
+@dataclass(frozen=True)
+class Target:
+    """An interval that is to be reached.
+
+    Args:
+        quantity: a parameter by its name, or "stiffness" or "loss_factor".
+        half: of its 95 % interval at most, over its value; of a predicted one at every point that is wanted.
+        place: of a predicted one; None of a parameter.
+    """
+
+    quantity: str
+    half: float
+    place: Place | None = None
+
+    def __str__(self) -> str:
+        return self.quantity if self.place is None else f"{self.quantity}.{self.place}"
+
+
 @dataclass(frozen=True, eq=False)
 class Wanted:
     """What the plan is for.
 
     Args:
         parameters: names whose errors count, of aim "parameters".
+        targets: of aim "targets": once they are met, no further test is planned.
         points: where the stiffness is wanted; predictions are told for them whatever the aim.
         hours: of the rig, at most.
         rig: its limits, and its time for a point and for a set-up.
@@ -143,6 +166,7 @@ class Wanted:
     places: tuple[Place, ...]
     points: tuple[Points, ...]
     parameters: tuple[str, ...] = ()
+    targets: tuple[Target, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -175,6 +199,7 @@ class Programme:
         loss: the same of the loss factor, in loss factor, (n,).
         apart: expected chi-square between the two nearest rivals that any tests tell apart, after the best refit of
             either; None without rivals.
+        halves: half of the 95 % interval of each target over its value, the widest of all points.
         visible: of the effects that the standard programme can show, the smallest amount found.
         drift: largest shift of a parameter, over its standard error, by a drift of the gain of 1 % over the session.
     """
@@ -186,6 +211,7 @@ class Programme:
     stiffness: Array
     loss: Array
     apart: float | None
+    halves: tuple[float, ...]
     visible: tuple[Visible, ...]
     drift: float
 
@@ -202,7 +228,10 @@ class Plan:
     Args:
         before: no tests, and so what is known without them.
         planned: the tests chosen.
-        standard: the paper's tests, as often as the hours allow.
+        standard: the paper's tests, as often as the same hours allow.
+        purposes: of each test with all its repeats, what would be lost without it, in words.
+        missed: by what the planned tests fail each target, in words; None where they meet it.
+        enough: why hours stay free, in words; None where they are used.
         notes: what a user must know.
     """
 
@@ -211,4 +240,12 @@ class Plan:
     before: Programme
     planned: Programme
     standard: Programme
+    purposes: Mapping[Test, str]
+    missed: tuple[str | None, ...] = ()
+    enough: str | None = None
     notes: tuple[str, ...] = ()
+
+    @property
+    def hours_left(self) -> float:
+        """Of the rig, that no test takes."""
+        return self.wanted.hours - self.planned.hours

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -150,20 +150,22 @@ class Budget:
         return np.where(barred | (self.spent(counts) + more > self.most), np.inf, more)
 
 
-def best_runs(criterion: Criterion, budget: Budget, start: Array) -> Array:
-    """So many runs of each test within the budget, (tests,), that the criterion is small.
+def best_runs(criterion: Criterion, budget: Budget, start: Array, kept: Array) -> Array:
+    """So many runs of each test within the budget, (tests,), that the criterion is small; those `kept` at least.
 
     Notes: greedy from `start` by what the logarithm falls per minute; then exchanges (Fedorov 1972): one run of each
     test, and all of them, are given up for the best that can be had in their time, as long as that helps.
     """
-    counts = _filled(criterion, budget, start)
+    counts = filled(criterion, budget, start)
     best = criterion.together(counts)
     for _ in range(8):  # nearly all plans take three
         before = best
         for test in np.flatnonzero(counts):
-            for fewer in {1, int(counts[test])}:
+            for fewer in {1, int(counts[test] - kept[test])} - {0}:
+                if counts[test] - fewer < kept[test]:
+                    continue
                 less = counts - fewer * (np.arange(counts.size) == test)
-                other = _filled(criterion, budget, less)
+                other = filled(criterion, budget, less)
                 value = criterion.together(other)
                 if value < best - _WORTH:
                     counts, best = other, value
@@ -173,10 +175,12 @@ def best_runs(criterion: Criterion, budget: Budget, start: Array) -> Array:
     return counts
 
 
-def _filled(criterion: Criterion, budget: Budget, counts: Array) -> Array:
-    """Runs added one after the other, each the best per minute, as long as time is left."""
+def filled(
+    criterion: Criterion, budget: Budget, counts: Array, enough: Callable[[Array], bool] = lambda _: False
+) -> Array:
+    """Runs added one after the other, each the best per minute, as long as time is left and they are not `enough`."""
     counts, so_far = counts.copy(), criterion.together(counts)
-    while np.isfinite(further := budget.further(counts)).any():
+    while not enough(counts) and np.isfinite(further := budget.further(counts)).any():
         values = criterion.one_more(counts)
         fall = (so_far - values) / further
         best = int(np.argmax(np.where(np.isfinite(further), fall, -np.inf)))

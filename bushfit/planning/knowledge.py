@@ -42,6 +42,7 @@ def of_result(result: Result, noise: Noise | None = None, source: str = "") -> K
         strain=strain,
         specimens=result.specimens,
         warnings=tuple(result.warnings),
+        result=result,
     )
 
 

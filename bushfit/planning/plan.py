@@ -3,162 +3,117 @@
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
-from bushfit.diagnosis.priors import TELLS
+from bushfit.campaign.schema import SimulatedSweep
 from bushfit.effects import qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.fitting.coordinates import residual
-from bushfit.fitting.data_sets import new_sweep
 from bushfit.fitting.repeats import FEWEST_STEPS
 from bushfit.geometry import Place, Specimen
-from bushfit.model.covariance import Z95
-from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
+from bushfit.planning.candidates import standard_tests
 from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible, Wanted
-from bushfit.planning.criterion import Budget, Criterion, View, best_runs, distances, noncentrality_of, root_of
+from bushfit.planning.criterion import Budget, Criterion, best_runs, filled, noncentrality_of, root_of
+from bushfit.planning.offer import FOUND, RIVALS_APART, Offer
 from bushfit.planning.order import Drifting, ordered
-from bushfit.planning.sensitivity import Column, Grid, Information, relative_slopes
+from bushfit.planning.sensitivity import Information
+from bushfit.planning.targets import ENDLESS, Goal, percent, untested
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import number
 
-#: The 90 % quantile of the normal distribution.
-_NINE_OF_TEN = 1.2815515655446004
-#: Amount of an effect over its standard error that a test of one in twenty finds in nine of ten cases: the 97.5 % and
-#: the 90 % quantile of the normal distribution.
-FOUND = Z95 + _NINE_OF_TEN
-#: Expected chi-square between rivals from which on `diagnose` tells them apart in nine of ten cases: of d it finds d
-#: with a standard deviation of 2 sqrt(d), and it takes those for one set that are within TELLS.
-RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + TELLS))) ** 2
-#: Shares of the hours that are tried for rivals, before all of them.
-_SHARES = (0.125, 0.1875, 0.25, 0.375, 0.5)
+#: Shares of the hours that are tried before all of them: for rivals, and within a tenth for targets.
+_SHARES = {"rivals": (0.125, 0.1875, 0.25, 0.375, 0.5), "targets": tuple((2.0 ** (np.arange(-40, 0) / 8)).tolist())}
 #: Weight of the logarithm of each lack of power, beside the logarithm of the variance that is wanted small, and the
 #: weight where the first leaves a lack; chosen.
 _PENALTY, _STRICT = 3.0, 30.0
 #: Degrees of freedom behind the scatter of sweeps at least; chosen: with five, errors are a tenth larger than planned.
 _SCATTER_FREEDOM = 10
+#: What a test has to be worth of an error to be made for its sake; chosen.
+_WORTH_SAYING = 1.005
+#: Minutes after which no more are asked for: months.
+_MOST_MINUTES = 60.0 * 2000.0
 
 
 def plan(known: Knowledge, wanted: Wanted) -> Plan:
-    """Tests for an aim within the hours and the limits of the rig; rivals in as few of the hours as tell them apart.
+    """Tests for an aim within the hours and the limits of the rig, in as few hours as part rivals or meet targets.
 
     Raises:
         ModelError: no test is possible, none fits into the hours, or there are no rivals to be told apart.
     """
-    found: dict[float, Plan] = {}
-
-    def surely_apart(share: float) -> bool:
-        with suppress(ModelError):  # too few hours for any test
-            found[share] = _Planner(known, replace(wanted, hours=share * wanted.hours)).plan()
-            return (found[share].planned.apart or 0.0) >= 2.0 * RIVALS_APART  # rivals may be smaller than they seem
-        return False
-
-    enough = bisect_left(_SHARES, True, key=surely_apart) if wanted.aim == "rivals" else len(_SHARES)
-    return found[_SHARES[enough]] if enough < len(_SHARES) else _Planner(known, wanted).plan()
+    if wanted.aim == "rivals" and len(known.rivals) < 2:
+        raise ModelError(
+            "there are no rivals to be told apart",
+            found=known.source,
+            expected="tests of a campaign that two effects or more explain alike",
+            hint="plan from the campaign, or for parameters or predictions",
+        )
+    offer = Offer(known, wanted)
+    few = [_Planner(offer, share * wanted.hours) for share in _SHARES.get(wanted.aim, ())]
+    for sound in (True, False) if offer.goals else (False,):  # blind, or without repeats, only where it has to be
+        least = bisect_left(few, True, key=lambda each: each.reaches and (each.sound or not sound))
+        if least < len(few):
+            return few[least].plan()
+    return _Planner(offer, wanted.hours).plan()
 
 
 @dataclass(frozen=True, eq=False)
 class _Planner:
-    known: Knowledge
-    wanted: Wanted
+    """Of what is on offer, the best within so many hours."""
 
-    @cached_property
-    def tests(self) -> tuple[Test, ...]:
-        """The candidates first, then what only the standard programme has."""
-        every = [*candidates(self.known, self.wanted), *standard_tests(self.known, self.wanted)]
-        return tuple(dict.fromkeys(every))
-
-    @cached_property
-    def grid(self) -> Grid:
-        return Grid(self.known, self.tests)
-
-    @cached_property
-    def columns(self) -> list[Column]:
-        return self.grid.columns
-
-    @cached_property
-    def views(self) -> list[View]:
-        """The likeliest model's, beside the effects that it lacks; each rival's, beside what the others differ by."""
-        data_sets = self.grid.data_sets
-        effects = np.array([column.values for column in self.columns])
-        views = [View.of(self.grid, self.known, effects)]
-        left = [residual(rival.model, data_sets) for rival in self.known.rivals]
-        for i, rival in enumerate(self.known.rivals):
-            others = np.array([other - left[i] for j, other in enumerate(left) if j != i])
-            views.append(View.of(self.grid, rival, others))
-        return views
-
-    @cached_property
-    def slopes(self) -> Array:
-        """Gain and phase of the stiffness at the points wanted by change of the parameters, (k + b, 2, n)."""
-        sweeps = [
-            new_sweep(self.known.model, points.place, points.frequency, points.amplitude, (1.0, 1.0), (0.0, 0.0))
-            for points in self.wanted.points
-        ]
-        each = [np.stack(np.split(relative_slopes(self.known, [sweep]), 2, axis=-1), axis=1) for sweep in sweeps]
-        return np.concatenate(each, axis=-1)
-
-    @cached_property
-    def weight(self) -> Array | None:
-        """Of the parameters' covariance in what is to be small; None where rivals are to be told apart."""
-        if self.wanted.aim == "rivals":
-            return None
-        if self.wanted.aim == "predictions":
-            return np.asarray(np.einsum("kcn,lcn->kl", self.slopes, self.slopes) / self.slopes.shape[-1])
-        return np.diag(np.isin((*self.known.names, *self.known.bounded), self.wanted.parameters).astype(float))
+    offer: Offer
+    hours: float
 
     @cached_property
     def budget(self) -> Budget:
-        places = list(dict.fromkeys([*self.wanted.places, *(test.direction for test in self.tests)]))
-        lines = [
-            (test.direction, test.amplitude, test.frequency)
-            if isinstance(test, SimulatedLoop)
-            else (test.direction, test.stepped, test.held)
-            for test in self.tests
-        ]
-        known = list(dict.fromkeys(lines))
-        return Budget(
-            np.array([minutes(test, self.wanted.rig) for test in self.tests]),
-            np.array([places.index(test.direction) for test in self.tests]),
-            np.array([known.index(line) for line in lines]),
-            np.array([1000 * (test.direction in self.wanted.places) for test in self.tests]),
-            setup_minutes(self.wanted.rig),
-            60.0 * self.wanted.hours,
-        )
+        return replace(self.offer.budget, most=60.0 * self.hours)
+
+    @cached_property
+    def best(self) -> Array:
+        """So many runs of each test, (tests,); none where no test fits into the hours."""
+        return self._with_repeats(self._choice())
+
+    @property
+    def reaches(self) -> bool:
+        """Whether they part the rivals, which may be smaller than they seem, or meet the targets that can be met."""
+        if self.offer.wanted.aim == "rivals":
+            return bool(self.offer.apart(self.best, self.offer.tellable).min() >= 2.0 * RIVALS_APART)
+        offer, off = self.offer, self.offer.off(self.best)
+        told = all(goal.reached(off, offer.endless) for goal in offer.goals)
+        here = [goal for goal in offer.goals if goal.target.place in offer.wanted.places]
+        return bool(offer.goals) and told and not any(self._untold(goal, self.best) for goal in here)
+
+    @property
+    def sound(self) -> bool:
+        """Whether all effects show as in the standard programme, and repeats tell the scatter."""
+        return not self.lacking and self._scatter_freedom(self.best) >= _SCATTER_FREEDOM
 
     def plan(self) -> Plan:
         """See the function."""
-        if self.wanted.aim == "rivals" and len(self.known.rivals) < 2:
-            raise ModelError(
-                "there are no rivals to be told apart",
-                found=self.known.source,
-                expected="tests of a campaign that two effects or more explain alike",
-                hint="plan from the campaign, or for parameters or predictions",
-            )
-        best = self._with_repeats(self._best())
-        if not best.any():
+        best = self.best
+        if not best.any() and not self.reaches:
             raise ModelError(
                 "no test fits into the hours",
                 place="--hours",
-                found=f"{number(self.wanted.hours, 3)} h",
+                found=f"{number(self.offer.wanted.hours, 3)} h",
                 expected=f"at least {number((self.budget.minutes.min() + self.budget.setup) / 60.0, 2)} h",
             )
-        planned = self._programme(ordered(best, self.budget.place, self._drifting(best)))
+        planned = self._programme(ordered(best, self.budget.place, self._drifting(best)) if best.any() else [])
         before, standard = self._programme([]), self._programme(self.standard_runs)
-        return Plan(self.known, self.wanted, before, planned, standard, tuple(self._notes(planned, best)))
+        missed, reasons = tuple(self._missed(best, goal) for goal in self.offer.goals), self._purposes(best)
+        enough, notes = self._enough(planned, missed), tuple(self._notes(planned, missed))
+        return Plan(self.offer.known, self.offer.wanted, before, planned, standard, reasons, missed, enough, notes)
 
-    def _best(self) -> Array:
+    def _choice(self) -> Array:
         """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be."""
-        nothing, standard = np.zeros(len(self.tests), dtype=int), self._counts(self.standard_runs)
-        best = best_runs(self._criterion(_PENALTY), self.budget, nothing)
+        kept, standard = self.kept, self._counts(self.standard_runs)
+        best = best_runs(self._criterion(_PENALTY), self.budget, kept, kept)
         if self._lacking(best):
-            starts = best, np.minimum(standard, self.budget.runs)
-            best = min((best_runs(self.strict, self.budget, start) for start in starts), key=self.strict.together)
+            starts = [best, *([] if kept.any() else [np.minimum(standard, self.budget.runs)])]
+            every = (best_runs(self.strict, self.budget, start, kept) for start in starts)
+            best = min(every, key=self.strict.together)
         return best
 
     def _with_repeats(self, counts: Array) -> Array:
@@ -173,17 +128,38 @@ class _Planner:
                 counts = min(self._once_more(counts, quickest), key=self.strict.together, default=counts)
         return self._with_scatter(counts)
 
+    @cached_property
+    def kept(self) -> Array:
+        """One run at each place whose stiffness is a target, where it can be tested and was not, (tests,): no other
+        place tells the error of the formula that leads there. None where they do not fit into the hours."""
+        nothing = np.zeros(len(self.offer.tests), dtype=int)
+        kept, worth = nothing.copy(), self.strict.one_more(nothing) if self.offer.goals else nothing
+        for goal in self.offer.goals:
+            mine = np.array([test.direction == goal.target.place for test in self.offer.tests]) & (self.budget.runs > 0)
+            if mine.any() and (not self._tested(kept) or self._untold(goal, kept)):
+                kept[int(np.argmin(np.where(mine, worth, np.inf)))] = 1
+        return kept if self.budget.spent(kept) <= self.budget.most else nothing
+
+    def _tested(self, counts: Array) -> list[str]:
+        """Directions, and specimens, of the tests so far and of so many runs of each test."""
+        planned = (self.offer.tests[test] for test in np.flatnonzero(counts))
+        return [str(test.direction) for test in (*self.offer.known.tests, *planned)]
+
+    def _untold(self, goal: Goal, counts: Array) -> str | None:
+        """What the interval of a goal does not hold because nothing was tested there, nor is by so many runs."""
+        place = goal.target.place
+        return untested(self.offer.known, place, self._tested(counts)) if place else None
+
     def _drift_shown(self, counts: Array) -> float:
         """Noncentrality of a drift by so many runs of each test, in their best order."""
-        drifting = self._drifting(counts)
-        return drifting.noncentrality(ordered(counts, self.budget.place, drifting))
+        return (drifting := self._drifting(counts)).noncentrality(ordered(counts, self.budget.place, drifting))
 
     def _with_scatter(self, counts: Array) -> Array:
         """The runs with further repeats of sweeps, until a fit can tell their scatter from what repeats differ by, as
-        far as that costs next to nothing of the aim."""
-        most = self.strict.together(counts) + 0.1  # of the logarithm of a variance: a twentieth of the error
+        far as that costs next to nothing of the aim; for targets whatever it costs, as long as they are met."""
+        most = np.inf if self.offer.goals else self.strict.together(counts) + 0.1  # a twentieth of the error
         while (freedom := self._scatter_freedom(counts)) < [_SCATTER_FREEDOM]:
-            again = [test for test in np.flatnonzero(counts).tolist() if _differences(self.tests[test])]
+            again = [test for test in np.flatnonzero(counts).tolist() if _differences(self.offer.tests[test])]
             more = [
                 runs
                 for runs in self._once_more(counts, again)
@@ -199,11 +175,11 @@ class _Planner:
 
         Of tests that are made once, the least useful are left out in turn; what takes longer without them is left out.
         """
-        one = np.eye(len(self.tests), dtype=int)
+        one = np.eye(len(self.offer.tests), dtype=int)
         for test in tests:
             runs = counts + one[test]
-            while self.budget.spent(runs) > self.budget.most and (runs == 1).any():
-                runs = min((runs - one[single] for single in np.flatnonzero(runs == 1)), key=self.strict.together)
+            while self.budget.spent(runs) > self.budget.most and (single := (runs == 1) & (self.kept == 0)).any():
+                runs = min((runs - one[each] for each in np.flatnonzero(single)), key=self.strict.together)
             if self.budget.spent(runs) <= self.budget.most:
                 yield runs
 
@@ -212,8 +188,8 @@ class _Planner:
 
         Of each rig, the bushing's and each specimen's, up to what is enough; the fewest first.
         """
-        runs = Counter(self.known.tests)
-        runs.update({test: int(n) for test, n in zip(self.tests, counts, strict=True) if n})
+        runs = Counter(self.offer.known.tests)
+        runs.update({test: int(n) for test, n in zip(self.offer.tests, counts, strict=True) if n})
         freedom = Counter[Place | None]()
         for test, times in runs.items():
             if isinstance(test, SimulatedSweep):
@@ -222,46 +198,34 @@ class _Planner:
         return sorted(min(each, _SCATTER_FREEDOM) for each in freedom.values())
 
     def _criterion(self, penalty: float) -> Criterion:
-        odds = np.array([rival.probability for rival in self.known.rivals])
-        return Criterion(self.views, self.weight, odds, self.least, penalty)
+        odds = np.array([rival.probability for rival in self.offer.known.rivals])
+        return Criterion(self.offer.views, self.offer.weight, odds, self.least, penalty)
 
     @cached_property
     def strict(self) -> Criterion:
         """With more weight on what effects show less than in the standard programme."""
         return self._criterion(_STRICT)
 
-    @cached_property
-    def _pairs(self) -> Array:
-        """Any two rivals by their numbers, (2, pairs)."""
-        return np.stack(np.triu_indices(len(self.known.rivals), 1))
-
-    @cached_property
-    def _tellable(self) -> Array:
-        """Those that all tests together would tell apart, (2, pairs); all where none are."""
-        if not self.known.rivals:
-            return self._pairs
-        apart = self._distances(np.ones(len(self.tests), dtype=int), self._pairs) >= RIVALS_APART
-        return self._pairs[:, apart] if apart.any() else self._pairs
-
-    def _distances(self, counts: Array, pairs: Array) -> Array:
-        """Expected chi-square between the rivals of each pair by so many runs of each test, (pairs,)."""
-        return distances([view.together(counts) for view in self.views[1:]])[0, *pairs]
-
     def _counts(self, runs: Sequence[int]) -> Array:
         """How often each test stands among the runs, (tests,)."""
-        return np.bincount(np.array(runs, dtype=int), minlength=len(self.tests))
+        return np.bincount(np.array(runs, dtype=int), minlength=len(self.offer.tests))
+
+    @cached_property
+    def lacking(self) -> list[str]:
+        """Effects that the best runs show less well than the standard programme."""
+        return self._lacking(self.best)
 
     def _lacking(self, counts: Array) -> list[str]:
         """Effects that so many runs of each test show less well than the standard programme."""
-        reached = noncentrality_of(self.views[0].together(counts))[0]
+        reached = noncentrality_of(self.offer.views[0].together(counts))[0]
         short = np.sqrt(reached) < 0.995 * np.sqrt(self.least)  # what the numbers are good for
-        return list(dict.fromkeys(self.columns[i].effect.name for i in np.flatnonzero(short)))
+        return list(dict.fromkeys(self.offer.columns[i].effect.name for i in np.flatnonzero(short)))
 
     @cached_property
     def standard_runs(self) -> list[int]:
         """The standard programme over and over, as long as it fits into the hours; by direction, as labs do."""
-        places = [self.tests.index(test) for test in standard_tests(self.known, self.wanted)]
-        counts, runs = np.zeros(len(self.tests), dtype=int), list[int]()
+        places = [self.offer.tests.index(test) for test in standard_tests(self.offer.known, self.offer.wanted)]
+        counts, runs = np.zeros(len(self.offer.tests), dtype=int), list[int]()
         while places:
             counts[test := places[len(runs) % len(places)]] += 1
             if self.budget.spent(counts) > self.budget.most:
@@ -272,13 +236,13 @@ class _Planner:
     @cached_property
     def least(self) -> Array:
         """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
-        reached = noncentrality_of(self.views[0].together(self._counts(self.standard_runs)))[0]
-        seen = [column.reach * np.sqrt(size) >= FOUND for column, size in zip(self.columns, reached, strict=True)]
+        reached = noncentrality_of(self.offer.views[0].together(self._counts(self.standard_runs)))[0]
+        seen = [column.reach * np.sqrt(size) >= FOUND for column, size in zip(self.offer.columns, reached, strict=True)]
         return np.where(seen, reached, 0.0)
 
     def _drifting(self, counts: Array) -> Drifting:
         """What a drift does to so many runs of each test."""
-        view, k = self.views[0], len(self.known.names) + len(self.known.bounded)
+        view, k = self.offer.views[0], len(self.offer.known.names) + len(self.offer.known.bounded)
         own, seen = view.information.own, view.information.own[:, k, k]
         one = Information(own * counts[:, None, None], own[..., k : k + 1], seen[:, None])  # by the gain of one run
         level = np.square(view.level[:, 0])
@@ -289,36 +253,37 @@ class _Planner:
     def _programme(self, runs: Sequence[int]) -> Programme:
         """What runs in their order tell."""
         counts, places = self._counts(runs), self.budget.place[list(runs)]
-        view, k, drifting = self.views[0], len(self.known.names), self._drifting(counts)
+        view, k, drifting = self.offer.views[0], len(self.offer.known.names), self._drifting(counts)
         found = view.together(counts)
         off, covariance = view.off(found)[0], np.linalg.inv(found.own[0])
-        gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.slopes, off, self.slopes))
+        gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.offer.slopes, off, self.offer.slopes))
         moved = root_of(found.own[0]) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
         # tests alone leave open what they tell less of than rounding; without tests errors are beyond all use
         values, vectors = np.linalg.eigh(found.own[0] - view.prior)
         alone = vectors / np.sqrt(np.maximum(values, max(1e-14 * float(values.max()), 1e-12)))
         return Programme(
-            tuple(self.tests[run] for run in runs),
+            tuple(self.offer.tests[run] for run in runs),
             self.budget.minutes[list(runs)] + self.budget.setup * (np.diff(places, prepend=-1) != 0),
             np.sqrt(np.diag(off))[:k],
             np.linalg.norm(alone, axis=1)[:k],
             gain,
             phase * (1.0 + np.square(self._loss_factor())),
-            float(self._distances(counts, self._tellable).min()) if self.known.rivals else None,
+            float(self.offer.apart(counts, self.offer.tellable).min()) if self.offer.known.rivals else None,
+            tuple(goal.half(off) for goal in self.offer.goals),
             tuple(self._visible(noncentrality_of(found)[0], drifting.noncentrality(runs))),
             0.01 * float(np.abs(moved[:k]).max()),
         )
 
     def _loss_factor(self) -> Array:
         """Of the model at the points wanted, (n,)."""
-        model = self.known.model
-        stiffness = [model.stiffness(each.place, each.frequency, each.amplitude) for each in self.wanted.points]
+        model = self.offer.known.model
+        stiffness = [model.stiffness(each.place, each.frequency, each.amplitude) for each in self.offer.wanted.points]
         return np.concatenate([loss_factor(each) for each in stiffness])
 
     def _visible(self, reached: Array, drifting: float) -> Iterator[Visible]:
         """The smallest amount found of each effect that the standard programme shows, in the shape it shows best."""
-        for effect in dict.fromkeys(column.effect for column in self.columns):
-            mine = [i for i, column in enumerate(self.columns) if column.effect is effect]
+        for effect in dict.fromkeys(column.effect for column in self.offer.columns):
+            mine = [i for i, column in enumerate(self.offer.columns) if column.effect is effect]
             best = mine[int(np.argmax(self.least[mine]))]
             if self.least[best] > 0.0:
                 amount = effect.amount
@@ -327,25 +292,94 @@ class _Planner:
                 )
         yield Visible("drift", "drift.gain", "1", _found(drifting))
 
-    def _notes(self, planned: Programme, counts: Array) -> Iterator[str]:
+    def _missed(self, counts: Array, goal: Goal) -> str | None:
+        """By what so many runs of each test fail a target; None where they meet it."""
+        offer = self.offer
+        if sentence := self._untold(goal, counts):
+            which = "in the plan" if goal.target.place in offer.wanted.places else "on offer"
+            return f"no test so far or {which} is made there: {sentence}"
+        if not goal.met(offer.endless):
+            limit, why = percent(goal.half(offer.endless)), goal.why_not(offer.known, offer.endless)
+            return f"no test on offer meets it, {ENDLESS} runs of each would reach {limit}: {why}"
+        return None if goal.met(offer.off(counts)) else self._more_hours(counts, goal)
+
+    def _more_hours(self, counts: Array, goal: Goal) -> str:
+        """In how many hours a target would be met, at the runs that are best per minute after those planned."""
+        more = filled(
+            replace(self.strict, weight=goal.weight(self.offer.endless)),
+            self.offer.budget,
+            counts,
+            lambda runs: goal.met(self.offer.off(runs)) or self.offer.budget.spent(runs) > _MOST_MINUTES,
+        )
+        hours = number(self.offer.budget.spent(more) / 60.0, 2)
+        if goal.met(self.offer.off(more)):
+            return f"{number(self.hours, 3)} h are too few, about {hours} h would do"
+        reached = percent(goal.half(self.offer.off(more)))
+        return f"{hours} h would reach {reached}, and no further run would take a quarter per cent off that"
+
+    def _purposes(self, counts: Array) -> dict[Test, str]:
+        """In words, of each test with all its repeats, what of the aim would be lost without it."""
+        found = {}
+        for test in np.flatnonzero(counts).tolist():
+            without = np.where(np.arange(counts.size) == test, 0, counts)
+            found[self.offer.tests[test]] = self._lost(counts, without) or "shows effects that the model lacks"
+        return found
+
+    def _lost(self, counts: Array, without: Array) -> str | None:
+        """What fewer runs lose of the aim, the worst of it; None of next to nothing."""
+        offer, off, less = self.offer, self.offer.off(counts), self.offer.off(without)
+        if offer.wanted.aim == "rivals":
+            apart, closer = (float(offer.apart(runs, offer.tellable).min()) for runs in (counts, without))
+            far = f"rivals {number(closer, 2)} apart in expected chi-square without it, {number(apart, 2)} with it"
+            return far if closer * _WORTH_SAYING <= apart else None
+        if offer.goals:
+            wider = [goal for goal in offer.goals if goal.half(less) >= _WORTH_SAYING * goal.half(off)]
+            for goal in sorted(wider, key=lambda goal: -goal.half(less) / goal.target.half):
+                return f"{goal.target}: {percent(goal.half(less), 3)} without it, {percent(goal.half(off), 3)} with it"
+            return None
+        growths = dict(zip(offer.known.names, np.sqrt(np.diag(less) / np.diag(off)), strict=False))
+        if offer.wanted.aim == "predictions":
+            growths = {"stiffness": np.sqrt(np.sum(less * offer.weight) / np.sum(off * offer.weight))}
+        growth, name = max((growths[name], name) for name in growths if name in ("stiffness", *offer.wanted.parameters))
+        more = number(100.0 * (growth - 1.0), 2)
+        return f"{name}: error {more} % larger without it" if growth >= _WORTH_SAYING else None
+
+    def _enough(self, planned: Programme, missed: Sequence[str | None]) -> str | None:
+        """Why hours stay free, if they do."""
+        asked, left = self.offer.wanted.hours, self.offer.wanted.hours - planned.hours
+        if left <= float(self.budget.minutes.max() + self.budget.setup) / 60.0:
+            return None
+        why = "no further run would take a quarter per cent off the error"
+        if self.offer.wanted.aim == "rivals" and self.hours < asked:
+            why = "these tests tell the rivals apart"
+        elif missed and self.hours < asked:
+            why = "no target that can be met is missed" if any(missed) else "all targets are met"
+        if not planned.tests:
+            needed = "would help" if any(missed) else "is needed"
+            return f"no test {needed}: {why} by what is known, and all of the {number(asked, 3)} h stay free"
+        return (
+            f"{number(planned.hours, 2)} of {number(asked, 3)} h are enough: {why}, and {number(left, 2)} h stay free"
+        )
+
+    def _notes(self, planned: Programme, missed: Sequence[str | None]) -> Iterator[str]:
         """What a user must know."""
-        yield from self.known.warnings
-        if self.known.bounded:
+        yield from self.offer.known.warnings
+        for target, half, why in zip(self.offer.wanted.targets, planned.halves, missed, strict=True):
+            if why:
+                yield f"{target}: {percent(target.half)} asked for, {percent(half)} planned: {why}"
+        if self.offer.known.bounded:
             yield (
-                f"{' and '.join(self.known.bounded)} came to rest on a bound: the errors of the others count that noise"
-                " takes it off there half of the times"
+                f"{' and '.join(self.offer.known.bounded)} came to rest on a bound: the errors of the others count that"
+                " noise takes it off there half of the times"
             )
-        if planned.hours < self.wanted.hours - float(self.budget.minutes.max() + self.budget.setup) / 60.0:
-            yield (
-                f"{number(planned.hours, 2)} of {number(self.wanted.hours, 3)} h are planned: no further run would "
-                "take a quarter per cent off the error"
-            )
-        if lacking := self._lacking(counts):
-            yield f"the standard programme shows these effects better: {', '.join(lacking)}"
-        tellable = {tuple(pair) for pair in self._tellable.T.tolist()}
-        for one, other in self._pairs.T.tolist():
+        if missed and self._scatter_freedom(self.best) < _SCATTER_FREEDOM:
+            yield "too few repeats tell how sweeps scatter: intervals may come out half as wide again as planned"
+        if self.lacking:
+            yield f"the standard programme shows these effects better: {', '.join(self.lacking)}"
+        tellable = {tuple(pair) for pair in self.offer.tellable.T.tolist()}
+        for one, other in self.offer.pairs.T.tolist():
             if (one, other) not in tellable:
-                names = (self.known.rivals[place].model.effects[-1] for place in (one, other))
+                names = (self.offer.known.rivals[place].model.effects[-1] for place in (one, other))
                 yield f"no test of this rig would tell {' from '.join(names)}: they are left out"
         if planned.apart is not None and planned.apart < RIVALS_APART:
             yield (
@@ -354,34 +388,12 @@ class _Planner:
             )
 
 
-def _found(noncentrality: float) -> float:
-    """The smallest amount that is found, of a column with this noncentrality for a unit; inf where it is not seen."""
-    return FOUND / float(np.sqrt(noncentrality)) if noncentrality > 0.0 else np.inf
-
-
 def _differences(test: Test) -> int:
     """Degrees of freedom of the scatter that a repeat of a test tells."""
     steps = len(test.steps) if isinstance(test, SimulatedSweep) else 0
     return steps - 1 if steps >= FEWEST_STEPS else 0
 
 
-def purposes(plan: Plan) -> dict[Test, str]:
-    """In words, of each test with all its repeats, what would be lost without it."""
-    known, counts = plan.knowledge, Counter(plan.planned.tests)
-    view = View.of(Grid(known, tuple(counts)), known)
-    runs = np.array(list(counts.values()))
-    whole = _errors(view, runs)[: len(known.names)]
-    rest = "tells the rivals apart" if plan.wanted.aim == "rivals" else "shows effects that the model lacks"
-    found = {}
-    for at, test in enumerate(counts):
-        without = np.where(np.arange(runs.size) == at, 0, runs)
-        growth = _errors(view, without)[: whole.size] / whole
-        worst = int(np.argmax(growth))
-        lost = f"{known.names[worst]}: error {number(100.0 * float(growth[worst] - 1.0), 2)} % larger without it"
-        found[test] = lost if growth[worst] >= 1.005 else rest  # chosen
-    return found
-
-
-def _errors(view: View, runs: Array) -> Array:
-    """Standard error of each parameter's relative change, after so many runs of each test."""
-    return np.sqrt(np.diag(view.off(view.together(runs))[0]))
+def _found(noncentrality: float) -> float:
+    """The smallest amount that is found, of a column with this noncentrality for a unit; inf where it is not seen."""
+    return FOUND / float(np.sqrt(noncentrality)) if noncentrality > 0.0 else np.inf

@@ -9,10 +9,15 @@ import pandas as pd
 from bushfit.campaign.schema import SimulatedLoop
 from bushfit.effects.contract import Array
 from bushfit.planning.contract import Plan, Test, operating_points
-from bushfit.planning.plan import purposes
 from bushfit.report import plots
 from bushfit.report.contents import Contents
 from bushfit.units import number
+
+#: Columns of the sheet, those of a plan without any test too.
+_COLUMNS = (
+    *("order", "direction", "test", "amplitude", "frequency [Hz]", "cycles", "repeat", "force up to", "minutes"),
+    *("minutes so far", "what for"),
+)
 
 
 def plan_contents(plan: Plan) -> Contents:
@@ -25,7 +30,7 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
 
     Amplitudes count zero-to-peak. The force is what the model expects at most, so that a load cell can be chosen.
     """
-    tests, reasons = plan.planned.tests, purposes(plan)
+    tests = plan.planned.tests
     counts, seen, rows = Counter(tests), Counter[Test](), []
     for order, (test, minutes) in enumerate(zip(tests, plan.planned.minutes, strict=True), start=1):
         seen[test] += 1
@@ -40,10 +45,10 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
                 **_force(plan, test),
                 "minutes": round(float(minutes), 1),
                 "minutes so far": round(float(np.sum(plan.planned.minutes[:order])), 1),
-                "what for": reasons[test],
+                "what for": plan.purposes[test],
             }
         )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=_COLUMNS)
 
 
 def _motion(test: Test) -> dict[str, str]:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pandas as pd
-from shell import BUSHING, CAMPAIGN, Run, document, names
+import pytest
+from shell import BUSHING, CAMPAIGN, Run, document, names, refused, typing
 
 from bushfit.cli.export import command
+from bushfit.effects.contract import Circumstances
 from bushfit.jobs.export import FORMATS
+from bushfit.model.file import load_result
+from bushfit.units import CELSIUS
 
 #: Options of every format that is written without a compiler.
 ALL = [f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx")]
@@ -87,3 +92,44 @@ def test_an_unresolved_effect_is_a_loss_of_every_deck(bushfit: Run, root: Path, 
         low = float(line.split("|K| is ")[1].split()[0])
         # radially 20 to 40 kN/mm with 0.014 mm/kN in series: 1/(1 - K c) is far above 1
         assert low > 20.0, line
+
+
+def test_without_a_grid_it_is_the_measured_one_and_files_say_where_they_hold(root: Path, tmp_path: Path) -> None:
+    """By the model file alone, at levels that no other grid has."""
+    typing(root)("fit", "data/practice/case_000/bushing.toml", "-o", tmp_path / "fit", "--no-plots")
+    typing(root)("export", tmp_path / "fit/model.json", *ALL[:4], "-o", tmp_path / "x")
+    for place, levels in (("axial", [0.2, 0.4, 1.0]), ("radial", [0.05, 0.1, 0.2])):
+        table = pd.read_csv(tmp_path / f"x/{place}.csv")
+        measured = pd.read_csv(root / f"data/practice/case_000/sweep_{place}.csv")
+        assert table["amplitude [mm]"].unique() == pytest.approx(levels)
+        assert table["frequency [Hz]"].unique() == pytest.approx(measured.iloc[:, 0].unique())
+    said = (
+        *("campaign: case 000, bushing.toml", "tests: 4, no date stated"),
+        "valid: axial, 0.1 to 155 Hz, 0.2 to 2 mm, temperature not stated, fitted there",
+        "valid: radial, 0.1 to 155 Hz, 0.0483 to 0.483 mm, temperature not stated, not fitted there",
+    )
+    today = f" on {datetime.now(UTC).date().isoformat()}"
+    for deck in ("bushing.bdf", "bushing.inp", "bushing_car.bus"):
+        text = " ".join((tmp_path / "x" / deck).read_text().replace("** |", "$ |").replace("\n$ |", "").split())
+        for words in (*said, today):
+            assert words in text, (deck, words)
+    provenance = pd.read_csv(tmp_path / "x/provenance.csv")
+    assert (provenance["what"] == "valid").sum() == 2
+
+
+def test_a_deck_is_of_the_temperature_asked_for(bushfit: Run, root: Path, tmp_path: Path) -> None:
+    model = document(root / "data/arm_bushing/truth.json")
+    model["effects"].append("temperature")
+    for name, value in (("softening", 4e-3), ("shift", 0.08)):
+        model["parameters"][f"temperature.{name}"] = {"value": value, "unit": "1/K", "vary": False}
+    (tmp_path / "m.json").write_text(json.dumps(model))
+    grid = ("--direction", "axial", "--frequencies", "10, 50 Hz", "--amplitudes", "0.2 mm", "--temperature", "60 degC")
+    bushfit("export", tmp_path / "m.json", "--format", "nastran", "--format", "csv", *grid, "-o", tmp_path / "x")
+    table, warm = pd.read_csv(tmp_path / "x/axial.csv"), Circumstances(60.0 + CELSIUS)
+    exact = load_result(tmp_path / "m.json").model.stiffness("axial", table["frequency [Hz]"], 2e-4, under=warm)
+    assert table["storage stiffness [N/mm]"].to_numpy() == pytest.approx(exact.real / 1e3, rel=1e-6)
+    deck = (tmp_path / "x/bushing.bdf").read_text()
+    assert "$ temperature: 60 degC" in deck
+    assert f"{exact[1].real / 1e3:.4E}" in deck
+    cold = ("export", root / "data/arm_bushing/truth.json", "--format", "nastran", "--temperature", "60 degC")
+    refused(bushfit(*cold, "-o", tmp_path / "y", status=2), tmp_path / "y", "the model knows no temperature")

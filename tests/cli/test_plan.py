@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from shell import CAMPAIGN, Run, document, names, typing, values
+from shell import CAMPAIGN, Run, document, names, refused, typing, values
 
 
 @pytest.fixture(scope="module")
@@ -105,3 +105,87 @@ def test_specimens_are_mounted_once_in_their_order_and_each_tells_its_scatter(
         swept = Counter((*map(tuple, (run["amplitudes"], run["frequencies_Hz"])),) for run in mine if run["stepped"])
         steps = {test: max(map(len, test)) for test in swept}
         assert sum((count - 1) * (steps[test] - 1) for test, count in swept.items() if steps[test] > 2) >= fewest
+
+
+TARGETS = ("configs/new_bushing.toml", "--no-plots", "--json")
+
+
+def test_a_plan_for_targets_stops_once_they_are_met(root: Path, tmp_path: Path) -> None:
+    """In less than half of the hours, in every direction whose stiffness is asked for, and said; what is not asked for
+    is not planned, and tighter targets take longer."""
+    bushfit = typing(root)
+    asked = ("--target", "stiffness=1 %", "--target", "alpha = 2 %")
+    done = bushfit("plan", *TARGETS, *asked, "--hours", "6", "-o", tmp_path / "both")
+    both = json.loads(done.stdout)
+    assert set(both["targets"]) == {"stiffness.axial", "stiffness.radial", "alpha"}
+    for name, target in both["targets"].items():
+        assert target["met"]
+        assert target["why"] is None
+        assert target["planned"] <= target["asked"] == (0.02 if name == "alpha" else 0.01)
+        assert target["planned"] < target["before"]
+    assert both["targets"]["alpha"]["planned"] == pytest.approx(1.96 * both["parameters"]["alpha"]["planned"], rel=1e-3)
+    assert {run["place"] for run in both["tests"]} == {"axial", "radial"}
+    assert both["hours_planned"] < 3.0
+    assert both["hours_left"] == pytest.approx(6.0 - both["hours_planned"])
+    assert "all targets are met" in both["enough"]
+    assert both["enough"] in done.stderr.replace("\n", " ")
+    assert not both["warnings"]
+    reasons = pd.read_csv(tmp_path / "both/plan.csv")["what for"]
+    assert any(words.startswith(("stiffness.", "alpha: +/-2.")) for words in reasons), "what would miss a target"
+    one = json.loads(bushfit("plan", *TARGETS, "--target", "alpha=4 %", "--hours", "6", "-o", tmp_path / "one").stdout)
+    assert one["hours_planned"] < both["hours_planned"]
+    assert {run["place"] for run in one["tests"]} == {"axial"}
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "said"),
+    [
+        (
+            "configs/new_bushing.toml",
+            ("stiffness=0.001 %",),
+            "the class of the rig, 0.5 % of gain and 4.4 mrad of phase",
+        ),
+        ("configs/new_bushing.toml", ("mu=0.25 %", "--hours", "2"), "2 h are too few, about"),
+        (
+            "configs/new_bushing.toml",
+            ("stiffness.radial=5 %", "--direction", "axial"),
+            "no test so far or on offer is made there: radial: not fitted",
+        ),
+        (
+            "data/practice/case_003/bushing.toml",
+            ("stiffness.axial=1 %",),
+            "+/-23 % at 155 Hz and 0.4 mm is the model's own error",
+        ),
+    ],
+)
+def test_what_keeps_a_target_from_being_met_is_named(
+    root: Path, tmp_path: Path, source: str, options: tuple[str, ...], said: str
+) -> None:
+    done = typing(root)("plan", source, "--target", *options, "--no-plots", "-o", tmp_path, status=1)
+    name, found = next(iter(document(tmp_path / "plan.json")["targets"].items()))
+    assert said in found["why"]
+    assert not found["met"]
+    assert found["why"] in done.stderr.replace("\n", " ")
+    assert f"these targets are not met: {name}" in done.stderr.replace("\n", " ")
+
+
+def test_no_test_is_planned_for_what_is_known(bushfit: Run, tmp_path: Path) -> None:
+    done = bushfit("plan", CAMPAIGN, "--target", "mu=20 %", "-o", tmp_path)
+    assert "no test is needed" in done.stderr
+    assert names(tmp_path) == {"plan.json", "plan.csv", "plan.png"}
+    assert pd.read_csv(tmp_path / "plan.csv").empty
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("mu",), 'such as "mu=2 %"'),
+        (("mu=2 mm",), "the unit does not fit"),
+        (("nu=2 %",), "there is no such target"),
+        (("stiffness.torsion=2 %",), "stiffness.axial, stiffness.radial"),
+        (("mu=2 %", "--for", "parameters"), "an aim of its own"),
+    ],
+)
+def test_a_target_that_is_none_is_refused(root: Path, tmp_path: Path, options: tuple[str, ...], said: str) -> None:
+    done = typing(root)("plan", TARGETS[0], "--target", *options, "-o", tmp_path / "x", status=2)
+    refused(done, tmp_path / "x", said)

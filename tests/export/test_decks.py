@@ -24,8 +24,8 @@ from bushfit.prediction.stiffness import predict
 
 #: Agreement of the model itself with the kept computation, as tests/model/test_model.py holds it.
 MODEL = 2e-4
-#: What the digits of a deck leave.
-DIGITS = 2e-9
+#: What the five digits of a deck leave of a value, and ten of what a table goes over.
+DIGITS, ALONG = 5e-5, 2e-9
 SYSTEMS = ["mm t s N", "m kg s N", "mm kg ms kN", "in lbf*s^2/in s lbf"]
 
 
@@ -63,7 +63,7 @@ def test_every_value_of_the_grid_is_read_back(
             for rank in ranks:
                 frequency, stiffness = rows_of(known, direction, rank)
                 f, k = found[dof, rank]
-                np.testing.assert_allclose(f * second, frequency, rtol=DIGITS)
+                np.testing.assert_allclose(f * second, frequency, rtol=ALONG)
                 worst = max(worst, np.abs(k / scale / stiffness - 1.0).max())
                 exact = order.result.model.stiffness(direction, frequency, amplitude_of(known, direction, rank))
                 apart = max(apart, np.abs(k / scale / exact - 1.0).max())
@@ -99,7 +99,7 @@ def test_the_compound_of_abaqus_is_the_model_at_that_strain(order: Order, paper_
         modulus = 2.0 * c10 * (1.0 - gain + 1j * loss) * 1e6  # N/mm^2
         # of the axial stiffness, Eq. 10: K = 2 pi L G/ln(b/a)
         axial = paper_model.stiffness("axial", frequency, amplitude)
-        np.testing.assert_allclose(modulus, axial * np.log(1.8) / (2.0 * np.pi * 0.034), rtol=1e-8)
+        np.testing.assert_allclose(modulus, axial * np.log(1.8) / (2.0 * np.pi * 0.034), rtol=DIGITS)
 
 
 def test_adams_holds_curve_and_damping(order: Order, known: pd.DataFrame) -> None:
@@ -121,7 +121,7 @@ def test_adams_holds_curve_and_damping(order: Order, known: pd.DataFrame) -> Non
                 moved, resisting = curve.T
                 assert (np.diff(moved) > 0.0).all()
                 np.testing.assert_allclose(curve, -curve[::-1], atol=1e-9)
-                np.testing.assert_allclose(moved[moved > 0.0], amplitudes * length, rtol=DIGITS)
+                np.testing.assert_allclose(moved[moved > 0.0], amplitudes * length, rtol=ALONG)
                 slow = [rows_of(known, Direction(direction), rank + 1)[1][0].real for rank in range(amplitudes.size)]
                 np.testing.assert_allclose(resisting[moved > 0.0], amplitudes * slow * force, rtol=MODEL)
                 frequency, stiffness = rows_of(known, Direction(direction), (amplitudes.size + 1) // 2)
@@ -143,11 +143,11 @@ def test_one_frequency_and_one_amplitude(order: Order, tmp_path: Path) -> None:
     text = nastran.export(one).files["bushing.bdf"].decode()
     assert "PBUSHT" not in text.replace("PBUSHT*", "")
     assert "TABLED1" not in text
-    assert f"{exact.real / 1e3:.9E}" in text
+    assert f"{exact.real / 1e3:.4E}" in text
     blocks = teimorbit(adams.export(one).files["bushing_car.bus"].decode())
     moved, force = blocks["FZ_CURVE"][2].T
     assert moved.size == 5
-    np.testing.assert_allclose(force, moved * exact.real / 1e3, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(force, moved * exact.real / 1e3, rtol=DIGITS)
     assert "one frequency, 20 Hz" in " ".join(nastran.export(one).losses)
     (found,) = read("abaqus", one, tmp_path)[1].values()
     assert found[1][0] * 1e3 == pytest.approx(exact, rel=DIGITS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,11 +13,12 @@ from fmpy.validation import validate_fmu
 from fmus import LEVELS, Running, off, order_of, wandering, written
 
 from bushfit.effects import LIBRARY, Branch, Layer, Level, qualified
-from bushfit.effects.contract import Array
+from bushfit.effects.contract import Array, Circumstances
 from bushfit.export.in_time import FIELDS
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 from bushfit.model.rig import imposed, wave
+from bushfit.units import CELSIUS
 
 #: Root mean square error that the force may have, relative: asked for.
 LARGEST = 0.01
@@ -125,6 +127,22 @@ def test_preload_of_one_direction_has_values_of_its_own(paper_model: Model, open
     running = Running(written(order_of(model), opened), opened / "preload")
     assert {"mu.axial", "mu.radial", "mu.torsion"} <= set(running.reference)
     assert worst(running, model, "random") < LARGEST
+
+
+def test_an_fmu_is_of_the_temperature_asked_for(paper_model: Model, opened: Path) -> None:
+    """Springs that soften, and a springpot that shifts as well."""
+    values = {"temperature.softening": 4e-3, "temperature.shift": 0.08}
+    model = paper_model.with_effect("temperature", values)
+    plain, at, frequency = order_of(model), 60.0 + CELSIUS, 55.0
+    running = Running(written(replace(plain, temperature=at), opened), opened / "warm")
+    amplitude, phase = LEVELS[Direction.AXIAL][1], np.arange(30 * 64 + 1) / 64
+    motion = np.zeros((phase.size, 3))
+    motion[:, 0] = amplitude * np.sin(2.0 * np.pi * phase)
+    force = running.run(motion, 1.0 / (64 * frequency))[-64:, 0]
+    found = 2.0 * np.mean(force * np.exp(-2j * np.pi * phase[-64:])) / (-1j * amplitude)
+    warm = model.stiffness("axial", frequency, amplitude, under=Circumstances(at))
+    print(abs(found / warm - 1.0), abs(found / model.stiffness("axial", frequency, amplitude) - 1.0))
+    assert abs(found / warm - 1.0) < LARGEST < 0.2 * abs(found / model.stiffness("axial", frequency, amplitude) - 1.0)
 
 
 def test_steps_of_any_length_agree_where_the_motion_is_straight(paper: Running) -> None:

@@ -13,7 +13,7 @@ from bushfit.model.model import Model
 from bushfit.planning.contract import Knowledge, Points, Wanted
 from bushfit.planning.criterion import View
 from bushfit.planning.knowledge import noise_of, of_campaign, rig_of
-from bushfit.planning.plan import plan, purposes
+from bushfit.planning.plan import plan
 from bushfit.planning.sensitivity import Information, relative_slopes
 from bushfit.simulation.measured import simulate
 
@@ -72,7 +72,7 @@ def test_a_plan_beside_a_bound_counts_it_and_says_so(measured: Knowledge) -> Non
     assert counted.planned.errors.shape == (len(measured.names),)
     assert counted.planned.errors[place] > 1.1 * ignored.planned.errors[place]
     assert any("mu came to rest on a bound" in note for note in counted.notes)
-    assert not any("mu" in words for words in purposes(counted).values())
+    assert not any("mu" in words for words in counted.purposes.values())
 
 
 @pytest.mark.parametrize("effect", ["temperature", "force_saturation"])

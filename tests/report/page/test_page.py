@@ -40,7 +40,7 @@ from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
 from bushfit.report.contents import Formats
 from bushfit.report.page import report_page
-from bushfit.report.page.readback import canonical, read_results
+from bushfit.report.page.readback import read_results
 from bushfit.report.page.uses import _ELSE
 
 Results = Callable[[str], Path]

@@ -128,6 +128,19 @@ def test_files_are_drawn_as_they_are_together_and_alone(seen: list[Inspected]) -
         whole(inspection_figure([one]))
 
 
+def test_files_of_one_direction_are_drawn_alike_and_pictures_say_which_they_are(root: Path) -> None:
+    """Loops to 1 and 2 mm in the same scales, with their folders where names repeat; others each in their own."""
+    names = ("practice/case_000", "arm_bushing")
+    every = [inspect(root / f"data/{name}/loop_axial_{number}.csv", {}) for name in names for number in (1, 2)]
+    for page, name in enumerate(names):
+        figure = inside(inspection_figure(every, 2 * page, 2))
+        loops = [axes for axes in figure.axes if axes.get_xlabel() == "displacement [mm]"]
+        assert figure.get_suptitle() == f"Test files as they are, {page + 1} of 2"
+        assert [title.split("/")[0] for title in titles(figure)] == [name.split("/")[-1]] * 2
+        for ends in ([axes.get_xlim() for axes in loops], [axes.get_ylim() for axes in loops]):
+            assert (ends[0] == ends[1]) is (page == 0)
+
+
 def test_what_is_not_as_it_was_recorded_is_said(root: Path, tmp_path: Path) -> None:
     table = pd.read_csv(root / "data/cmp_15961/loop_axial_1.csv")
     turned, timeless = tmp_path / "turned_axial.csv", tmp_path / "timeless_axial.csv"

@@ -8,7 +8,7 @@ from bushfit.errors import ModelError
 from bushfit.jobs.plan import PlanTests
 from bushfit.planning.campaign import settings_of
 from bushfit.planning.contract import Noise, Test
-from bushfit.planning.plan import RIVALS_APART
+from bushfit.planning.offer import RIVALS_APART
 from bushfit.simulation.measured import Simulated, simulate
 
 #: Highest frequency of the rig that makes the session, over that of the tests so far: what `diagnose` asks for at most.

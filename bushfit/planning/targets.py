@@ -1,0 +1,139 @@
+"""Targets: 95 % intervals that tests are to reach, how wide they come out, and by what one fails that none reaches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.geometry import Place
+from bushfit.model.covariance import Z95, Covariance
+from bushfit.model.result import Range, Result
+from bushfit.planning.contract import Knowledge, Points, Target, Wanted
+from bushfit.prediction.caveats import unfitted
+from bushfit.prediction.stiffness import predict
+from bushfit.units import number, told
+
+#: Runs of each test that stand for no end of them; chosen: years of the rig, in which what scatters is gone.
+ENDLESS = 1000
+#: Half interval over that of endless tests, which is as near to a target beyond their reach as a plan goes; chosen.
+_NEARLY = 1.1
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """What a target asks for, as tests tell it; k parameters, the bounded among them, at n operating points.
+
+    Args:
+        rows: relative change of the quantity at each point by relative change of the parameters, (n, k).
+        own: its relative standard error by the model's own error, which no test lowers, (n,).
+        open: by how much readings widen the half interval that tests leave undecided, relative, (n,).
+        points: where; None of a parameter.
+    """
+
+    target: Target
+    rows: Array
+    own: Array
+    open: Array
+    points: Points | None = None
+
+    def halves(self, off: Array) -> Array:
+        """Half of the 95 % interval over the value at each point, (n,), of a covariance of the parameters, (k, k)."""
+        return self.open + Z95 * np.sqrt(self._variance(off) + self.own**2)
+
+    def half(self, off: Array) -> float:
+        """The widest of them."""
+        return float(self.halves(off).max())
+
+    def met(self, off: Array) -> bool:
+        """Whether it is as narrow as asked for, but for rounding."""
+        return self.half(off) <= self.target.half * (1.0 + 1e-9)
+
+    def reached(self, off: Array, endless: Array) -> bool:
+        """Whether it is met; or where not even tests without end meet it, nearly as narrow as those make it."""
+        return self.met(off) or (not self.met(endless) and self.half(off) <= _NEARLY * self.half(endless))
+
+    def weight(self, endless: Array) -> Array:
+        """Of the parameters' covariance, (k, k): its mean variance over what the target leaves to them, or over what is
+        nearly as little as endless tests leave."""
+        left = np.square(np.maximum(self.target.half - self.open, 0.0) / Z95) - self.own**2
+        nearly = np.square(_NEARLY * self.halves(endless) / Z95) - self.own**2 - np.square(self.open / Z95)
+        allowed = np.where(self.met(endless), left, nearly)
+        return np.asarray((self.rows / allowed[:, None]).T @ self.rows / len(self.rows))
+
+    def why_not(self, known: Knowledge, endless: Array) -> str:
+        """By what the target fails even with endless tests: what is widest at the widest point."""
+        worst, variance = int(np.argmax(self.halves(endless))), self._variance(endless)
+        by = np.abs(self.rows[worst]) * np.sqrt(np.diag(endless))
+        name = (*known.names, *known.bounded)[int(np.argmax(by))]
+        gain, phase = known.noise.level
+        of_class = f"{number(100.0 * gain, 2)} % of gain and {number(1e3 * phase, 2)} mrad of phase"
+        if variance[worst] > 0.25 * self._variance(known.covariance)[worst]:
+            of_tests = f"{name}, which no test on offer tells well enough"
+        else:
+            of_tests = f"the class of the rig, {of_class} that all repeats of a test share, in {name}"
+        size, words = max(
+            (Z95 * float(self.own[worst]), "the model's own error: no test lowers it, naming what it lacks may"),
+            (float(self.open[worst]), "what the tests leave undecided: bushfit diagnose names the test that tells"),
+            (Z95 * float(np.sqrt(variance[worst])), of_tests),
+        )
+        where = ""
+        if self.points:
+            unit, factor = self.points.place.display.displacement
+            frequency, amplitude = (float(each[worst]) for each in (self.points.frequency, self.points.amplitude))
+            where = f" at {told('Hz', frequency)} and {told(unit, factor * amplitude)}"
+        return f"{percent(size)}{where} is {words}"
+
+    def _variance(self, off: Array) -> Array:
+        """What the parameters' errors make of the quantity, relative, (n,)."""
+        return np.asarray(np.einsum("nk,kl,nl->n", self.rows, off, self.rows))
+
+
+def goals(known: Knowledge, wanted: Wanted, slopes: Array) -> Iterator[Goal]:
+    """A goal for each target.
+
+    Args:
+        slopes: gain and phase of the stiffness at all points wanted by relative change of the parameters, (k, 2, n).
+    """
+    names, ends = (*known.names, *known.bounded), np.cumsum([each.frequency.size for each in wanted.points])[:-1]
+    at = {each.place: (each, part) for each, part in zip(wanted.points, np.split(slopes, ends, axis=-1), strict=True)}
+    for target in wanted.targets:
+        if target.place is None:
+            row = np.array([[float(name == target.quantity) for name in names]])
+            yield Goal(target, row, np.zeros(1), np.zeros(1))
+        else:
+            yield _of_points(known, target, *at[target.place])
+
+
+def _of_points(known: Knowledge, target: Target, points: Points, slopes: Array) -> Goal:
+    """The goal of a predicted quantity. Without errors of its parameters, the band of `predict` is what stays open."""
+    exact = replace(known.result or Result(known.model), covariance=Covariance())
+    found, sizes, rates = (
+        predict(exact, points.place, points.frequency, points.amplitude),
+        points.amplitude,
+        points.frequency,
+    )
+    here = np.searchsorted(np.unique(sizes), sizes) * np.unique(rates).size + np.searchsorted(np.unique(rates), rates)
+    loss = found.loss_factor.value[here]
+    of_stiffness = target.quantity == "stiffness"
+    band = found.stiffness if of_stiffness else found.loss_factor
+    value, wide = band.value[here], np.maximum(band.high - band.value, band.value - band.low)[here]
+    rows = slopes[:, 0] if of_stiffness else slopes[:, 1] * (1.0 + loss**2) / loss
+    own = np.linalg.norm(band.root, axis=0)[here] / value
+    return Goal(target, rows.T, own, np.maximum(wide / value - Z95 * own, 0.0), points)
+
+
+def untested(known: Knowledge, place: Place, tested: Iterable[str]) -> str | None:
+    """What no interval at a place holds where no test was or will be made there; None where it holds all."""
+    measured = known.result.measured if known.result else None
+    directions = dict.fromkeys([*(measured.directions if measured else ()), *tested])
+    reached = measured or Range((1.0, 1.0), (1.0, 1.0))
+    result = Result(known.model, known.names, measured=replace(reached, directions=tuple(directions)))
+    return next(unfitted(result, place), None) if str(place) not in directions else None
+
+
+def percent(half: float, digits: int = 2) -> str:
+    """Half an interval, over its value, in words."""
+    return f"+/-{number(100.0 * half, digits)} %"
