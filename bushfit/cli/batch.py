@@ -15,7 +15,17 @@ import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
-from bushfit.cli.options import FILE, NO_REPORT, PLOT_FORMAT, TABLE_FORMAT, command_called, place_option
+from bushfit.cli.options import (
+    FILE,
+    NO_REPORT,
+    PLOT_FORMAT,
+    TABLE_FORMAT,
+    Choice,
+    command_called,
+    option,
+    place_option,
+    under,
+)
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import alike, for_people
@@ -33,38 +43,42 @@ _SECONDS_A_LINE = 10.0
 
 @command_called("batch", '"data/practice/*/bushing.toml" --at "axial 25 Hz 0.1 mm"')
 @click.argument("manifest", metavar="MANIFEST", nargs=-1, required=True)
-@click.option(
-    "--command",
-    "commands",
-    type=click.Choice(["run", "fit", "diagnose", "predict"]),
-    multiple=True,
-    metavar="COMMAND",
-    help="What to do with each campaign: fit, diagnose, predict, may be given again; or run, the whole chain [fit].",
+@under(
+    "What is done with each",
+    option(
+        "--command",
+        "commands",
+        type=Choice(["run", "fit", "diagnose", "predict"]),
+        multiple=True,
+        metavar="COMMAND",
+        help="fit, diagnose, predict or run; may be given again [fit].",
+    ),
+    place_option("Tests to fit, as in bushfit fit."),
+    option("--effect", "effects", multiple=True, metavar="NAME", help="Add an effect, as in bushfit fit."),
+    option(
+        "--at",
+        multiple=True,
+        metavar="POINT",
+        help='Stiffness and loss factor at "axial 25 Hz 0.1 mm"; may be given again.',
+    ),
 )
-@place_option("Tests to fit, as in bushfit fit.")
-@click.option("--effect", "effects", multiple=True, metavar="NAME", help="Add an effect, as in bushfit fit.")
-@click.option(
-    "--at",
-    multiple=True,
-    metavar="POINT",
-    help='Stiffness and loss factor there, such as "axial 25 Hz 0.1 mm" (zero-to-peak); may be given again.',
+@under(
+    "Limits",
+    option("--limits", type=FILE, metavar="FILE", help="Judge each bushing by the limits in this TOML file."),
+    option("--junit", type=FILE, metavar="FILE", help="Write a JUnit report for CI."),
 )
-@click.option("--limits", type=FILE, metavar="FILE", help="Judge each bushing by this TOML file (above).")
-@click.option("--junit", type=FILE, metavar="FILE", help="Write a JUnit report for CI.")
-@click.option("--jobs", type=click.IntRange(1), help="Worker processes [the cores there are].")
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Work on this Dask cluster, such as tcp://10.0.0.5:8786, whose workers see the same files and paths.",
+@under(
+    "How the work is done",
+    option("--resume", is_flag=True, help="Do what is missing, failed or changed, keep the rest."),
+    option("--jobs", type=click.IntRange(1), metavar="N", help="Worker processes [the cores there are]."),
+    option("--scheduler", metavar="ADDRESS", help="Work on this Dask cluster, such as tcp://10.0.0.5:8786."),
 )
-@click.option(
-    "--resume",
-    is_flag=True,
-    help="Go on with the results that stand: do what is missing, failed, or has changed (a test, a setting, bushfit).",
+@under(
+    "Output",
+    option("--tables", is_flag=True),
+    option("--plots", is_flag=True, help="Those of each bushing, too."),
+    option("--reports", is_flag=True, help="The page of each bushing that is diagnosed, too."),
 )
-@click.option("--tables", is_flag=True, help="Write loops.csv, sweeps.csv and the like of each too.")
-@click.option("--plots", is_flag=True, help="Write each bushing's plots too.")
-@click.option("--reports", is_flag=True, help="Write report.html of each that is diagnosed too.")
 @with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, NO_REPORT)
 def command(
     manifest: tuple[str, ...],
@@ -82,23 +96,16 @@ def command(
     reports: bool,
     options: Options,
 ) -> None:
-    """Fit (diagnose, predict, run) every campaign of MANIFEST: a TOML or CSV list, a pattern in quotes, or campaigns.
+    """Fit (diagnose, predict, run) many campaigns, with a row each in one table.
 
-    A TOML list has a [[bushings]] table a row: campaign (a file or a pattern, counted from the list's folder), and on
-    request name, commands, directions, effects, adopt, without, max_effects, tolerance, model. The same keys, and at,
-    may stand at its top for all rows; the options here win over these, a row's own keys over both. A CSV list has the
-    keys as columns.
+    MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or campaigns:
 
-    LIMITS are TOML: nrmse, reduced_chi_square, verdicts; tables [parameters.mu], and [[stiffness]] and [[loss_factor]]
-    with at = "axial 25 Hz 0.1 mm", each with min, max, nominal and tolerance, or sigma (standard deviations of the
-    batch, where it has at_least bushings). guard = true counts as missed what is only within by its value.
+    \b
+        [[bushings]]
+        campaign = "batch_7/*/campaign.toml"   # from the list's folder
 
-    Work is kept as it finishes: after an interruption the same command with --resume does what is missing. A row that
-    fails costs that row; its error stands in the table. --force also removes results of bushings that are no longer
-    listed. Exit status 1 where a row failed or a limit is missed.
-
-    Writes batch.csv (a row a bushing), batch.png, batch.json, index.html (control charts, a table to sort), and
-    bushings/<name>/ with model.json of each, or all that `bushfit run` writes.
+    --force also removes results of bushings that are no longer listed. Exit status 1 where a row failed or a limit is
+    missed. Writes batch.csv, batch.png, batch.json, index.html (control charts), and bushings/<name>/model.json.
     """
     from bushfit.batch.pool import DaskPool, LocalPool
 

@@ -16,7 +16,19 @@ from rich.markup import escape
 from rich.segment import Segment
 
 from bushfit.campaign.naming import folder_name
-from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, Folder, Function, Parameter, Size, in_order
+from bushfit.cli.options import (
+    FILE,
+    PLOT_FORMAT,
+    TABLE_FORMAT,
+    Choice,
+    Folder,
+    Function,
+    Parameter,
+    Size,
+    in_order,
+    option,
+    under,
+)
 from bushfit.errors import ModelError, printable, typed
 from bushfit.report.contents import Formats, Kinds
 from bushfit.report.folder import check_free, to_json, write_files
@@ -135,13 +147,18 @@ def with_options(folder: str, *forms: Parameter) -> Parameter:
 
         return in_order(
             wrapped,
-            click.option("-o", "--output", type=Folder(path_type=Path), help=f"Folder for the results [{folder}]."),
-            click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, correlations, files."),
-            click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
-            click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output."),
-            click.option("--no-plots", is_flag=True, help="Write no plots."),
-            click.option("--force", is_flag=True, help="Replace results that stand."),
-            *forms,
+            under(
+                "Output",
+                option(
+                    "-o", "--output", type=Folder(path_type=Path), metavar="DIR", help=f"For the results [{folder}]."
+                ),
+                option("--force", is_flag=True, help="Replace results that stand there."),
+                *forms,
+                option("--no-plots", is_flag=True, hidden=PLOT_FORMAT not in forms, help="Write no plots."),
+                option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output."),
+                option("-v", "--verbose", is_flag=True),
+                option("-q", "--quiet", is_flag=True, help="Say more, or nothing but errors."),
+            ),
         )
 
     return decorate
@@ -205,16 +222,20 @@ def with_task(*forms: Parameter, soft_l1: str = "points far off pull less, outli
         return in_order(
             wrapped,
             click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
-            click.option(
-                "--loss",
-                type=click.Choice(["linear", "soft_l1"]),
-                help=f"linear: least squares [the campaign's, else this]. soft_l1: {soft_l1}.",
-            ),
-            click.option(
-                "--max-nrmse",
-                type=Size("share such as 0.02"),
-                metavar="SHARE",
-                help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
+            under(
+                "How it is fitted",
+                option(
+                    "--loss",
+                    type=Choice(["linear", "soft_l1"]),
+                    metavar="LOSS",
+                    help=f"linear: least squares [the campaign's, else this]; soft_l1: {soft_l1}.",
+                ),
+                option(
+                    "--max-nrmse",
+                    type=Size("share such as 0.02"),
+                    metavar="SHARE",
+                    help="Exit status 1 above this misfit, such as 0.02 (NRMSE).",
+                ),
             ),
         )
 

@@ -11,7 +11,7 @@ import click
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
 from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.inspect import tell_left_out
-from bushfit.cli.options import command_called, option_of
+from bushfit.cli.options import command_called, option, option_of, under
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
 from bushfit.report.folder import check_free
 from bushfit.units import quantity
@@ -28,12 +28,15 @@ _SIDES = ("inner", "outer")
     "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_axial.csv "
     '--inner-diameter "28 mm" --outer-diameter "40 mm" --length "45 mm"',
 )
-@click.option("--inner-radius", help='Of the rubber, such as "10 mm"; or else')
-@click.option("--inner-diameter", help='such as "20 mm".')
-@click.option("--outer-radius", help='Of the rubber, such as "18 mm"; or else')
-@click.option("--outer-diameter", help='such as "36 mm".')
-@click.option("--length", help='Mean length of the rubber, such as "34 mm".')
-@click.option("--name", help="Of the bushing [the folder of the first file].")
+@under(
+    "The rubber of the bushing",
+    option("--inner-radius", metavar="LENGTH"),
+    option("--inner-diameter", metavar="LENGTH", help='Inside, one of the two, such as "20 mm".'),
+    option("--outer-radius", metavar="LENGTH"),
+    option("--outer-diameter", metavar="LENGTH", help='Outside, one of the two, such as "36 mm".'),
+    option("--length", metavar="LENGTH", help='Mean of inside and outside, such as "34 mm".'),
+    option("--name", metavar="NAME", help="Of the bushing [the folder of the first file]."),
+)
 @with_stated()
 @with_options(CAMPAIGN_FOLDER)
 def command(
@@ -41,13 +44,8 @@ def command(
 ) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 
-    FILE may be a folder, or a workbook with several tests; what holds no test is told and left out. Columns tell what a
-    test is; names of file and sheet, or columns, its direction; names an amplitude or frequency without a column
-    (Dyn_axial_A0,05mm.csv). What only you can know, such as a unit, is asked for in an error that names the option. An
-    option holds for all files of its kind; where they differ, edit the campaign. Raw histories go through `bushfit
-    reduce` first. Tests of a modulus, or with --area and --thickness of a stiffness, need no size of a bushing.
-
-    Writes campaign.toml, or -o my_bushing.toml; of several parts a campaign each, and batch.toml, their list.
+    FILE may be a folder, or a workbook with several tests; an option holds for all files of its kind. Tests of coupons
+    need no bushing. Writes campaign.toml, or -o my_bushing.toml.
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.draft import campaign_text, campaigns_of_parts, with_specimens_named

@@ -32,19 +32,13 @@ _FILES_A_PICTURE = 5
 @with_stated()
 @with_options(FIRST_FILE_FOLDER, PLOT_FORMAT)
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
-    """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories, in any mixture.
+    """Look at test files before a campaign names them: loops, sweeps, raw histories.
 
-    FILE may be a folder, or a workbook with several tests; what holds no test is told and left out. For each test:
-    how every column was understood, in which unit, and its range; cycles, sampling, waveform, noise, frequencies,
-    amplitudes, repeats; and what is odd beyond noise, in sentences with figures. Odd is an amplitude or frequency
-    other than the file's name says, a gap, rows that stand still, cut-off tops, outliers, drift, cycles that still
-    settle, a motion off zero, a force of the other sign; in sweeps copied rows, missing frequencies, a repeat that is
-    off, loss factors below zero; two files that repeat each other 10 % apart. Rows count from 1 below the header.
-
-    The text for the campaign goes to standard output, with full paths. If a file cannot be used, the others are told,
-    nothing is written, exit status 2.
-
-    Writes inspect.png, and inspect_2.png and so on of more than five files.
+    FILE may be a folder, or a workbook with several tests. For each test: how every column was understood, in which
+    unit; cycles, noise, frequencies, amplitudes; and what is odd: gaps, outliers, drift, cut-off tops, copied rows,
+    repeats that disagree. Rows count from 1 below the header. The text for the campaign goes to standard output. If a
+    file cannot be used, the others are told, nothing is written, exit status 2. Writes inspect.png, and inspect_2.png
+    and so on of more than five files.
     """
     from bushfit.inspection.draft import pasted_text, with_specimens_named
     from bushfit.inspection.gathering import gather, with_contradictions

@@ -1,12 +1,14 @@
 """What options are made of: their types, those that several commands have, and commands with examples."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
 import click
 
+from bushfit.errors import did_you_mean
 from bushfit.reading.tablefile import Form
 from bushfit.report.contents import Picture
 
@@ -16,9 +18,61 @@ Parameter = Callable[[Function], Function]
 
 #: Type of an option or an argument that names a file or a folder.
 FILE = click.Path(path_type=Path)
+#: Characters of names in a help beside which their words stand; longer ones have them on the next line.
+_NAMES = 26
 
 
-class Direction(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
+class Option(click.Option):
+    """An option that stands under a heading of its command's help, with its words alone: they say what a default is."""
+
+    heading: str | None = None
+
+    def get_help_extra(self, ctx: click.Context) -> Any:
+        return {}
+
+
+#: Decorator for an option of a command.
+option = partial(click.option, cls=Option)
+
+
+class Command(click.Command):
+    """A command whose help has its options under headings, in the order in which they are declared.
+
+    Options without words share the line of the next that has some; without one, they are a paragraph of their own.
+    """
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        heading, groups = "Options", dict[str, list[tuple[str, str]]]()
+        for parameter in self.get_params(ctx):
+            heading = getattr(parameter, "heading", None) or heading
+            if not isinstance(parameter, click.Argument) and (record := parameter.get_help_record(ctx)):
+                groups.setdefault(heading, []).append(record)
+        for title, records in groups.items():
+            names, lines = list[str](), list[tuple[str, str]]()
+            for name, words in records:
+                names.append(name)
+                if words:
+                    lines.append((", ".join(names), words))
+                    names = []
+            with formatter.section(title):
+                if lines:
+                    formatter.write_dl(lines, col_max=_NAMES)
+                if names:
+                    formatter.write_text(", ".join(names))
+
+
+class Choice(click.Choice[str]):
+    """One of some words; another is told the nearest."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter as error:
+            words = (error.message.rstrip("."), did_you_mean(str(value), self.choices))
+            raise click.BadParameter("; ".join(filter(None, words)), ctx, param) from None
+
+
+class Direction(click.ParamType[Any]):
     """A direction of a test; geometry, which lists them, is slow to import, and is asked when they are needed."""
 
     name = "direction"
@@ -26,11 +80,11 @@ class Direction(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows n
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         from bushfit import geometry
 
-        choice = click.Choice([str(direction) for direction in geometry.Direction])
+        choice = Choice([str(direction) for direction in geometry.Direction])
         return geometry.Direction(choice.convert(value, param, ctx))
 
 
-class _Place(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
+class _Place(click.ParamType[str]):
     """A direction, or a specimen of a campaign, which only the campaign knows."""
 
     name = "place"
@@ -67,7 +121,7 @@ def command_called(name: str, *examples: str) -> Callable[[Function], click.Comm
     """
     title = f"Example{'s' * (len(examples) > 1)}:"
     return click.command(
-        name, epilog="\n".join(["\b", title, *(f"  bushfit {name} {line}".rstrip() for line in examples)])
+        name, cls=Command, epilog="\n".join(["\b", title, *(f"  bushfit {name} {line}".rstrip() for line in examples)])
     )
 
 
@@ -78,6 +132,24 @@ def in_order(function: Function, *parameters: Parameter) -> Function:
     return function
 
 
+def under(heading: str, *parameters: Parameter) -> Parameter:
+    """Options that stand under a heading of the help, in this order."""
+
+    def decorate(function: Function) -> Function:
+        before = len(_parameters(function))
+        in_order(function, *parameters)
+        for parameter in _parameters(function)[before:]:
+            parameter.heading = heading
+        return function
+
+    return decorate
+
+
+def _parameters(function: Function) -> Sequence[Any]:
+    """Those that a function to be a command has so far."""
+    return getattr(function, "__click_params__", ())
+
+
 def option_of(key: str) -> str:
     """The option of a key: --force-sign of force_sign."""
     return "--" + key.replace("_", "-")
@@ -85,27 +157,25 @@ def option_of(key: str) -> str:
 
 def place_option(words: str) -> Parameter:
     """Directions or specimens by name, as `directions`."""
-    return click.option("--direction", "directions", type=_Place(), multiple=True, help=words)
+    return option("--direction", "directions", type=_Place(), metavar="PLACE", multiple=True, help=words)
 
 
 #: Decorators of a command that writes tables, pictures or pages.
-TABLE_FORMAT: Parameter = click.option(
+TABLE_FORMAT: Parameter = option(
     "--table-format",
-    type=click.Choice(get_args(Form)),
+    type=Choice(get_args(Form)),
     metavar="FORM",
     default="csv",
     envvar="BUSHFIT_TABLE_FORMAT",
-    show_envvar=True,
-    help="csv, decimal-comma (for a German Excel), xlsx [csv].",
+    help="csv, decimal-comma (German Excel) or xlsx [csv].",
 )
-PLOT_FORMAT: Parameter = click.option(
+PLOT_FORMAT: Parameter = option(
     "--plot-format",
-    type=click.Choice(get_args(Picture)),
+    type=Choice(get_args(Picture)),
     multiple=True,
     metavar="FORM",
     default=["png"],
     envvar="BUSHFIT_PLOT_FORMAT",
-    show_envvar=True,
     help="png, svg, pdf; may be given again [png].",
 )
-NO_REPORT: Parameter = click.option("--no-report", is_flag=True, help="Write no page (HTML).")
+NO_REPORT: Parameter = option("--no-report", is_flag=True, help="Write no page (HTML).")

@@ -15,7 +15,17 @@ from rich.markup import escape
 
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options
-from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, Size, command_called, place_option
+from bushfit.cli.options import (
+    FILE,
+    PLOT_FORMAT,
+    TABLE_FORMAT,
+    Choice,
+    Size,
+    command_called,
+    option,
+    place_option,
+    under,
+)
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import for_people, number
@@ -36,36 +46,38 @@ _MOST_VALUES = 6
 
 @command_called("plan", "configs/arm_bushing.toml --hours 4", "configs/new_bushing.toml --hours 2.5 --for parameters")
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
-@click.option(
-    "--for",
-    "aim",
-    type=click.Choice(["parameters", "predictions", "rivals"]),
-    help="What the tests are to tell best: errors of parameters, of stiffness, or rivals apart [predictions].",
+@under(
+    "What is planned",
+    option(
+        "--hours",
+        type=Size("time in hours such as 8", _MOST_HOURS),
+        metavar="HOURS",
+        default=8.0,
+        help="Of the rig, at most [8].",
+    ),
+    option(
+        "--for",
+        "aim",
+        type=Choice(["parameters", "predictions", "rivals"]),
+        metavar="AIM",
+        help="parameters, predictions or rivals: what the tests shall tell best [predictions].",
+    ),
+    place_option(
+        "axial, radial, torsion or a specimen: where the rig can test; may be given again [axial and radial, or all "
+        "specimens]."
+    ),
+    option("--parameters", metavar="NAME,...", help="Whose errors count, with --for parameters [all]."),
+    option("--rivals", metavar="NAME,...", help="Effects to tell apart [what diagnose leaves open]."),
+    option("--campaign", type=FILE, metavar="FILE", help="With MODEL.json: take [rig] and [predict] of this."),
 )
-@click.option(
-    "--hours",
-    type=Size("time in hours such as 8", _MOST_HOURS),
-    metavar="HOURS",
-    default=8.0,
-    show_default=True,
-    help="Of the rig, at most.",
+@under("Where stiffness will be predicted", grid_options("the campaign's"))
+@under(
+    "To see that it holds",
+    option(
+        "--check", "count", type=click.IntRange(2, 100_000), metavar="N", help="Simulate the plan N times, and fit it."
+    ),
+    option("--seed", type=click.IntRange(0), metavar="N", default=0, help="Of its random numbers [0]."),
 )
-@place_option(
-    "axial, radial or torsion, or a specimen's name: where the rig can test; may be given again [axial and radial of a "
-    "bushing, else all specimens]."
-)
-@click.option("--parameters", metavar="NAME,...", help="Whose errors count, with --for parameters [all].")
-@click.option(
-    "--rivals",
-    metavar="NAME,...",
-    help="Effects to be told apart [those that a diagnosis of the campaign cannot tell].",
-)
-@grid_options("the campaign's")
-@click.option("--campaign", type=FILE, help="Of MODEL.json: take the [rig] and [predict] of this campaign.")
-@click.option(
-    "--check", "count", type=click.IntRange(2, 100_000), metavar="N", help="Simulate the plan N times, and fit each."
-)
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of --check.")
 @with_options("results/plan <name>", TABLE_FORMAT, PLOT_FORMAT)
 def command(
     source: Path,
@@ -82,11 +94,10 @@ def command(
 ) -> None:
     """Choose the tests that would tell most, within the hours and the limits of the rig.
 
-    It starts from the tests of CAMPAIGN, from its [compound] where there are none, or from MODEL.json or a folder of
-    results. A [compound] is a guess: hardness = "61 Shore A", filler = "27 phr", rubber = "natural". What the model
-    lacks shows at least as well as in the paper's tests of as many hours. Rivals take no more hours than they need.
+    It starts from the tests of CAMPAIGN, from its [compound] (hardness = "61 Shore A", filler = "27 phr") where there
+    are none, or from MODEL.json or a folder of results.
 
-    Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml for `bushfit simulate`.
+    Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml to simulate.
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.jobs.plan import CAMPAIGN_FILE, PlanTests

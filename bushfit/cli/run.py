@@ -33,8 +33,7 @@ def command(task: Task) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 
     Shows the verdict of diagnose, the parameters of the model to use, the range that was tested, and the corners of
-    the prediction. The paper's procedure, fit-static and fit-dynamic in turn until they agree, is said in a line; -v
-    shows its passes and what it costs beside the joint fit. Steps whose tests are missing are passed over, and said.
+    the prediction; -v shows every step. Steps whose tests are missing are passed over, and said.
 
     Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
     diagnosis.json, candidates.csv, report.html; as table and plot: loops, sweeps, gap, axial, radial, each specimen.

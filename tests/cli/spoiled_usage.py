@@ -5,7 +5,9 @@ from __future__ import annotations
 
 #: (arguments parted by |, what the error says ...)
 USAGE = [
-    ("fitt|campaign.toml", "No such command 'fitt'."),
+    ("fitt|campaign.toml", "No such command 'fitt'; did you mean \"fit\"?  (bushfit -h tells more)"),
+    ("fit|campaign.toml|--lss|linear", "No such option '--lss'. Did you mean '--loss'?  (bushfit fit -h tells more)"),
+    ("fit|campaign.toml|--loss|liner", "'liner' is not one of 'linear', 'soft_l1'; did you mean \"linear\"?"),
     ("fit", "Missing argument 'CAMPAIGN'."),
     ("fit|campaign.toml|extra", "Got unexpected extra argument (extra)"),
     ("fit|campaign.toml|--colour", "No such option '--colour'."),
@@ -100,7 +102,7 @@ USAGE = [
     ("inspect", "Missing argument 'FILE...'."),
     ("inspect|campaign.toml", "campaign.toml: a test file is needed", "found: a campaign", "bushfit diagnose looks at all tests of a campaign"),
     ("reduce|model.json", "model.json: a test file is needed", "found: a model"),
-    ("inspect|loop.csv|--direction|up", "Invalid value for '--direction': 'up' is not one of 'axial', 'radial', 'torsion'."),
+    ("inspect|loop.csv|--direction|up", "Invalid value for '--direction': 'up' is not one of 'axial', 'radial', 'torsion'"),
     ("inspect|loop.csv|--unit|force", "--unit: not a column's role with a value", 'such as "force=kN"; roles: time, displacement, force, frequency, amplitude,'),
     ("inspect|loop.csv|--unit|force=furlong", 'loop.csv, line 1, column "force [N]": two units for the force', "one unit, from the header, the units row or the campaign"),
     ("inspect|loop.csv|--column|kraft=force [N]", "--column: not a column's role with a value", 'such as "force=Kraft"; roles: time, displacement, force, frequency, amplitude,'),
@@ -139,7 +141,7 @@ USAGE = [
     ("reduce|loop.csv|--levels|0.1", "loop.csv: nothing says in which direction this was tested", "state it: --direction axial (or radial, torsion)"),
     ("reduce|loop.csv|--direction|axial|--levels|-1 mm", "--levels: frequencies and amplitudes are above zero", 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'),
     ("batch|loop.csv", "loop.csv, header: unknown key", "one of commands, directions, effects, adopt, without, max_effects, tolerance, model,"),
-    ("batch|campaign.toml|--command|magic", "Invalid value for '--command': 'magic' is not one of 'run', 'fit', 'diagnose', 'predict'."),
+    ("batch|campaign.toml|--command|magic", "Invalid value for '--command': 'magic' is not one of 'run', 'fit', 'diagnose', 'predict'"),
     ("batch|campaign.toml|--jobs|0", "Invalid value for '--jobs': 0 is not in the range x>=1."),
     ("batch|campaign.toml|--limits|lost.toml", "campaign.toml, bushing: unknown key", "this is one campaign: bushfit run takes it, and a pattern in quotes takes many"),
     ("batch", "Missing argument 'MANIFEST'."),
