@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from bushfit.cli import completion
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
 from bushfit.cli.options import (
     FILE,
@@ -54,7 +55,14 @@ _SECONDS_A_LINE = 10.0
         help="fit, diagnose, predict or run; may be given again [fit].",
     ),
     place_option("Tests to fit, as in bushfit fit."),
-    option("--effect", "effects", multiple=True, metavar="NAME", help="Add an effect, as in bushfit fit."),
+    option(
+        "--effect",
+        "effects",
+        multiple=True,
+        metavar="NAME",
+        shell_complete=completion.effects,
+        help="Add an effect, as in bushfit fit.",
+    ),
     option(
         "--at",
         multiple=True,

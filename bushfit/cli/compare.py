@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bushfit.cli import completion
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_source, progress, with_options
 from bushfit.cli.grids import asked_for, grid_options
 from bushfit.cli.options import (
@@ -48,6 +49,7 @@ _ALL = "all"
         is_flag=False,
         flag_value=_ALL,
         metavar="[NAME,...]",
+        shell_complete=completion.effect_lists,
         help="Model families on the one campaign A: the paper's, and those named, effects joined by + [each law of "
         "rate with each of amplitude].",
     ),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
+from bushfit.cli import completion
 from bushfit.cli.common import Options, Task, open_model, with_task
 from bushfit.cli.options import FILE, NO_REPORT, command_called, option, under
 from bushfit.cli.show import new_table, parameter_table
@@ -31,11 +32,16 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
         "--adopt",
         multiple=True,
         metavar="EFFECT",
+        shell_complete=completion.explanations,
         help="Add this effect, such as inertia, or mend this mistake in the record of a test, such as "
         "peak_to_peak:sweep_axial; may be given again. A wrong EFFECT lists all.",
     ),
     option(
-        "--without", multiple=True, metavar="EFFECT", help="Do not consider this effect or mistake; may be given again."
+        "--without",
+        multiple=True,
+        metavar="EFFECT",
+        shell_complete=completion.explanations,
+        help="Do not consider this effect or mistake; may be given again.",
     ),
     option(
         "--tolerance", metavar="SHARE", default="1 %", help="Gaps below this share of the stiffness do not count [1 %]."

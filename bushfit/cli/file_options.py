@@ -9,6 +9,7 @@ from typing import Any, get_args
 
 import click
 
+from bushfit.cli import completion
 from bushfit.cli.options import FILE, Direction, Function, Parameter, in_order, option, option_of, under
 from bushfit.errors import BushfitError, MeasurementError
 
@@ -74,7 +75,13 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
             click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
             under(
                 "What the files do not say",
-                option("--direction", type=Direction(), metavar="DIRECTION", help=f"{_DIRECTIONS} [names, columns]."),
+                option(
+                    "--direction",
+                    type=Direction(),
+                    shell_complete=completion.places,
+                    metavar="DIRECTION",
+                    help=f"{_DIRECTIONS} [names, columns].",
+                ),
                 option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Of a column: "force=kN".'),
                 option(
                     "--column",
@@ -100,9 +107,9 @@ def _stated(key: str, metavar: str, words: str | None = None) -> Parameter:
     return option(option_of(key), type=int if key in _WHOLE_NUMBERS else None, metavar=metavar, help=words)
 
 
-def _tests_alone(_: click.Context, __: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
+def _tests_alone(context: click.Context, _: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
     """Refuse a campaign or a model among test files."""
-    for file in files:
+    for file in () if context.resilient_parsing else files:  # while somebody types, Tab is no error
         if (found := _NO_TESTS.get(file.suffix.lower())) and file.is_file():
             hint = "bushfit diagnose looks at all tests of a campaign together; name its files, or their folder, here"
             raise MeasurementError("a test file is needed", file=file, found=found, expected="a table", hint=hint)

@@ -3,6 +3,7 @@
 from contextlib import nullcontext
 from pathlib import Path
 
+from bushfit.cli import completion
 from bushfit.cli.common import Task, open_model, progress, with_task
 from bushfit.cli.options import FILE, command_called, option, place_option, under
 from bushfit.cli.show import tell_fit
@@ -63,6 +64,7 @@ def dynamic(static: Path | None, task: Task) -> None:
         "effects",
         multiple=True,
         metavar="NAME",
+        shell_complete=completion.effects,
         help="Add an effect to the model, such as inertia; may be given again. A wrong NAME lists all.",
     ),
     option("--profile", is_flag=True, help="Add 95 % intervals by profile likelihood (some seconds)."),

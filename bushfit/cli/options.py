@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any, get_args
 
 import click
+from click.shell_completion import CompletionItem
 
+from bushfit.cli import completion
 from bushfit.errors import did_you_mean
 from bushfit.reading.tablefile import Form
 from bushfit.report.contents import Picture
@@ -96,6 +98,9 @@ class _Place(click.ParamType[str]):
 class Folder(click.Path):
     """A folder for results; an empty text, as of a variable that is not set, is none."""
 
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        return [CompletionItem(incomplete, type="dir")]
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         return (
             super().convert(value, param, ctx) if value else self.fail("this is no folder: an empty text", param, ctx)
@@ -157,7 +162,15 @@ def option_of(key: str) -> str:
 
 def place_option(words: str) -> Parameter:
     """Directions or specimens by name, as `directions`."""
-    return option("--direction", "directions", type=_Place(), metavar="PLACE", multiple=True, help=words)
+    return option(
+        "--direction",
+        "directions",
+        type=_Place(),
+        metavar="PLACE",
+        multiple=True,
+        help=words,
+        shell_complete=completion.places,
+    )
 
 
 #: Decorators of a command that writes tables, pictures or pages.

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, cast
 import click
 from rich.markup import escape
 
+from bushfit.cli import completion
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options
 from bushfit.cli.options import (
@@ -67,7 +68,12 @@ _MOST_VALUES = 6
         "specimens]."
     ),
     option("--parameters", metavar="NAME,...", help="Whose errors count, with --for parameters [all]."),
-    option("--rivals", metavar="NAME,...", help="Effects to tell apart [what diagnose leaves open]."),
+    option(
+        "--rivals",
+        metavar="NAME,...",
+        shell_complete=completion.effect_lists,
+        help="Effects to tell apart [what diagnose leaves open].",
+    ),
     option("--campaign", type=FILE, metavar="FILE", help="With MODEL.json: take [rig] and [predict] of this."),
 )
 @under("Where stiffness will be predicted", grid_options("the campaign's"))

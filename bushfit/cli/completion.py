@@ -1,0 +1,71 @@
+"""What the Tab key offers where an option takes a name: of places, effects, mistakes in a test, files' schemas.
+
+What a campaign or model on the line names is offered, too. While somebody types, no file is an error.
+"""
+
+import json
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import click
+
+#: What click asks for the words at the cursor.
+Offer = Callable[[click.Context, click.Parameter, str], list[str]]
+_READ: dict[str, Callable[[str], Any]] = {".toml": tomllib.loads, ".json": json.loads}
+
+
+def _documents(ctx: click.Context) -> Iterator[dict[str, Any]]:
+    """The campaigns and models that are typed already, as they can be read."""
+    values = [path for value in ctx.params.values() for path in (value if isinstance(value, tuple) else [value])]
+    typed = {Path(path) for path in (*values, *ctx.args) if isinstance(path, str | Path)}
+    for path in (path for path in typed if path.suffix in _READ):
+        with suppress(OSError, ValueError):
+            yield _READ[path.suffix](path.read_text(encoding="utf-8"))
+
+
+def _offered(known: Callable[[click.Context], Iterable[str]], between: str = "") -> Offer:
+    """Offers what is known, of a list with certain signs `between` its names for the last."""
+
+    def offer(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
+        typed = re.match(f"(?:.*[{between}])?", incomplete) if between else None
+        before = typed[0] if typed else ""
+        return [before + name for name in known(ctx) if name.startswith(incomplete[len(before) :])]
+
+    return offer
+
+
+def _places(ctx: click.Context) -> Iterator[str]:
+    yield from ("axial", "radial", "torsion")
+    yield from (body["name"] for document in _documents(ctx) for body in document.get("specimens", ()))
+
+
+def _effects(_: click.Context) -> list[str]:
+    from bushfit.effects import BASE, LIBRARY
+
+    return [name for name in LIBRARY if name not in BASE]
+
+
+def _explanations(ctx: click.Context) -> Iterator[str]:
+    """Effects, and mistakes with the test that they may have been made in."""
+    from bushfit.effects.mistakes import MISTAKES, labelled
+
+    yield from _effects(ctx)
+    tests = {kind: [test for document in _documents(ctx) for test in document.get(f"{kind}s", ())] for kind in _KINDS}
+    for name, mistake in MISTAKES.items():
+        yield from (labelled(name, Path(test["file"]).stem) for kind in mistake.kinds for test in tests[kind])
+
+
+def _schemas(_: click.Context) -> Iterable[str]:
+    from bushfit.schemas import DESCRIBED
+
+    return DESCRIBED
+
+
+_KINDS = ("loop", "sweep")
+places, effects, explanations, schemas = map(_offered, (_places, _effects, _explanations, _schemas))
+#: Several effects, between commas and plus signs.
+effect_lists = _offered(_effects, ",+")
