@@ -24,6 +24,7 @@ from bushfit.effects import effect_of, place_of, with_base
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.model.model import FIVE, Model
+from bushfit.progress import counting
 from bushfit.reading.columns import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
@@ -104,10 +105,13 @@ def load_campaign(path: str | Path) -> Campaign:
         bushing,
         tuple(
             loop
-            for keywords in reader_keywords(path, content.loops, specimens)
+            for keywords in counting("loops read", list(reader_keywords(path, content.loops, specimens)))
             for loop in programme(read_loop(**keywords), **keywords)
         ),
-        tuple(read_sweep(**keywords) for keywords in reader_keywords(path, content.sweeps, specimens)),
+        tuple(
+            read_sweep(**keywords)
+            for keywords in counting("sweeps read", list(reader_keywords(path, content.sweeps, specimens)))
+        ),
         content.fit,
         content.predict,
         content.simulate,

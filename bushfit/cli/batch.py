@@ -3,30 +3,14 @@
 from __future__ import annotations
 
 import os
-import time
-from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from bushfit.cli import completion
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
-from bushfit.cli.options import (
-    FILE,
-    NO_REPORT,
-    PLOT_FORMAT,
-    TABLE_FORMAT,
-    Choice,
-    command_called,
-    option,
-    place_option,
-    under,
-)
+from bushfit.cli.options import Choice, command_called, effect_option, file_option, option, place_option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import alike, for_people
@@ -38,8 +22,6 @@ if TYPE_CHECKING:
 
 #: Bushings of a kind (failed, out of limits, on the edge) that the terminal names; batch.csv has all.
 _MOST_SHOWN = 10
-#: Seconds between two lines on progress where standard error is no terminal.
-_SECONDS_A_LINE = 10.0
 
 
 @command_called("batch", '"data/practice/*/bushing.toml" --at "axial 25 Hz 0.1 mm"')
@@ -55,14 +37,7 @@ _SECONDS_A_LINE = 10.0
         help="fit, diagnose, predict or run; may be given again [fit].",
     ),
     place_option("Tests to fit, as in bushfit fit."),
-    option(
-        "--effect",
-        "effects",
-        multiple=True,
-        metavar="NAME",
-        shell_complete=completion.effects,
-        help="Add an effect, as in bushfit fit.",
-    ),
+    effect_option("Add an effect, as in bushfit fit."),
     option(
         "--at",
         multiple=True,
@@ -72,8 +47,8 @@ _SECONDS_A_LINE = 10.0
 )
 @under(
     "Limits",
-    option("--limits", type=FILE, metavar="FILE", help="Judge each bushing by the limits in this TOML file."),
-    option("--junit", type=FILE, metavar="FILE", help="Write a JUnit report for CI."),
+    file_option("--limits", "Judge each bushing by the limits in this TOML file."),
+    file_option("--junit", "Write a JUnit report for CI."),
 )
 @under(
     "How the work is done",
@@ -87,7 +62,7 @@ _SECONDS_A_LINE = 10.0
     option("--plots", is_flag=True, help="Those of each bushing, too."),
     option("--reports", is_flag=True, help="The page of each bushing that is diagnosed, too."),
 )
-@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, NO_REPORT)
+@with_options(CAMPAIGN_FOLDER, "tables", "pictures", "pages")
 def command(
     manifest: tuple[str, ...],
     commands: tuple[Command, ...],
@@ -140,46 +115,10 @@ def command(
     orders = Orders(output, tuple(dict.fromkeys(points)), formats, resume)
     plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.formats)
     check_free(plan, force=options.force)
-    with _progress(options, len(plan.rows)) as advance:
-        outcome = run(plan, workers, advance, lambda outcome: options.print_json(outcome.summary))
+    outcome = run(plan, workers, lambda outcome: options.print_json(outcome.summary))
     _tell(options, outcome, options.folder(read.stem))
     if outcome.status["failed"] or outcome.missed:
         click.get_current_context().exit(1)
-
-
-@contextmanager
-def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
-    """Rate and time left: a bar on a terminal, now and then a line elsewhere."""
-    console = options.console
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[failures]}", style="red"),
-    )
-    begin = said = time.monotonic()
-    tenth, count = 0, Counter[str]()
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("bushings", total=total, rate="", failures="")
-
-        def advance(status: str) -> None:
-            nonlocal said, tenth
-            count[status] += 1
-            done, now = count.total(), time.monotonic()
-            rate = done / max(now - begin, 1e-9)
-            failures = f"{count['failed']} failed" if count["failed"] else ""
-            bar.update(task, completed=done, rate=f"{rate:.1f}/s", failures=failures)
-            if done == total:
-                bar.stop()  # it takes what is printed for its own as long as it stands
-            due = now - begin >= _SECONDS_A_LINE and 10 * done // total != tenth
-            if not console.is_terminal and (due or now - said >= _SECONDS_A_LINE):
-                said, tenth = now, 10 * done // total
-                text = f"{done} of {total}, {rate:.1f}/s, {(total - done) / rate:.0f} s left"
-                options.say(", ".join(filter(None, (text, failures))))
-
-        yield advance
 
 
 def _tell(options: Options, outcome: Outcome, folder: Path) -> None:

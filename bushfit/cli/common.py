@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -16,19 +15,8 @@ from rich.markup import escape
 from rich.segment import Segment
 
 from bushfit.campaign.naming import folder_name
-from bushfit.cli.options import (
-    FILE,
-    PLOT_FORMAT,
-    TABLE_FORMAT,
-    Choice,
-    Folder,
-    Function,
-    Parameter,
-    Size,
-    in_order,
-    option,
-    under,
-)
+from bushfit.cli.options import FILE, FORMS, Choice, Folder, Function, Parameter, Size, Written, in_order, option, under
+from bushfit.cli.progress import shown_on
 from bushfit.errors import ModelError, printable, typed
 from bushfit.report.contents import Formats, Kinds
 from bushfit.report.folder import check_free, to_json, write_files
@@ -115,12 +103,12 @@ class Options:
             sys.stdout.flush()
 
 
-def with_options(folder: str, *forms: Parameter) -> Parameter:
+def with_options(folder: str, *written: Written) -> Parameter:
     """Decorator of a command: the options that all have become one `options`.
 
     Args:
         folder: where results go without --output, as the help says it.
-        forms: options on the form of what it writes: TABLE_FORMAT, PLOT_FORMAT, NO_REPORT.
+        written: what the command writes that has forms.
     """
 
     def decorate(function: Function) -> Function:
@@ -143,7 +131,9 @@ def with_options(folder: str, *forms: Parameter) -> Parameter:
                 table_form=table_format,
                 picture_forms=tuple(dict.fromkeys(plot_format)),
             )
-            return function(options=Options(output, verbose, quiet, as_json, formats, force), **others)
+            options = Options(output, verbose, quiet, as_json, formats, force)
+            with shown_on(options.console):
+                return function(options=options, **others)
 
         return in_order(
             wrapped,
@@ -153,8 +143,8 @@ def with_options(folder: str, *forms: Parameter) -> Parameter:
                     "-o", "--output", type=Folder(path_type=Path), metavar="DIR", help=f"For the results [{folder}]."
                 ),
                 option("--force", is_flag=True, help="Replace results that stand there."),
-                *forms,
-                option("--no-plots", is_flag=True, hidden=PLOT_FORMAT not in forms, help="Write no plots."),
+                *(FORMS[kind] for kind in written),
+                option("--no-plots", is_flag=True, hidden="pictures" not in written, help="Write no plots."),
                 option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output."),
                 option("-v", "--verbose", is_flag=True),
                 option("-q", "--quiet", is_flag=True, help="Say more, or nothing but errors."),
@@ -203,16 +193,16 @@ class Task:
             click.get_current_context().exit(1)
 
 
-def with_task(*forms: Parameter, soft_l1: str = "points far off pull less, outliers not at all") -> Parameter:
+def with_task(*written: Written, soft_l1: str = "points far off pull less, outliers not at all") -> Parameter:
     """Decorator of a command on one campaign, with tables and plots: CAMPAIGN and its options become one `task`.
 
     Args:
-        forms: further ones of `with_options`.
+        written: beside tables and pictures, as of `with_options`.
         soft_l1: what this loss does, as the help says it.
     """
 
     def decorate(function: Function) -> Function:
-        @with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, *forms)
+        @with_options(CAMPAIGN_FOLDER, "tables", "pictures", *written)
         @wraps(function)
         def wrapped(
             campaigns: Sequence[Path], loss: Loss | None, max_nrmse: float | None, options: Options, **others: Any
@@ -295,23 +285,3 @@ def open_source(source: Path) -> Campaign | Result:
             hint="name a model file itself, or a campaign",
         )
     return open_model(file)
-
-
-@contextmanager
-def progress(options: Options, what: str) -> Iterator[Callable[[str, int], None]]:
-    """Which of some things is done, by its name, and how many are left: a bar on a terminal, a line each elsewhere."""
-    from rich.progress import Progress
-
-    console = options.console
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(what, total=None)
-
-        def advance(name: str, left: int) -> None:
-            done = bar.tasks[0].completed + 1
-            bar.update(task, completed=done, total=done + left, description=f"{what} {name}: done")
-            if not console.is_terminal:
-                options.say(f"{what} {name}: done, {left} to go")
-            elif not left:
-                bar.stop()
-
-        yield advance

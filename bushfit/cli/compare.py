@@ -8,21 +8,12 @@ from typing import TYPE_CHECKING
 import click
 
 from bushfit.cli import completion
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_source, progress, with_options
+from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options
-from bushfit.cli.options import (
-    FILE,
-    NO_REPORT,
-    PLOT_FORMAT,
-    TABLE_FORMAT,
-    command_called,
-    option,
-    option_of,
-    place_option,
-    under,
-)
+from bushfit.cli.options import FILE, command_called, option, option_of, place_option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
+from bushfit.progress import counting
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
@@ -54,7 +45,7 @@ _ALL = "all"
         "rate with each of amplitude].",
     ),
 )
-@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, NO_REPORT)
+@with_options(CAMPAIGN_FOLDER, "tables", "pictures", "pages")
 def command(
     sources: tuple[Path, ...], families: str | None, directions: tuple[str, ...], options: Options, **grids: str | None
 ) -> None:
@@ -88,12 +79,11 @@ def command(
                 all(map(effect_named, name.split("+")))
         campaign = load_campaign(sources[0])
         folder = options.free_folder(campaign.name, job.kinds(families=True), form="{} families")
-        with progress(options, "family") as advance:
-            outcome = job.run_families(campaign, str(sources[0]), names, advance)
+        outcome = job.run_families(campaign, str(sources[0]), names)
     else:
         opened = [_opened(source) for source in sources]
         folder = options.free_folder(" and ".join(each.name for each, *_ in opened), job.kinds())
-        outcome = job.run([job.entry(*each) for each in opened])
+        outcome = job.run([job.entry(*each) for each in counting("results fitted", opened)])
     _tell(options, outcome)
     options.write(folder, options.formats.files(outcome.contents), outcome.document)
 

@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from bushfit.cli import completion
 from bushfit.cli.common import Options, Task, open_model, with_task
-from bushfit.cli.options import FILE, NO_REPORT, command_called, option, under
+from bushfit.cli.options import command_called, file_option, option, under
 from bushfit.cli.show import new_table, parameter_table
 from bushfit.errors import BushfitError, naming
 from bushfit.units import alike, for_people, number, quantity
@@ -46,9 +46,9 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
     option(
         "--tolerance", metavar="SHARE", default="1 %", help="Gaps below this share of the stiffness do not count [1 %]."
     ),
-    option("--model", type=FILE, metavar="FILE", help="Start from the effects of this model.json [the paper's three]."),
+    file_option("--model", "Start from the effects of this model.json [the paper's three]."),
 )
-@with_task(NO_REPORT, soft_l1="the same with outliers left out")
+@with_task("pages", soft_l1="the same with outliers left out")
 def command(
     model: Path | None, adopt: tuple[str, ...], without: tuple[str, ...], max_effects: int, tolerance: str, task: Task
 ) -> None:

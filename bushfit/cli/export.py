@@ -7,16 +7,7 @@ import click
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
 from bushfit.cli.grids import asked_for, grid_options, positive
-from bushfit.cli.options import (
-    FILE,
-    PLOT_FORMAT,
-    TABLE_FORMAT,
-    Choice,
-    command_called,
-    option,
-    place_option,
-    under,
-)
+from bushfit.cli.options import FILE, Choice, command_called, file_option, option, place_option, under
 
 
 @command_called(
@@ -51,9 +42,9 @@ from bushfit.cli.options import (
     "Where it is predicted",
     place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
     grid_options("the campaign's"),
-    option("--campaign", type=FILE, metavar="FILE", help="Take the grid of this campaign."),
+    file_option("--campaign", "Take the grid of this campaign."),
 )
-@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT)
+@with_options(CAMPAIGN_FOLDER, "tables", "pictures")
 def command(
     model: Path,
     formats: tuple[str, ...],

@@ -1,19 +1,14 @@
 """`bushfit fit-static`, `fit-dynamic` and `fit`: loops, sweeps, or both together -> parameters."""
 
-from contextlib import nullcontext
 from pathlib import Path
 
-from bushfit.cli import completion
-from bushfit.cli.common import Task, open_model, progress, with_task
-from bushfit.cli.options import FILE, command_called, option, place_option, under
+from bushfit.cli.common import Task, open_model, with_task
+from bushfit.cli.options import command_called, effect_option, file_option, option, place_option, under
 from bushfit.cli.show import tell_fit
 
 
 @command_called("fit-static", "configs/cmp_15961.toml")
-@under(
-    "How it is fitted",
-    option("--dynamic", type=FILE, metavar="FILE", help="Hold m and alpha at those of this dynamic.json."),
-)
+@under("How it is fitted", file_option("--dynamic", "Hold m and alpha at those of this dynamic.json."))
 @with_task()
 def static(dynamic: Path | None, task: Task) -> None:
     """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, at given m and alpha.
@@ -31,11 +26,8 @@ def static(dynamic: Path | None, task: Task) -> None:
 @command_called("fit-dynamic", "configs/cmp_15961.toml")
 @under(
     "How it is fitted",
-    option(
-        "--static",
-        type=FILE,
-        metavar="FILE",
-        help="Hold mu, sigma_fmax and eps_half at those of this static.json [the loops are fitted first].",
+    file_option(
+        "--static", "Hold mu, sigma_fmax and eps_half at those of this static.json [the loops are fitted first]."
     ),
 )
 @with_task()
@@ -59,14 +51,7 @@ def dynamic(static: Path | None, task: Task) -> None:
         "Tests in this direction (axial, radial, torsion) or of this specimen; may be given again [axial, and all "
         "specimens]."
     ),
-    option(
-        "--effect",
-        "effects",
-        multiple=True,
-        metavar="NAME",
-        shell_complete=completion.effects,
-        help="Add an effect to the model, such as inertia; may be given again. A wrong NAME lists all.",
-    ),
+    effect_option("Add an effect to the model, such as inertia; may be given again. A wrong NAME lists all."),
     option("--profile", is_flag=True, help="Add 95 % intervals by profile likelihood (some seconds)."),
 )
 @with_task()
@@ -82,5 +67,4 @@ def fit(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, ta
     """
     from bushfit.jobs.fits import Fit
 
-    with progress(task.options, "profile of") if profile else nullcontext() as advance:
-        task.perform(Fit(directions, effects, advance), tell_fit)
+    task.perform(Fit(directions, effects, profile), tell_fit)

@@ -13,6 +13,7 @@ from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.inspect import tell_left_out
 from bushfit.cli.options import command_called, option, option_of, under
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
+from bushfit.progress import counting
 from bushfit.report.folder import check_free
 from bushfit.units import quantity
 
@@ -140,7 +141,7 @@ def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_sized: bool)
         raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
     seen: list[Inspected] = []
     others = list(left_out)
-    for source in sources:
+    for source in counting("tests looked at", sources):
         with options_named():
             one = source.inspect()
             if is_sized and isinstance(one.direction, Specimen) and one.direction.kind == "shear":

@@ -13,9 +13,10 @@ from rich.markup import escape
 
 from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
 from bushfit.cli.file_options import options_named, with_stated
-from bushfit.cli.options import PLOT_FORMAT, command_called
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
+from bushfit.progress import counting
 from bushfit.report import plots
 from bushfit.report.contents import Contents, Kinds
 
@@ -30,7 +31,7 @@ _FILES_A_PICTURE = 5
 
 @command_called("inspect", "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv")
 @with_stated()
-@with_options(FIRST_FILE_FOLDER, PLOT_FORMAT)
+@with_options(FIRST_FILE_FOLDER, "pictures")
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw histories.
 
@@ -50,7 +51,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     folder = options.free_folder(files[0].stem, Kinds(pictures=tuple(pages)))
     seen: list[Inspected] = []
     failed: list[BushfitError] = []
-    for source in sources:
+    for source in counting("tests looked at", sources):
         try:
             with options_named():
                 seen.append(source.inspect())

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import click
 from click.shell_completion import CompletionItem
@@ -173,8 +173,19 @@ def place_option(words: str) -> Parameter:
     )
 
 
-#: Decorators of a command that writes tables, pictures or pages.
-TABLE_FORMAT: Parameter = option(
+def effect_option(words: str) -> Parameter:
+    """Effects to add by name, as `effects`."""
+    return option("--effect", "effects", multiple=True, metavar="NAME", help=words, shell_complete=completion.effects)
+
+
+def file_option(name: str, words: str) -> Parameter:
+    """A file."""
+    return option(name, type=FILE, metavar="FILE", help=words)
+
+
+#: What a command writes that has forms, and the option of these.
+Written = Literal["tables", "pictures", "pages"]
+_TABLE_FORMAT: Parameter = option(
     "--table-format",
     type=Choice(get_args(Form)),
     metavar="FORM",
@@ -182,7 +193,7 @@ TABLE_FORMAT: Parameter = option(
     envvar="BUSHFIT_TABLE_FORMAT",
     help="csv, decimal-comma (German Excel) or xlsx [csv].",
 )
-PLOT_FORMAT: Parameter = option(
+_PLOT_FORMAT: Parameter = option(
     "--plot-format",
     type=Choice(get_args(Picture)),
     multiple=True,
@@ -191,4 +202,5 @@ PLOT_FORMAT: Parameter = option(
     envvar="BUSHFIT_PLOT_FORMAT",
     help="png, svg, pdf; may be given again [png].",
 )
-NO_REPORT: Parameter = option("--no-report", is_flag=True, help="Write no page (HTML).")
+_NO_REPORT: Parameter = option("--no-report", is_flag=True, help="Write no page (HTML).")
+FORMS: dict[Written, Parameter] = {"tables": _TABLE_FORMAT, "pictures": _PLOT_FORMAT, "pages": _NO_REPORT}

@@ -16,17 +16,7 @@ from rich.markup import escape
 from bushfit.cli import completion
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options
-from bushfit.cli.options import (
-    FILE,
-    PLOT_FORMAT,
-    TABLE_FORMAT,
-    Choice,
-    Size,
-    command_called,
-    option,
-    place_option,
-    under,
-)
+from bushfit.cli.options import FILE, Choice, Size, command_called, file_option, option, place_option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import for_people, number
@@ -74,7 +64,7 @@ _MOST_VALUES = 6
         shell_complete=completion.effect_lists,
         help="Effects to tell apart [what diagnose leaves open].",
     ),
-    option("--campaign", type=FILE, metavar="FILE", help="With MODEL.json: take [rig] and [predict] of this."),
+    file_option("--campaign", "With MODEL.json: take [rig] and [predict] of this."),
 )
 @under("Where stiffness will be predicted", grid_options("the campaign's"))
 @under(
@@ -84,7 +74,7 @@ _MOST_VALUES = 6
     ),
     option("--seed", type=click.IntRange(0), metavar="N", default=0, help="Of its random numbers [0]."),
 )
-@with_options("results/plan <name>", TABLE_FORMAT, PLOT_FORMAT)
+@with_options("results/plan <name>", "tables", "pictures")
 def command(
     source: Path,
     aim: str | None,
@@ -201,19 +191,17 @@ def _tell_effects(options: Options, document: PlanFile) -> None:
 
 def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check:
     """The plan simulated, with a table of what was predicted and found."""
-    from rich.progress import Progress
-
     from bushfit.batch import pool
     from bushfit.planning.check import Found, check
+    from bushfit.progress import counted
 
     def every(seeds: Sequence[int], work: Callable[[Sequence[int]], list[Found]]) -> Iterator[tuple[int, Found]]:
-        for done in pool.run(seeds, work, lambda _: None, pool.LocalPool(os.cpu_count() or 1)):
-            progress.advance(task)
-            yield done
+        with counted("campaigns simulated and fitted", count) as advance:
+            for done in pool.run(seeds, work, lambda _: None, pool.LocalPool(os.cpu_count() or 1)):
+                yield done
+                advance("")
 
-    with Progress(console=options.console, transient=True) as progress:
-        task = progress.add_task("simulated", total=count)
-        found = check(outcome.plan, count, seed, every)
+    found = check(outcome.plan, count, seed, every)
     table = new_table(
         f"{len(found.off)} simulated campaigns from seed {found.seed} on: standard errors [%]",
         "of",

@@ -9,7 +9,7 @@ import click
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
 from bushfit.cli.grids import asked_for, grid_options, positive
-from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, command_called, option, place_option, under
+from bushfit.cli.options import FILE, command_called, file_option, option, place_option, under
 from bushfit.cli.show import new_table, tell_tests
 
 if TYPE_CHECKING:
@@ -26,16 +26,11 @@ _MOST_AMPLITUDES = 8
     place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
     grid_options("the campaign's"),
     option("--temperature", metavar="TEMP", help='Such as "40 degC", if the model knows it [23 degC].'),
-    option("--campaign", type=FILE, metavar="FILE", help="Take its grid, and show its sweeps beside."),
+    file_option("--campaign", "Take its grid, and show its sweeps beside."),
 )
 @under(
     "What is predicted besides",
-    option(
-        "--bushing",
-        type=FILE,
-        metavar="FILE",
-        help="Another one, of the same compound: [bushing] of this TOML file.",
-    ),
+    file_option("--bushing", "Another one, of the same compound: [bushing] of this TOML file."),
     option("--mass", metavar="MASS"),
     option(
         "--base-acceleration",
@@ -51,7 +46,7 @@ _MOST_AMPLITUDES = 8
         help="Maxwell arms for the springpot, within this error [1 %].",
     ),
 )
-@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT)
+@with_options(CAMPAIGN_FOLDER, "tables", "pictures")
 def command(
     model: Path,
     campaign: Path | None,

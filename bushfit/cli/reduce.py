@@ -14,7 +14,7 @@ import click
 from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
 from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.grids import parse_grid, positive
-from bushfit.cli.options import PLOT_FORMAT, TABLE_FORMAT, command_called, option, under
+from bushfit.cli.options import command_called, option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.report import plots
@@ -53,7 +53,7 @@ _LINES_AN_OCTAVE = 3
     option("--specimen", metavar="NAME", help="What was tested, if it is no bushing."),
     option("--base-acceleration", metavar="ACCELERATION", help='Such as "0.1 g", if no column says it.'),
 )
-@with_options(FIRST_FILE_FOLDER, TABLE_FORMAT, PLOT_FORMAT)
+@with_options(FIRST_FILE_FOLDER, "tables", "pictures")
 def command(
     files: tuple[Path, ...],
     stated: Mapping[str, Any],

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from bushfit.cli.common import Options, Task, with_task
 from bushfit.cli.diagnose import tell_findings, tell_verdict
-from bushfit.cli.options import NO_REPORT, command_called
+from bushfit.cli.options import command_called
 from bushfit.cli.predict import tell_predictions
 from bushfit.cli.show import new_table, report, tell_fit, tell_result, tell_sources
 from bushfit.units import alike, for_people, number
@@ -28,7 +28,7 @@ _OPEN = 100.0
 
 
 @command_called("run", "configs/cmp_15961.toml")
-@with_task(NO_REPORT)
+@with_task("pages")
 def command(task: Task) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
-from bushfit.cli.options import FILE, TABLE_FORMAT, command_called, option, option_of, under
+from bushfit.cli.options import FILE, command_called, option, option_of, under
 from bushfit.errors import ModelError, UnitError, naming
 from bushfit.units import is_number, quantity
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     option("--gain-error", metavar="SHARE", help='Shared by a run, one repeat of one amplitude: "0.4 %".'),
     option("--phase-error", metavar="ANGLE", help='Shared by a run: "0.2 deg".'),
 )
-@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT)
+@with_options(CAMPAIGN_FOLDER, "tables")
 def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
     """Put a model on the virtual rig and write a campaign of simulated raw tests.
 
