@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
-from bushfit.cli.options import Choice, command_called, effect_option, file_option, option, place_option, under
+from bushfit.cli.options import Choice, command_called, effect_option, file_option, flag, option, place_option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import alike, for_people
@@ -29,21 +29,15 @@ _MOST_SHOWN = 10
 @under(
     "What is done with each",
     option(
-        "--command",
-        "commands",
+        "--command commands",
+        "COMMAND",
+        "fit, diagnose, predict or run; may be given again [fit].",
         type=Choice(["run", "fit", "diagnose", "predict"]),
         multiple=True,
-        metavar="COMMAND",
-        help="fit, diagnose, predict or run; may be given again [fit].",
     ),
     place_option("Tests to fit, as in bushfit fit."),
     effect_option("Add an effect, as in bushfit fit."),
-    option(
-        "--at",
-        multiple=True,
-        metavar="POINT",
-        help='Stiffness and loss factor at "axial 25 Hz 0.1 mm"; may be given again.',
-    ),
+    option("--at", "POINT", 'Stiffness and loss factor at "axial 25 Hz 0.1 mm"; may be given again.', multiple=True),
 )
 @under(
     "Limits",
@@ -52,15 +46,15 @@ _MOST_SHOWN = 10
 )
 @under(
     "How the work is done",
-    option("--resume", is_flag=True, help="Do what is missing, failed or changed, keep the rest."),
-    option("--jobs", type=click.IntRange(1), metavar="N", help="Worker processes [the cores there are]."),
-    option("--scheduler", metavar="ADDRESS", help="Work on this Dask cluster, such as tcp://10.0.0.5:8786."),
+    flag("--resume", "Do what is missing, failed or changed, keep the rest."),
+    option("--jobs", "N", "Worker processes [the cores there are].", type=click.IntRange(1)),
+    option("--scheduler", "ADDRESS", "Work on this Dask cluster, such as tcp://10.0.0.5:8786."),
 )
 @under(
     "Output",
-    option("--tables", is_flag=True),
-    option("--plots", is_flag=True, help="Those of each bushing, too."),
-    option("--reports", is_flag=True, help="The page of each bushing that is diagnosed, too."),
+    flag("--tables"),
+    flag("--plots", "Those of each bushing, too."),
+    flag("--reports", "The page of each bushing that is diagnosed, too."),
 )
 @with_options(CAMPAIGN_FOLDER, "tables", "pictures", "pages")
 def command(

@@ -15,7 +15,20 @@ from rich.markup import escape
 from rich.segment import Segment
 
 from bushfit.campaign.naming import folder_name
-from bushfit.cli.options import FILE, FORMS, Choice, Folder, Function, Parameter, Size, Written, in_order, option, under
+from bushfit.cli.options import (
+    FILE,
+    FORMS,
+    Choice,
+    Folder,
+    Function,
+    Parameter,
+    Size,
+    Written,
+    flag,
+    in_order,
+    option,
+    under,
+)
 from bushfit.cli.progress import shown_on
 from bushfit.errors import ModelError, printable, typed
 from bushfit.report.contents import Formats, Kinds
@@ -139,15 +152,13 @@ def with_options(folder: str, *written: Written) -> Parameter:
             wrapped,
             under(
                 "Output",
-                option(
-                    "-o", "--output", type=Folder(path_type=Path), metavar="DIR", help=f"For the results [{folder}]."
-                ),
-                option("--force", is_flag=True, help="Replace results that stand there."),
+                option("-o --output", "DIR", f"For the results [{folder}].", type=Folder(path_type=Path)),
+                flag("--force", "Replace results that stand there."),
                 *(FORMS[kind] for kind in written),
-                option("--no-plots", is_flag=True, hidden="pictures" not in written, help="Write no plots."),
-                option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output."),
-                option("-v", "--verbose", is_flag=True),
-                option("-q", "--quiet", is_flag=True, help="Say more, or nothing but errors."),
+                flag("--no-plots", "Write no plots.", hidden="pictures" not in written),
+                flag("--json as_json", "Print the result as JSON on standard output."),
+                flag("-v --verbose"),
+                flag("-q --quiet", "Say more, or nothing but errors."),
             ),
         )
 
@@ -216,15 +227,15 @@ def with_task(*written: Written, soft_l1: str = "points far off pull less, outli
                 "How it is fitted",
                 option(
                     "--loss",
+                    "LOSS",
+                    f"linear: least squares [the campaign's, else this]; soft_l1: {soft_l1}.",
                     type=Choice(["linear", "soft_l1"]),
-                    metavar="LOSS",
-                    help=f"linear: least squares [the campaign's, else this]; soft_l1: {soft_l1}.",
                 ),
                 option(
                     "--max-nrmse",
+                    "SHARE",
+                    "Exit status 1 above this misfit, such as 0.02 (NRMSE).",
                     type=Size("share such as 0.02"),
-                    metavar="SHARE",
-                    help="Exit status 1 above this misfit, such as 0.02 (NRMSE).",
                 ),
             ),
         )

@@ -37,12 +37,14 @@ _ALL = "all"
     grid_options("as measured"),
     option(
         "--families",
+        "[NAME,...]",
+        (
+            "Model families on the one campaign A: the paper's, and those named, effects joined by + [each law of "
+            "rate with each of amplitude]."
+        ),
         is_flag=False,
         flag_value=_ALL,
-        metavar="[NAME,...]",
         shell_complete=completion.effect_lists,
-        help="Model families on the one campaign A: the paper's, and those named, effects joined by + [each law of "
-        "rate with each of amplitude].",
     ),
 )
 @with_options(CAMPAIGN_FOLDER, "tables", "pictures", "pages")

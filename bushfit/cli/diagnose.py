@@ -27,25 +27,25 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 @command_called("diagnose", "configs/mystery_mount.toml")
 @under(
     "What may be missing",
-    option("--max-effects", type=click.IntRange(0, 5), metavar="N", default=3, help="Effects to add at most [3]."),
+    option("--max-effects", "N", "Effects to add at most [3].", type=click.IntRange(0, 5), default=3),
     option(
         "--adopt",
+        "EFFECT",
+        (
+            "Add this effect, such as inertia, or mend this mistake in the record of a test, such as "
+            "peak_to_peak:sweep_axial; may be given again. A wrong EFFECT lists all."
+        ),
         multiple=True,
-        metavar="EFFECT",
         shell_complete=completion.explanations,
-        help="Add this effect, such as inertia, or mend this mistake in the record of a test, such as "
-        "peak_to_peak:sweep_axial; may be given again. A wrong EFFECT lists all.",
     ),
     option(
         "--without",
+        "EFFECT",
+        "Do not consider this effect or mistake; may be given again.",
         multiple=True,
-        metavar="EFFECT",
         shell_complete=completion.explanations,
-        help="Do not consider this effect or mistake; may be given again.",
     ),
-    option(
-        "--tolerance", metavar="SHARE", default="1 %", help="Gaps below this share of the stiffness do not count [1 %]."
-    ),
+    option("--tolerance", "SHARE", "Gaps below this share of the stiffness do not count [1 %].", default="1 %"),
     file_option("--model", "Start from the effects of this model.json [the paper's three]."),
 )
 @with_task("pages", soft_l1="the same with outliers left out")

@@ -19,24 +19,21 @@ from bushfit.cli.options import FILE, Choice, command_called, file_option, optio
 @under(
     "For which program",
     option(
-        "--format",
-        "formats",
+        "--format formats",
+        "FORMAT",
+        "fmu, nastran, abaqus, adams, csv or xlsx; needed, and may be given again.",
         type=Choice(["fmu", "nastran", "abaqus", "adams", "csv", "xlsx"]),
-        metavar="FORMAT",
         multiple=True,
         required=True,
-        help="fmu, nastran, abaqus, adams, csv or xlsx; needed, and may be given again.",
     ),
-    option("--units", metavar="UNITS", help='Length, mass, time and force, such as "m kg s N" [decks: "mm t s N"].'),
+    option("--units", "UNITS", 'Length, mass, time and force, such as "m kg s N" [decks: "mm t s N"].'),
     option(
         "--dialect",
+        "DIALECT",
+        "optistruct: of --format nastran, with stiffness and loss angle.",
         type=Choice(["optistruct"]),
-        metavar="DIALECT",
-        help="optistruct: of --format nastran, with stiffness and loss angle.",
     ),
-    option(
-        "--accuracy", metavar="ERROR", default="1 %", help="Largest error of the modulus that an fmu may have [1 %]."
-    ),
+    option("--accuracy", "ERROR", "Largest error of the modulus that an fmu may have [1 %].", default="1 %"),
 )
 @under(
     "Where it is predicted",

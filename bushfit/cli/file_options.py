@@ -42,6 +42,8 @@ _NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, 
 _DIRECTIONS = "axial, radial or torsion"
 _WHOLE_NUMBERS = ("elements", "header_line")
 _SAME_NAME = ("force_sign", *_OF_TESTS, *_AS_WRITTEN)
+#: What the options state of a test, by key; columns and units aside.
+STATED = ("direction", *_SAME_NAME)
 #: An inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")
 #: One entry of such a table that is an option here.
@@ -77,20 +79,16 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
                 "What the files do not say",
                 option(
                     "--direction",
+                    "DIRECTION",
+                    f"{_DIRECTIONS} [names, columns].",
                     type=Direction(),
                     shell_complete=completion.places,
-                    metavar="DIRECTION",
-                    help=f"{_DIRECTIONS} [names, columns].",
                 ),
-                option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Of a column: "force=kN".'),
+                option("--unit units", "ROLE=UNIT", 'Of a column: "force=kN".', multiple=True),
                 option(
-                    "--column",
-                    "columns",
-                    multiple=True,
-                    metavar="ROLE=HEADER",
-                    help='Which it is, "force=Fz"; a wrong ROLE lists all.',
+                    "--column columns", "ROLE=HEADER", 'Which it is, "force=Fz"; a wrong ROLE lists all.', multiple=True
                 ),
-                option("--force-sign", type=int, metavar="-1", help="If the load cell counts the other way."),
+                option("--force-sign", "-1", "If the load cell counts the other way.", type=int),
                 *(_stated(key, metavar, words) for key, (metavar, words) in keys.items()),
             ),
             under(
@@ -104,7 +102,7 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
 
 def _stated(key: str, metavar: str, words: str | None = None) -> Parameter:
     """The option of a key of a campaign."""
-    return option(option_of(key), type=int if key in _WHOLE_NUMBERS else None, metavar=metavar, help=words)
+    return option(option_of(key), metavar, words, type=int if key in _WHOLE_NUMBERS else None)
 
 
 def _tests_alone(context: click.Context, _: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:

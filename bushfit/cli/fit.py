@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from bushfit.cli.common import Task, open_model, with_task
-from bushfit.cli.options import command_called, effect_option, file_option, option, place_option, under
+from bushfit.cli.options import command_called, effect_option, file_option, flag, place_option, under
 from bushfit.cli.show import tell_fit
 
 
@@ -52,7 +52,7 @@ def dynamic(static: Path | None, task: Task) -> None:
         "specimens]."
     ),
     effect_option("Add an effect to the model, such as inertia; may be given again. A wrong NAME lists all."),
-    option("--profile", is_flag=True, help="Add 95 % intervals by profile likelihood (some seconds)."),
+    flag("--profile", "Add 95 % intervals by profile likelihood (some seconds)."),
 )
 @with_task()
 def fit(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:

@@ -23,10 +23,10 @@ def grid_options(usual: str) -> Parameter:
     """Where stiffness is predicted, by the keys of [predict]; `usual` says what the grid is without them."""
     return lambda function: in_order(
         function,
-        option("--frequencies", metavar="GRID", help=f'"5:155:10 Hz" or "20, 50 Hz" [{usual}].'),
-        option("--amplitudes", metavar="GRID", help=f'Zero-to-peak, "0.1, 0.5 mm" [{usual}].'),
-        option("--torsion-amplitudes", metavar="GRID", help='For --direction torsion ["0.5, 1, 2 deg"].'),
-        option("--strain-amplitudes", metavar="GRID", help='For specimens that give a modulus ["1, 2, 5 %"].'),
+        option("--frequencies", "GRID", f'"5:155:10 Hz" or "20, 50 Hz" [{usual}].'),
+        option("--amplitudes", "GRID", f'Zero-to-peak, "0.1, 0.5 mm" [{usual}].'),
+        option("--torsion-amplitudes", "GRID", 'For --direction torsion ["0.5, 1, 2 deg"].'),
+        option("--strain-amplitudes", "GRID", 'For specimens that give a modulus ["1, 2, 5 %"].'),
     )
 
 

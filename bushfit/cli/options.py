@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -33,8 +32,14 @@ class Option(click.Option):
         return {}
 
 
-#: Decorator for an option of a command.
-option = partial(click.option, cls=Option)
+def option(names: str, metavar: str | None, words: str | None = None, **more: Any) -> Parameter:
+    """An option of a command: its names (the last may be that in Python), what stands for its value, and its words."""
+    return click.option(*names.split(), cls=Option, metavar=metavar, help=words, **more)
+
+
+def flag(names: str, words: str | None = None, **more: Any) -> Parameter:
+    """An option without a value."""
+    return option(names, None, words, is_flag=True, **more)
 
 
 class Command(click.Command):
@@ -163,44 +168,38 @@ def option_of(key: str) -> str:
 def place_option(words: str) -> Parameter:
     """Directions or specimens by name, as `directions`."""
     return option(
-        "--direction",
-        "directions",
-        type=_Place(),
-        metavar="PLACE",
-        multiple=True,
-        help=words,
-        shell_complete=completion.places,
+        "--direction directions", "PLACE", words, type=_Place(), multiple=True, shell_complete=completion.places
     )
 
 
 def effect_option(words: str) -> Parameter:
     """Effects to add by name, as `effects`."""
-    return option("--effect", "effects", multiple=True, metavar="NAME", help=words, shell_complete=completion.effects)
+    return option("--effect effects", "NAME", words, multiple=True, shell_complete=completion.effects)
 
 
 def file_option(name: str, words: str) -> Parameter:
     """A file."""
-    return option(name, type=FILE, metavar="FILE", help=words)
+    return option(name, "FILE", words, type=FILE)
 
 
 #: What a command writes that has forms, and the option of these.
 Written = Literal["tables", "pictures", "pages"]
 _TABLE_FORMAT: Parameter = option(
     "--table-format",
+    "FORM",
+    "csv, decimal-comma (German Excel) or xlsx [csv].",
     type=Choice(get_args(Form)),
-    metavar="FORM",
     default="csv",
     envvar="BUSHFIT_TABLE_FORMAT",
-    help="csv, decimal-comma (German Excel) or xlsx [csv].",
 )
 _PLOT_FORMAT: Parameter = option(
     "--plot-format",
+    "FORM",
+    "png, svg, pdf; may be given again [png].",
     type=Choice(get_args(Picture)),
     multiple=True,
-    metavar="FORM",
     default=["png"],
     envvar="BUSHFIT_PLOT_FORMAT",
-    help="png, svg, pdf; may be given again [png].",
 )
-_NO_REPORT: Parameter = option("--no-report", is_flag=True, help="Write no page (HTML).")
+_NO_REPORT: Parameter = flag("--no-report", "Write no page (HTML).")
 FORMS: dict[Written, Parameter] = {"tables": _TABLE_FORMAT, "pictures": _PLOT_FORMAT, "pages": _NO_REPORT}

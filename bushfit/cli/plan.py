@@ -40,39 +40,32 @@ _MOST_VALUES = 6
 @under(
     "What is planned",
     option(
-        "--hours",
-        type=Size("time in hours such as 8", _MOST_HOURS),
-        metavar="HOURS",
-        default=8.0,
-        help="Of the rig, at most [8].",
+        "--hours", "HOURS", "Of the rig, at most [8].", type=Size("time in hours such as 8", _MOST_HOURS), default=8.0
     ),
     option(
-        "--for",
-        "aim",
+        "--for aim",
+        "AIM",
+        "parameters, predictions or rivals: what the tests shall tell best [predictions].",
         type=Choice(["parameters", "predictions", "rivals"]),
-        metavar="AIM",
-        help="parameters, predictions or rivals: what the tests shall tell best [predictions].",
     ),
     place_option(
         "axial, radial, torsion or a specimen: where the rig can test; may be given again [axial and radial, or all "
         "specimens]."
     ),
-    option("--parameters", metavar="NAME,...", help="Whose errors count, with --for parameters [all]."),
+    option("--parameters", "NAME,...", "Whose errors count, with --for parameters [all]."),
     option(
         "--rivals",
-        metavar="NAME,...",
+        "NAME,...",
+        "Effects to tell apart [what diagnose leaves open].",
         shell_complete=completion.effect_lists,
-        help="Effects to tell apart [what diagnose leaves open].",
     ),
     file_option("--campaign", "With MODEL.json: take [rig] and [predict] of this."),
 )
 @under("Where stiffness will be predicted", grid_options("the campaign's"))
 @under(
     "To see that it holds",
-    option(
-        "--check", "count", type=click.IntRange(2, 100_000), metavar="N", help="Simulate the plan N times, and fit it."
-    ),
-    option("--seed", type=click.IntRange(0), metavar="N", default=0, help="Of its random numbers [0]."),
+    option("--check count", "N", "Simulate the plan N times, and fit it.", type=click.IntRange(2, 100_000)),
+    option("--seed", "N", "Of its random numbers [0].", type=click.IntRange(0), default=0),
 )
 @with_options("results/plan <name>", "tables", "pictures")
 def command(

@@ -9,7 +9,7 @@ import click
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
 from bushfit.cli.grids import asked_for, grid_options, positive
-from bushfit.cli.options import FILE, command_called, file_option, option, place_option, under
+from bushfit.cli.options import FILE, command_called, file_option, flag, option, place_option, under
 from bushfit.cli.show import new_table, tell_tests
 
 if TYPE_CHECKING:
@@ -25,25 +25,19 @@ _MOST_AMPLITUDES = 8
     "Where it is predicted",
     place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
     grid_options("the campaign's"),
-    option("--temperature", metavar="TEMP", help='Such as "40 degC", if the model knows it [23 degC].'),
+    option("--temperature", "TEMP", 'Such as "40 degC", if the model knows it [23 degC].'),
     file_option("--campaign", "Take its grid, and show its sweeps beside."),
 )
 @under(
     "What is predicted besides",
     file_option("--bushing", "Another one, of the same compound: [bushing] of this TOML file."),
-    option("--mass", metavar="MASS"),
+    option("--mass", "MASS"),
     option(
-        "--base-acceleration",
-        metavar="ACCELERATION",
-        help='Resonance of a mass, such as "1.2 kg", on a base shaken with "0.1 g".',
+        "--base-acceleration", "ACCELERATION", 'Resonance of a mass, such as "1.2 kg", on a base shaken with "0.1 g".'
     ),
-    option("--wide", is_flag=True, help="Tables with amplitudes across, without bands, too."),
+    flag("--wide", "Tables with amplitudes across, without bands, too."),
     option(
-        "--arms",
-        is_flag=False,
-        flag_value="1 %",
-        metavar="[ERROR]",
-        help="Maxwell arms for the springpot, within this error [1 %].",
+        "--arms", "[ERROR]", "Maxwell arms for the springpot, within this error [1 %].", is_flag=False, flag_value="1 %"
     ),
 )
 @with_options(CAMPAIGN_FOLDER, "tables", "pictures")

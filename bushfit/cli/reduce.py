@@ -43,15 +43,15 @@ _LINES_AN_OCTAVE = 3
 @with_stated(sweeps=False)
 @under(
     "Of raw histories",
-    option("--levels", metavar="GRID", help='Amplitudes that were asked for, "0.1, 0.2 mm" [found].'),
-    option("--cycles", type=click.IntRange(3, 1000), metavar="N", default=3, help="Fewest steady cycles [3]."),
+    option("--levels", "GRID", 'Amplitudes that were asked for, "0.1, 0.2 mm" [found].'),
+    option("--cycles", "N", "Fewest steady cycles [3].", type=click.IntRange(3, 1000), default=3),
 )
 @under(
     "Of a resonance test",
-    option("--mass", metavar="MASS", help='On the mount, such as "0.5 kg".'),
-    option("--mass-added", metavar="MASS", help='What moves with it, such as "15 g".'),
-    option("--specimen", metavar="NAME", help="What was tested, if it is no bushing."),
-    option("--base-acceleration", metavar="ACCELERATION", help='Such as "0.1 g", if no column says it.'),
+    option("--mass", "MASS", 'On the mount, such as "0.5 kg".'),
+    option("--mass-added", "MASS", 'What moves with it, such as "15 g".'),
+    option("--specimen", "NAME", "What was tested, if it is no bushing."),
+    option("--base-acceleration", "ACCELERATION", 'Such as "0.1 g", if no column says it.'),
 )
 @with_options(FIRST_FILE_FOLDER, "tables", "pictures")
 def command(

@@ -23,22 +23,21 @@ if TYPE_CHECKING:
 @under(
     "What is simulated",
     option(
-        "--effect",
-        "effects",
+        "--effect effects",
+        "EFFECT",
+        'Hide an effect in the tests, such as "inertia.mass=0.1 kg"; may be given again.',
         multiple=True,
-        metavar="EFFECT",
-        help='Hide an effect in the tests, such as "inertia.mass=0.1 kg"; may be given again.',
     ),
-    option("--repeats", type=click.IntRange(1, 1000), metavar="N", help="Of each sweep [1]."),
-    option("--seed", type=click.IntRange(0), metavar="N", help="Of the random numbers [0]."),
+    option("--repeats", "N", "Of each sweep [1].", type=click.IntRange(1, 1000)),
+    option("--seed", "N", "Of the random numbers [0].", type=click.IntRange(0)),
 )
 @under(
     "Noise and errors of the rig [those of the campaign, else none]",
-    option("--noise", metavar="SHARE", help='Scatter of a sweep point relative to |K|, such as "0.5 %".'),
-    option("--force-noise", metavar="SHARE", help='Of a loop, relative to half its range of force: "0.3 %".'),
-    option("--displacement-noise", metavar="SHARE", help='Of a loop, relative to its amplitude: "0.02 %".'),
-    option("--gain-error", metavar="SHARE", help='Shared by a run, one repeat of one amplitude: "0.4 %".'),
-    option("--phase-error", metavar="ANGLE", help='Shared by a run: "0.2 deg".'),
+    option("--noise", "SHARE", 'Scatter of a sweep point relative to |K|, such as "0.5 %".'),
+    option("--force-noise", "SHARE", 'Of a loop, relative to half its range of force: "0.3 %".'),
+    option("--displacement-noise", "SHARE", 'Of a loop, relative to its amplitude: "0.02 %".'),
+    option("--gain-error", "SHARE", 'Shared by a run, one repeat of one amplitude: "0.4 %".'),
+    option("--phase-error", "ANGLE", 'Shared by a run: "0.2 deg".'),
 )
 @with_options(CAMPAIGN_FOLDER, "tables")
 def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
