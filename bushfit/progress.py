@@ -39,15 +39,7 @@ def counted(what: str, total: int | None = None) -> Iterator[Callable[[str], Non
 
 
 def counting(what: str, items: Collection[_Item]) -> Iterator[_Item]:
-    """The items one by one, counted as `counted` does.
-
-    >>> told = []
-    >>> with heard_by(lambda *step: told.append(step)):
-    ...     list(counting("runs", ["a", "b"]))
-    ['a', 'b']
-    >>> told[0], told[-1]
-    (('runs', 0, 2, ''), ('runs', None, 2, ''))
-    """
+    """The items one by one, each counted when its work is done."""
     with counted(what, len(items)) as advance:
         for item in items:
             yield item

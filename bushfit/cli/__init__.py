@@ -4,6 +4,7 @@ import contextlib
 import importlib
 import io
 import os
+import re
 import sys
 from collections.abc import Callable
 from typing import Any, TextIO
@@ -114,6 +115,9 @@ def _status(command: click.Command) -> int:
     except click.ClickException as error:
         where = error.ctx if isinstance(error, click.UsageError) else None
         text = " ".join(error.format_message().split())
+        if wrong := re.search(r"'([^']*)' is not one of (.*)\.$", text):
+            near = did_you_mean(wrong[1], re.findall(r"'([^']*)'", wrong[2]))
+            text = f"{text[:-1]}; {near}" if near else text
         message = printable(f"error: {text}  ({where.command_path if where else 'bushfit'} -h tells more)")
     except BushfitError as error:
         message = f"error: {error}"

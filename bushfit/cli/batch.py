@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
-from bushfit.cli.options import Choice, command_called, effect_option, file_option, flag, option, place_option, under
+from bushfit.cli.options import command_called, effect_option, file_option, flag, option, place_option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import alike, for_people
@@ -32,7 +32,7 @@ _MOST_SHOWN = 10
         "--command commands",
         "COMMAND",
         "fit, diagnose, predict or run; may be given again [fit].",
-        type=Choice(["run", "fit", "diagnose", "predict"]),
+        type=click.Choice(["run", "fit", "diagnose", "predict"]),
         multiple=True,
     ),
     place_option("Tests to fit, as in bushfit fit."),

@@ -15,20 +15,7 @@ from rich.markup import escape
 from rich.segment import Segment
 
 from bushfit.campaign.naming import folder_name
-from bushfit.cli.options import (
-    FILE,
-    FORMS,
-    Choice,
-    Folder,
-    Function,
-    Parameter,
-    Size,
-    Written,
-    flag,
-    in_order,
-    option,
-    under,
-)
+from bushfit.cli.options import FILE, FORMS, Folder, Function, Parameter, Size, Written, flag, in_order, option, under
 from bushfit.cli.progress import shown_on
 from bushfit.errors import ModelError, printable, typed
 from bushfit.report.contents import Formats, Kinds
@@ -229,7 +216,7 @@ def with_task(*written: Written, soft_l1: str = "points far off pull less, outli
                     "--loss",
                     "LOSS",
                     f"linear: least squares [the campaign's, else this]; soft_l1: {soft_l1}.",
-                    type=Choice(["linear", "soft_l1"]),
+                    type=click.Choice(["linear", "soft_l1"]),
                 ),
                 option(
                     "--max-nrmse",

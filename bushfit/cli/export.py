@@ -7,7 +7,7 @@ import click
 
 from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
 from bushfit.cli.grids import asked_for, grid_options, positive
-from bushfit.cli.options import FILE, Choice, command_called, file_option, option, place_option, under
+from bushfit.cli.options import FILE, command_called, file_option, option, place_option, under
 
 
 @command_called(
@@ -22,7 +22,7 @@ from bushfit.cli.options import FILE, Choice, command_called, file_option, optio
         "--format formats",
         "FORMAT",
         "fmu, nastran, abaqus, adams, csv or xlsx; needed, and may be given again.",
-        type=Choice(["fmu", "nastran", "abaqus", "adams", "csv", "xlsx"]),
+        type=click.Choice(["fmu", "nastran", "abaqus", "adams", "csv", "xlsx"]),
         multiple=True,
         required=True,
     ),
@@ -31,7 +31,7 @@ from bushfit.cli.options import FILE, Choice, command_called, file_option, optio
         "--dialect",
         "DIALECT",
         "optistruct: of --format nastran, with stiffness and loss angle.",
-        type=Choice(["optistruct"]),
+        type=click.Choice(["optistruct"]),
     ),
     option("--accuracy", "ERROR", "Largest error of the modulus that an fmu may have [1 %].", default="1 %"),
 )

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import click
 
@@ -40,7 +40,13 @@ _AS_WRITTEN = {
 #: What test files are not, by their endings.
 _NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
 _DIRECTIONS = "axial, radial or torsion"
-_WHOLE_NUMBERS = ("elements", "header_line")
+#: Types of what is stated, by key; else a text.
+TYPES = {
+    "direction": Direction(),
+    "waveform": click.Choice(["sine", "triangle"]),
+    "amplitude": click.Choice(["zero-to-peak", "peak-to-peak"]),
+    **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),
+}
 _SAME_NAME = ("force_sign", *_OF_TESTS, *_AS_WRITTEN)
 #: What the options state of a test, by key; columns and units aside.
 STATED = ("direction", *_SAME_NAME)
@@ -69,7 +75,6 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
             stated = {key: given.pop(key) for key in told}
             stated["columns"] = _pairs(columns, "--column", "force=Kraft", known())
             stated["units"] = _pairs(units, "--unit", "force=kN", known())
-            _check_amplitude(stated.get("amplitude"))
             return function(stated={key: value for key, value in stated.items() if value}, **given)
 
         return in_order(
@@ -102,7 +107,7 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
 
 def _stated(key: str, metavar: str, words: str | None = None) -> Parameter:
     """The option of a key of a campaign."""
-    return option(option_of(key), metavar, words, type=int if key in _WHOLE_NUMBERS else None)
+    return option(option_of(key), metavar, words, type=TYPES.get(key))
 
 
 def _tests_alone(context: click.Context, _: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
@@ -141,22 +146,6 @@ def direction_error(file: Path, sheet: str | None = None) -> MeasurementError:
         expected="a direction",
         hint="state it: --direction axial (or radial, torsion); or where others say another, name the file after it",
     )
-
-
-def _check_amplitude(counting: str | None) -> None:
-    """Refuse a value where the counting of amplitudes is stated."""
-    from bushfit.reading.headers import AmplitudeConvention
-
-    known = get_args(AmplitudeConvention)
-    if counting and counting not in known:
-        raise MeasurementError(
-            "this does not say how amplitudes are counted",
-            place="--amplitude",
-            found=f'"{counting}"',
-            expected=" or ".join(known),
-            hint=f'--at-amplitude "{counting if counting[0].isdigit() else "0.1 mm"}" states the amplitude of files '
-            "that have no column for it",
-        )
 
 
 def _pairs(texts: Sequence[str], option: str, example: str, known: Sequence[str]) -> Mapping[str, str]:

@@ -109,7 +109,8 @@ def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
     if radius is not None:
         return radius
     if diameter is None:
-        raise CampaignError(f"missing option '{options[0]}' or '{options[1]}'", hint=f'{options[1]} "20 mm"')
+        hint = f'state it: {options[1]} "20 mm", or {options[0]} "10 mm"'
+        raise CampaignError(f"the {side} size of the rubber is not stated", hint=hint)
     with naming(place=options[1]):
         return f"{1e3 * quantity(diameter, 'm') / 2.0:.12g} mm"
 
@@ -125,7 +126,7 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
 
     table = {f"{side}_radius": _radius(side, sizes) for side in _SIDES}
     if (length := sizes["length"]) is None:
-        raise CampaignError("missing option '--length'", hint='--length "34 mm"')
+        raise CampaignError("the length of the rubber is not stated", hint='state it: --length "34 mm"')
     table["length"] = length
     halved = [f"{side}_radius" for side in _SIDES if sizes[f"{side}_diameter"]]
     try:

@@ -9,7 +9,6 @@ import click
 from click.shell_completion import CompletionItem
 
 from bushfit.cli import completion
-from bushfit.errors import did_you_mean
 from bushfit.reading.tablefile import Form
 from bushfit.report.contents import Picture
 
@@ -68,17 +67,6 @@ class Command(click.Command):
                     formatter.write_text(", ".join(names))
 
 
-class Choice(click.Choice[str]):
-    """One of some words; another is told the nearest."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        try:
-            return super().convert(value, param, ctx)
-        except click.BadParameter as error:
-            words = (error.message.rstrip("."), did_you_mean(str(value), self.choices))
-            raise click.BadParameter("; ".join(filter(None, words)), ctx, param) from None
-
-
 class Direction(click.ParamType[Any]):
     """A direction of a test; geometry, which lists them, is slow to import, and is asked when they are needed."""
 
@@ -87,7 +75,7 @@ class Direction(click.ParamType[Any]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         from bushfit import geometry
 
-        choice = Choice([str(direction) for direction in geometry.Direction])
+        choice = click.Choice([str(direction) for direction in geometry.Direction])
         return geometry.Direction(choice.convert(value, param, ctx))
 
 
@@ -188,7 +176,7 @@ _TABLE_FORMAT: Parameter = option(
     "--table-format",
     "FORM",
     "csv, decimal-comma (German Excel) or xlsx [csv].",
-    type=Choice(get_args(Form)),
+    type=click.Choice(get_args(Form)),
     default="csv",
     envvar="BUSHFIT_TABLE_FORMAT",
 )
@@ -196,7 +184,7 @@ _PLOT_FORMAT: Parameter = option(
     "--plot-format",
     "FORM",
     "png, svg, pdf; may be given again [png].",
-    type=Choice(get_args(Picture)),
+    type=click.Choice(get_args(Picture)),
     multiple=True,
     default=["png"],
     envvar="BUSHFIT_PLOT_FORMAT",

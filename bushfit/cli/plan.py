@@ -16,7 +16,7 @@ from rich.markup import escape
 from bushfit.cli import completion
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options
-from bushfit.cli.options import FILE, Choice, Size, command_called, file_option, option, place_option, under
+from bushfit.cli.options import FILE, Size, command_called, file_option, option, place_option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import for_people, number
@@ -46,7 +46,7 @@ _MOST_VALUES = 6
         "--for aim",
         "AIM",
         "parameters, predictions or rivals: what the tests shall tell best [predictions].",
-        type=Choice(["parameters", "predictions", "rivals"]),
+        type=click.Choice(["parameters", "predictions", "rivals"]),
     ),
     place_option(
         "axial, radial, torsion or a specimen: where the rig can test; may be given again [axial and radial, or all "

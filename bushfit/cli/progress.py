@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import Lock, Timer
+from threading import Timer
 from typing import TYPE_CHECKING
 
 from bushfit.progress import heard_by
@@ -40,17 +40,16 @@ def shown_on(console: Console) -> Iterator[None]:
 
     columns = TextColumn("{task.description}"), BarColumn(), Told(), TextColumn("{task.fields[remark]}", style="red")
     bar = Progress(*columns, console=console, transient=True, redirect_stdout=False)
-    lines, lock, patient = dict[str, "TaskID"](), Lock(), True
+    lines, patient = dict[str, "TaskID"](), True
 
     def listen(what: str, done: int | None, total: int | None, remark: str) -> None:
-        with lock:
-            if done is None:
-                bar.remove_task(lines.pop(what))
-            else:
-                if what not in lines:
-                    lines[what] = bar.add_task(what, total=total, remark="")
-                bar.update(lines[what], completed=done, remark=remark)
-            show()
+        if done is None:
+            bar.remove_task(lines.pop(what))
+        else:
+            if what not in lines:
+                lines[what] = bar.add_task(what, total=total, remark="")
+            bar.update(lines[what], completed=done, remark=remark)
+        show()
 
     def show() -> None:
         """What is printed between two kinds of work stands on a line of its own."""
@@ -61,9 +60,8 @@ def shown_on(console: Console) -> Iterator[None]:
 
     def run_out() -> None:
         nonlocal patient
-        with lock:
-            patient = False
-            show()
+        patient = False
+        show()
 
     timer = Timer(_PATIENCE, run_out)
     timer.start()

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 import click
 
 from bushfit.cli.common import Options
-from bushfit.cli.file_options import STATED
-from bushfit.cli.options import Direction, option_of
+from bushfit.cli.file_options import STATED, TYPES
+from bushfit.cli.options import option_of
 from bushfit.errors import BushfitError
 
 #: An option that the hint of an error names, perhaps with the role of a column.
@@ -28,12 +28,6 @@ _WORDS = {
     "inner_diameter": 'inner diameter of the rubber, where it meets the inner sleeve, such as "20 mm"',
     "outer_diameter": 'its outer diameter, such as "36 mm"',
     "length": 'its length, the mean of inside and outside, such as "34 mm"',
-}
-_TYPES = {
-    "direction": Direction(),
-    "waveform": click.Choice(["sine", "triangle"]),
-    "amplitude": click.Choice(["zero-to-peak", "peak-to-peak"]),
-    **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),
 }
 #: The key that an answer is of, and of columns and units the role; the one that is asked for once for all files.
 _Key = tuple[str, str]
@@ -78,7 +72,7 @@ class Questions:
             self.options.say(f"\n{told}")
             words = _WORDS.get(name, name.replace("_", " ")).format(role=role.replace("_", " "))
             usual = "zero-to-peak" if key == _COUNTING else known
-            known = click.prompt(words, default=usual, type=_TYPES.get(name), err=True)
+            known = click.prompt(words, default=usual, type=TYPES.get(name), err=True)
             key = ("frequency", "") if name == "rate" and "Hz" in known else key
         self._answers[key] = known
         return {key: known}
