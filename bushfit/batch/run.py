@@ -2,7 +2,7 @@
 
 import shutil
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -19,7 +19,7 @@ from bushfit.batch.quantities import PARTS, figures
 from bushfit.batch.work import failed, work
 from bushfit.effects.contract import Array
 from bushfit.errors import OutputError
-from bushfit.progress import counted
+from bushfit.progress import counting
 from bushfit.report.contents import Kinds, Picture
 from bushfit.report.folder import check_free as check_writable
 from bushfit.report.folder import write_files
@@ -115,15 +115,16 @@ def _worked(plan: Plan, workers: Pool) -> Outcome:
     earlier = list(_earlier(plan))
     records: list[Record] = [failed("") for _ in plan.rows]
     numbers = defaultdict[str, Array](lambda: np.full((len(PARTS), count), np.nan))
-    failures = 0
-    with counted("bushings", count) as advance:
-        for number, record in pool.run(plan.rows, partial(work, orders=plan.orders), failed, workers):
-            for name, known in figures(record):
-                if known[0] is not None:
-                    numbers[name][:, number] = np.array(known, dtype=float)
-            records[number] = cast("Record", {key: entry for key, entry in record.items() if key not in _NOT_HELD})
-            failures += record["status"] == "failed"
-            advance(f"{failures} failed" if failures else "")
+    count_of = Counter[str]()
+    come = pool.run(plan.rows, partial(work, orders=plan.orders), failed, workers)
+    for number, record in counting(
+        "bushings", come, count, lambda: f"{count_of['failed']} failed" if count_of["failed"] else ""
+    ):
+        for name, known in figures(record):
+            if known[0] is not None:
+                numbers[name][:, number] = np.array(known, dtype=float)
+        records[number] = cast("Record", {key: entry for key, entry in record.items() if key not in _NOT_HELD})
+        count_of[record["status"]] += 1
     return Outcome(plan, records, dict(numbers), time.perf_counter() - begin, earlier)
 
 

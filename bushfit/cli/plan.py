@@ -186,13 +186,11 @@ def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check
     """The plan simulated, with a table of what was predicted and found."""
     from bushfit.batch import pool
     from bushfit.planning.check import Found, check
-    from bushfit.progress import counted
+    from bushfit.progress import counting
 
     def every(seeds: Sequence[int], work: Callable[[Sequence[int]], list[Found]]) -> Iterator[tuple[int, Found]]:
-        with counted("campaigns simulated and fitted", count) as advance:
-            for done in pool.run(seeds, work, lambda _: None, pool.LocalPool(os.cpu_count() or 1)):
-                yield done
-                advance("")
+        come = pool.run(seeds, work, lambda _: None, pool.LocalPool(os.cpu_count() or 1))
+        return counting("campaigns simulated and fitted", come, count)
 
     found = check(outcome.plan, count, seed, every)
     table = new_table(

@@ -5,24 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Timer
-from typing import TYPE_CHECKING
+from time import monotonic
+from typing import TYPE_CHECKING, Any
 
 from bushfit.progress import heard_by
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Task, TaskID
 
 #: Seconds after which long work shows how far it is.
 _PATIENCE = 2.0
 
 
-def _told(task: Task) -> str:
-    """How many are done, of how many, how fast, and the seconds that are left, as far as these are known."""
-    speed, left = task.speed or 0.0, task.time_remaining
-    count = f"{task.completed:.0f}" + (f" of {task.total:.0f}" if task.total else "")
-    pace = f"{speed:.3g} a second" if speed >= 1.0 else f"{1.0 / speed:.2g} s each" if speed else ""
-    return ", ".join(filter(None, (count, pace, f"{left:.0f} s left" if left else "")))
+def _told(done: int, total: int, seconds: float) -> str:
+    """How many are done, of how many, how fast, and the seconds that are left."""
+    if not done:
+        return f"0 of {total}"
+    pace = f"{done / seconds:.3g} a second" if done >= seconds else f"{seconds / done:.2g} s each"
+    return f"{done} of {total}, {pace}, {seconds / done * (total - done):.0f} s left"
 
 
 @contextmanager
@@ -31,24 +31,24 @@ def shown_on(console: Console) -> Iterator[None]:
     if console.quiet or not (console.is_interactive and console.file.isatty()):
         yield
         return
-    from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn
-    from rich.text import Text
+    from rich.progress import BarColumn, Progress, TextColumn
 
-    class Told(ProgressColumn):
-        def render(self, task: Task) -> Text:
-            return Text(_told(task))
-
-    columns = TextColumn("{task.description}"), BarColumn(), Told(), TextColumn("{task.fields[remark]}", style="red")
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(20),
+        TextColumn("{task.fields[told]} [red]{task.fields[remark]}"),
+    )
     bar = Progress(*columns, console=console, transient=True, redirect_stdout=False)
-    lines, patient = dict[str, "TaskID"](), True
+    lines, patient = dict[str, tuple[float, Any]](), True
 
-    def listen(what: str, done: int | None, total: int | None, remark: str) -> None:
+    def listen(what: str, done: int | None, total: int, remark: str) -> None:
         if done is None:
-            bar.remove_task(lines.pop(what))
+            bar.remove_task(lines.pop(what)[1])
         else:
             if what not in lines:
-                lines[what] = bar.add_task(what, total=total, remark="")
-            bar.update(lines[what], completed=done, remark=remark)
+                lines[what] = monotonic(), bar.add_task(what, total=total, told="", remark="")
+            begun, line = lines[what]
+            bar.update(line, completed=done, told=_told(done, total, monotonic() - begun), remark=remark)
         show()
 
     def show() -> None:

@@ -54,15 +54,11 @@ class Search:
         """Every hypothesis that was weighed, the most probable first."""
         beam = [self.root]
         for depth in range(ROUNDS + 1):
-            for weighed in counting(f"explanations, round {depth + 1} of at most {ROUNDS + 1}", beam):
+            for weighed in counting(f"round {depth + 1} of at most {ROUNDS + 1}", beam):
                 self._note_with_each(weighed, depth)
             if depth == ROUNDS or self._is_sure():
                 break
-            fresh = [
-                one
-                for weighed in counting("explanations refitted with one more", beam)
-                for one in self._grown(weighed, depth)
-            ]
+            fresh = [one for weighed in counting("with one more", beam) for one in self._grown(weighed, depth)]
             if depth == 0:
                 fresh += self._of_records()
             for weighed in fresh:

@@ -22,6 +22,7 @@ class Terminal(io.StringIO):
 def said(work: Path, monkeypatch: pytest.MonkeyPatch, heard: io.StringIO, *words: object) -> str:
     monkeypatch.chdir(work)
     monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.setattr("sys.argv", ["bushfit", *map(str, words)])
     with (
         contextlib.redirect_stderr(heard),
