@@ -13,6 +13,8 @@ from typing import Any
 
 import click
 
+#: In which a bushing is tested: geometry, which has them, is slow to import.
+DIRECTIONS = ("axial", "radial", "torsion")
 #: What click asks for the words at the cursor.
 Offer = Callable[[click.Context, click.Parameter, str], list[str]]
 _READ: dict[str, Callable[[str], Any]] = {".toml": tomllib.loads, ".json": json.loads}
@@ -39,7 +41,7 @@ def _offered(known: Callable[[click.Context], Iterable[str]], between: str = "")
 
 
 def _places(ctx: click.Context) -> Iterator[str]:
-    yield from ("axial", "radial", "torsion")
+    yield from DIRECTIONS
     yield from (body["name"] for document in _documents(ctx) for body in document.get("specimens", ()))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from bushfit.cli import completion
-from bushfit.cli.options import FILE, Direction, Function, Parameter, in_order, option, option_of, under
+from bushfit.cli.options import FILE, Function, Parameter, in_order, option, option_of, under
 from bushfit.errors import BushfitError, MeasurementError
 
 #: What a test file does not say itself, as keys of a campaign, with metavar and words: of loops and sweeps, ...
@@ -39,10 +39,9 @@ _AS_WRITTEN = {
 }
 #: What test files are not, by their endings.
 _NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
-_DIRECTIONS = "axial, radial or torsion"
 #: Types of what is stated, by key; else a text.
-TYPES = {
-    "direction": Direction(),
+TYPES: dict[str, click.ParamType[Any]] = {
+    "direction": click.Choice(completion.DIRECTIONS),
     "waveform": click.Choice(["sine", "triangle"]),
     "amplitude": click.Choice(["zero-to-peak", "peak-to-peak"]),
     **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),
@@ -82,18 +81,12 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
             click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
             under(
                 "What the files do not say",
-                option(
-                    "--direction",
-                    "DIRECTION",
-                    f"{_DIRECTIONS} [names, columns].",
-                    type=Direction(),
-                    shell_complete=completion.places,
-                ),
+                _stated("direction", "DIRECTION", "axial, radial or torsion [names, columns]."),
                 option("--unit units", "ROLE=UNIT", 'Of a column: "force=kN".', multiple=True),
                 option(
                     "--column columns", "ROLE=HEADER", 'Which it is, "force=Fz"; a wrong ROLE lists all.', multiple=True
                 ),
-                option("--force-sign", "-1", "If the load cell counts the other way.", type=int),
+                _stated("force_sign", "-1", "If the load cell counts the other way."),
                 *(_stated(key, metavar, words) for key, (metavar, words) in keys.items()),
             ),
             under(

@@ -1,7 +1,7 @@
 """What options are made of: their types, those that several commands have, and commands with examples."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -67,18 +67,6 @@ class Command(click.Command):
                     formatter.write_text(", ".join(names))
 
 
-class Direction(click.ParamType[Any]):
-    """A direction of a test; geometry, which lists them, is slow to import, and is asked when they are needed."""
-
-    name = "direction"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        from bushfit import geometry
-
-        choice = click.Choice([str(direction) for direction in geometry.Direction])
-        return geometry.Direction(choice.convert(value, param, ctx))
-
-
 class _Place(click.ParamType[str]):
     """A direction, or a specimen of a campaign, which only the campaign knows."""
 
@@ -134,18 +122,14 @@ def under(heading: str, *parameters: Parameter) -> Parameter:
     """Options that stand under a heading of the help, in this order."""
 
     def decorate(function: Function) -> Function:
-        before = len(_parameters(function))
+        made: list[Any] = vars(function).setdefault("__click_params__", [])
+        before = len(made)
         in_order(function, *parameters)
-        for parameter in _parameters(function)[before:]:
+        for parameter in made[before:]:
             parameter.heading = heading
         return function
 
     return decorate
-
-
-def _parameters(function: Function) -> Sequence[Any]:
-    """Those that a function to be a command has so far."""
-    return getattr(function, "__click_params__", ())
 
 
 def option_of(key: str) -> str:

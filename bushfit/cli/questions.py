@@ -19,7 +19,6 @@ from bushfit.errors import BushfitError
 _NAMED = re.compile(r'--(?:(column|unit) "?(\w+)=|([a-z][a-z-]+))')
 #: How a question is put, by the key that its answer is of, or else by the key itself.
 _WORDS = {
-    "direction": "direction: axial, radial or torsion",
     "column": "header of the column of the {role}",
     "unit": "unit of the {role}",
     "rate": 'rate of the motion, such as "10 mm/min", or its frequency, such as "0.1 Hz"',
