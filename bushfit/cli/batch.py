@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.options import command_called, effect_option, file_option, flag, option, place_option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
@@ -56,7 +56,7 @@ _MOST_SHOWN = 10
     flag("--plots", "Those of each bushing, too."),
     flag("--reports", "The page of each bushing that is diagnosed, too."),
 )
-@with_options(CAMPAIGN_FOLDER, "tables", "pictures", "pages")
+@with_options("results/<manifest>", "tables", "pictures", "pages")
 def command(
     manifest: tuple[str, ...],
     commands: tuple[Command, ...],

@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from bushfit.reading.tablefile import Form
     from bushfit.report.contents import Picture
 
-#: Where results go by default, as the help says it.
-CAMPAIGN_FOLDER = "results/<campaign or file>"
-FIRST_FILE_FOLDER = "results/<first file>"
 #: Width of tables where standard error is no terminal, in characters.
 _WIDTH = 100
 
@@ -200,7 +197,7 @@ def with_task(*written: Written, soft_l1: str = "points far off pull less, outli
     """
 
     def decorate(function: Function) -> Function:
-        @with_options(CAMPAIGN_FOLDER, "tables", "pictures", *written)
+        @with_options("results/<campaign name>", "tables", "pictures", *written)
         @wraps(function)
         def wrapped(
             campaigns: Sequence[Path], loss: Loss | None, max_nrmse: float | None, options: Options, **others: Any

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bushfit.cli import completion
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_source, with_options
+from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options
 from bushfit.cli.options import FILE, command_called, option, option_of, place_option, under
 from bushfit.cli.show import new_table
@@ -47,7 +47,7 @@ _ALL = "all"
         shell_complete=completion.effect_lists,
     ),
 )
-@with_options(CAMPAIGN_FOLDER, "tables", "pictures", "pages")
+@with_options("results/<names>", "tables", "pictures", "pages")
 def command(
     sources: tuple[Path, ...], families: str | None, directions: tuple[str, ...], options: Options, **grids: str | None
 ) -> None:

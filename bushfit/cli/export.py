@@ -5,7 +5,7 @@ from typing import Literal
 
 import click
 
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
+from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.grids import asked_for, grid_options, positive
 from bushfit.cli.options import FILE, command_called, file_option, option, place_option, under
 
@@ -41,7 +41,7 @@ from bushfit.cli.options import FILE, command_called, file_option, option, place
     grid_options("the campaign's"),
     file_option("--campaign", "Take the grid of this campaign."),
 )
-@with_options(CAMPAIGN_FOLDER, "tables", "pictures")
+@with_options("results/<name>", "tables", "pictures")
 def command(
     model: Path,
     formats: tuple[str, ...],

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.inspect import tell_left_out
 from bushfit.cli.options import command_called, flag, option, option_of, under
@@ -44,8 +44,8 @@ _SIDES = ("inner", "outer")
     option("--name", "NAME", "Of the bushing [the folder of the first file]."),
 )
 @with_stated()
-@under("Output", flag("--no-input", "Ask nothing; say what lacks, as where nobody can answer."))
-@with_options(CAMPAIGN_FOLDER)
+@under("Output", flag("--no-input", "Ask nothing, as in a script: say what lacks."))
+@with_options("results/<bushing name>")
 def command(
     files: tuple[Path, ...],
     name: str | None,
@@ -56,9 +56,8 @@ def command(
 ) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 
-    In a terminal it asks for what neither files nor options say; elsewhere it says what lacks. FILE may be a folder, or
-    a workbook with several tests; an option holds for all files of its kind. Tests of coupons need no bushing. Writes
-    campaign.toml, or -o my_bushing.toml.
+    In a terminal it asks for what neither files nor options say. FILE may be a folder, or a workbook with several
+    tests; an option holds for all files of its kind. Writes campaign.toml, or -o my_bushing.toml.
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.draft import campaign_text, campaigns_of_parts, with_specimens_named

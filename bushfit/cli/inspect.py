@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import options_named, with_stated
 from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table
@@ -31,7 +31,7 @@ _FILES_A_PICTURE = 5
 
 @command_called("inspect", "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv")
 @with_stated()
-@with_options(FIRST_FILE_FOLDER, "pictures")
+@with_options("results/<first file>", "pictures")
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw histories.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
+from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.grids import asked_for, grid_options, positive
 from bushfit.cli.options import FILE, command_called, file_option, flag, option, place_option, under
 from bushfit.cli.show import new_table, tell_tests
@@ -40,7 +40,7 @@ _MOST_AMPLITUDES = 8
         "--arms", "[ERROR]", "Maxwell arms for the springpot, within this error [1 %].", is_flag=False, flag_value="1 %"
     ),
 )
-@with_options(CAMPAIGN_FOLDER, "tables", "pictures")
+@with_options("results/<name>", "tables", "pictures")
 def command(
     model: Path,
     campaign: Path | None,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.grids import parse_grid, positive
 from bushfit.cli.options import command_called, option, under
@@ -53,7 +53,7 @@ _LINES_AN_OCTAVE = 3
     option("--specimen", "NAME", "What was tested, if it is no bushing."),
     option("--base-acceleration", "ACCELERATION", 'Such as "0.1 g", if no column says it.'),
 )
-@with_options(FIRST_FILE_FOLDER, "tables", "pictures")
+@with_options("results/<first file>", "tables", "pictures")
 def command(
     files: tuple[Path, ...],
     stated: Mapping[str, Any],

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
+from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.options import FILE, command_called, option, option_of, under
 from bushfit.errors import ModelError, UnitError, naming
 from bushfit.units import is_number, quantity
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     option("--gain-error", "SHARE", 'Shared by a run, one repeat of one amplitude: "0.4 %".'),
     option("--phase-error", "ANGLE", 'Shared by a run: "0.2 deg".'),
 )
-@with_options(CAMPAIGN_FOLDER, "tables")
+@with_options("results/simulated <name>", "tables")
 def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
     """Put a model on the virtual rig and write a campaign of simulated raw tests.
 
