@@ -20,13 +20,16 @@ Offer = Callable[[click.Context, click.Parameter, str], list[str]]
 _READ: dict[str, Callable[[str], Any]] = {".toml": tomllib.loads, ".json": json.loads}
 
 
-def _documents(ctx: click.Context) -> Iterator[dict[str, Any]]:
-    """The campaigns and models that are typed already, as they can be read."""
+def _named(ctx: click.Context, tables: str, key: str) -> Iterator[str]:
+    """What the campaigns and models that are typed already have under a key of such tables, as far as they do."""
     values = [path for value in ctx.params.values() for path in (value if isinstance(value, tuple) else [value])]
     typed = {Path(path) for path in (*values, *ctx.args) if isinstance(path, str | Path)}
     for path in (path for path in typed if path.suffix in _READ):
         with suppress(OSError, ValueError):
-            yield _READ[path.suffix](path.read_text(encoding="utf-8"))
+            document = _READ[path.suffix](path.read_text(encoding="utf-8"))
+            listed = document.get(tables) if isinstance(document, dict) else None
+            entries = listed if isinstance(listed, list) else []
+            yield from (str(entry[key]) for entry in entries if isinstance(entry, dict) and key in entry)
 
 
 def _offered(known: Callable[[click.Context], Iterable[str]], between: str = "") -> Offer:
@@ -42,7 +45,7 @@ def _offered(known: Callable[[click.Context], Iterable[str]], between: str = "")
 
 def _places(ctx: click.Context) -> Iterator[str]:
     yield from DIRECTIONS
-    yield from (body["name"] for document in _documents(ctx) for body in document.get("specimens", ()))
+    yield from _named(ctx, "specimens", "name")
 
 
 def _effects(_: click.Context) -> list[str]:
@@ -56,9 +59,10 @@ def _explanations(ctx: click.Context) -> Iterator[str]:
     from bushfit.effects.mistakes import MISTAKES, labelled
 
     yield from _effects(ctx)
-    tests = {kind: [test for document in _documents(ctx) for test in document.get(f"{kind}s", ())] for kind in _KINDS}
     for name, mistake in MISTAKES.items():
-        yield from (labelled(name, Path(test["file"]).stem) for kind in mistake.kinds for test in tests[kind])
+        yield from (
+            labelled(name, Path(file).stem) for kind in mistake.kinds for file in _named(ctx, f"{kind}s", "file")
+        )
 
 
 def _schemas(_: click.Context) -> Iterable[str]:
@@ -67,7 +71,6 @@ def _schemas(_: click.Context) -> Iterable[str]:
     return DESCRIBED
 
 
-_KINDS = ("loop", "sweep")
 places, effects, explanations, schemas = map(_offered, (_places, _effects, _explanations, _schemas))
 #: Several effects, between commas and plus signs.
 effect_lists = _offered(_effects, ",+")

@@ -56,7 +56,7 @@ class Questions:
             except BushfitError as error:
                 told = type(error)(**{**vars(error), "hint": None})
                 wanted = _wanted(error)
-                new = [key for key in wanted if key not in given and not _together(stated, {}).get(key[0])]
+                new = [key for key in wanted if key not in given and not stated.get(key[0])]
                 wrong = [key for key, answer in given.items() if key in wanted or _is_about(told, key, answer)]
                 if not (new or wrong):
                     raise

@@ -24,6 +24,7 @@ ASKED = [
     ("init|x.csv|--direction|ra", {"plain,radial"}),
     ("fit|configs/epdm_70.toml|--direction|", {*PLACES, "plain,DMA", "plain,DMA 2", "plain,mount"}),
     ("fit|configs/lost.toml|--direction|", PLACES),
+    ("fit|half.toml|--direction|", PLACES),
     ("fit|README.md|--effect|interf", {"plain,interface_slip"}),
     ("diagnose|configs/cmp_15961.toml|--adopt|peak_to", MISTAKES),
     ("diagnose|--without|inerti", {"plain,inertia"}),
@@ -41,7 +42,9 @@ def asking(*words: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize(("words", "offered"), ASKED, ids=[words for words, _ in ASKED])
-def test_tab_offers(root: Path, monkeypatch: pytest.MonkeyPatch, words: str, offered: set[str]) -> None:
+def test_tab_offers(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, offered: set[str]) -> None:
+    (tmp_path / "half.toml").write_text("specimens = [1, {}]\nloops = 3\n")  # as while it is written
+    words = words.replace("half.toml", str(tmp_path / "half.toml"))
     monkeypatch.chdir(root)
     done = CliRunner().invoke(cli, prog_name="bushfit", env=asking(*words.split("|")))
     assert (done.exit_code, set(done.stdout.split("\n")) - {""}, done.stderr) == (0, offered, "")
