@@ -105,12 +105,14 @@ def load_campaign(path: str | Path) -> Campaign:
         bushing,
         tuple(
             loop
-            for keywords in counting("loops read", list(reader_keywords(path, content.loops, specimens)))
+            for keywords in counting("loops read", reader_keywords(path, content.loops, specimens), len(content.loops))
             for loop in programme(read_loop(**keywords), **keywords)
         ),
         tuple(
             read_sweep(**keywords)
-            for keywords in counting("sweeps read", list(reader_keywords(path, content.sweeps, specimens)))
+            for keywords in counting(
+                "sweeps read", reader_keywords(path, content.sweeps, specimens), len(content.sweeps)
+            )
         ),
         content.fit,
         content.predict,

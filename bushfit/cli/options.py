@@ -163,6 +163,7 @@ _TABLE_FORMAT: Parameter = option(
     type=click.Choice(get_args(Form)),
     default="csv",
     envvar="BUSHFIT_TABLE_FORMAT",
+    show_envvar=True,
 )
 _PLOT_FORMAT: Parameter = option(
     "--plot-format",
@@ -172,6 +173,7 @@ _PLOT_FORMAT: Parameter = option(
     multiple=True,
     default=["png"],
     envvar="BUSHFIT_PLOT_FORMAT",
+    show_envvar=True,
 )
 _NO_REPORT: Parameter = flag("--no-report", "Write no page (HTML).")
 FORMS: dict[Written, Parameter] = {"tables": _TABLE_FORMAT, "pictures": _PLOT_FORMAT, "pages": _NO_REPORT}
