@@ -56,7 +56,7 @@ class LocalPool:
         if forks:
             from multiprocessing.forkserver import ensure_running
 
-            self._context.set_forkserver_preload(["bushfit.batch.work", "bushfit.jobs.fits", "lmfit", "pandas"])
+            self._context.set_forkserver_preload(["bushfit.batch.work", "bushfit.jobs.fits", "pandas"])
             ensure_running()
 
     def executor(self) -> Executor:

@@ -13,7 +13,7 @@ Notes:
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -27,7 +27,7 @@ from bushfit.effects.contract import Array
 _ROUNDING = 1e-9
 #: Change of |K| by a unit of an amount, below which the tests do not see it.
 _UNSEEN = 1e-9
-#: Numbers that errors of the rig at all nodes together may take at once: 32 MB.
+#: Numbers that errors of the rig at all nodes together, or columns of groups, may take at once: 32 MB.
 _AT_ONCE = 4_000_000
 
 
@@ -115,12 +115,24 @@ class Group:
         unit: share of |K| that a unit changes, (c,); of columns that move together complex at some points, (c, p).
         together: whether the amounts are independent of one size; else one column is chosen, each as likely.
         sense: +1 where only positive amounts make sense, of columns of which one is chosen.
+        among: the rows that the columns have, and of how many, where they have not all of them.
     """
 
     columns: Array
     unit: Array
     together: bool
     sense: int = 0
+    among: tuple[slice, int] | None = None
+
+    @property
+    def whole(self) -> Array:
+        """The columns over all rows, (c, n)."""
+        if self.among is None:
+            return self.columns
+        rows, count = self.among
+        found = np.zeros((len(self.columns), count))
+        found[:, rows] = self.columns
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +182,7 @@ class Ledger:
     @cached_property
     def _every(self) -> Array:
         """Residual, derivatives and columns of all groups, (1 + k + c, n)."""
-        return np.concatenate([self.residual[None], self.jacobian, *(group.columns for group in self.groups)])
+        return np.concatenate([self.residual[None], self.jacobian, *(group.whole for group in self.groups)])
 
     @cached_property
     def _scatters(self) -> Array:
@@ -247,6 +259,12 @@ class Ledger:
         weight = np.array([self.rig.nodes[node].log_weight for node in nodes.tolist()])
         base = weight - 0.5 * (rest[:, 0] + log_size)
         return _Solved(base, rest[:, 0], np.maximum(square[:, 1 + k :], 0.0), rest[:, 1 + k :], grams)
+
+    def worths_of(self, groups: Sequence[Group]) -> list[Worth]:
+        """What other groups are worth, some at a time, as memory has it."""
+        whole = np.cumsum([len(group.columns) for group in groups]) * self.residual.size // _AT_ONCE
+        ends = [0, *(np.flatnonzero(np.diff(whole)) + 1).tolist(), len(groups)]
+        return [worth for own in pairwise(ends) for worth in replace(self, groups=groups[slice(*own)]).worths]
 
     @property
     def log_evidence(self) -> float:

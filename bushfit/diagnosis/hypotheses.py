@@ -203,7 +203,7 @@ class Weighed:
 
     def worths_of(self, every: Sequence[Explanation]) -> Sequence[Worth]:
         """Of explanations that have columns."""
-        return replace(self.first, groups=[each.group for each in every if each.group], at=self._likely).worths
+        return replace(self.first, at=self._likely).worths_of([each.group for each in every if each.group])
 
     def with_(self, each: Explanation, worth: Worth, log_odds: float) -> Hypothesis:
         """This state with an explanation more, counted linearly."""

@@ -1,6 +1,6 @@
 """A least-squares fit that goes step by step: several can go side by side, and one that cannot win be stopped.
 
-Every fit within bounds is made so; lmfit fits the paper's branches alone where no bound is met, see `solve`.
+Every fit is made so but those of the paper's own procedure, which lmfit makes, see `solve`.
 
 Notes:
     Levenberg-Marquardt, damped as Nielsen does (Damping parameter in Marquardt's method, IMM-REP-1999-05, Lyngby

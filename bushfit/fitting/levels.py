@@ -98,13 +98,14 @@ def level_columns(data_sets: Sequence[DataSet]) -> tuple[Array, Array, tuple[flo
     rows, which, before = [], [], (0.0, 0.0)
     size = sum(data_set.size for data_set in data_sets)
     for sweep, own in zip(data_sets, rows_of(data_sets), strict=True):
-        if not isinstance(sweep, SweepData):
-            continue
-        before = sweep.noise.level
-        for held in np.unique(sweep.held):
-            for kind, column in enumerate(sweep.moved_together(sweep.held == held)):
-                row = np.zeros(size)
-                row[own] = column
-                rows.append(row)
-                which.append(kind)
-    return np.array(rows), np.array(which), before
+        if isinstance(sweep, SweepData):
+            before, columns = sweep.noise.level, level_errors_of(sweep)
+            rows.append(np.zeros((len(columns), size)))
+            rows[-1][:, own] = columns
+            which += [0, 1] * (len(columns) // 2)
+    return np.concatenate(rows or [np.empty((0, size))]), np.array(which), before
+
+
+def level_errors_of(sweep: SweepData) -> Array:
+    """Whitened unit error of each level of a sweep, in gain and then in phase, (2 levels, n)."""
+    return np.array([column for held in np.unique(sweep.held) for column in sweep.moved_together(sweep.held == held)])

@@ -23,6 +23,7 @@ from functools import cached_property
 from itertools import chain, product
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
@@ -34,7 +35,7 @@ from bushfit.errors import FitError
 from bushfit.fitting.common_error import CommonError, Joined, Seen
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Solution, anderson, coordinate_bounds
 from bushfit.fitting.data_sets import DataSet, LoopData, log_slopes, parted, reached, rows_of
-from bushfit.fitting.levels import level_columns
+from bushfit.fitting.levels import level_errors_of
 from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.robust import Estimate
 from bushfit.fitting.solve import solve
@@ -68,12 +69,12 @@ class _FittedTests:
 
     Args:
         solution: residuals and derivatives in noise alone.
-        errors: whitened residuals that one standard deviation of each of the rig's errors makes, (w, n).
+        errors: of each test, whitened residuals that one standard deviation of each of the rig's errors makes, (w, n).
     """
 
     solution: Solution
     data_sets: Sequence[DataSet]
-    errors: Array
+    errors: Sequence[Array]
 
     @cached_property
     def names(self) -> Array:
@@ -154,17 +155,18 @@ class _FittedTests:
     def left(self) -> tuple[Array, Array]:
         """Of what the parameters and the rig's errors make, orthonormal but for what is known of the latter, and of
         what both leave, the part that is seen, (k, d) and (d,)."""
-        rows = np.concatenate((self.solution.jacobian, self.errors))
-        information = rows @ rows.T
-        information[np.diag_indices(len(rows))] += np.repeat(
-            (0.0, 1.0), (len(rows) - len(self.errors), len(self.errors))
-        )
+        rows, residual, owns = self.solution.jacobian, self.solution.residual, rows_of(self.data_sets)
+        across = np.concatenate([rows[:, own] @ each.T for own, each in zip(owns, self.errors, strict=True)], axis=1)
+        among = block_diag(*(each @ each.T for each in self.errors))
+        information = np.block([[rows @ rows.T, across], [across.T, among + np.eye(len(among))]])
         scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         size, vectors = np.linalg.eigh(information / np.outer(scale, scale))
         known = size > ROUNDING * size.max(initial=0.0)
-        span = (vectors[:, known] / np.sqrt(size[known])).T @ (rows / scale[:, None])
-        left = self.solution.residual - (self.solution.residual @ span.T) @ span
-        return self.seen.of(span), self.seen.of(left)
+        mixed = (vectors[:, known] / np.sqrt(size[known])).T / scale
+        seen = block_diag(*(self.seen.of_part(number, each) for number, each in enumerate(self.errors)))
+        span = mixed @ np.concatenate((self.seen.of(rows), seen))
+        along = [rows @ residual, *(each @ residual[own] for own, each in zip(owns, self.errors, strict=True))]
+        return span, self.seen.of(residual) - (mixed @ np.concatenate(along)) @ span
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,21 +342,22 @@ def _alive(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
 def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[DataSet]) -> _FittedTests:
     """A fit with its parameters at other values, and the tests in noise alone."""
     found = solution.at(solution.model.with_values(values), data_sets)
-    return _FittedTests(found, data_sets, found.jacobian[:0])
+    return _FittedTests(found, data_sets, [np.empty((0, each.size)) for each in data_sets])
 
 
-def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> Array:
-    """Whitened residuals that the errors of a rig of the class make beside what is counted: the gain of each loop, and
-    gain and phase of each level, (w, n)."""
-    levels, which, before = level_columns(data_sets)
-    beyond = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(before), 0.0))
-    size = sum(each.size for each in data_sets)
-    rows = [*(levels * beyond[which, None] if which.size else ())]
-    for each, own in zip(data_sets, rows_of(data_sets), strict=True):
-        if isinstance(each, LoopData) and not each.gain_weighs:
-            rows.append(np.zeros(size))
-            rows[-1][own] = each.gain_error * each.unit_gain
-    return np.array(rows).reshape(-1, size)
+def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> list[Array]:
+    """Whitened residuals of each test that the errors of a rig of the class make beside what is counted: the gain of a
+    loop, and gain and phase of each level, (w, n)."""
+    found = []
+    for each in data_sets:
+        if isinstance(each, LoopData):
+            own = each.gain_error * each.unit_gain[None]
+            found.append(own[:0] if each.gain_weighs else own)
+        else:
+            beyond = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(each.noise.level), 0.0))
+            columns = level_errors_of(each)
+            found.append(columns * np.tile(beyond, len(columns) // 2)[:, None])
+    return found
 
 
 def _shaped(data_sets: Sequence[DataSet], size: float) -> list[DataSet]:

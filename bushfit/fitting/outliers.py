@@ -5,11 +5,9 @@ puts one row far from the rows beside it. So a misfit, however large, makes no o
 """
 
 from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import median_filter
 from scipy.special import chdtri, fdtri
 
 from bushfit.effects.contract import Array
@@ -92,6 +90,8 @@ def gross_rows(values: Array) -> Array:
 
     None where these are many, even with a median over few rows: then the motion turns within so few rows.
     """
+    from scipy.ndimage import median_filter
+
     for width in (NEIGHBOURS, _FEW_NEIGHBOURS):
         level = median_filter(values, width, mode="nearest")
         off = np.abs(values - level) > _GROSS / 2.0 * float(np.ptp(level))
@@ -174,11 +174,13 @@ def misfit_scale(distance: Array, parts: int) -> float:
 
 def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
     """Distance of each point from the median of those around it in its block, complex (n,)."""
-    local = np.zeros_like(values)
-    for first, last in pairwise([*starts.tolist(), values.size]):
-        rows = np.arange(last - first)
-        real, imag = (from_neighbours(part[first:last], rows, window) for part in (values.real, values.imag))
-        local[first:last] = real + 1j * imag
+    sizes, local = np.diff(starts, append=values.size), np.zeros_like(values)
+    for width in np.unique(np.minimum(sizes, window)).tolist():  # mostly one: blocks are longer
+        chosen = np.minimum(sizes, window) == width
+        first, last = (np.repeat(ends[chosen], sizes[chosen]) for ends in (starts, starts + sizes - width))
+        rows = np.flatnonzero(np.repeat(chosen, sizes))
+        around = values[np.clip(rows - width // 2, first, last)[:, None] + np.arange(width)]
+        local[rows] = values[rows] - median(around.real, axis=1) - 1j * median(around.imag, axis=1)
     return local
 
 

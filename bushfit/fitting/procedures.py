@@ -1,7 +1,8 @@
 """The fits a user asks for: static, dynamic, the two in turn, and all parameters together."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.profile import limit95, profile95
 from bushfit.fitting.rig_class import largest_error, words_of
 from bushfit.fitting.robust import Estimate, estimate, outlier_warnings
+from bushfit.fitting.solve import solve, solve_with_lmfit
 from bushfit.geometry import place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -88,7 +90,7 @@ def fit_joint(
     data_sets = data.chosen(directions)
     left = [data_set for data_set in data.data_sets if data_set not in data_sets]
     effects = data.effects if effects is None else effects
-    found = _solve(data, data_sets, effects, {})
+    found = _solve(data, data_sets, effects, {}, solver=solve)
     most = largest_error(data.campaign.rig)
     errors = level_errors(found.minimised, found.solution.residual, found.solution.jacobian, most)
     at_limit = any(error >= _AT_LIMIT * limit for error, limit in zip(errors.error, most, strict=True))
@@ -97,7 +99,7 @@ def fit_joint(
     if counts and not error:
         loops, sweeps = parted(data_sets)
         data_sets = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
-        found = _solve(data, data_sets, effects, {}, found.solution.model)
+        found = _solve(data, data_sets, effects, {}, found.solution.model, solve)
     notes = [_LEVELS.format(words_of(errors.error))] if errors.matters and not at_limit and not error else []
     notes += [*([model_error_warning(error) + _NEXT] if error else []), *unfitted(found.solution.model, left, _NEXT)]
     result = _result(data, [found], notes=notes, left=left)
@@ -141,6 +143,7 @@ def given_static(data: Data) -> Result | None:
     return Result(Model.started(data.campaign.bushing, ("elastic", "friction"), held))
 
 
+@lru_cache(maxsize=1)  # `run` asks for it, and so does what its static fit says of the springpot
 def fit_two_step(data: Data) -> TwoStep:
     """Static and dynamic fit in turn, each holding what the other found, until they agree.
 
@@ -205,11 +208,12 @@ def _solve(
     effects: Sequence[str],
     held: Mapping[str, float],
     model: Model | None = None,
+    solver: Callable[..., Solution] = solve_with_lmfit,
 ) -> Estimate:
     """Fit what the campaign leaves free of a model, from its values or else from start values taken from the data."""
     model = model or data.started(effects, data_sets, held)
     names = [name for name in data.free(tuple(model.parameters)) if name not in held]
-    return estimate(model, data_sets, names, data.bounds, robust=data.robust)
+    return estimate(model, data_sets, names, data.bounds, robust=data.robust, solver=solver)
 
 
 def _result(

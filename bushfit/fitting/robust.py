@@ -7,7 +7,7 @@ Notes:
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -66,6 +66,7 @@ def estimate(
     bounds: Bounds | None = None,
     *,
     robust: bool = False,
+    solver: Callable[..., Solution] = solve,
 ) -> Estimate:
     """Fit the named parameters by least squares, or robustly: soft_l1, the outliers of sweeps left out.
 
@@ -74,13 +75,13 @@ def estimate(
     slope. Outliers of loops have no weight from the start, see `drive`.
     """
     if not robust:
-        solution, same = solve(model, data_sets, names, bounds), tuple(data_sets)
+        solution, same = solver(model, data_sets, names, bounds), tuple(data_sets)
         return Estimate(solution, same, same, same, outliers_at(solution.model, same))
     for _ in range(_MOST_ROUNDS):
         outlying = tuple(data_set.outlying(model) for data_set in data_sets)
         kept = tuple(data_set.without(points) for data_set, points in zip(data_sets, outlying, strict=True))
         softened = tuple(_softened(data_set, model) for data_set in kept)
-        solution = solve(model, softened, names, bounds)
+        solution = solver(model, softened, names, bounds)
         before = solution.coordinates.point(model.values)
         moved = (solution.coordinates.point(solution.model.values) - before) @ solution.jacobian
         model = solution.model

@@ -66,7 +66,11 @@ class Covariance:
 
     def half(self, name: str) -> float:
         """Half width of the 95 % interval of one of the parameters, in its SI unit."""
-        return float(self.half_width(np.array(self.names)[:, None] == name)[0])
+        return self._halves[name]
+
+    @cached_property
+    def _halves(self) -> dict[str, float]:
+        return dict(zip(self.names, self.half_width(np.eye(len(self.names))).tolist(), strict=True))
 
     def left_open(self, values: Mapping[str, float]) -> str:
         """A sentence on parameters half of whose 95 % interval is their value or more; "" where there is none."""

@@ -10,6 +10,7 @@ Notes:
 
 import csv
 import re
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
@@ -195,11 +196,13 @@ def _is_row(cells: Sequence[str]) -> bool:
 
 def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, Sequence[str]]:
     """Index of the first of three rows of numbers in a row, and what parts them; else the number of lines, and all."""
-    inside = [index for index, line in enumerate(lines) if not is_comment(line.content, ";")]
-    for start, *others in zip(inside, inside[1:], inside[2:], strict=False):
-        three = [lines[index].content for index in (start, *others)]
-        if parting := [mark for mark in delimiters if all(_is_row(split(content, mark)) for content in three)]:
-            return start, parting
+    last = deque[int](maxlen=3)
+    for index in (index for index, line in enumerate(lines) if not is_comment(line.content, ";")):
+        last.append(index)
+        three = [lines[place].content for place in last]
+        parting = [mark for mark in delimiters if all(_is_row(split(content, mark)) for content in reversed(three))]
+        if len(three) == 3 and parting:
+            return last[0], parting
     return len(lines), delimiters
 
 
@@ -233,8 +236,10 @@ def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence
         cells = [cell.strip("[]() ") for cell in split(line.content, delimiter)]
         if (len(cells) < len(headers) or fits(cells, len(headers))) and _is_units_row(cells):
             units_line, row = line.number, tuple([*cells, *row][: len(headers)])
-    rows = [split(line.content, delimiter) for line in lines[index + 1 :] if line.number != units_line]
-    numbered = bool(rows) and all(_NUMBERED.match(next(filter(None, cells), "")) for cells in rows)
+    below = [line.content for line in lines[index + 1 :] if line.number != units_line]
+    numbered = bool(below) and all(
+        _NUMBERED.match(next(filter(None, split(content, delimiter)), "")) for content in below
+    )
     return Layout(delimiter, tuple(headers), lines[index].number, row, units_line, numbered=numbered)
 
 

@@ -52,7 +52,7 @@ class FaultyPlace(Explanation):
     def columns(self) -> Array:
         """Whitened residuals that a unit deviation of each kind makes, (c, n)."""
         assert self.group is not None
-        return self.group.columns
+        return self.group.whole
 
     @property
     def freely(self) -> "FaultyPlace":

@@ -1,6 +1,8 @@
 """Places of the tests gone wrong: a frequency, a level, a repeat, or a loop that disagrees with all the others."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 import numpy as np
 
@@ -8,7 +10,7 @@ from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import FaultyPlace
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import LoopData, SweepData, parted
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted
 
 #: Neighbouring frequencies that one disturbance covers at most: mains hum and its sidebands.
 _WIDEST = 3
@@ -30,13 +32,20 @@ def places(evidence: Evidence) -> list[FaultyPlace]:
 
 def _loop(evidence: Evidence, loop: LoopData) -> FaultyPlace:
     """A loop wrong as a whole, in gain or offset."""
-    columns = [evidence.embedded(column, loop) for column in loop.gain_and_offset()]
     ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
-    return FaultyPlace("place", "loop", f"the loop {loop.name}", _group(columns, np.eye(2)), loop.direction, *ends)
+    group = _group(evidence, [loop], np.array(loop.gain_and_offset()), np.eye(2))
+    return FaultyPlace("place", "loop", f"the loop {loop.name}", group, loop.direction, *ends)
 
 
-def _group(columns: Sequence[Array] | Array, unit: Array) -> Group:
-    return Group(np.array(columns), unit, together=True)
+def _rows(evidence: Evidence, data_sets: Sequence[DataSet]) -> slice:
+    """From the first row of some data sets to their last."""
+    places = [evidence.place[each] for each in data_sets]
+    return slice(min(place.start for place in places), max(place.stop for place in places))
+
+
+def _group(evidence: Evidence, data_sets: Sequence[DataSet], columns: Array, unit: Array) -> Group:
+    among = _rows(evidence, data_sets), evidence.residual.size
+    return Group(columns, unit, together=True, among=among)
 
 
 def _changed(columns: int, kind: str) -> Array:
@@ -50,7 +59,7 @@ def _changed(columns: int, kind: str) -> Array:
 
 
 def _place(
-    words: str, kind: str, sweeps: Sequence[SweepData], chosen: Sequence[Array], columns: Sequence[Array] | Array
+    evidence: Evidence, words: str, kind: str, sweeps: Sequence[SweepData], chosen: Sequence[Array], columns: Array
 ) -> FaultyPlace:
     """Chosen points of sweeps, (n,) bool each."""
     pairs = list(zip(sweeps, chosen, strict=True))
@@ -58,35 +67,36 @@ def _place(
         np.concatenate([getattr(sweep, axis)[mine] for sweep, mine in pairs]) for axis in ("frequency", "amplitude")
     )
     ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
-    return FaultyPlace("place", kind, words, _group(columns, _changed(len(columns), kind)), sweeps[0].direction, *ends)
+    group = _group(evidence, sweeps, columns, _changed(len(columns), kind))
+    return FaultyPlace("place", kind, words, group, sweeps[0].direction, *ends)
 
 
 def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
+    levels = Counter(str(sweep.direction) for sweep in sweeps for _ in np.unique(sweep.held))
     for sweep in sweeps:
-        every = np.unique(sweep.held)
-        for held in every:
+        for held in np.unique(sweep.held):
             here = sweep.held == held
             words = sweep.line_words(int(np.argmax(here)))
-            if every.size > 1:
-                yield _place(words, "level", [sweep], [here], _off(evidence, [sweep], [here], sloping=True))
+            if levels[str(sweep.direction)] > 1:  # in this file or in others
+                columns = _off(evidence, [sweep], [here], sloping=True)
+                yield _place(evidence, words, "level", [sweep], [here], columns)
             numbers = np.unique(sweep.repeat[here])
             for number in numbers if numbers.size > 2 else ():
                 mine = here & (sweep.repeat == number)
                 columns = _off(evidence, [sweep], [mine])
-                yield _place(f"repeat {number} of {words}", "repeat", [sweep], [mine], columns)
+                yield _place(evidence, f"repeat {number} of {words}", "repeat", [sweep], [mine], columns)
 
 
 def _repeats(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
     """A repeat as a whole, of one direction or of all."""
-    for scope in _scopes(sweeps):
+    for _, which, scope in _scopes(sweeps):
         if not all(np.unique(sweep.repeat).size > 1 for sweep in scope):
             continue
         for number in sorted({int(each) for sweep in scope for each in sweep.repeat}):
             chosen = [sweep.repeat == number for sweep in scope]
             if all(rows.any() for rows in chosen):
-                where = "every sweep" if len(scope) > 1 else f"the {scope[0].direction} sweep {scope[0].name}"
                 columns = _off(evidence, scope, chosen, sloping=True)
-                yield _place(f"repeat {number} of {where}", "repeat", scope, chosen, columns)
+                yield _place(evidence, f"repeat {number} of {which}", "repeat", scope, chosen, columns)
 
 
 def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
@@ -95,10 +105,9 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Fa
     if steps.size < _FEWEST_FREQUENCIES:
         return
     bands = [part[[0, -1]] for part in np.array_split(steps, min(steps.size, _MOST_FREQUENCIES))]
-    for scope in _scopes(sweeps):
+    for where, _, scope in _scopes(sweeps):
         touched = [[(low <= sweep.frequency) & (sweep.frequency <= high) for sweep in scope] for low, high in bands]
         columns = [_off(evidence, scope, chosen) for chosen in touched]
-        where = scope[0].direction if len(scope) == 1 else "all directions"
         for width in range(1, _WIDEST + 1):
             for first in range(len(bands) - width + 1):
                 window = slice(first, first + width)
@@ -108,20 +117,38 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Fa
                 span = " to ".join(f"{step:.4g}" for step in dict.fromkeys((low, high)))
                 words = f"{span} Hz in {where}, at every amplitude"
                 rows = [np.any([chosen[place] for chosen in touched[window]], axis=0) for place in range(len(scope))]
-                own = [column for each in columns[window] for column in each]
-                yield _place(words, "frequency", scope, rows, own)
+                yield _place(evidence, words, "frequency", scope, rows, np.concatenate(columns[window]))
 
 
-def _scopes(sweeps: Sequence[SweepData]) -> list[Sequence[SweepData]]:
-    return [*([sweep] for sweep in sweeps), *([sweeps] if len(sweeps) > 1 else [])]
+def _scopes(sweeps: Sequence[SweepData]) -> Iterator[tuple[str, str, Sequence[SweepData]]]:
+    """Sweeps that may be off together: one alone, those of a direction in several files, and all; where that is, and
+    which sweeps these are, in words."""
+    of_directions = [(name, list(own)) for name, own in groupby(sorted(sweeps, key=_direction), _direction)]
+    for name, own in of_directions:
+        several = len(own) > 1
+        for each in own:
+            words = f"the {name} sweep {each.name}"
+            yield words if several else name, words, [each]
+        if several:
+            yield name, f"every {name} sweep", own
+    if len(of_directions) > 1:
+        yield "all directions", "every sweep", sweeps
+
+
+def _direction(sweep: SweepData) -> str:
+    return str(sweep.direction)
 
 
 def _off(evidence: Evidence, sweeps: Sequence[SweepData], chosen: Sequence[Array], *, sloping: bool = False) -> Array:
     """Residuals of some points of sweeps that are off together: in gain, in phase, and if `sloping` along the step."""
-    columns = np.zeros((2 + 2 * sloping, evidence.residual.size))
+    among = _rows(evidence, sweeps)
+    columns = np.zeros((2 + 2 * sloping, among.stop - among.start))
     for sweep, rows in zip(sweeps, chosen, strict=True):
         values = [rows.astype(float), *([rows * _along(sweep.step)] if sloping else [])]
-        columns[:, evidence.place[sweep]] = [column for value in values for column in sweep.moved_together(value)]
+        own = evidence.place[sweep]
+        columns[:, own.start - among.start : own.stop - among.start] = [
+            column for value in values for column in sweep.moved_together(value)
+        ]
     return columns
 
 

@@ -12,6 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import nodes_among
 from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted
 from bushfit.fitting.loop_data import smooth_waves
+from bushfit.reading.measurement import SAME_TEMPERATURE
 
 #: Lengths in ln frequency and ln strain over which a curve changes: smooth, and rough.
 _LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
@@ -44,6 +45,7 @@ def _harmonics(evidence: Evidence, loops: Sequence[LoopData]) -> Array:
 
 
 def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Iterator[tuple[str, Group]]:
+    """Sweeps of one direction and temperature share a process, however many files they come in."""
     if not sweeps:
         return
     model, lengths = evidence.model, np.array(_LENGTHS[how])
@@ -51,27 +53,28 @@ def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Ite
         np.log(np.stack((sweep.frequency, sweep.amplitude * model.unit_strain(sweep.direction)), axis=1)) / lengths
         for sweep in sweeps
     ]
-    features = _features(np.concatenate(points))
-    ends = np.cumsum([0, *(len(each) for each in points)])
-    own = [
-        np.array(
-            [
-                evidence.embedded(sweep.whiten(feature * unit), sweep)
-                for feature in features[:, a:b]
-                for unit in (1.0, 1.0j)
-            ]
-        )
-        for sweep, a, b in zip(sweeps, ends[:-1], ends[1:], strict=True)
-    ]
-    share = (features[:, None] * np.array([[1.0], [1.0j]])).reshape(-1, features.shape[1])
-    directions = dict.fromkeys(str(sweep.direction) for sweep in sweeps)
-    for direction in directions:
-        here = [number for number, sweep in enumerate(sweeps) if str(sweep.direction) == direction]
-        columns = np.concatenate([own[number] for number in here])
-        parts = [share[:, ends[number] : ends[number + 1]] for number in here]
-        yield direction, Group(columns, block_diag(*parts), together=True)
-    if len(directions) > 1:
-        yield "all", Group(np.sum(own, axis=0), share, together=True)
+    features = _features(np.concatenate(points))[:, None] * np.array([[1.0], [1.0j]])
+    share = features.reshape(-1, features.shape[-1])
+    columns, of_row, of_point = np.zeros((len(share), evidence.residual.size)), np.full(evidence.residual.size, -1), []
+    kinds = [(str(sweep.direction), _degrees(sweep)) for sweep in sweeps]
+    ends = np.cumsum([0, *map(len, points)])
+    for sweep, kind, first, last in zip(sweeps, kinds, ends[:-1], ends[1:], strict=True):
+        columns[:, evidence.place[sweep]] = sweep.whiten(share[:, first:last])
+        of_row[evidence.place[sweep]] = kinds.index(kind)
+        of_point += [kinds.index(kind)] * (last - first)
+    for direction in dict.fromkeys(name for name, _ in kinds):
+        own = np.array([kinds.index(kind) for kind in dict.fromkeys(kinds) if kind[0] == direction])[:, None, None]
+        parts = columns * (of_row == own), share * (np.array(of_point) == own)
+        moved, changed = (part.reshape(-1, part.shape[-1]) for part in parts)
+        yield direction, Group(moved, changed, together=True)
+    if len({name for name, _ in kinds}) > 1:
+        yield "all", Group(columns, share, together=True)
+
+
+def _degrees(sweep: SweepData) -> int | None:
+    """The temperature of a sweep in steps of what counts as one; None where it is not known."""
+    kelvin = sweep.sweep.temperature
+    return None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)
 
 
 def _features(points: Array) -> Array:

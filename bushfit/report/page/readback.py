@@ -23,7 +23,7 @@ from bushfit.model.document import CampaignTable, TestTable
 from bushfit.model.file import from_document, read_document, require_schema
 from bushfit.model.result import Result
 from bushfit.reading.files import read_utf8, view_bytes
-from bushfit.reading.tablefile import in_a_line, undefused
+from bushfit.reading.tablefile import for_each_distinct, in_a_line, undefused
 from bushfit.reading.workbook import read_sheets
 from bushfit.report.artifacts import place_names
 from bushfit.report.contents import Contents, Documents, Tables
@@ -174,7 +174,7 @@ def canonical(table: pd.DataFrame) -> pd.DataFrame:
     def column(name: str) -> object:
         values = table[name]
         if name in TEXTS:
-            return [in_a_line(str(value)) for value in values]
+            return for_each_distinct(values.astype(str), lambda value: in_a_line(str(value)))
         numbers = values.to_numpy(dtype=float, na_value=np.nan)
         return [float(f"{value:.7g}") for value in numbers.tolist()]
 

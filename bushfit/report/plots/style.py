@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
@@ -100,7 +101,8 @@ def new_figure(title: str, height: float) -> Figure:
     """An empty figure as wide as a page, of so many centimetres for its panels, under a title of any letters."""
     lines = textwrap.wrap(title, _TITLE_LETTERS)
     height += FRAME + LINE * max(0, len(lines) - 1)
-    figure = Figure(figsize=(_WIDTH / 2.54, height / 2.54), dpi=_DPI, layout=ConstrainedLayoutEngine(wspace=0.05))
+    size = _WIDTH / 2.54, height / 2.54
+    figure = Figure(figsize=size, dpi=_DPI, facecolor="white", layout=ConstrainedLayoutEngine(wspace=0.05))
     figure.suptitle("\n".join(lines), fontsize=TEXT + 1.5, weight="bold", family=fonts(), parse_math=False)
     return figure
 
@@ -252,5 +254,7 @@ def to_image(figure: Figure, form: str = "png") -> bytes:
     settings = rc_context({"svg.hashsalt": "bushfit", "svg.fonttype": "path", "pdf.fonttype": 42})
     with warnings.catch_warnings(), settings:
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        figure.savefig(buffer, format=form, dpi=_DPI, facecolor="white", metadata=dict.fromkeys(_UNSAID[form]))
+        # past `savefig`, which draws twice: once to lay out what a single drawing lays out as well
+        canvas = get_registered_canvas_class(form)(figure)
+        getattr(canvas, f"print_{form}")(buffer, metadata=dict.fromkeys(_UNSAID[form]))
     return buffer.getvalue()
