@@ -78,7 +78,7 @@ def fit(
     """
     if loss:
         campaign = replace(campaign, fit=replace(campaign.fit, loss=loss))
-    return Fit(tuple(directions), tuple(effects), (lambda *_: None) if profile else None).run(Data.of(campaign))
+    return Fit(tuple(directions), tuple(effects), profile).run(Data.of(campaign))
 
 
 def fit_static(campaign: Campaign, *, dynamic: Result | Outcome | None = None) -> Fitted:

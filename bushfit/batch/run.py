@@ -2,7 +2,7 @@
 
 import shutil
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -19,6 +19,7 @@ from bushfit.batch.quantities import PARTS, figures
 from bushfit.batch.work import failed, work
 from bushfit.effects.contract import Array
 from bushfit.errors import OutputError
+from bushfit.progress import counting
 from bushfit.report.contents import Kinds, Picture
 from bushfit.report.folder import check_free as check_writable
 from bushfit.report.folder import write_files
@@ -71,12 +72,11 @@ def _blamed_on(junit: Path) -> Iterator[None]:
         raise
 
 
-def run(plan: Plan, workers: Pool, progress: Callable[[str], None], tell: Callable[[Outcome], None]) -> Outcome:
+def run(plan: Plan, workers: Pool, tell: Callable[[Outcome], None]) -> Outcome:
     """Do every row, then write the table, the picture, the summary, the page and the JUnit report.
 
     Args:
         plan, workers: the batch, and where its rows are done.
-        progress: called with the status of each row as it comes.
         tell: called with what came of it when all is on the disk and only stands elsewhere; if it raises, the rows are
             kept, and nothing is written of the whole.
 
@@ -89,7 +89,7 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None], tell: Callab
         with ledger.held(output):
             for name in FILES:  # from here on they tell of results that are replaced
                 (output / name).unlink(missing_ok=True)
-            outcome = _worked(plan, workers, progress)
+            outcome = _worked(plan, workers)
             ready = output / ledger.STAGE / "whole"
             ready.mkdir()
             for name, content in plan.formats.files(outcome.contents).items():
@@ -109,18 +109,22 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None], tell: Callab
         ) from error
 
 
-def _worked(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Outcome:
+def _worked(plan: Plan, workers: Pool) -> Outcome:
     """Do every row, and take over its record and its numbers."""
     begin, count = time.perf_counter(), len(plan.rows)
     earlier = list(_earlier(plan))
     records: list[Record] = [failed("") for _ in plan.rows]
     numbers = defaultdict[str, Array](lambda: np.full((len(PARTS), count), np.nan))
-    for number, record in pool.run(plan.rows, partial(work, orders=plan.orders), failed, workers):
+    count_of = Counter[str]()
+    come = pool.run(plan.rows, partial(work, orders=plan.orders), failed, workers)
+    for number, record in counting(
+        "bushings", come, count, lambda: f"{count_of['failed']} failed" if count_of["failed"] else ""
+    ):
         for name, known in figures(record):
             if known[0] is not None:
                 numbers[name][:, number] = np.array(known, dtype=float)
         records[number] = cast("Record", {key: entry for key, entry in record.items() if key not in _NOT_HELD})
-        progress(record["status"])
+        count_of[record["status"]] += 1
     return Outcome(plan, records, dict(numbers), time.perf_counter() - begin, earlier)
 
 

@@ -24,6 +24,7 @@ from bushfit.effects import effect_of, place_of, with_base
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.model.model import FIVE, Model
+from bushfit.progress import counting
 from bushfit.reading.columns import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
@@ -108,10 +109,15 @@ def load_campaign(path: str | Path) -> Campaign:
         bushing,
         tuple(
             loop
-            for keywords in reader_keywords(path, content.loops, specimens)
+            for keywords in counting("loops read", reader_keywords(path, content.loops, specimens), len(content.loops))
             for loop in programme(read_loop(**keywords), **keywords)
         ),
-        tuple(read_sweep(**keywords) for keywords in reader_keywords(path, content.sweeps, specimens)),
+        tuple(
+            read_sweep(**keywords)
+            for keywords in counting(
+                "sweeps read", reader_keywords(path, content.sweeps, specimens), len(content.sweeps)
+            )
+        ),
         content.fit,
         content.predict,
         content.simulate,

@@ -94,6 +94,7 @@ class LoopFile(TestFile):
                     "these keys do not settle the time of a loop",
                     found=", ".join(key for key in ("rate", "frequency", "waveform") if getattr(self, key)),
                     expected='rate, or frequency and waveform ("sine" or "triangle") together',
+                    hint='state waveform = "sine" beside it' if self.frequency and not self.rate else None,
                 )
             )
 

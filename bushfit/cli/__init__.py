@@ -4,35 +4,48 @@ import contextlib
 import importlib
 import io
 import os
+import re
 import sys
 from collections.abc import Callable
 from typing import Any, TextIO
 
 import click
 
-from bushfit.errors import BushfitError, OutputError, printable
+from bushfit.errors import BushfitError, OutputError, did_you_mean, printable
 from bushfit.version import __version__
 
-#: Commands in their order: the module of each, loaded when it is called, with a function not called `command` after a
-#: point; and the line that `bushfit --help` shows.
-_COMMANDS = {
-    "run": ("run", "The whole chain: fit-static, fit-dynamic, fit, diagnose, predict."),
-    "fit-static": ("fit.static", "Loops -> mu, sigma_fmax, eps_half (elasticity and friction)."),
-    "fit-dynamic": ("fit.dynamic", "Smallest-amplitude sweep -> m, alpha (rate dependence)."),
-    "fit": ("fit.fit", "Loops and sweeps -> all five parameters together: the fit to use."),
-    "predict": ("predict", "Model -> axial and radial stiffness tables and plots."),
-    "compare": ("compare", "Results side by side, or model families: what differs, and is it more than chance?"),
-    "export": ("export", "Model -> files of solvers, multibody codes and spreadsheets."),
-    "diagnose": ("diagnose", "Where do model and tests disagree? What is missing? Add it, show the gap shrink."),
-    "plan": ("plan", "Which tests next? Chosen for what they would tell, with errors beforehand."),
-    "report": ("report", "A folder of results -> one page to show, to print and to mail."),
-    "batch": ("batch", "Many campaigns at once -> one table, limits, a report for CI."),
-    "inspect": ("inspect", "Test files: how they are understood, what is in them, what is odd."),
-    "init": ("init", "Test files and geometry -> a campaign."),
-    "reduce": ("reduce", "Raw stepped-sine histories -> a sweep, with its noise and distortion."),
-    "simulate": ("simulate", "Model -> a simulated campaign of raw tests, with noise."),
-    "schema": ("schema", "JSON Schemas of the files: for programs that read them, and for editors."),
+#: Commands by what one wants to do, in their order: the module of each, loaded when it is called, with a function not
+#: called `command` after a point; and the line that `bushfit --help` shows.
+_GROUPS = {
+    "From tests to a result": {
+        "run": ("run", "The main job: every fit, what the model lacks, the prediction."),
+        "diagnose": ("diagnose", "Where do model and tests disagree? What is missing?"),
+        "predict": ("predict", "A model -> tables and plots of stiffness and loss factor."),
+        "compare": ("compare", "Results side by side: what differs, by more than chance?"),
+        "report": ("report", "A folder of results -> one page to show, print and mail."),
+        "batch": ("batch", "Many campaigns at once -> one table, limits, a report for CI."),
+    },
+    "Test files": {
+        "inspect": ("inspect", "How they are understood, what is in them, what is odd."),
+        "init": ("init", "Test files and geometry -> a campaign."),
+        "reduce": ("reduce", "Raw stepped-sine histories, or a resonance test -> a sweep."),
+    },
+    "Single fits": {
+        "fit": ("fit.fit", "Loops and sweeps -> all five parameters: the fit to use."),
+        "fit-static": ("fit.static", "Loops -> mu, sigma_fmax, eps_half."),
+        "fit-dynamic": ("fit.dynamic", "Smallest-amplitude sweep -> m, alpha."),
+    },
+    "Before a test, and for other programs": {
+        "plan": ("plan", "Which tests next? Chosen for what they would tell."),
+        "simulate": ("simulate", "A model -> a simulated campaign of raw tests, with noise."),
+        "export": ("export", "A model -> files of solvers, multibody codes, spreadsheets."),
+        "schema": ("schema", "What stands in the files: JSON Schemas, also for editors."),
+    },
 }
+_COMMANDS = {name: entry for commands in _GROUPS.values() for name, entry in commands.items()}
+
+#: Characters of the longest name of a command.
+_LONGEST = max(map(len, _COMMANDS))
 
 #: Linear algebra on one thread: the matrices are small, and a sum split over threads ends in other digits.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -52,16 +65,20 @@ class _Commands(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
-            return None
+            words = (f"No such command '{cmd_name}'", did_you_mean(cmd_name, _COMMANDS))
+            raise click.UsageError("; ".join(filter(None, words)), ctx)
         module, _, name = _COMMANDS[cmd_name][0].partition(".")
         return getattr(importlib.import_module(f"bushfit.cli.{module}"), name or "command")
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, line) for name, (_, line) in _COMMANDS.items()])
+        for heading, commands in _GROUPS.items():
+            with formatter.section(heading):
+                formatter.write_dl([(name.ljust(_LONGEST), line) for name, (_, line) in commands.items()])
 
 
-@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": _HELP_WIDTH})
+@click.group(
+    "bushfit", cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": _HELP_WIDTH}
+)
 @click.version_option(__version__, "-V", "--version", prog_name="bushfit")
 def cli() -> None:
     """Fit the stiffness and loss of rubber bushings over frequency and amplitude.
@@ -71,9 +88,8 @@ def cli() -> None:
         bushfit run CAMPAIGN.toml
 
     which says what the model lacks, if anything, and writes parameters, stiffness tables and plots to
-    results/<campaign name>. `bushfit init` makes a campaign of test files. `bushfit COMMAND -h` tells more of each.
-    Text for people goes to standard error. Exit status: 0 done, 1 done but a stated limit is missed, 2 wrong usage or
-    unusable input.
+    results/<campaign name>. `bushfit init FILES` makes a campaign of test files. `bushfit COMMAND -h` tells more of
+    each. Exit status: 0 done, 1 done but a stated limit is missed, 2 wrong usage or unusable input.
     """
 
 
@@ -91,16 +107,18 @@ def main(command: click.Command = cli) -> None:
 def _status(command: click.Command) -> int:
     """Exit status of a command as it is typed; what went wrong is said."""
     try:
-        status = command.main(standalone_mode=False)
+        status = command.main(prog_name=command.name, standalone_mode=False)
         sys.stdout.flush()
         return status or 0
     except (click.exceptions.Abort, KeyboardInterrupt):
         message = "aborted"
     except click.ClickException as error:
-        shown = io.StringIO()
-        error.show(shown)
-        sys.stderr.write(printable(shown.getvalue(), lines=True))
-        return 2
+        where = error.ctx if isinstance(error, click.UsageError) else None
+        text = " ".join(error.format_message().split())
+        if wrong := re.search(r"'([^']*)' is not one of (.*)\.$", text):
+            near = did_you_mean(wrong[1], re.findall(r"'([^']*)'", wrong[2]))
+            text = f"{text[:-1]}; {near}" if near else text
+        message = printable(f"error: {text}  ({where.command_path if where else 'bushfit'} -h tells more)")
     except BushfitError as error:
         message = f"error: {error}"
     except MemoryError:

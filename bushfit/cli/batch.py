@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import os
-import time
-from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
-from bushfit.cli.options import FILE, NO_REPORT, PLOT_FORMAT, TABLE_FORMAT, command_called, place_option
+from bushfit.cli.common import Options, with_options
+from bushfit.cli.options import command_called, effect_option, file_option, flag, option, place_option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import alike, for_people
@@ -27,45 +22,41 @@ if TYPE_CHECKING:
 
 #: Bushings of a kind (failed, out of limits, on the edge) that the terminal names; batch.csv has all.
 _MOST_SHOWN = 10
-#: Seconds between two lines on progress where standard error is no terminal.
-_SECONDS_A_LINE = 10.0
 
 
 @command_called("batch", '"data/practice/*/bushing.toml" --at "axial 25 Hz 0.1 mm"')
 @click.argument("manifest", metavar="MANIFEST", nargs=-1, required=True)
-@click.option(
-    "--command",
-    "commands",
-    type=click.Choice(["run", "fit", "diagnose", "predict"]),
-    multiple=True,
-    metavar="COMMAND",
-    help="What to do with each campaign: fit, diagnose, predict, may be given again; or run, the whole chain [fit].",
+@under(
+    "What is done with each",
+    option(
+        "--command commands",
+        "COMMAND",
+        "fit, diagnose, predict or run; may be given again [fit].",
+        type=click.Choice(["run", "fit", "diagnose", "predict"]),
+        multiple=True,
+    ),
+    place_option("Tests to fit, as in bushfit fit."),
+    effect_option("Add an effect, as in bushfit fit."),
+    option("--at", "POINT", 'Stiffness and loss factor at "axial 25 Hz 0.1 mm"; may be given again.', multiple=True),
 )
-@place_option("Tests to fit, as in bushfit fit.")
-@click.option("--effect", "effects", multiple=True, metavar="NAME", help="Add an effect, as in bushfit fit.")
-@click.option(
-    "--at",
-    multiple=True,
-    metavar="POINT",
-    help='Stiffness and loss factor there, such as "axial 25 Hz 0.1 mm" (zero-to-peak); may be given again.',
+@under(
+    "Limits",
+    file_option("--limits", "Judge each bushing by the limits in this TOML file."),
+    file_option("--junit", "Write a JUnit report for CI."),
 )
-@click.option("--limits", type=FILE, metavar="FILE", help="Judge each bushing by this TOML file (above).")
-@click.option("--junit", type=FILE, metavar="FILE", help="Write a JUnit report for CI.")
-@click.option("--jobs", type=click.IntRange(1), help="Worker processes [the cores there are].")
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Work on this Dask cluster, such as tcp://10.0.0.5:8786, whose workers see the same files and paths.",
+@under(
+    "How the work is done",
+    flag("--resume", "Do what is missing, failed or changed, keep the rest."),
+    option("--jobs", "N", "Worker processes [the cores there are].", type=click.IntRange(1)),
+    option("--scheduler", "ADDRESS", "Work on this Dask cluster, such as tcp://10.0.0.5:8786."),
 )
-@click.option(
-    "--resume",
-    is_flag=True,
-    help="Go on with the results that stand: do what is missing, failed, or has changed (a test, a setting, bushfit).",
+@under(
+    "Output",
+    flag("--tables"),
+    flag("--plots", "Those of each bushing, too."),
+    flag("--reports", "The page of each bushing that is diagnosed, too."),
 )
-@click.option("--tables", is_flag=True, help="Write loops.csv, sweeps.csv and the like of each too.")
-@click.option("--plots", is_flag=True, help="Write each bushing's plots too.")
-@click.option("--reports", is_flag=True, help="Write report.html of each that is diagnosed too.")
-@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, NO_REPORT)
+@with_options("results/<manifest>", "tables", "pictures", "pages")
 def command(
     manifest: tuple[str, ...],
     commands: tuple[Command, ...],
@@ -82,23 +73,16 @@ def command(
     reports: bool,
     options: Options,
 ) -> None:
-    """Fit (diagnose, predict, run) every campaign of MANIFEST: a TOML or CSV list, a pattern in quotes, or campaigns.
+    """Fit (diagnose, predict, run) many campaigns, with a row each in one table.
 
-    A TOML list has a [[bushings]] table a row: campaign (a file or a pattern, counted from the list's folder), and on
-    request name, commands, directions, effects, adopt, without, max_effects, tolerance, model. The same keys, and at,
-    may stand at its top for all rows; the options here win over these, a row's own keys over both. A CSV list has the
-    keys as columns.
+    MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or campaigns:
 
-    LIMITS are TOML: nrmse, reduced_chi_square, verdicts; tables [parameters.mu], and [[stiffness]] and [[loss_factor]]
-    with at = "axial 25 Hz 0.1 mm", each with min, max, nominal and tolerance, or sigma (standard deviations of the
-    batch, where it has at_least bushings). guard = true counts as missed what is only within by its value.
+    \b
+        [[bushings]]
+        campaign = "batch_7/*/campaign.toml"   # from the list's folder
 
-    Work is kept as it finishes: after an interruption the same command with --resume does what is missing. A row that
-    fails costs that row; its error stands in the table. --force also removes results of bushings that are no longer
-    listed. Exit status 1 where a row failed or a limit is missed.
-
-    Writes batch.csv (a row a bushing), batch.png, batch.json, index.html (control charts, a table to sort), and
-    bushings/<name>/ with model.json of each, or all that `bushfit run` writes.
+    --force also removes results of bushings that are no longer listed. Exit status 1 where a row failed or a limit is
+    missed. Writes batch.csv, batch.png, batch.json, index.html (control charts), and bushings/<name>/model.json.
     """
     from bushfit.batch.pool import DaskPool, LocalPool
 
@@ -125,46 +109,10 @@ def command(
     orders = Orders(output, tuple(dict.fromkeys(points)), formats, resume)
     plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.formats)
     check_free(plan, force=options.force)
-    with _progress(options, len(plan.rows)) as advance:
-        outcome = run(plan, workers, advance, lambda outcome: options.print_json(outcome.summary))
+    outcome = run(plan, workers, lambda outcome: options.print_json(outcome.summary))
     _tell(options, outcome, options.folder(read.stem))
     if outcome.status["failed"] or outcome.missed:
         click.get_current_context().exit(1)
-
-
-@contextmanager
-def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
-    """Rate and time left: a bar on a terminal, now and then a line elsewhere."""
-    console = options.console
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[failures]}", style="red"),
-    )
-    begin = said = time.monotonic()
-    tenth, count = 0, Counter[str]()
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("bushings", total=total, rate="", failures="")
-
-        def advance(status: str) -> None:
-            nonlocal said, tenth
-            count[status] += 1
-            done, now = count.total(), time.monotonic()
-            rate = done / max(now - begin, 1e-9)
-            failures = f"{count['failed']} failed" if count["failed"] else ""
-            bar.update(task, completed=done, rate=f"{rate:.1f}/s", failures=failures)
-            if done == total:
-                bar.stop()  # it takes what is printed for its own as long as it stands
-            due = now - begin >= _SECONDS_A_LINE and 10 * done // total != tenth
-            if not console.is_terminal and (due or now - said >= _SECONDS_A_LINE):
-                said, tenth = now, 10 * done // total
-                text = f"{done} of {total}, {rate:.1f}/s, {(total - done) / rate:.0f} s left"
-                options.say(", ".join(filter(None, (text, failures))))
-
-        yield advance
 
 
 def _tell(options: Options, outcome: Outcome, folder: Path) -> None:

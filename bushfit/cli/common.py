@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -16,7 +15,8 @@ from rich.markup import escape
 from rich.segment import Segment
 
 from bushfit.campaign.naming import folder_name
-from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, Folder, Function, Parameter, Size, in_order
+from bushfit.cli.options import FILE, FORMS, Folder, Function, Parameter, Size, Written, flag, in_order, option, under
+from bushfit.cli.progress import shown_on
 from bushfit.errors import ModelError, printable, typed
 from bushfit.report.contents import Formats, Kinds
 from bushfit.report.folder import check_free, to_json, write_files
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from bushfit.reading.tablefile import Form
     from bushfit.report.contents import Picture
 
-#: Where results go by default, as the help says it.
-CAMPAIGN_FOLDER = "results/<campaign or file>"
-FIRST_FILE_FOLDER = "results/<first file>"
 #: Width of tables where standard error is no terminal, in characters.
 _WIDTH = 100
 
@@ -103,12 +100,12 @@ class Options:
             sys.stdout.flush()
 
 
-def with_options(folder: str, *forms: Parameter) -> Parameter:
+def with_options(folder: str, *written: Written) -> Parameter:
     """Decorator of a command: the options that all have become one `options`.
 
     Args:
         folder: where results go without --output, as the help says it.
-        forms: options on the form of what it writes: TABLE_FORMAT, PLOT_FORMAT, NO_REPORT.
+        written: what the command writes that has forms.
     """
 
     def decorate(function: Function) -> Function:
@@ -131,17 +128,22 @@ def with_options(folder: str, *forms: Parameter) -> Parameter:
                 table_form=table_format,
                 picture_forms=tuple(dict.fromkeys(plot_format)),
             )
-            return function(options=Options(output, verbose, quiet, as_json, formats, force), **others)
+            options = Options(output, verbose, quiet, as_json, formats, force)
+            with shown_on(options.console):
+                return function(options=options, **others)
 
         return in_order(
             wrapped,
-            click.option("-o", "--output", type=Folder(path_type=Path), help=f"Folder for the results [{folder}]."),
-            click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, correlations, files."),
-            click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
-            click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output."),
-            click.option("--no-plots", is_flag=True, help="Write no plots."),
-            click.option("--force", is_flag=True, help="Replace results that stand."),
-            *forms,
+            under(
+                "Output",
+                option("-o --output", "DIR", f"For the results [{folder}].", type=Folder(path_type=Path)),
+                flag("--force", "Replace results that stand there."),
+                *(FORMS[kind] for kind in written),
+                flag("--no-plots", "Write no plots.", hidden="pictures" not in written),
+                flag("--json as_json", "Print the result as JSON on standard output."),
+                flag("-v --verbose"),
+                flag("-q --quiet", "Say more, or nothing but errors."),
+            ),
         )
 
     return decorate
@@ -186,16 +188,16 @@ class Task:
             click.get_current_context().exit(1)
 
 
-def with_task(*forms: Parameter, soft_l1: str = "points far off pull less, outliers not at all") -> Parameter:
+def with_task(*written: Written, soft_l1: str = "points far off pull less, outliers not at all") -> Parameter:
     """Decorator of a command on one campaign, with tables and plots: CAMPAIGN and its options become one `task`.
 
     Args:
-        forms: further ones of `with_options`.
+        written: beside tables and pictures, as of `with_options`.
         soft_l1: what this loss does, as the help says it.
     """
 
     def decorate(function: Function) -> Function:
-        @with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, *forms)
+        @with_options("results/<campaign name>", "tables", "pictures", *written)
         @wraps(function)
         def wrapped(
             campaigns: Sequence[Path], loss: Loss | None, max_nrmse: float | None, options: Options, **others: Any
@@ -205,16 +207,20 @@ def with_task(*forms: Parameter, soft_l1: str = "points far off pull less, outli
         return in_order(
             wrapped,
             click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
-            click.option(
-                "--loss",
-                type=click.Choice(["linear", "soft_l1"]),
-                help=f"linear: least squares [the campaign's, else this]. soft_l1: {soft_l1}.",
-            ),
-            click.option(
-                "--max-nrmse",
-                type=Size("share such as 0.02"),
-                metavar="SHARE",
-                help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
+            under(
+                "How it is fitted",
+                option(
+                    "--loss",
+                    "LOSS",
+                    f"linear: least squares [the campaign's, else this]; soft_l1: {soft_l1}.",
+                    type=click.Choice(["linear", "soft_l1"]),
+                ),
+                option(
+                    "--max-nrmse",
+                    "SHARE",
+                    "Exit status 1 above this misfit, such as 0.02 (NRMSE).",
+                    type=Size("share such as 0.02"),
+                ),
             ),
         )
 
@@ -274,23 +280,3 @@ def open_source(source: Path) -> Campaign | Result:
             hint="name a model file itself, or a campaign",
         )
     return open_model(file)
-
-
-@contextmanager
-def progress(options: Options, what: str) -> Iterator[Callable[[str, int], None]]:
-    """Which of some things is done, by its name, and how many are left: a bar on a terminal, a line each elsewhere."""
-    from rich.progress import Progress
-
-    console = options.console
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(what, total=None)
-
-        def advance(name: str, left: int) -> None:
-            done = bar.tasks[0].completed + 1
-            bar.update(task, completed=done, total=done + left, description=f"{what} {name}: done")
-            if not console.is_terminal:
-                options.say(f"{what} {name}: done, {left} to go")
-            elif not left:
-                bar.stop()
-
-        yield advance

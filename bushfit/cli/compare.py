@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_source, progress, with_options
+from bushfit.cli import completion
+from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options
-from bushfit.cli.options import FILE, NO_REPORT, PLOT_FORMAT, TABLE_FORMAT, command_called, option_of, place_option
+from bushfit.cli.options import FILE, command_called, option, option_of, place_option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
+from bushfit.progress import counting
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
@@ -26,34 +28,36 @@ _ALL = "all"
     "compare", "configs/cmp_15961.toml configs/arm_bushing.toml", "configs/arm_bushing.toml --families sliders,kraus"
 )
 @click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=FILE)
-@click.option(
-    "--families",
-    is_flag=False,
-    flag_value=_ALL,
-    metavar="[NAME,...]",
-    help="Compare model families on the one campaign A: the paper's, and those named, effects joined by + [each law of "
-    "rate with each of amplitude].",
+@under(
+    "What is compared",
+    place_option(
+        "axial, radial, torsion or a specimen; of campaigns only these tests are fitted; may be given again [where all "
+        "were fitted]."
+    ),
+    grid_options("as measured"),
+    option(
+        "--families",
+        "[NAME,...]",
+        (
+            "Model families on the one campaign A: the paper's, and those named, effects joined by + [each law of "
+            "rate with each of amplitude]."
+        ),
+        is_flag=False,
+        flag_value=_ALL,
+        shell_complete=completion.effect_lists,
+    ),
 )
-@place_option(
-    "axial, radial or torsion, or a specimen's name: where to compare, and which tests of campaigns to fit; may be "
-    "given again [all where each was fitted]."
-)
-@grid_options("as far as all were measured")
-@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT, NO_REPORT)
+@with_options("results/<names>", "tables", "pictures", "pages")
 def command(
     sources: tuple[Path, ...], families: str | None, directions: tuple[str, ...], options: Options, **grids: str | None
 ) -> None:
     """Compare A, the reference, with others: what differs, by how much, and whether by more than chance.
 
     Each is a model (JSON), a folder of results (its model.json), or a campaign, which is fitted on the spot as by
-    `bushfit fit`. Parameters stand side by side with the interval of each difference, stiffness and loss factor over
-    frequency with bands; words say what differs, or how large a difference may be that is not seen.
+    `bushfit fit`: parameters, and stiffness and loss factor over frequency. --families fits several models to one
+    campaign: how well each meets the tests, and which predicts best what it was not fitted to.
 
-    --families fits several models to one campaign and holds out alike what tests them: which to use over what range,
-    how well each meets the tests, and which predicts better what it was not fitted to.
-
-    Writes compare.json, parameters.csv, differences.csv (a row a result, place, frequency and amplitude), compare.png,
-    compare.html, a page to show, to print and to mail, and with --families families.csv.
+    Writes compare.json, parameters.csv, differences.csv, compare.png, compare.html; with --families families.csv.
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.effects import effect_named
@@ -77,12 +81,11 @@ def command(
                 all(map(effect_named, name.split("+")))
         campaign = load_campaign(sources[0])
         folder = options.free_folder(campaign.name, job.kinds(families=True), form="{} families")
-        with progress(options, "family") as advance:
-            outcome = job.run_families(campaign, str(sources[0]), names, advance)
+        outcome = job.run_families(campaign, str(sources[0]), names)
     else:
         opened = [_opened(source) for source in sources]
         folder = options.free_folder(" and ".join(each.name for each, *_ in opened), job.kinds())
-        outcome = job.run([job.entry(*each) for each in opened])
+        outcome = job.run([job.entry(*each) for each in counting("results fitted", opened)])
     _tell(options, outcome)
     options.write(folder, options.formats.files(outcome.contents), outcome.document)
 

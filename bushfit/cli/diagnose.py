@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
+from bushfit.cli import completion
 from bushfit.cli.common import Options, Task, open_model, with_task
-from bushfit.cli.options import FILE, NO_REPORT, command_called
+from bushfit.cli.options import command_called, file_option, option, under
 from bushfit.cli.show import new_table, parameter_table
 from bushfit.errors import BushfitError, naming
 from bushfit.units import alike, for_people, number, quantity
@@ -24,33 +25,40 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 
 
 @command_called("diagnose", "configs/mystery_mount.toml")
-@click.option(
-    "--model", type=FILE, help="Start from this model's effects [the paper's three]; its values are fitted anew."
+@under(
+    "What may be missing",
+    option("--max-effects", "N", "Effects to add at most [3].", type=click.IntRange(0, 5), default=3),
+    option(
+        "--adopt",
+        "EFFECT",
+        (
+            "Add this effect, such as inertia, or mend this mistake in the record of a test, such as "
+            "peak_to_peak:sweep_axial; may be given again. A wrong EFFECT lists all."
+        ),
+        multiple=True,
+        shell_complete=completion.explanations,
+    ),
+    option(
+        "--without",
+        "EFFECT",
+        "Do not consider this effect or mistake; may be given again.",
+        multiple=True,
+        shell_complete=completion.explanations,
+    ),
+    option("--tolerance", "SHARE", "Gaps below this share of the stiffness do not count [1 %].", default="1 %"),
+    file_option("--model", "Start from the effects of this model.json [the paper's three]."),
 )
-@click.option(
-    "--adopt",
-    multiple=True,
-    metavar="EFFECT",
-    help="Add this effect by hand, such as inertia, or mend a mistake in the record of a test, such as "
-    "peak_to_peak:sweep_axial; may be given again.",
-)
-@click.option(
-    "--without", multiple=True, metavar="EFFECT", help="Do not consider this effect or mistake; may be given again."
-)
-@click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
-@click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
-@with_task(NO_REPORT, soft_l1="the same with outliers left out")
+@with_task("pages", soft_l1="the same with outliers left out")
 def command(
     model: Path | None, adopt: tuple[str, ...], without: tuple[str, ...], max_effects: int, tolerance: str, task: Task
 ) -> None:
     """Find where the model and the tests of CAMPAIGN disagree, name the missing effect, add it, show the gap shrink.
 
-    All tests are used, in every direction. The verdict is one of: consistent (nothing is missing), named (what was
-    added closes the gap; or the tests agree if one of them was recorded wrongly, which is told and never mended unless
-    adopted), ambiguous (look-alikes: all are listed, none is added), described (it has no name, but a smooth
-    correction), partly (a little remains) or unexplained (no known effect closes the gap; the model is left as it was).
+    All tests are used, in every direction. The verdict is consistent (nothing is missing), named (what was added, or
+    one test recorded wrongly, closes the gap), ambiguous (look-alikes: all are listed, none is added), described (no
+    name, but a smooth correction), partly (a little remains) or unexplained. Mistakes are told, and mended by --adopt.
 
-    Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv, gap.png, report.html, as run does.
+    Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv, gap.png, report.html.
     """
     from bushfit.diagnosis.record import Settings
     from bushfit.jobs.diagnose import Diagnose

@@ -5,9 +5,9 @@ from typing import Literal
 
 import click
 
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
+from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.grids import TEMPERATURE, asked_for, grid_options, kelvin, positive
-from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, command_called, place_option
+from bushfit.cli.options import FILE, command_called, file_option, option, place_option, under
 
 
 @command_called(
@@ -15,27 +15,34 @@ from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, command_called,
     "data/arm_bushing/truth.json --format nastran --format xlsx",
     'data/arm_bushing/truth.json --format abaqus --units "m kg s N" -o results/si',
 )
-@click.argument("model", type=FILE)
-@click.option(
-    "--format",
-    "formats",
-    type=click.Choice(["fmu", "nastran", "abaqus", "adams", "csv", "xlsx"]),
-    multiple=True,
-    required=True,
-    help="May be given again.",
+@click.argument("model", metavar="MODEL.json", type=FILE)
+@under(
+    "For which program",
+    option(
+        "--format formats",
+        "FORMAT",
+        "fmu, nastran, abaqus, adams, csv or xlsx; needed, and may be given again.",
+        type=click.Choice(["fmu", "nastran", "abaqus", "adams", "csv", "xlsx"]),
+        multiple=True,
+        required=True,
+    ),
+    option("--units", "UNITS", 'Length, mass, time and force, such as "m kg s N" [decks: "mm t s N"].'),
+    option(
+        "--dialect",
+        "DIALECT",
+        "optistruct: of --format nastran, with stiffness and loss angle.",
+        type=click.Choice(["optistruct"]),
+    ),
+    option("--accuracy", "ERROR", "Largest error of the modulus that an fmu may have [1 %].", default="1 %"),
 )
-@click.option("--campaign", type=FILE, help="Take the grid of this campaign's [predict], or of its sweeps.")
-@place_option(
-    "axial, radial or torsion, or a specimen's name; may be given again [axial and radial, and all specimens]."
+@under(
+    "Where it is predicted",
+    place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
+    grid_options("the campaign's"),
+    TEMPERATURE,
+    file_option("--campaign", "Take the grid of this campaign."),
 )
-@grid_options("the campaign's")
-@TEMPERATURE
-@click.option(
-    "--units", help='Length, mass, time and force that fit together [decks "mm t s N"; tables as predict; fmu SI].'
-)
-@click.option("--dialect", type=click.Choice(["optistruct"]), help="Of --format nastran: |K| and loss angle.")
-@click.option("--accuracy", default="1 %", help="Largest error of the modulus that an fmu may have [1 %].")
-@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT)
+@with_options("results/<name>", "tables", "pictures")
 def command(
     model: Path,
     formats: tuple[str, ...],
@@ -48,12 +55,13 @@ def command(
     options: Options,
     **grids: str | None,
 ) -> None:
-    """MODEL (the model.json of run, fit or diagnose, or dynamic.json) in the files of other programs.
+    """Write a fitted model for other programs: a solver, a multibody code, a spreadsheet.
 
-    Writes bushing.bdf (nastran), bushing.fem (with --dialect optistruct), bushing.inp (abaqus), bushing_car.bus and
-    bushing_ride.bus (adams), a .fmu (fmu) with arms.csv and arms.png, its Maxwell arms and their error, bushing.xlsx,
-    or a CSV file for each table. Says what each format cannot carry, and what that costs. Effects of the rig are left
-    out. z is the bushing's axis.
+    MODEL.json is the model.json of run, fit or diagnose, or dynamic.json. What a format cannot carry, and what that
+    costs, is said. Effects of the rig are left out. z is the bushing's axis.
+
+    Writes bushing.bdf, .fem, .inp or .xlsx, bushing_car.bus and bushing_ride.bus (adams), a CSV file a table, or an
+    .fmu with arms.csv and arms.png, its Maxwell arms.
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.errors import naming

@@ -5,42 +5,50 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import click
 
-from bushfit.cli.options import FILE, Direction, Function, Parameter, in_order, option_of
+from bushfit.cli import completion
+from bushfit.cli.options import FILE, Function, Parameter, in_order, option, option_of, under
 from bushfit.errors import BushfitError, MeasurementError
-from bushfit.reading.headers import AmplitudeConvention
-from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 
-#: What a test file does not say itself, as keys of a campaign: of loops and sweeps, and how any file is written.
+#: What a test file does not say itself, as keys of a campaign, with metavar and words: of loops and sweeps, ...
 _OF_TESTS = {
-    "rate": 'Of a loop without time, a triangle: "10 mm/min".',
-    "frequency": 'Of a loop without time, with --waveform: "0.1 Hz".',
-    "waveform": "sine or triangle.",
-    "amplitude": "zero-to-peak or peak-to-peak, if headers do not say.",
-    "at_amplitude": 'Without a column: "0.1 mm" [found in the name].',
-    "at_frequency": 'Without a column: "10 Hz" [found in the name].',
-    "temperature": 'Of the test, or of the rows to take: "23 degC".',
-    "specimen": "Its name, if no bushing [coupon, or bar in tension].",
-    "specimen_number": "Of the part, or of the rows to take.",
-    "area": 'Of one rubber block in shear, such as "772 mm^2".',
-    "thickness": 'Of one rubber block in shear, such as "6 mm".',
-    "elements": "Rubber blocks in parallel [1].",
+    "amplitude": ("COUNTING", "zero-to-peak or peak-to-peak [as headers say]."),
+    "at_amplitude": ("SIZE", '"0.1 mm", without a column [found in the name].'),
+    "at_frequency": ("FREQUENCY", '"10 Hz", without a column [found in the name].'),
+    "temperature": ("TEMP", '"23 degC": of the test, or of the rows to take.'),
+    "rate": ("SPEED", '"10 mm/min": of a triangle without time.'),
+    "frequency": ("FREQUENCY", None),
+    "waveform": ("WAVE", '"0.1 Hz", sine or triangle: a loop without time.'),
+    "specimen": ("NAME", "If this is no bushing, its name [coupon; bar]."),
+    "area": ("AREA", None),
+    "thickness": ("LENGTH", None),
+    "elements": ("N", '"772 mm^2", "6 mm": of N blocks in shear [1].'),
+    "specimen_number": ("NUMBER", "Of the part, or of the rows to take."),
 }
+#: ... and how any file is written.
 _AS_WRITTEN = {
-    "encoding": 'Such as "cp1252" [detected].',
-    "delimiter": "comma, semicolon, tab, pipe or blanks [detected].",
-    "decimal": '"." or "," [detected].',
-    "thousands": '".", ",", " ", "\'" or none [detected].',
-    "header_line": "Line of the header, from 1 [found].",
-    "sheet": "Of a workbook [all with a test].",
+    "encoding": "NAME",
+    "delimiter": "WORD",
+    "decimal": "MARK",
+    "thousands": "MARK",
+    "header_line": "LINE",
+    "sheet": "NAME",
 }
 #: What test files are not, by their endings.
 _NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
-_WHOLE_NUMBERS = ("elements", "header_line")
+#: Types of what is stated, by key; else a text.
+TYPES: dict[str, click.ParamType[Any]] = {
+    "direction": click.Choice(completion.DIRECTIONS),
+    "waveform": click.Choice(["sine", "triangle"]),
+    "amplitude": click.Choice(["zero-to-peak", "peak-to-peak"]),
+    **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),
+}
 _SAME_NAME = ("force_sign", *_OF_TESTS, *_AS_WRITTEN)
+#: What the options state of a test, by key; columns and units aside.
+STATED = ("direction", *_SAME_NAME)
 #: An inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")
 #: One entry of such a table that is an option here.
@@ -52,50 +60,52 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
 
     Beside loops there are `sweeps`, with all keys of a campaign, or else resonance tests, with those of any file.
     """
-    others = SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS
-    known = tuple(dict.fromkeys((*LOOP_COLUMNS, *others)))
-    roles = (
-        f"ROLEs{' of loops' if sweeps else ''}: {', '.join(LOOP_COLUMNS)}; "
-        f"of {'sweeps' if sweeps else 'resonance tests'}: {', '.join(others)}"
-    )
-    keys = (_OF_TESTS if sweeps else {}) | _AS_WRITTEN
+    keys = _OF_TESTS if sweeps else {}
+    told = ("direction", "force_sign", *keys, *_AS_WRITTEN)
+
+    def known() -> tuple[str, ...]:
+        from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
+
+        return tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
 
     def decorate(function: Function) -> Function:
         @wraps(function)
         def wrapped(columns: Sequence[str], units: Sequence[str], **given: Any) -> Any:
-            stated = {key: given.pop(key) for key in ("direction", "force_sign", *keys)}
-            stated["columns"] = _pairs(columns, "--column", "force=Kraft", known)
-            stated["units"] = _pairs(units, "--unit", "force=kN", known)
-            _check_amplitude(stated.get("amplitude"))
+            stated = {key: given.pop(key) for key in told}
+            stated["columns"] = _pairs(columns, "--column", "force=Kraft", known())
+            stated["units"] = _pairs(units, "--unit", "force=kN", known())
             return function(stated={key: value for key, value in stated.items() if value}, **given)
 
         return in_order(
             wrapped,
             click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
-            click.option("--direction", type=Direction(), help="axial, radial or torsion [names, columns]."),
-            click.option(
-                "--column",
-                "columns",
-                multiple=True,
-                metavar="ROLE=HEADER",
-                help=f'Such as "force=Fz", of files that have this header; may be given again. {roles}.',
+            under(
+                "What the files do not say",
+                _stated("direction", "DIRECTION", "axial, radial or torsion [names, columns]."),
+                option("--unit units", "ROLE=UNIT", 'Of a column: "force=kN".', multiple=True),
+                option(
+                    "--column columns", "ROLE=HEADER", 'Which it is, "force=Fz"; a wrong ROLE lists all.', multiple=True
+                ),
+                _stated("force_sign", "-1", "If the load cell counts the other way."),
+                *(_stated(key, metavar, words) for key, (metavar, words) in keys.items()),
             ),
-            click.option(
-                "--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Such as "force=kN"; ROLEs as above.'
-            ),
-            click.option("--force-sign", type=int, help="-1: the load cell counts the other way."),
-            *(
-                click.option(option_of(key), type=int if key in _WHOLE_NUMBERS else None, help=words)
-                for key, words in keys.items()
+            under(
+                "How they are written, where it is not detected",
+                *(_stated(key, metavar) for key, metavar in _AS_WRITTEN.items()),
             ),
         )
 
     return decorate
 
 
-def _tests_alone(_: click.Context, __: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
+def _stated(key: str, metavar: str, words: str | None = None) -> Parameter:
+    """The option of a key of a campaign."""
+    return option(option_of(key), metavar, words, type=TYPES.get(key))
+
+
+def _tests_alone(context: click.Context, _: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
     """Refuse a campaign or a model among test files."""
-    for file in files:
+    for file in () if context.resilient_parsing else files:  # while somebody types, Tab is no error
         if (found := _NO_TESTS.get(file.suffix.lower())) and file.is_file():
             hint = "bushfit diagnose looks at all tests of a campaign together; name its files, or their folder, here"
             raise MeasurementError("a test file is needed", file=file, found=found, expected="a table", hint=hint)
@@ -129,20 +139,6 @@ def direction_error(file: Path, sheet: str | None = None) -> MeasurementError:
         expected="a direction",
         hint="state it: --direction axial (or radial, torsion); or where others say another, name the file after it",
     )
-
-
-def _check_amplitude(counting: str | None) -> None:
-    """Refuse a value where the counting of amplitudes is stated."""
-    known = get_args(AmplitudeConvention)
-    if counting and counting not in known:
-        raise MeasurementError(
-            "this does not say how amplitudes are counted",
-            place="--amplitude",
-            found=f'"{counting}"',
-            expected=" or ".join(known),
-            hint=f'--at-amplitude "{counting if counting[0].isdigit() else "0.1 mm"}" states the amplitude of files '
-            "that have no column for it",
-        )
 
 
 def _pairs(texts: Sequence[str], option: str, example: str, known: Sequence[str]) -> Mapping[str, str]:

@@ -1,23 +1,20 @@
 """`bushfit fit-static`, `fit-dynamic` and `fit`: loops, sweeps, or both together -> parameters."""
 
-from contextlib import nullcontext
 from pathlib import Path
 
-import click
-
-from bushfit.cli.common import Task, open_model, progress, with_task
-from bushfit.cli.options import FILE, command_called, place_option
+from bushfit.cli.common import Task, open_model, with_task
+from bushfit.cli.options import command_called, effect_option, file_option, flag, place_option, under
 from bushfit.cli.show import tell_fit
 
 
 @command_called("fit-static", "configs/cmp_15961.toml")
-@click.option("--dynamic", type=FILE, help="Hold the springpot at m and alpha of this dynamic.json or model.json.")
+@under("How it is fitted", file_option("--dynamic", "Hold m and alpha at those of this dynamic.json."))
 @with_task()
 def static(dynamic: Path | None, task: Task) -> None:
-    """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, the springpot held.
+    """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, at given m and alpha.
 
-    m and alpha come from --dynamic, or from [fit] of the campaign where it gives both. Where they are not known
-    yet the springpot is left out, and a warning says what this does to the result.
+    These come from --dynamic, or from [fit] of the campaign. Where they are not known yet the part of the model that
+    depends on frequency (the springpot) is left out, and a warning says what this does to the result.
 
     Writes static.json, loops.csv and loops.png.
     """
@@ -27,19 +24,20 @@ def static(dynamic: Path | None, task: Task) -> None:
 
 
 @command_called("fit-dynamic", "configs/cmp_15961.toml")
-@click.option(
-    "--static",
-    type=FILE,
-    help="Hold mu, sigma_fmax and eps_half at those of this static.json [fitted to the loops on the spot].",
+@under(
+    "How it is fitted",
+    file_option(
+        "--static", "Hold mu, sigma_fmax and eps_half at those of this static.json [the loops are fitted first]."
+    ),
 )
 @with_task()
 def dynamic(static: Path | None, task: Task) -> None:
-    """Fit m and alpha to the smallest-amplitude sweep of CAMPAIGN, the other three held.
+    """Fit m and alpha to the smallest-amplitude sweep of CAMPAIGN, at given mu, sigma_fmax and eps_half.
 
-    They are held at --static, and their errors are carried over. Without it the loops of CAMPAIGN are fitted first,
-    as fit-static does. [fit] dynamic_amplitudes in the campaign chooses other sweep amplitudes.
+    These come from --static, and their errors are carried over; without it the loops of CAMPAIGN are fitted first.
+    [fit] dynamic_amplitudes in the campaign chooses other sweep amplitudes.
 
-    Writes dynamic.json, which `bushfit predict` takes as it is, sweeps.csv and sweeps.png.
+    Writes dynamic.json, a model that bushfit predict takes, sweeps.csv and sweeps.png.
     """
     from bushfit.jobs.fits import FitDynamic
 
@@ -47,33 +45,26 @@ def dynamic(static: Path | None, task: Task) -> None:
 
 
 @command_called("fit", "configs/arm_bushing.toml --direction axial --direction radial --profile")
-@place_option(
-    "Tests to fit: axial, radial or torsion, or a specimen's name; may be given again [axial, as in the paper, and all "
-    "specimens; of loops, or of sweeps, all where none is axial]."
+@under(
+    "What is fitted",
+    place_option(
+        "Tests in this direction (axial, radial, torsion) or of this specimen; may be given again [axial, and all "
+        "specimens]."
+    ),
+    effect_option("Add an effect to the model, such as inertia; may be given again. A wrong NAME lists all."),
+    flag("--profile", "Add 95 % intervals by profile likelihood (some seconds)."),
 )
-@click.option(
-    "--effect",
-    "effects",
-    multiple=True,
-    metavar="NAME",
-    help="Add an effect to the paper's three and to those of [fit] effects, such as inertia; may be given again. A "
-    "wrong NAME lists them all.",
-)
-@click.option("--profile", is_flag=True, help="Add 95 % intervals by profile likelihood (some seconds).")
 @with_task()
 def fit(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:
     """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
 
-    Writes model.json, and the tables and plots of both: loops.csv, loops.png, sweeps.csv, sweeps.png. Tests in
-    directions that were not fitted are shown as predictions.
+    This is the fit to use: bushfit predict takes its model. Without axial loops, or axial sweeps, it takes those of all
+    directions. Tests that were not fitted are shown as predictions. Where [fit] of the campaign holds all five
+    (vary = false) nothing is fitted, and it is said how well the values given meet the tests. --profile is right also
+    where a parameter is hardly determined and the interval from the standard error is not.
 
-    Where [fit] of the campaign holds all five (vary = false) nothing is fitted, and it is said how well the values
-    given meet the tests.
-
-    --profile moves each parameter until the fit of all others is worse than chance allows: slower than the interval
-    from the standard error, and right where that is not, as where a parameter is hardly determined.
+    Writes model.json, and of loops and sweeps a table and a plot each.
     """
     from bushfit.jobs.fits import Fit
 
-    with progress(task.options, "profile of") if profile else nullcontext() as advance:
-        task.perform(Fit(directions, effects, advance), tell_fit)
+    task.perform(Fit(directions, effects, profile), tell_fit)

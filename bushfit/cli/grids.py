@@ -6,9 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import click
-
-from bushfit.cli.options import Parameter, in_order, option_of
+from bushfit.cli.options import Parameter, in_order, option, option_of
 from bushfit.errors import UnitError, naming
 from bushfit.units import quantity
 
@@ -21,21 +19,17 @@ _MOST_VALUES = 100_000
 _UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 
 #: Option of what is predicted at one temperature.
-TEMPERATURE: Parameter = click.option(
-    "--temperature", help='Of the rubber, such as "40 degC", for a model with the effect of it [23 degC].'
-)
+TEMPERATURE: Parameter = option("--temperature", "TEMP", 'Such as "40 degC", if the model knows it [23 degC].')
 
 
 def grid_options(usual: str) -> Parameter:
     """Where stiffness is predicted, by the keys of [predict]; `usual` says what the grid is without them."""
     return lambda function: in_order(
         function,
-        click.option("--frequencies", help=f'Such as "5:155:10 Hz" or "20, 50, 100 Hz" [{usual}].'),
-        click.option("--amplitudes", help=f'Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [{usual}].'),
-        click.option("--torsion-amplitudes", help='Zero-to-peak rotation, for --direction torsion ["0.5, 1, 2 deg"].'),
-        click.option(
-            "--strain-amplitudes", help='Zero-to-peak strain, for specimens that give a modulus ["1, 2, 5 %"].'
-        ),
+        option("--frequencies", "GRID", f'"5:155:10 Hz" or "20, 50 Hz" [{usual}].'),
+        option("--amplitudes", "GRID", f'Zero-to-peak, "0.1, 0.5 mm" [{usual}].'),
+        option("--torsion-amplitudes", "GRID", 'For --direction torsion ["0.5, 1, 2 deg"].'),
+        option("--strain-amplitudes", "GRID", 'For specimens that give a modulus ["1, 2, 5 %"].'),
     )
 
 

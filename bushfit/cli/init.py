@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, with_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.inspect import tell_left_out
-from bushfit.cli.options import command_called, option_of
+from bushfit.cli.options import command_called, flag, option, option_of, under
+from bushfit.cli.questions import Questions
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
+from bushfit.progress import counting
 from bushfit.report.folder import check_free
 from bushfit.units import quantity
 
 if TYPE_CHECKING:
     from bushfit.geometry import Bushing
+    from bushfit.inspection.gathering import Source
     from bushfit.inspection.record import Inspected, InspectionDocument
+_Seen = TypeVar("_Seen")
 #: Sides of the rubber whose radius or diameter is asked for.
 _SIDES = ("inner", "outer")
 
@@ -28,40 +34,50 @@ _SIDES = ("inner", "outer")
     "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_axial.csv "
     '--inner-diameter "28 mm" --outer-diameter "40 mm" --length "45 mm"',
 )
-@click.option("--inner-radius", help='Of the rubber, such as "10 mm"; or else')
-@click.option("--inner-diameter", help='such as "20 mm".')
-@click.option("--outer-radius", help='Of the rubber, such as "18 mm"; or else')
-@click.option("--outer-diameter", help='such as "36 mm".')
-@click.option("--length", help='Mean length of the rubber, such as "34 mm".')
-@click.option("--name", help="Of the bushing [the folder of the first file].")
+@under(
+    "The rubber of the bushing",
+    option("--inner-radius", "LENGTH"),
+    option("--inner-diameter", "LENGTH", 'Inside, one of the two, such as "20 mm".'),
+    option("--outer-radius", "LENGTH"),
+    option("--outer-diameter", "LENGTH", 'Outside, one of the two, such as "36 mm".'),
+    option("--length", "LENGTH", 'Mean of inside and outside, such as "34 mm".'),
+    option("--name", "NAME", "Of the bushing [the folder of the first file]."),
+)
 @with_stated()
-@with_options(CAMPAIGN_FOLDER)
+@under("Output", flag("--no-input", "Ask nothing, as in a script: say what lacks."))
+@with_options("results/<bushing name>")
 def command(
-    files: tuple[Path, ...], name: str | None, stated: Mapping[str, Any], options: Options, **sizes: str | None
+    files: tuple[Path, ...],
+    name: str | None,
+    no_input: bool,
+    stated: Mapping[str, Any],
+    options: Options,
+    **sizes: str | None,
 ) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 
-    FILE may be a folder, or a workbook with several tests; what holds no test is told and left out. Columns tell what a
-    test is; names of file and sheet, or columns, its direction; names an amplitude or frequency without a column
-    (Dyn_axial_A0,05mm.csv). What only you can know, such as a unit, is asked for in an error that names the option. An
-    option holds for all files of its kind; where they differ, edit the campaign. Raw histories go through `bushfit
-    reduce` first. Tests of a modulus, or with --area and --thickness of a stiffness, need no size of a bushing.
-
-    Writes campaign.toml, or -o my_bushing.toml; of several parts a campaign each, and batch.toml, their list.
+    In a terminal it asks for what neither files nor options say. FILE may be a folder, or a workbook with several
+    tests; an option holds for all files of its kind. Writes campaign.toml, or -o my_bushing.toml.
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.draft import campaign_text, campaigns_of_parts, with_specimens_named
 
-    name = name or (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
+    questions = Questions.of(options, no_input=no_input)
+    usual = (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
+    if name is None and questions and not any(sizes.values()):
+        name = click.prompt("name of the bushing", default=usual, err=True)
+    name = name or usual
     folder, target = options.folder(name), "campaign.toml"
     if options.output and options.output.suffix == ".toml":
         folder, target = options.output.parent, options.output.name
-    bushing = _bushing(name, sizes) if any(sizes.values()) else None
+    settle = questions.settled if questions else _as_stated
+    size = partial(_bushing, name)
+    bushing = settle(sizes, size) if any(sizes.values()) else None
     check_free(folder, [target], force=options.force)
-    seen, left_out = _usable(files, stated, is_sized=bushing is not None)
+    seen, left_out = _usable(files, stated, questions, is_sized=bushing is not None)
     seen = with_specimens_named(seen)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
-        bushing = _bushing(name, sizes)
+        bushing = settle(sizes, size)
     table = bushing and bushing[1]
     if len({one.part for one in seen if one.part}) > 1:
         target = target if options.output and options.output.suffix == ".toml" else "batch.toml"
@@ -92,7 +108,8 @@ def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
     if radius is not None:
         return radius
     if diameter is None:
-        raise click.UsageError(f"Missing option '{options[0]}' or '{options[1]}'.")
+        hint = f'state it: {options[1]} "20 mm", or {options[0]} "10 mm"'
+        raise CampaignError(f"the {side} size of the rubber is not stated", hint=hint)
     with naming(place=options[1]):
         return f"{1e3 * quantity(diameter, 'm') / 2.0:.12g} mm"
 
@@ -106,9 +123,10 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
     from bushfit.geometry import Bushing
     from bushfit.validation import check_tables
 
+    table = {f"{side}_radius": _radius(side, sizes) for side in _SIDES}
     if (length := sizes["length"]) is None:
-        raise click.UsageError("Missing option '--length'.")
-    table = {f"{side}_radius": _radius(side, sizes) for side in _SIDES} | {"length": length}
+        raise CampaignError("the length of the rubber is not stated", hint='state it: --length "34 mm"')
+    table["length"] = length
     halved = [f"{side}_radius" for side in _SIDES if sizes[f"{side}_diameter"]]
     try:
         return Bushing(**vars(check_tables({"name": name, **table}, None, BushingTable))), table
@@ -123,7 +141,9 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
         raise
 
 
-def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_sized: bool) -> tuple[list[Inspected], list[str]]:
+def _usable(
+    files: Sequence[Path], stated: Mapping[str, Any], questions: Questions | None, *, is_sized: bool
+) -> tuple[list[Inspected], list[str]]:
     """The loops and sweeps among files, each of a known direction or specimen, and why others are left out.
 
     `is_sized` says whether sizes of a bushing are given: then a file that names a direction is a test of it, and no
@@ -132,9 +152,7 @@ def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_sized: bool)
     Raises:
         MeasurementError: a file that the user names is another, with the way on.
     """
-    from bushfit.geometry import Specimen
     from bushfit.inspection.gathering import gather
-    from bushfit.inspection.recognition import BLOCK_KEYS
 
     sources, left_out = gather(files, stated)
     places = [(source.file.resolve(), str(source.stated)) for source in sources]
@@ -142,20 +160,10 @@ def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_sized: bool)
         raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
     seen: list[Inspected] = []
     others = list(left_out)
-    for source in sources:
-        with options_named():
-            one = source.inspect()
-            if is_sized and isinstance(one.direction, Specimen) and one.direction.kind == "shear":
-                named = source.without(*BLOCK_KEYS, "direction").inspect().direction
-                one = source.without(*BLOCK_KEYS).inspect() if named else one
-        if not (is_sized or "specimen" not in stated or isinstance(one.direction, Specimen)):
-            raise click.UsageError(
-                "These are tests of a stiffness: of a specimen in shear, which needs --area and --thickness, or of a "
-                "bushing, which needs --inner-radius, --outer-radius and --length."
-            )
+    settle = questions.settled if questions else _as_stated
+    for source in sources if questions else counting("tests looked at", sources):
+        one = settle(source.stated, partial(_look, source, is_sized=is_sized, is_asked=questions is not None))
         if one.kind != "history":
-            if one.direction is None:
-                raise direction_error(source.file, source.sheet)
             seen.append(one)
             continue
         hint = f"bushfit reduce {typed(one.file)} --direction {one.direction or '...'} makes a sweep.csv of it"
@@ -168,6 +176,34 @@ def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_sized: bool)
             )
         others.append(f"{source}: a raw stepped-sine history; {hint}")
     return seen, others
+
+
+def _as_stated(stated: Mapping[str, Any], look: Callable[[Mapping[str, Any]], _Seen]) -> _Seen:
+    """What comes of what is stated, where nobody is asked."""
+    return look(stated)
+
+
+def _look(source: Source, stated: Mapping[str, Any], *, is_sized: bool, is_asked: bool) -> Inspected:
+    """A test of which this is stated; where somebody `is_asked`, how amplitudes count is not taken for granted."""
+    from bushfit.geometry import Specimen
+    from bushfit.inspection.recognition import BLOCK_KEYS
+
+    source = replace(source, stated=stated)
+    with options_named():
+        one = source.inspect()
+        if is_sized and isinstance(one.direction, Specimen) and one.direction.kind == "shear":
+            named = source.without(*BLOCK_KEYS, "direction").inspect().direction
+            one = source.without(*BLOCK_KEYS).inspect() if named else one
+    if not (is_sized or "specimen" not in stated or isinstance(one.direction, Specimen)):
+        raise click.UsageError(
+            "These are tests of a stiffness: of a specimen in shear, which needs --area and --thickness, or of a "
+            "bushing, which needs --inner-radius, --outer-radius and --length."
+        )
+    if one.kind != "history" and one.direction is None:
+        raise direction_error(source.file, source.sheet)
+    if is_asked and one.is_counting_open:
+        raise MeasurementError("no header says how amplitudes are counted", file=source.file, hint="--amplitude")
+    return one
 
 
 def _tell_bushing(options: Options, bushing: Bushing) -> None:

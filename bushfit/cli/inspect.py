@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import options_named, with_stated
-from bushfit.cli.options import PLOT_FORMAT, command_called
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
+from bushfit.progress import counting
 from bushfit.report import plots
 from bushfit.report.contents import Contents, Kinds
 
@@ -30,21 +31,15 @@ _FILES_A_PICTURE = 5
 
 @command_called("inspect", "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv")
 @with_stated()
-@with_options(FIRST_FILE_FOLDER, PLOT_FORMAT)
+@with_options("results/<first file>", "pictures")
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
-    """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories, in any mixture.
+    """Look at test files before a campaign names them: loops, sweeps, raw histories.
 
-    FILE may be a folder, or a workbook with several tests; what holds no test is told and left out. For each test:
-    how every column was understood, in which unit, and its range; cycles, sampling, waveform, noise, frequencies,
-    amplitudes, repeats; and what is odd beyond noise, in sentences with figures. Odd is an amplitude or frequency
-    other than the file's name says, a gap, rows that stand still, cut-off tops, outliers, drift, cycles that still
-    settle, a motion off zero, a force of the other sign; in sweeps copied rows, missing frequencies, a repeat that is
-    off, loss factors below zero; two files that repeat each other 10 % apart. Rows count from 1 below the header.
-
-    The text for the campaign goes to standard output, with full paths. If a file cannot be used, the others are told,
-    nothing is written, exit status 2.
-
-    Writes inspect.png, and inspect_2.png and so on of more than five files.
+    FILE may be a folder, or a workbook with several tests. For each test: how every column was understood, in which
+    unit; cycles, noise, frequencies, amplitudes; and what is odd: gaps, outliers, drift, cut-off tops, copied rows,
+    repeats that disagree. Rows count from 1 below the header. The text for the campaign goes to standard output. If a
+    file cannot be used, the others are told, nothing is written, exit status 2. Writes inspect.png, and inspect_2.png
+    and so on of more than five files.
     """
     from bushfit.inspection.draft import pasted_text, with_specimens_named
     from bushfit.inspection.gathering import gather, with_contradictions
@@ -56,7 +51,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     folder = options.free_folder(files[0].stem, Kinds(pictures=tuple(pages)))
     seen: list[Inspected] = []
     failed: list[BushfitError] = []
-    for source in sources:
+    for source in counting("tests looked at", sources):
         try:
             with options_named():
                 seen.append(source.inspect())

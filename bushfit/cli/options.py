@@ -3,10 +3,12 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import click
+from click.shell_completion import CompletionItem
 
+from bushfit.cli import completion
 from bushfit.reading.tablefile import Form
 from bushfit.report.contents import Picture
 
@@ -16,21 +18,56 @@ Parameter = Callable[[Function], Function]
 
 #: Type of an option or an argument that names a file or a folder.
 FILE = click.Path(path_type=Path)
+#: Characters of names in a help beside which their words stand; longer ones have them on the next line.
+_NAMES = 26
 
 
-class Direction(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
-    """A direction of a test; geometry, which lists them, is slow to import, and is asked when they are needed."""
+class Option(click.Option):
+    """An option that stands under a heading of its command's help, with its words alone: they say what a default is."""
 
-    name = "direction"
+    heading: str | None = None
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        from bushfit import geometry
-
-        choice = click.Choice([str(direction) for direction in geometry.Direction])
-        return geometry.Direction(choice.convert(value, param, ctx))
+    def get_help_extra(self, ctx: click.Context) -> Any:
+        return {}
 
 
-class _Place(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
+def option(names: str, metavar: str | None, words: str | None = None, **more: Any) -> Parameter:
+    """An option of a command: its names (the last may be that in Python), what stands for its value, and its words."""
+    return click.option(*names.split(), cls=Option, metavar=metavar, help=words, **more)
+
+
+def flag(names: str, words: str | None = None, **more: Any) -> Parameter:
+    """An option without a value."""
+    return option(names, None, words, is_flag=True, **more)
+
+
+class Command(click.Command):
+    """A command whose help has its options under headings, in the order in which they are declared.
+
+    Options without words share the line of the next that has some; without one, they are a paragraph of their own.
+    """
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        heading, groups = "Options", dict[str, list[tuple[str, str]]]()
+        for parameter in self.get_params(ctx):
+            heading = getattr(parameter, "heading", None) or heading
+            if not isinstance(parameter, click.Argument) and (record := parameter.get_help_record(ctx)):
+                groups.setdefault(heading, []).append(record)
+        for title, records in groups.items():
+            names, lines = list[str](), list[tuple[str, str]]()
+            for name, words in records:
+                names.append(name)
+                if words:
+                    lines.append((", ".join(names), words))
+                    names = []
+            with formatter.section(title):
+                if lines:
+                    formatter.write_dl(lines, col_max=_NAMES)
+                if names:
+                    formatter.write_text(", ".join(names))
+
+
+class _Place(click.ParamType[str]):
     """A direction, or a specimen of a campaign, which only the campaign knows."""
 
     name = "place"
@@ -41,6 +78,9 @@ class _Place(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
 
 class Folder(click.Path):
     """A folder for results; an empty text, as of a variable that is not set, is none."""
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        return [CompletionItem(incomplete, type="dir")]
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         return (
@@ -67,7 +107,7 @@ def command_called(name: str, *examples: str) -> Callable[[Function], click.Comm
     """
     title = f"Example{'s' * (len(examples) > 1)}:"
     return click.command(
-        name, epilog="\n".join(["\b", title, *(f"  bushfit {name} {line}".rstrip() for line in examples)])
+        name, cls=Command, epilog="\n".join(["\b", title, *(f"  bushfit {name} {line}".rstrip() for line in examples)])
     )
 
 
@@ -78,6 +118,20 @@ def in_order(function: Function, *parameters: Parameter) -> Function:
     return function
 
 
+def under(heading: str, *parameters: Parameter) -> Parameter:
+    """Options that stand under a heading of the help, in this order."""
+
+    def decorate(function: Function) -> Function:
+        made: list[Any] = vars(function).setdefault("__click_params__", [])
+        before = len(made)
+        in_order(function, *parameters)
+        for parameter in made[before:]:
+            parameter.heading = heading
+        return function
+
+    return decorate
+
+
 def option_of(key: str) -> str:
     """The option of a key: --force-sign of force_sign."""
     return "--" + key.replace("_", "-")
@@ -85,27 +139,41 @@ def option_of(key: str) -> str:
 
 def place_option(words: str) -> Parameter:
     """Directions or specimens by name, as `directions`."""
-    return click.option("--direction", "directions", type=_Place(), multiple=True, help=words)
+    return option(
+        "--direction directions", "PLACE", words, type=_Place(), multiple=True, shell_complete=completion.places
+    )
 
 
-#: Decorators of a command that writes tables, pictures or pages.
-TABLE_FORMAT: Parameter = click.option(
+def effect_option(words: str) -> Parameter:
+    """Effects to add by name, as `effects`."""
+    return option("--effect effects", "NAME", words, multiple=True, shell_complete=completion.effects)
+
+
+def file_option(name: str, words: str) -> Parameter:
+    """A file."""
+    return option(name, "FILE", words, type=FILE)
+
+
+#: What a command writes that has forms, and the option of these.
+Written = Literal["tables", "pictures", "pages"]
+_TABLE_FORMAT: Parameter = option(
     "--table-format",
+    "FORM",
+    "csv, decimal-comma (German Excel) or xlsx [csv].",
     type=click.Choice(get_args(Form)),
-    metavar="FORM",
     default="csv",
     envvar="BUSHFIT_TABLE_FORMAT",
     show_envvar=True,
-    help="csv, decimal-comma (for a German Excel), xlsx [csv].",
 )
-PLOT_FORMAT: Parameter = click.option(
+_PLOT_FORMAT: Parameter = option(
     "--plot-format",
+    "FORM",
+    "png, svg, pdf; may be given again [png].",
     type=click.Choice(get_args(Picture)),
     multiple=True,
-    metavar="FORM",
     default=["png"],
     envvar="BUSHFIT_PLOT_FORMAT",
     show_envvar=True,
-    help="png, svg, pdf; may be given again [png].",
 )
-NO_REPORT: Parameter = click.option("--no-report", is_flag=True, help="Write no page (HTML).")
+_NO_REPORT: Parameter = flag("--no-report", "Write no page (HTML).")
+FORMS: dict[Written, Parameter] = {"tables": _TABLE_FORMAT, "pictures": _PLOT_FORMAT, "pages": _NO_REPORT}

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, cast
 import click
 from rich.markup import escape
 
+from bushfit.cli import completion
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options, positive
-from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, Size, command_called, place_option
+from bushfit.cli.options import FILE, Size, command_called, file_option, option, place_option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.units import for_people, number
@@ -36,44 +37,43 @@ _MOST_VALUES = 6
 
 @command_called("plan", "configs/arm_bushing.toml --hours 4", 'configs/new_bushing.toml --target "stiffness=1 %"')
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
-@click.option(
-    "--for",
-    "aim",
-    type=click.Choice(["parameters", "predictions", "rivals"]),
-    help="What the tests are to tell best: parameters, stiffness, or rivals apart [predictions].",
+@under(
+    "What is planned",
+    option(
+        "--hours", "HOURS", "Of the rig, at most [8].", type=Size("time in hours such as 8", _MOST_HOURS), default=8.0
+    ),
+    option(
+        "--for aim",
+        "AIM",
+        "parameters, predictions or rivals: what the tests shall tell best [predictions].",
+        type=click.Choice(["parameters", "predictions", "rivals"]),
+    ),
+    place_option(
+        "axial, radial, torsion or a specimen: where the rig can test; may be given again [axial and radial, or all "
+        "specimens]."
+    ),
+    option(
+        "--target targets",
+        "NAME=SIZE",
+        '95 % interval to reach, either way: "mu=2 %", "stiffness=1 %", "loss_factor.axial=5 %"; may be given again.',
+        multiple=True,
+    ),
+    option("--parameters", "NAME,...", "Whose errors count, with --for parameters [all]."),
+    option(
+        "--rivals",
+        "NAME,...",
+        "Effects to tell apart [what diagnose leaves open].",
+        shell_complete=completion.effect_lists,
+    ),
+    file_option("--campaign", "With MODEL.json: take [rig] and [predict] of this."),
 )
-@click.option(
-    "--hours",
-    type=Size("time in hours such as 8", _MOST_HOURS),
-    metavar="HOURS",
-    default=8.0,
-    show_default=True,
-    help="Of the rig, at most.",
+@under("Where stiffness will be predicted", grid_options("the campaign's"))
+@under(
+    "To see that it holds",
+    option("--check count", "N", "Simulate the plan N times, and fit it.", type=click.IntRange(2, 100_000)),
+    option("--seed", "N", "Of its random numbers [0].", type=click.IntRange(0), default=0),
 )
-@place_option(
-    "axial, radial, torsion or a specimen, where the rig can test; may be given again [axial and radial, else all "
-    "specimens]."
-)
-@click.option("--parameters", metavar="NAME,...", help="Whose errors count [all].")
-@click.option(
-    "--rivals",
-    metavar="NAME,...",
-    help="Effects to be told apart [those that a diagnosis of the campaign cannot tell].",
-)
-@click.option(
-    "--target",
-    "targets",
-    multiple=True,
-    metavar="NAME=SIZE",
-    help='95 % interval to reach, either way: "mu=2%", "stiffness=1%", "loss_factor.axial=5%"; may be given again.',
-)
-@grid_options("the campaign's")
-@click.option("--campaign", type=FILE, help="Of MODEL.json: take the [rig] and [predict] of this campaign.")
-@click.option(
-    "--check", "count", type=click.IntRange(2, 100_000), metavar="N", help="Simulate the plan N times, and fit each."
-)
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of --check.")
-@with_options("results/plan <name>", TABLE_FORMAT, PLOT_FORMAT)
+@with_options("results/plan <name>", "tables", "pictures")
 def command(
     source: Path,
     aim: str | None,
@@ -90,12 +90,11 @@ def command(
 ) -> None:
     """Choose the tests that would tell most, within what the rig can do.
 
-    It starts from the tests of CAMPAIGN, from its [compound] where there are none, or from MODEL.json or a folder of
-    results. A [compound] is a guess: hardness = "61 Shore A", filler = "27 phr", rubber = "natural". What the model
-    lacks shows at least as well as in the paper's tests of as many hours. Rivals and targets take no more hours than
-    they need; a target that is missed is explained, with exit status 1.
+    It starts from the tests of CAMPAIGN, from its [compound] (hardness = "61 Shore A", filler = "27 phr") where there
+    are none, or from MODEL.json or a folder of results. Rivals and targets take no more hours than they need; a target
+    that is missed is explained, with exit status 1.
 
-    Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml for `bushfit simulate`.
+    Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml to simulate.
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.jobs.plan import CAMPAIGN_FILE, PlanTests
@@ -225,19 +224,15 @@ def _tell_effects(options: Options, document: PlanFile) -> None:
 
 def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check:
     """The plan simulated, with a table of what was predicted and found."""
-    from rich.progress import Progress
-
     from bushfit.batch import pool
     from bushfit.planning.check import Found, check
+    from bushfit.progress import counting
 
     def every(seeds: Sequence[int], work: Callable[[Sequence[int]], list[Found]]) -> Iterator[tuple[int, Found]]:
-        for done in pool.run(seeds, work, lambda _: None, pool.LocalPool(os.cpu_count() or 1)):
-            progress.advance(task)
-            yield done
+        come = pool.run(seeds, work, lambda _: None, pool.LocalPool(os.cpu_count() or 1))
+        return counting("campaigns simulated and fitted", come, count)
 
-    with Progress(console=options.console, transient=True) as progress:
-        task = progress.add_task("simulated", total=count)
-        found = check(outcome.plan, count, seed, every)
+    found = check(outcome.plan, count, seed, every)
     table = new_table(
         f"{len(found.off)} simulated campaigns from seed {found.seed} on: standard errors [%]",
         "of",

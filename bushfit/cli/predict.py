@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
+from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.grids import TEMPERATURE, asked_for, grid_options, kelvin, positive
-from bushfit.cli.options import FILE, PLOT_FORMAT, TABLE_FORMAT, command_called, place_option
+from bushfit.cli.options import FILE, command_called, file_option, flag, option, place_option, under
 from bushfit.cli.show import new_table, tell_tests
 
 if TYPE_CHECKING:
@@ -20,33 +20,27 @@ _MOST_AMPLITUDES = 8
 
 
 @command_called("predict", 'data/arm_bushing/truth.json --frequencies "10:100:10 Hz" --amplitudes "0.1, 0.5 mm"')
-@click.argument("model", type=FILE)
-@click.option(
-    "--campaign", type=FILE, help="Lay its sweeps over the plots and beside the prediction, and use its [predict] grid."
+@click.argument("model", metavar="MODEL.json", type=FILE)
+@under(
+    "Where it is predicted",
+    place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
+    grid_options("the campaign's"),
+    TEMPERATURE,
+    file_option("--campaign", "Take its grid, and show its sweeps beside."),
 )
-@click.option(
-    "--bushing",
-    type=FILE,
-    metavar="FILE",
-    help="Predict another bushing of the same compound: the [bushing] table of this TOML file.",
+@under(
+    "What is predicted besides",
+    file_option("--bushing", "Another one, of the same compound: [bushing] of this TOML file."),
+    option("--mass", "MASS"),
+    option(
+        "--base-acceleration", "ACCELERATION", 'Resonance of a mass, such as "1.2 kg", on a base shaken with "0.1 g".'
+    ),
+    flag("--wide", "Tables with amplitudes across, without bands, too."),
+    option(
+        "--arms", "[ERROR]", "Maxwell arms for the springpot, within this error [1 %].", is_flag=False, flag_value="1 %"
+    ),
 )
-@place_option(
-    "axial, radial or torsion, or a specimen's name; may be given again [axial and radial of a bushing, and all "
-    "specimens]."
-)
-@grid_options("the campaign's")
-@TEMPERATURE
-@click.option("--mass", help='Predict its resonance on each place, too: such as "1.2 kg", with --base-acceleration.')
-@click.option("--base-acceleration", help='Amplitude of the base under the mass, such as "0.1 g" or "1 m/s^2".')
-@click.option("--wide", is_flag=True, help="Also <place>_wide.csv: frequency down, amplitude across, no bands.")
-@click.option(
-    "--arms",
-    is_flag=False,
-    flag_value="1 %",
-    metavar="[ERROR]",
-    help="Also arms.csv, arms.png: Maxwell arms for the springpot, within this error [1 %].",
-)
-@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT, PLOT_FORMAT)
+@with_options("results/<name>", "tables", "pictures")
 def command(
     model: Path,
     campaign: Path | None,
@@ -60,17 +54,11 @@ def command(
     options: Options,
     **grids: str | None,
 ) -> None:
-    """Dynamic stiffness and loss factor of MODEL (the model.json of run, fit or diagnose, or dynamic.json) over a grid.
+    """Dynamic stiffness and loss factor of a fitted model over frequency and amplitude, with 95 % bands.
 
-    Writes axial.csv and radial.csv (torsion.csv on request), and a table of each specimen, with 95 % bands, and a plot
-    of each; with --campaign measured.csv, its sweeps beside the model. Effects of the rig are left out; of what may be
-    the bushing's or the rig's both readings are written. Without a grid in the options or the campaign it is that of
-    the campaign's sweeps at each place, or the paper's as far as it was measured. A warning names what leaves the
-    fitted directions, strains or frequencies.
-
-    --mass shakes the base under a mass: its transmissibility, in <place>_resonance.csv.
-
-    --bushing carries the compound to another shape: effects of its material are kept, those of bushing and rig are not.
+    MODEL.json is the model.json of run, fit or diagnose, or dynamic.json. Effects of the rig are left out; a warning
+    names what leaves the range that was tested. Writes a table and a plot of each place (axial.csv, axial.png), and
+    with --campaign measured.csv.
     """
     from bushfit.campaign.campaign import load_bushing, load_campaign
     from bushfit.jobs.predict import Predict

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from bushfit.cli.common import FIRST_FILE_FOLDER, Options, with_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.grids import parse_grid, positive
-from bushfit.cli.options import PLOT_FORMAT, TABLE_FORMAT, command_called
+from bushfit.cli.options import command_called, option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.report import plots
@@ -41,13 +41,19 @@ _LINES_AN_OCTAVE = 3
     'data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --specimen mount',
 )
 @with_stated(sweeps=False)
-@click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].')
-@click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
-@click.option("--mass", help='Of a resonance test, such as "0.5 kg".')
-@click.option("--mass-added", help='What moves with it, such as "15 g".')
-@click.option("--specimen", help="What was tested, where it is no bushing.")
-@click.option("--base-acceleration", help='Such as "0.1 g", where no column says it.')
-@with_options(FIRST_FILE_FOLDER, TABLE_FORMAT, PLOT_FORMAT)
+@under(
+    "Of raw histories",
+    option("--levels", "GRID", 'Amplitudes that were asked for, "0.1, 0.2 mm" [found].'),
+    option("--cycles", "N", "Fewest steady cycles [3].", type=click.IntRange(3, 1000), default=3),
+)
+@under(
+    "Of a resonance test",
+    option("--mass", "MASS", 'On the mount, such as "0.5 kg".'),
+    option("--mass-added", "MASS", 'What moves with it, such as "15 g".'),
+    option("--specimen", "NAME", "What was tested, if it is no bushing."),
+    option("--base-acceleration", "ACCELERATION", 'Such as "0.1 g", if no column says it.'),
+)
+@with_options("results/<first file>", "tables", "pictures")
 def command(
     files: tuple[Path, ...],
     stated: Mapping[str, Any],
@@ -58,14 +64,9 @@ def command(
 ) -> None:
     """Reduce raw stepped-sine histories or a resonance test to a sweep.
 
-    Time, displacement, force: one FILE may hold many steps, joined by ramps and pauses; several files of one direction
-    make one sweep, and what occurs again is a repeat. The steady whole cycles of each step are found, its transient
-    left out, and stiffness and loss factor of the fundamental computed by least squares; a step needs five or six
-    cycles. A swept sine is refused, single outliers are left out. Told of each point: its noise (standard error), THD
-    (overtones of the force over its fundamental) and the amplitude reached.
-
-    A mass on the mount on a shaker (--mass, one FILE): frequency, acceleration and phase of base and mass, or their
-    transmissibility. Told of each point: the amplitude reached and its standard error.
+    Raw histories (time, displacement, force): a FILE may hold many steps of at least five cycles; several files of one
+    direction make one sweep. A resonance test (--mass, one FILE): acceleration and phase of the base and of a mass on
+    the mount, or their transmissibility. Each point is told with its error.
 
     Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from bushfit.cli.common import Options, Task, with_task
 from bushfit.cli.diagnose import tell_findings, tell_verdict
-from bushfit.cli.options import NO_REPORT, command_called
+from bushfit.cli.options import command_called
 from bushfit.cli.predict import tell_predictions
 from bushfit.cli.show import new_table, report, tell_fit, tell_result, tell_sources
 from bushfit.units import alike, for_people, number
@@ -28,13 +28,12 @@ _OPEN = 100.0
 
 
 @command_called("run", "configs/cmp_15961.toml")
-@with_task(NO_REPORT)
+@with_task("pages")
 def command(task: Task) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 
     Shows the verdict of diagnose, the parameters of the model to use, the range that was tested, and the corners of
-    the prediction. The paper's procedure, fit-static and fit-dynamic in turn until they agree, is said in a line; -v
-    shows its passes and what it costs beside the joint fit. Steps whose tests are missing are passed over, and said.
+    the prediction; -v shows every step. Steps whose tests are missing are passed over, and said.
 
     Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
     diagnosis.json, candidates.csv, report.html; as table and plot: loops, sweeps, gap, axial, radial, each specimen.

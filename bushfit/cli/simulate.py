@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import CAMPAIGN_FOLDER, Options, open_model, with_options
-from bushfit.cli.options import FILE, TABLE_FORMAT, command_called, option_of
+from bushfit.cli.common import Options, open_model, with_options
+from bushfit.cli.options import FILE, command_called, option, option_of, under
 from bushfit.errors import ModelError, UnitError, naming
 from bushfit.units import is_number, quantity
 
@@ -20,33 +20,32 @@ if TYPE_CHECKING:
 
 @command_called("simulate", "configs/simulate_arm_bushing.toml --seed 7")
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
-@click.option("--seed", type=click.IntRange(0), help="Of the random numbers; the same seed gives the same data [0].")
-@click.option("--repeats", type=click.IntRange(1, 1000), help="Of each sweep [1].")
-@click.option("--noise", help='Scatter of a sweep point relative to |K|, such as "0.5 %".')
-@click.option("--force-noise", help='Scatter of a loop\'s force relative to its half range, such as "0.3 %".')
-@click.option(
-    "--displacement-noise", help='Scatter of a loop\'s displacement relative to its amplitude, such as "0.02 %".'
+@under(
+    "What is simulated",
+    option(
+        "--effect effects",
+        "EFFECT",
+        'Hide an effect in the tests, such as "inertia.mass=0.1 kg"; may be given again.',
+        multiple=True,
+    ),
+    option("--repeats", "N", "Of each sweep [1].", type=click.IntRange(1, 1000)),
+    option("--seed", "N", "Of the random numbers [0].", type=click.IntRange(0)),
 )
-@click.option(
-    "--gain-error",
-    help='Gain error shared by a run (one repeat of one amplitude, or of what is held), such as "0.4 %".',
+@under(
+    "Noise and errors of the rig [those of the campaign, else none]",
+    option("--noise", "SHARE", 'Scatter of a sweep point relative to |K|, such as "0.5 %".'),
+    option("--force-noise", "SHARE", 'Of a loop, relative to half its range of force: "0.3 %".'),
+    option("--displacement-noise", "SHARE", 'Of a loop, relative to its amplitude: "0.02 %".'),
+    option("--gain-error", "SHARE", 'Shared by a run, one repeat of one amplitude: "0.4 %".'),
+    option("--phase-error", "ANGLE", 'Shared by a run: "0.2 deg".'),
 )
-@click.option("--phase-error", help='Phase error shared by a run, such as "0.2 deg".')
-@click.option(
-    "--effect",
-    "effects",
-    multiple=True,
-    metavar="NAME.PARAMETER=VALUE",
-    help='Hide an effect, such as "inertia.mass=0.1 kg".',
-)
-@with_options(CAMPAIGN_FOLDER, TABLE_FORMAT)
+@with_options("results/simulated <name>", "tables")
 def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
     """Put a model on the virtual rig and write a campaign of simulated raw tests.
 
-    The model is MODEL.json, tested as the paper's bushing was, or the [simulate] table of CAMPAIGN with tests of its
-    own. Equations (3) and (5) are stepped through time; the closed form that the fits use is not involved. Noise is
-    that of the [simulate] table, or none; each option replaces one entry of the table. Good for planning: would
-    `bushfit diagnose` see in these tests what --effect hides there?
+    The model is MODEL.json, tested as the paper's bushing was, or CAMPAIGN with tests of its [simulate] table. Every
+    step in time is computed, without the closed form that the fits use. Good before a test: would `bushfit diagnose`
+    see what --effect hides here?
 
     Writes campaign.toml, the tables it names, and truth.json, the model behind them.
     """

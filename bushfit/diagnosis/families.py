@@ -1,6 +1,6 @@
 """Model families on one campaign: the paper's and others in place of its branches, fitted and held out alike."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from itertools import product
@@ -21,6 +21,7 @@ from bushfit.fitting.model_error import log_likelihood, with_model_error
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.prediction.comparison import CHANCE
+from bushfit.progress import counting
 from bushfit.units import number
 
 #: Laws of rate and of amplitude beside the paper's or in their place, of which families are made, each with each.
@@ -100,14 +101,12 @@ def fit_families(
     names: Sequence[str],
     held: Sequence[str],
     bounds: Bounds,
-    progress: Callable[[str, int], None] | None = None,
 ) -> tuple[list[FittedFamily], dict[str, float]]:
     """The model as it comes first, and it with each of these families, fitted to the tests and held out alike.
 
     Args:
         names: of effects, several of one family joined by +; all that are known where there are none.
         held, bounds: parameters that do not move, and limits inside the parameters' own.
-        progress: called with each that was fitted, and how many are left.
 
     Returns:
         The first and those named, or else the likeliest, held out; and the probability of each family that is left.
@@ -120,11 +119,9 @@ def fit_families(
     own = "+".join(["paper", *(name for name in model.effects if name not in BASE)])
     chains = {own: [first]}
     asked = names or known_families(model, data_sets)
-    for left, name in zip(reversed(range(len(asked))), asked, strict=True):
+    for name in counting("families fitted", asked):
         with nullcontext() if names else suppress(FitError):
             chains[name] = _chain(chains, first, name, held, bounds)
-        if progress:
-            progress(name, left)
     effects = {name: [] if name == own else name.split("+") for name in chains}
     worth = {name: _log_evidence(chain, effects[name], bounds) for name, chain in chains.items()}
     odds = np.exp(np.array([*worth.values()]) - logsumexp([*worth.values()]))
@@ -132,7 +129,7 @@ def fit_families(
     others = sorted((name for name in worth if name != own), key=worth.__getitem__, reverse=True)
     likely = [name for name in others if names or probability[name] >= _LIKELY] or others[:1]
     kept, found = {own, *(likely if names else likely[:_MOST])}, []
-    for name in (name for name in worth if name in kept):
+    for name in counting("families held out", [name for name in worth if name in kept]):
         told, skipped = predicted_parts(first, chains[name][-1], bounds)
         out = HoldOut.of({part: of.residuals for part, of in told.items()}, skipped)
         gain = _gain(told, data_sets) if name != own else (None, None)

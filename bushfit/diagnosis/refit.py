@@ -1,6 +1,6 @@
 """Candidate refits: effects fitted together with all parameters of the model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -18,6 +18,7 @@ from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import fit_from, probes
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
+from bushfit.progress import counting
 
 #: Chi-square beyond that of the best at which a refit is left on its way.
 _FAR = 60.0
@@ -43,15 +44,21 @@ def refitted(
         known = {name: value for name, value in start.items() if name in proposal.model.values}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
             fits[proposal.name] = fit_from(proposal.model.with_values(known), evidence.data_sets, held, limits)
+    list(counting("effects refitted", _finished(fits), len(fits)))
+    best = min((fit.chi_square for fit in fits.values()), default=0.0)
+    near = {name: fit for name, fit in fits.items() if _ended(fit) or fit.chi_square <= best + _FAR}
+    return {name: Evidence(fit.solution, evidence.data_sets) for name, fit in near.items()}
+
+
+def _finished(fits: dict[str, Descent]) -> Iterator[str]:
+    """Steps fits side by side until each has ended or fallen behind, and gives its name then."""
     running = list(fits)
     while running:
         for name in running:
             fits[name] = fits[name].stepped()
         best = min(fit.chi_square for fit in fits.values())
+        yield from (name for name in running if not _goes_on(fits[name], best))
         running = [name for name in running if _goes_on(fits[name], best)]
-    best = min((fit.chi_square for fit in fits.values()), default=0.0)
-    near = {name: fit for name, fit in fits.items() if _ended(fit) or fit.chi_square <= best + _FAR}
-    return {name: Evidence(fit.solution, evidence.data_sets) for name, fit in near.items()}
 
 
 def _ended(fit: Descent) -> bool:

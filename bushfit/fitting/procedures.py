@@ -72,15 +72,14 @@ def fit_joint(
     *,
     effects: Sequence[str] | None = None,
     directions: Sequence[str] | None = None,
-    profile: Callable[[str, int], None] | None = None,
+    profile: bool = False,
 ) -> Result:
     """All parameters of a model together, from loops and sweeps.
 
     Args:
         effects: the model; the paper's three branches, and what [fit] adds to them, unless told.
         directions: and specimens whose tests to use; see `Data.chosen`.
-        profile: called with the name of each parameter when its profile likelihood is done, and how many are left;
-            None asks for none.
+        profile: whether to add 95 % intervals by profile likelihood.
 
     Raises:
         FitError: no test in those directions, or data that cannot support the fit.
@@ -105,10 +104,9 @@ def fit_joint(
     notes += [*([model_error_warning(error) + _NEXT] if error else []), *unfitted(found.solution.model, left, _NEXT)]
     result = _result(data, [found], notes=notes, left=left)
     result = replace(result, usable=usable(found.solution, found.minimised, left), model_error=error)
-    if profile is None:
+    if not profile:
         return result
-    intervals = profile95(found.solution, found.minimised, result.covariance, data.bounds, profile)
-    return replace(result, profile=intervals)
+    return replace(result, profile=profile95(found.solution, found.minimised, result.covariance, data.bounds))
 
 
 def fit_static(data: Data, springpot: Result | None = None) -> Result:

@@ -4,7 +4,7 @@ A standard error takes the misfit for a parabola. The profile asks the data: it 
 anew, and looks where chi-square has risen too far. The two differ where a parameter is barely determined.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,6 +17,7 @@ from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, coordinat
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import solve
 from bushfit.model.covariance import Z95, Covariance
+from bushfit.progress import counting
 
 #: Longest step of the search, in coordinates, which are of order one: one that the fit of the others follows.
 _LONGEST_STEP = 0.5
@@ -95,11 +96,7 @@ class _Profile:
 
 
 def profile95(
-    best: Solution,
-    data_sets: Sequence[DataSet],
-    covariance: Covariance,
-    bounds: Bounds,
-    advance: Callable[[str, int], None],
+    best: Solution, data_sets: Sequence[DataSet], covariance: Covariance, bounds: Bounds
 ) -> Mapping[str, Interval]:
     """95 % intervals of the fitted parameters by profile likelihood.
 
@@ -107,8 +104,6 @@ def profile95(
     an F-test that takes its scale from the misfit. What the covariance counts beyond that (noise that was itself
     estimated, a model that misses the data) widens the profile by the same factor as the symmetric interval:
     chi-square may rise to the square of that interval's half width over the linear standard error.
-
-    `advance` is called with the name of each parameter when it is done, and how many are left.
 
     Returns:
         Lower and upper end by name; None where the data leave that side open up to the bound, or
@@ -128,12 +123,11 @@ def profile95(
     linear = linear_errors(best.jacobian)
     allowed = _allowed(best, data_sets, covariance, linear)
     found: dict[str, Interval] = {}
-    for i, name in enumerate(names):
+    for i, name in enumerate(counting("profiles", names)):
         profile = _Profile(name, best, data_sets, bounds, {start[i]: best})
         step = min(_FIRST_REACH * allowed[i] * linear[i], _LONGEST_STEP)
         low, high = (profile.end(start[i], bound, step, allowed[i]) for bound in limits[i])
         found[name] = low, high
-        advance(name, len(names) - len(found))
     return found
 
 

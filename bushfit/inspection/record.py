@@ -127,6 +127,11 @@ class Inspected:
         return self.entry["specimen_number"] if "specimen number" in [one.role for one in self.columns] else None
 
     @property
+    def is_counting_open(self) -> bool:
+        """Whether nothing says how the amplitudes of a sweep are counted."""
+        return self.kind == "sweep" and not self.counted and "amplitude" not in self.entry
+
+    @property
     def assumed(self) -> str | None:
         """What was assumed, with the option or key that says otherwise; None where nothing was."""
         said = []
@@ -135,7 +140,7 @@ class Inspected:
             if self.direction.strain == "tension":
                 taken, other = "that of a bar in tension", "engineering"
             said.append(f'its strain is taken as {taken}, else strain = "{other}" or "tensor" in [[specimens]]')
-        if self.kind == "sweep" and not self.counted and "amplitude" not in self.entry:
+        if self.is_counting_open:
             what = "nothing says" if "at_amplitude" in self.entry else "its header does not say"
             said.append(f"{what} how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak")
         return "; ".join(said) or None

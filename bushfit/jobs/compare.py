@@ -232,16 +232,8 @@ class Compare:
         ]
         return Compared(entries, with_holm(found), families, tuple(notes), self.command)
 
-    def run_families(
-        self,
-        campaign: Campaign,
-        source: str,
-        names: Sequence[str] = (),
-        progress: Callable[[str, int], None] | None = None,
-    ) -> Compared:
+    def run_families(self, campaign: Campaign, source: str, names: Sequence[str] = ()) -> Compared:
         """Families on one campaign, the model of its [fit] first; all that the library knows unless named.
-
-        `progress` is called with each that was fitted, and how many are left.
 
         Raises:
             FitError: data that cannot support the fit of one.
@@ -251,7 +243,7 @@ class Compare:
         data_sets = [data_set.with_weight() for data_set in data.chosen(self.asked.directions)]
         model = data.started(data.effects, data_sets, {})
         held = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]
-        families, left = fit_families(model, data_sets, names, held, data.bounds, progress)
+        families, left = fit_families(model, data_sets, names, held, data.bounds)
         tested = iter(holm([family.p for family in families if family.p is not None]))
         families = [family if family.p is None else replace(family, p=next(tested)) for family in families]
         entries = [

@@ -15,6 +15,7 @@ from bushfit.export.contract import Dialect, Exported, Order
 from bushfit.export.systems import UnitSystem
 from bushfit.jobs.predict import Predict, Predicted
 from bushfit.model.result import Result
+from bushfit.progress import counting
 from bushfit.reading.files import sha256, view_bytes
 from bushfit.reading.measurement import Source
 from bushfit.report.artifacts import arms_contents
@@ -112,7 +113,7 @@ class Export:
         day = datetime.now(UTC).date().isoformat()
         order = Order(result, source, tuple(predicted.predictions), *settings, self.predict.temperature, day)
         exported = {}
-        for name in self.formats:
+        for name in counting("formats written", self.formats):
             module, _, function = FORMATS[name].partition(":")
             exported[name] = getattr(importlib.import_module(f"bushfit.{module}"), function)(order)
         return Written(predicted, exported)

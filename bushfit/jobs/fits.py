@@ -1,6 +1,6 @@
 """fit-static, fit-dynamic and fit: one frame, three procedures."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -94,13 +94,12 @@ class FitDynamic:
 class Fit:
     """All parameters together: of the paper's branches and further effects, from the tests of some directions.
 
-    `profile`, where it is given, asks for profile likelihoods, and is called with each parameter that has one and
-    how many are left.
+    `profile` asks for profile likelihoods.
     """
 
     directions: tuple[str, ...] = ()
     effects: tuple[str, ...] = ()
-    profile: Callable[[str, int], None] | None = None
+    profile: bool = False
 
     def kinds(self, campaign: Campaign) -> Kinds:
         return Kinds(("model",)) + Kinds.shown(kinds_of_test(campaign, self._added(campaign)))

@@ -88,7 +88,7 @@ class _Planner:
     @property
     def sound(self) -> bool:
         """Whether all effects show as in the standard programme, and repeats tell the scatter."""
-        return not self.lacking and self._scatter_freedom(self.best) >= _SCATTER_FREEDOM
+        return not self.lacking and self._scatter_freedom(self.best) >= [_SCATTER_FREEDOM]
 
     def plan(self) -> Plan:
         """See the function."""
@@ -372,7 +372,7 @@ class _Planner:
                 f"{' and '.join(self.offer.known.bounded)} came to rest on a bound: the errors of the others count that"
                 " noise takes it off there half of the times"
             )
-        if missed and self._scatter_freedom(self.best) < _SCATTER_FREEDOM:
+        if missed and self._scatter_freedom(self.best) < [_SCATTER_FREEDOM]:
             yield "too few repeats tell how sweeps scatter: intervals may come out half as wide again as planned"
         if self.lacking:
             yield f"the standard programme shows these effects better: {', '.join(self.lacking)}"

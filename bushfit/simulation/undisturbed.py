@@ -19,6 +19,7 @@ from bushfit.errors import CampaignError
 from bushfit.geometry import Direction, Place
 from bushfit.model import rig
 from bushfit.model.model import Model
+from bushfit.progress import counting
 from bushfit.reduction.resonance import response
 
 #: The paper's loop: 1 mm at 0.1 Hz.
@@ -83,8 +84,11 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
     under = planned_session(truth.bushing, [*loops, *sweeps, *resonances], plan.repeats)
     return Undisturbed(
         truth,
-        tuple((test, _clean_loop(truth, test, own.at(0))) for test, own in zip(loops, under, strict=False)),
-        tuple((test, _clean_sweep(truth, test, steps_per_cycle)) for test in sweeps),
+        tuple(
+            (test, _clean_loop(truth, test, own.at(0)))
+            for test, own in counting("loops simulated", list(zip(loops, under, strict=False)))
+        ),
+        tuple((test, _clean_sweep(truth, test, steps_per_cycle)) for test in counting("sweeps simulated", sweeps)),
         tuple((test, _clean_resonance(truth, test, steps_per_cycle)) for test in resonances),
     )
 

@@ -24,7 +24,7 @@ from bushfit.report.contents import Formats
 
 COMMANDS = cli.list_commands(click.Context(cli))
 #: Lines of the longest help on a terminal of 80 columns.
-LONGEST = 60
+LONGEST = 47
 EXAMPLES = re.compile(r"^  Examples?:\n((?:    .*\n)+)\Z", re.MULTILINE)
 
 
@@ -124,8 +124,11 @@ def test_a_help_is_short_and_says_what_is_written(typed: Run, command: str) -> N
     told = typed(command, "-h").stdout
     assert len(told.splitlines()) <= LONGEST
     assert re.search("[Ww]rites", told)
-    for option in ("-o, --output", "-v, --verbose", "-q, --quiet", "--json", "--no-plots", "--force"):
+    for option in ("-o, --output", "-v, --verbose", "-q, --quiet", "--json", "--force"):
         assert option in told
+    assert ("--no-plots" in told) == ("--plot-format" in told)
+    placeholders = re.findall(r"^  (?:-\w, )?--[\w-]+ ([A-Z[-].*?)(?:  |, -|$)", told, re.MULTILINE)
+    assert [each for each in placeholders if re.search(r"\s|TEXT|RANGE|INTEGER|FLOAT", each)] == []
     if "--direction" in told and command != "batch":  # which is as of fit
         of_direction = told.partition("--direction")[2].partition("\n  -")[0]
         assert {"axial", "radial", "torsion"} <= set(re.findall(r"\w+", of_direction))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import shlex
@@ -199,3 +200,80 @@ def test_the_next_line_can_be_pasted_whatever_the_name(typed: Run, tests: list[P
     _, *words = shlex.split(line.removeprefix("next: "))
     assert words == ["run", str(Path("results/My bushing/campaign.toml"))]
     typed(*words, "-o", "run", "--no-plots")
+
+
+class Person(io.StringIO):
+    """Somebody at a terminal, who types these lines and then leaves."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def answering(monkeypatch: pytest.MonkeyPatch, *lines: str) -> Person:
+    person = Person("".join(f"{line}\n" for line in lines))
+    monkeypatch.setattr("sys.stdin", person)
+    return person
+
+
+#: Of a loop without time and a sweep without units: wrong answers among the right ones.
+ANSWERS = [
+    *("My B", "0.1", "0.1 Hz", "sine", "up", "axial"),
+    *("Kx", "K", "Hz", "N", "mm", "N/mm", "radial", "peak-to-peak"),
+    *("20", "20 mm", "18 mm", "34 mm", "20 mm", "36 mm", "34 mm"),
+]
+
+
+@pytest.fixture
+def silent(tests: list[Path]) -> list[Path]:
+    """A loop and a sweep that say next to nothing of themselves."""
+    loop = change(tests[0], time="").rename(tests[0].with_name("first.csv"))
+    sweep = tests[1].rename(tests[1].with_name("second.csv"))
+    lines = sweep.read_text(encoding="utf-8").split("\n")
+    sweep.write_text("\n".join(["f,A,repeat,K,tan delta", *lines[1:]]), encoding="utf-8")
+    return [loop, sweep]
+
+
+def test_at_a_terminal_what_lacks_is_asked_for(
+    typed: Run, silent: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    person = answering(monkeypatch, *ANSWERS)
+    told = typed("init", *silent, "-o", "x").stderr
+    assert person.read() == "", "every answer was asked for"
+    for wrong in ("a number without a unit", "'up' is not one of", 'there is no column "Kx"', "the unit does not fit"):
+        assert told.count(wrong) == 1 + (wrong == "a number without a unit")
+    assert "impossible bushing" in told
+    assert "try:" not in told
+    campaign = load_campaign(tmp_path / "x/campaign.toml")
+    assert (campaign.bushing.name, campaign.bushing.inner_radius, campaign.bushing.outer_radius) == (
+        "My B",
+        0.01,
+        0.018,
+    )
+    assert [str(test.direction) for test in (*campaign.loops, *campaign.sweeps)] == ["axial", "radial"]
+    assert campaign.sweeps[0].amplitude.max() == pytest.approx(0.25e-3)
+    assert campaign.loops[0].time[-1] == pytest.approx(30.0, rel=0.01)
+
+
+@pytest.mark.parametrize("count", [0, 3, 8, len(ANSWERS) - 1])
+def test_who_leaves_a_question_open_has_nothing_written(
+    typed: Run, silent: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
+) -> None:
+    answering(monkeypatch, *ANSWERS[:count])
+    assert typed("init", *silent, "-o", "x", status=2).stderr.endswith("bushfit: aborted\n")
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize("option", ["--no-input", "--json", "--quiet"])
+def test_programs_are_asked_nothing(
+    typed: Run, silent: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str
+) -> None:
+    person = answering(monkeypatch, *ANSWERS)
+    refused(typed("init", *silent, option, "-o", "x", status=2), tmp_path / "x", "there is no column for the time")
+    assert person.tell() == 0
+
+
+def test_a_command_that_says_all_is_asked_nothing(
+    typed: Run, tests: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answering(monkeypatch)
+    typed("init", *tests, *GEOMETRY, "--amplitude", "zero-to-peak", "-o", "x")

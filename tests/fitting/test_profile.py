@@ -20,6 +20,7 @@ from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
+from bushfit.progress import heard_by
 
 Rig = Callable[..., Campaign]
 SEEDS = 100
@@ -34,14 +35,15 @@ def plan(largest: float, **changes: Any) -> dict[str, Any]:
 
 
 def profiled(campaign: Campaign) -> Result:
-    return fit_joint(Data.of(campaign), profile=lambda *_: None)
+    return fit_joint(Data.of(campaign), profile=True)
 
 
 def test_good_data_make_it_the_symmetric_interval(rig: Rig) -> None:
-    told: list[tuple[str, int]] = []
+    told: list[tuple[str, int | None, int | None, str]] = []
     data = Data.of(replace(rig(1, **plan(1e-3)), rig=RigSettings(gain_error=0.0)))
-    result = fit_joint(data, profile=lambda *done: told.append(done))
-    assert told == [(name, 4 - place) for place, name in enumerate(FIVE)]
+    with heard_by(lambda *step: told.append(step)):
+        result = fit_joint(data, profile=True)
+    assert told == [("profiles", done, 5, "") for done in (*range(6), None)]
     assert fit_joint(data).profile == {}
     for profile in (result.profile, {"mu": (1.0, None)}):
         assert from_document(to_document(replace(result, profile=profile))).profile == profile
