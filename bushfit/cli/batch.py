@@ -85,9 +85,9 @@ def command(
     """Fit (diagnose, predict, run) every campaign of MANIFEST: a TOML or CSV list, a pattern in quotes, or campaigns.
 
     A TOML list has a [[bushings]] table a row: campaign (a file or a pattern, counted from the list's folder), and on
-    request name, commands, directions, effects, adopt, without, max_effects, tolerance, model. The same keys, and at,
-    may stand at its top for all rows; the options here win over these, a row's own keys over both. A CSV list has the
-    keys as columns.
+    request name, subgroup, commands, directions, effects, adopt, without, max_effects, tolerance, model. The same keys
+    from commands on, and at, may stand at its top for all rows; the options here win over these, a row's own keys over
+    both. A CSV list has the keys as columns.
 
     LIMITS are TOML: nrmse, reduced_chi_square, verdicts; tables [parameters.mu], and [[stiffness]] and [[loss_factor]]
     with at = "axial 25 Hz 0.1 mm", each with min, max, nominal and tolerance, or sigma (standard deviations of the
@@ -96,6 +96,8 @@ def command(
     Work is kept as it finishes: after an interruption the same command with --resume does what is missing. A row that
     fails costs that row; its error stands in the table. --force also removes results of bushings that are no longer
     listed. Exit status 1 where a row failed or a limit is missed.
+
+    Named are bushings that differ from the others by more than chance, what drifts, and with limits the capability.
 
     Writes batch.csv (a row a bushing), batch.png, batch.json, index.html (control charts, a table to sort), and
     bushings/<name>/ with model.json of each, or all that `bushfit run` writes.
@@ -184,10 +186,14 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
     if plan.limits:
         options.say("limits: " + ", ".join(f"{count} {word}" for word, count in outcome.limits.items()))
     options.warn(outcome.notes)
+    for name, each in outcome.together.process.items():
+        if each["capability"]:
+            options.say(f"capability: {name}: {each['capability']}")
     for word, names in (
         ("failed", [f"{name}: {' '.join(error.split())}" for name, error in outcome.errors]),
         ("out of limits", [f"{name}: {words}" for name, words in outcome.missed]),
         ("conditional pass", [f"{name}: {words}" for name, words in outcome.edge]),
+        ("differs", [f"{each['name']}: {each['words']}" for each in outcome.together.differ]),
     ):
         for name in names[:_MOST_SHOWN]:
             options.say(f"{word}: {name}")
