@@ -18,7 +18,7 @@ from bushfit.report.page.readback import canonical, read_table
 from bushfit.report.page.steady import Column, Curves, Quantity
 from bushfit.report.process import ENOUGH, LEVEL
 from bushfit.report.tables import BETWEEN, spread
-from bushfit.units import split_header
+from bushfit.units import number, split_header
 from bushfit.validation import Number, WholeNumber, check_tables
 
 #: What "schema" of the document says.
@@ -103,14 +103,18 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
     """
     batch = check_tables(documents["batch"], None, Batch, kind=ModelError)
     table = canonical(tables["batch"])
-    columns = [Column.of(name, each, table) for name, each in batch.quantities.items() if name in table]
+    order = np.argsort(table["order of test [-]"]) if "order of test [-]" in table else np.arange(len(table))
+    named = table["subgroup"].iloc[order].tolist() if "subgroup" in table else [""]
+    known = {name: each for name, each in batch.quantities.items() if name in table}
+    together = np.asarray(order), named if all(named) else []
+    columns = [Column(name, each, table[name].to_numpy(), *together) for name, each in known.items()]
     by = {each.row - 1: each.by for each in batch.differ if 0 < each.row <= len(table)}
     shown = [name for name in _WORDS if name in table and (name == "status" or len(set(table[name])) > 1)]
     remarks = [name for name in _REMARKS if name in table]
     curves = Curves.of(table) if _OFF in table else None
-    order, important = _ordered(table, by)
+    listed, important = _ordered(table, by)
     most = max(1, _MOST_CELLS // (len(shown) + len(columns) + (4 if curves else 1)))
-    first, others = order[: min(important, most)], order[important:]
+    first, others = listed[: min(important, most)], listed[important:]
     sample = [others[at] for at in spread(len(others), max(0, most - len(first)))]
     chosen = [*first, *sample]
     warned = {at: table["warnings"][at].split(BETWEEN) if table["warnings"][at] else [] for at in chosen}
@@ -130,8 +134,9 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
     def cells(at: int) -> Iterator[tuple[str, str]]:
         """Values, and a tone for what is out of limits or differs."""
         for column in columns:
-            differs = split_header(column.name)[0] in by.get(at, {})
-            yield column.cells[at], "bad" if column.out[at] else "fair" if differs else ""
+            value, differs = column.known[at], split_header(column.header)[0] in by.get(at, {})
+            tone = "bad" if column.out[at] else "fair" if differs else ""
+            yield "" if np.isnan(value) else number(float(value), 4), tone
 
     context = {
         "batch": batch,

@@ -17,7 +17,7 @@ from bushfit.report.page import filled
 from bushfit.report.page.chart import DASHES, LIMIT, Axis, Rule, Series, chart, colors, outline, span_of, stroke
 from bushfit.report.process import Process, charted
 from bushfit.report.tables import numbers
-from bushfit.units import for_people, number, split_header
+from bushfit.units import number, split_header
 from bushfit.validation import Number
 
 #: Points of a chart at most but for those that need a look, taken evenly and in no step that cavities or shifts have:
@@ -36,6 +36,8 @@ _WIDE, _HIGH = 110.0, 26.0
 _BEYOND, _USUAL = "#b4500c", "#1f4e9c"
 #: The column of a point of a curve as measured.
 _MEASURED = re.compile(r"measured stiffness (.+) (\S+) Hz (\S+) (\S+) \[(.+)\]")
+#: Least and largest.
+Ends = Sequence[float]
 
 
 @dataclass(frozen=True)
@@ -50,88 +52,55 @@ class Quantity:
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """A quantity of all bushings in the unit in which people read it, NaN where it is not known, (n,).
+    """A quantity of all bushings.
 
     Args:
-        name: header in the table of the batch.
-        factor: from the unit there to that of `header`.
-        order: numbers of the rows in the order of test.
-        subgroups: of each in that order, or none.
+        header: of its column of the table.
+        found: what batch.json says of it.
+        known: its values, NaN where a bushing has none, (n,).
+        order, subgroups: numbers of the rows in the order of test, (n,), and in that order their subgroups, or none.
     """
 
-    name: str
     header: str
-    factor: float
-    known: Array
-    low: float
-    high: float
     found: Quantity
+    known: Array
     order: Array
     subgroups: Sequence[str]
-
-    @classmethod
-    def of(cls, name: str, quantity: Quantity, table: pd.DataFrame) -> Self:
-        """A column of the table of the batch."""
-        what, _, unit = name.rpartition(" [")
-        unit, factor = for_people(unit.rstrip("]"), 1.0, quantity.median)
-        low, high = quantity.allowed
-        ends = (-math.inf if low is None else low * factor, math.inf if high is None else high * factor)
-        values, order = table[name].to_numpy() * factor, np.arange(len(table))
-        if "order of test [-]" in table:
-            order = np.argsort(table["order of test [-]"].to_numpy())
-        grouped = quantity.process and quantity.process["size"] > 1 and "subgroup" in table
-        subgroups = table["subgroup"].iloc[order].tolist() if grouped else []
-        return cls(name, f"{what} [{unit}]", factor, values, *ends, quantity, order, subgroups)
 
     @property
     def limits(self) -> list[float]:
         """The ends of what is allowed, as far as there are some."""
-        return [end for end in (self.low, self.high) if math.isfinite(end)]
+        return [end for end in self.found.allowed if end is not None]
 
     @cached_property
     def out(self) -> Array:
         """Which bushings are out of limits, (n,) bool."""
-        return (self.known < self.low) | (self.known > self.high)
-
-    @cached_property
-    def cells(self) -> list[str]:
-        """The values as texts."""
-        return ["" if math.isnan(value) else number(value, 4) for value in self.known.tolist()]
+        low, high = (np.nan if end is None else end for end in self.found.allowed)
+        return (self.known < low) | (self.known > high)
 
     def charts(self) -> Iterator[Markup]:
         """Values, or means of subgroups, in the order of test, and their ranges where these make control limits."""
         values, ranges, size = charted(self.known[self.order], self.subgroups)
-        median, sigma, of = self.found.median * self.factor, self.found.sigma * self.factor, self.found.process
-        rules, control = [Rule(median, "median")], [-math.inf, math.inf]
-        if of and of["control"]:
-            center, *control = (end * self.factor for end in of["control"])
-            drawn = control[int(control[0] < 0.0 <= np.nanmin(self.known)) :]  # below what can be there is no limit
-            named = zip(drawn, ("control limit", ""), strict=False)
-            rules = [Rule(center, "mean"), *(Rule(end, name, "2 3") for end, name in named)]
-        rules += [Rule(end, "" if place else "limit", "6 3", LIMIT) for place, end in enumerate(self.limits)]
+        median, sigma, of = self.found.median, self.found.sigma, self.found.process
+        center, *control = (of and of["control"]) or (median, -math.inf, math.inf)
+        drawn = [end for end in control if math.isfinite(end) and (end > 0.0 or np.nanmin(self.known) < 0.0)]
+        rules = [Rule(center, "mean" if drawn else "median")]
+        rules += [Rule(end, "control limit" * (end == drawn[0]), "2 3") for end in drawn]
+        rules += [Rule(end, "limit" * (end == self.limits[0]), "6 3", LIMIT) for end in self.limits]
         words = f"median {number(median, 4)}, robust std dev {number(sigma, 2)}, {int(self.out.sum())} out of limits"
-        reach = [median - _FURTHEST * sigma, median + _FURTHEST * sigma] if sigma > 0.0 else [-math.inf, math.inf]
+        reach = _FURTHEST * sigma or math.inf
         out = self.out[self.order] if size == 1 else np.zeros(values.size, dtype=bool)
-        yield self._chart("mean of subgroups: " * (size > 1), values, out, control, rules, words, reach)
+        yield self._chart(
+            "mean of subgroups: " * (size > 1), values, out, control, rules, words, (median - reach, median + reach)
+        )
         if of and of["ranges"]:
-            middle, most = (end * self.factor for end in of["ranges"])
-            rules, out = (
-                [Rule(middle, "mean range"), Rule(most, "control limit", "2 3")],
-                np.zeros(ranges.size, dtype=bool),
-            )
-            kind = "range of subgroups: " if size > 1 else "moving range: "
-            words = f"mean {number(middle, 3)}, control limit {number(most, 3)}"
-            yield self._chart(kind, ranges, out, [-math.inf, most], rules, words, [0.0, 3.0 * most])
+            middle, most = of["ranges"]
+            rules = [Rule(middle, "mean range"), Rule(most, "control limit", "2 3")]
+            kind, words = "range of subgroups: " if size > 1 else "moving range: ", f"mean {number(middle, 3)}"
+            yield self._chart(kind, ranges, ranges < 0.0, (0.0, most), rules, words, (0.0, 3.0 * most))
 
     def _chart(
-        self,
-        kind: str,
-        values: Array,
-        out: Array,
-        control: Sequence[float],
-        rules: Sequence[Rule],
-        words: str,
-        reach: Sequence[float],
+        self, kind: str, values: Array, out: Array, control: Ends, rules: list[Rule], words: str, reach: Ends
     ) -> Markup:
         """Points over the order of test; what is beyond `reach`, where no rule is, is drawn at the edge."""
         at, levels = np.arange(1.0, values.size + 1.0), [rule.value for rule in rules]
@@ -143,12 +112,9 @@ class Column:
             ("beyond control limits", _BEYOND, beyond & ~out & _some(beyond)),
         )
         series = [Series(name, color, points=(at[which], shown[which])) for name, color, which in looks if which.any()]
-        labels = (
-            f"{'subgroup' if self.subgroups else 'bushing'}, in the order of test",
-            split_header(self.header)[1] or "",
-        )
-        title, dot = f"{kind}{self.header}", 4.6 if values.size <= 60 else 3.0
-        return chart(title, (labels[0], labels[1].replace("-", "")), series, f"{title} {words}", rules=rules, dot=dot)
+        unit, title = (split_header(self.header)[1] or "").replace("-", ""), f"{kind}{self.header}"
+        labels = f"{'subgroup' if self.subgroups else 'bushing'}, in the order of test", unit
+        return chart(title, labels, series, f"{title}, {words}", rules=rules, dot=4.6 if values.size <= 60 else 3.0)
 
 
 def _some(which: Array) -> Array:
@@ -174,16 +140,17 @@ class Curves:
 
     @classmethod
     def of(cls, table: pd.DataFrame) -> Self | None:
-        """Those of the table of a batch; None where it has none."""
+        """Those of the table of a batch; None where none is whole."""
         found = {name: match for name in table if (match := _MEASURED.fullmatch(str(name)))}
-        if not found:
+        values = numbers(table, *map(str, found))
+        if not np.isfinite(values).all(axis=0).any():
             return None
         place, _, _, length, unit = next(iter(found.values())).groups()
         frequency, amplitude = np.array([(float(each[2]), float(each[3])) for each in found.values()]).T
         over = bool(np.ptp(frequency))
         held = f"{number(amplitude[0], 3)} {length}" if over else f"{number(frequency[0], 3)} Hz"
         along, x = ("frequency [Hz]", frequency) if over else (f"amplitude [{length}]", amplitude)
-        return cls(f"{place}, {held}", along, unit, x, numbers(table, *map(str, found)))
+        return cls(f"{place}, {held}", along, unit, x, values)
 
     @cached_property
     def _band(self) -> tuple[Array, Array]:
@@ -191,10 +158,6 @@ class Curves:
         known = self.values[:, np.isfinite(self.values).all(axis=0)]
         median, sigma = np.array([scatter(each) for each in known]).T
         return median, sigma
-
-    @property
-    def _log(self) -> bool:
-        return bool(self.x.max() > 8.0 * self.x.min() > 0.0)
 
     def picture(self, names: Mapping[int, str]) -> Markup:
         """Median and band of all, and the curves of some bushings, by the numbers of their rows."""
@@ -207,7 +170,13 @@ class Curves:
         named = ", ".join(names[at] for at in chosen) or "none"
         alt = f"|K| as measured, {self.title}: median {span_of(median)} {self.unit}; single curves: {named}"
         labels = self.along, f"|K| [{self.unit}]"
-        return chart(f"Dynamic stiffness as measured: {self.title}", labels, [all_of, *single], alt, log=self._log)
+        return chart(
+            f"Dynamic stiffness as measured: {self.title}",
+            labels,
+            [all_of, *single],
+            alt,
+            log=self.along.startswith("frequency"),
+        )
 
     @cached_property
     def reach(self) -> float:
@@ -220,7 +189,7 @@ class Curves:
         off, half = self.values[:, at] / median - 1.0, np.clip(_BAND * sigma / median, 0.0, self.reach)
         if not np.isfinite(off).all():
             return Markup()
-        x = Axis.over("", [self.x], 1.0, _WIDE - 1.0, log=self._log)(self.x)
+        x = Axis.over("", [self.x], 1.0, _WIDE - 1.0, log=self.along.startswith("frequency"))(self.x)
         y = Axis("", -self.reach, self.reach, _HIGH - 1.0, 1.0)
         low, high = (number(100.0 * float(end), 2, "+") for end in (off.min(), off.max()))
         drawn = {"band": outline(x, y(-half), y(half)), "line": stroke(x, y(np.clip(off, -self.reach, self.reach)))}
