@@ -46,8 +46,8 @@ class Capability(TypedDict):
     """
 
     index: str | None
-    spread: list[float] | None
-    nearest: list[float] | None
+    spread: tuple[float, float, float] | None
+    nearest: tuple[float, float, float] | None
     capability: str
 
 
@@ -66,10 +66,10 @@ class Process(Capability):
 
     size: int
     points: int
-    control: list[float] | None
-    ranges: list[float] | None
+    control: tuple[float, float, float] | None
+    ranges: tuple[float, float] | None
     beyond: int
-    drift: list[float] | None
+    drift: tuple[float, float, float, float] | None
 
 
 def charted(values: Array, subgroups: Sequence[str]) -> tuple[Array, Array, int]:
@@ -109,7 +109,7 @@ def process(
     if count >= FEWEST and (middle := float(np.nanmean(steps))) > 0.0:
         d2, d3 = _D2[max(size, 2) - 2], _D3[max(size, 2) - 2]
         center, half = float(np.nanmean(usual)), 3.0 * middle / d2 / math.sqrt(size)
-        control, ranges = [center, center - half, center + half], [middle, middle * (1.0 + 3.0 * d3 / d2)]
+        control, ranges = (center, center - half, center + half), (middle, middle * (1.0 + 3.0 * d3 / d2))
         points, steps, _ = charted(values, subgroups)
         beyond = int((np.abs(points - center) > half).sum() + (steps > ranges[1]).sum())
     moved = _drift(values, quantities)
@@ -123,7 +123,7 @@ def process(
     return {**chart, **able}  # type: ignore[typeddict-item]
 
 
-def _drift(values: Array, quantities: int) -> list[float] | None:
+def _drift(values: Array, quantities: int) -> tuple[float, float, float, float] | None:
     """`drift` of a process."""
     at = np.flatnonzero(np.isfinite(values))
     if at.size < FEWEST or np.ptp(values[at]) == 0.0:
@@ -136,7 +136,7 @@ def _drift(values: Array, quantities: int) -> list[float] | None:
     p = 2.0 * float(ndtr(-max(abs(float(np.sign(slopes).sum())) - 1.0, 0.0) / deviation))
     ends = np.clip((slopes.size + Z95 * deviation * np.array([-1.0, 1.0])) / 2.0, 0, slopes.size - 1)
     low, high = slopes[math.floor(ends[0])], slopes[math.ceil(ends[1])]
-    return [float(np.median(slopes)), float(low), float(high), min(1.0, p * quantities)]
+    return float(np.median(slopes)), float(low), float(high), min(1.0, p * quantities)
 
 
 def _capability(index: str, known: Array, errors: Array, low: float, high: float) -> Capability:
@@ -145,8 +145,11 @@ def _capability(index: str, known: Array, errors: Array, low: float, high: float
     nearest, spread, told = min(high - mean, mean - low) / (3.0 * sigma), None, ""
     half = Z95 * math.sqrt(1.0 / (9.0 * count) + nearest**2 / (2.0 * (count - 1)))
     if math.isfinite(width := (high - low) / (6.0 * sigma)):
-        spread = [width, *(width * math.sqrt(chdtri(count - 1, p) / (count - 1)) for p in (0.975, 0.025))]
-        told = f"{index[:2]} = {number(width, 3)} ({number(spread[1], 2)} to {number(spread[2], 2)}), "
+        least, most = (width * math.sqrt(float(chdtri(count - 1, p)) / (count - 1)) for p in (0.975, 0.025))
+        spread, told = (
+            (width, least, most),
+            f"{index[:2]} = {number(width, 3)} ({number(least, 2)} to {number(most, 2)}), ",
+        )
     told += f"{index} = {number(nearest, 3)} ({number(nearest - half, 2)} to {number(nearest + half, 2)}): "
     if nearest - half < _ASKED <= nearest + half:
         needed = math.ceil((5.0 * Z95) ** 2 * (1.0 / (9.0 * max(nearest, 0.1) ** 2) + 0.5)) + 1
@@ -157,7 +160,7 @@ def _capability(index: str, known: Array, errors: Array, low: float, high: float
     own = errors[np.isfinite(errors)]
     share = min(float(np.median(own)) ** 2 / sigma**2, 1.0) if own.size else 0.0
     told += f"; {100.0 * share:.0f} % of the variance is error of the tests" if share >= 0.1 else ""
-    ends = [nearest, nearest - half, nearest + half]
+    ends = nearest, nearest - half, nearest + half
     return {"index": index, "spread": spread, "nearest": ends, "capability": told}
 
 

@@ -130,7 +130,7 @@ def test_drift_is_that_of_the_textbooks() -> None:
     found, slope = process_of(values)["drift"], stats.theilslopes(values, np.arange(40.0))
     assert found
     assert found[0] == pytest.approx(39 * slope.slope)
-    assert found[1:3] == pytest.approx([39 * slope.low_slope, 39 * slope.high_slope], rel=0.05)
+    assert list(found[1:3]) == pytest.approx([39 * slope.low_slope, 39 * slope.high_slope], rel=0.05)
     assert found[3] == pytest.approx(stats.kendalltau(np.arange(40), values).pvalue, rel=0.1)
 
 

@@ -143,6 +143,9 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
         "charts": list(chain.from_iterable(column.charts() for column in charts[:_MOST_CHARTS])),
         "left_charts": max(0, len(charts) - _MOST_CHARTS),
         "columns": columns,
+        "steady": any(
+            found and (found["control"] or found["index"]) for found in (each.found.process for each in columns)
+        ),
         "curves": curves,
         "curves_picture": curves.picture({at: names[at] for at in by}) if curves else "",
         "differ": [
@@ -169,7 +172,7 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
         "tones": _TONES,
         "enough": ENOUGH,
         "level": LEVEL,
-        "failed": [*zip(failed["name"], failed["error"], strict=True)],
+        "failed": [*zip(failed["name"], failed.get("error", failed["name"]), strict=True)],
     }
     return rendered("index.html", context)
 
