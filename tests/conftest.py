@@ -11,6 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import production
 import pytest
 from commandline import Done, Shared, call
 from hypothesis import HealthCheck, settings
@@ -45,6 +46,17 @@ def root() -> Path:
 def bushing() -> Bushing:
     """The bushing of the paper."""
     return CMP_15961
+
+
+@pytest.fixture(scope="session")
+def made(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A simulated production run, and in `out` the batch of it; what the terminal said is in `said`."""
+    folder = tmp_path_factory.mktemp("production")
+    production.make(folder, paper_model)
+    done = production.fitted(folder, "part_*/bushing.toml", "-o", "out")
+    assert done.returncode == 1, done.stderr
+    (folder / "said").write_text(done.stderr, encoding="utf-8")
+    return folder
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from typing_extensions import TypedDict
 
 from bushfit.diagnosis.document import Verdict
 from bushfit.model.result import End
+from bushfit.report.process import Process
 
 
 class Found(TypedDict, total=False):
@@ -28,6 +29,8 @@ class Found(TypedDict, total=False):
         reduced_chi_square: mean square residual in units of noise; null where nothing was fitted.
         points: by operating point, then "stiffness" [N/m, or N m/rad, or Pa] and "loss factor" [1]: value, least and
             largest of the 95 % band.
+        date: of the first test for which the campaign states one.
+        curve: |K| [N/m, N m/rad or Pa] by operating point, as the first sweep measured it at the level in its middle.
     """
 
     campaign_name: str
@@ -41,6 +44,8 @@ class Found(TypedDict, total=False):
     nrmse: float | None
     reduced_chi_square: float | None
     points: dict[str, dict[str, list[float | None]]]
+    date: str | None
+    curve: dict[str, float]
 
 
 class Record(Found):
@@ -98,11 +103,31 @@ class Control(TypedDict):
         median: in the unit of the column.
         sigma: robust standard deviation, in the unit of the column.
         allowed: least and largest, in the unit of the column; null where there is no limit.
+        process: what the order of test tells of it.
     """
 
     median: float
     sigma: float
     allowed: list[float | None]
+    process: Process
+
+
+class Differing(TypedDict):
+    """A bushing that differs from the others of its batch by more than chance.
+
+    Args:
+        name: of the bushing.
+        row: of the table, from 1.
+        by: robust z, by quantity: parameters before what follows from them, each the clearest first.
+        p: probability by chance of the clearest, all bushings and quantities counted (Holm).
+        words: the same in words.
+    """
+
+    name: str
+    row: int
+    by: dict[str, float]
+    p: float
+    words: str
 
 
 class Counts(TypedDict):
@@ -117,6 +142,7 @@ class Counts(TypedDict):
         missed: names of the bushings that miss a limit.
         conditional: names of those that pass on condition: the value is within, its interval reaches over the limit.
         warnings: what could not be judged, and other things to know.
+        differ: bushings that differ from the others by more than chance.
     """
 
     schema: Literal["bushfit/batch/1"]
@@ -127,6 +153,7 @@ class Counts(TypedDict):
     missed: list[str]
     conditional: list[str]
     warnings: list[str]
+    differ: list[Differing]
 
 
 class BatchFile(Counts):
@@ -135,10 +162,14 @@ class BatchFile(Counts):
     Args:
         title: of the batch.
         quantities: by column of the table.
+        order: what the order of test is taken from.
+        least_told: standard deviations by which a bushing has to differ to be told; null where none can be.
     """
 
     title: str
     quantities: dict[str, Control]
+    order: str
+    least_told: float | None
 
 
 class BatchSummary(Counts):

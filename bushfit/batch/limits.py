@@ -73,12 +73,18 @@ class Bounds:
         if self.min is not None and self.max is not None and self.min >= self.max:
             raise ValueError(CampaignError("these limits hold no value", expected="min below max"))
 
-    def resolve(self, values: Array) -> tuple[float, float]:
-        """Lowest and highest allowed value; `values` are those of the batch, (n,)."""
-        ranges = [(-math.inf if self.min is None else self.min, math.inf if self.max is None else self.max)]
+    @property
+    def stated(self) -> tuple[float, float]:
+        """Lowest and highest allowed value, whatever the batch is like."""
+        low, high = -math.inf if self.min is None else self.min, math.inf if self.max is None else self.max
         if self.nominal is not None and self.tolerance is not None:
             half = abs(self.nominal) * self.tolerance
-            ranges.append((self.nominal - half, self.nominal + half))
+            low, high = max(low, self.nominal - half), min(high, self.nominal + half)
+        return low, high
+
+    def resolve(self, values: Array) -> tuple[float, float]:
+        """Lowest and highest allowed value; `values` are those of the batch, (n,)."""
+        ranges = [self.stated]
         if self.sigma is not None and not self.idle(values):
             middle, spread = scatter(values)
             ranges.append((middle - self.sigma * spread, middle + self.sigma * spread))

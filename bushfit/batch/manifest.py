@@ -107,10 +107,12 @@ class Entry(Settings):
     Args:
         campaign: a campaign file or a pattern of such, relative to the manifest.
         name: of the bushing; that of the file unless stated.
+        subgroup: bushings made together, such as a shift or a cavity: control charts are then of mean and range.
     """
 
     campaign: Text
     name: Text | None = None
+    subgroup: Text | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,13 +132,15 @@ class ManifestFile(Settings):
 
 @dataclass(frozen=True)
 class Row:
-    """One bushing of a batch: its name, the folder of its results, its campaign as listed and as found, what to do."""
+    """One bushing of a batch: its name, the folder of its results, its campaign as listed and as found, what to do, and
+    what it was made together with."""
 
     name: str
     folder: str
     listed: str
     campaign: str
     settings: Settings
+    subgroup: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,7 +262,7 @@ def _rows(entries: Sequence[Entry], base: Path, given: Settings, source: str) ->
         except CampaignError as error:
             error.place = f"{entry.campaign}, {error.place}"
             raise
-        rows.append(Row(name, folder, entry.campaign, os.path.abspath(base / path), settings))  # noqa: PTH100 - links stay as named
+        rows.append(Row(name, folder, entry.campaign, os.path.abspath(base / path), settings, entry.subgroup))  # noqa: PTH100 - links stay as named
     return rows
 
 

@@ -18,6 +18,7 @@ from bushfit.batch.ledger import ROWS
 from bushfit.batch.limits import Judge, Judgement, Limits
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, PARTS, STIFFNESS, Quantity, at_point, parameter_quantities
+from bushfit.batch.together import Together
 from bushfit.batch.work import Orders
 from bushfit.effects.contract import Array
 from bushfit.reduction.scatter import scatter
@@ -130,6 +131,11 @@ class Outcome:
         ]
 
     @cached_property
+    def together(self) -> Together:
+        """Each bushing against the others."""
+        return Together(self.plan.rows, self.records, self.figures, self.quantities, self.plan.limits)
+
+    @cached_property
     def scatter(self) -> dict[Quantity, tuple[float, float]]:
         """Median and robust standard deviation of each quantity, in its unit."""
         found = {}
@@ -153,7 +159,7 @@ class Outcome:
             "warnings of their own: see the column warnings": sum(bool(each.get("warnings")) for each in self.records),
         }
         counted = [f"{n} bushing{'s' * (n > 1)} with {words} of {table}" for words, n in said.items() if n]
-        return [*(self.judge.notes if self.judge else ()), *counted, *self.earlier]
+        return [*(self.judge.notes if self.judge else ()), *self.together.notes, *counted, *self.earlier]
 
     @property
     def _counts(self) -> Counts:
@@ -167,6 +173,7 @@ class Outcome:
             "missed": [name for name, _ in self.missed],
             "conditional": [name for name, _ in self.edge],
             "warnings": self.notes,
+            "differ": self.together.differ,
         }
 
     @property
@@ -186,9 +193,12 @@ class Outcome:
             allowed, tabled = self._allowed(quantity.name), quantity.tabled
             ends = [end * tabled.factor if math.isfinite(end) else None for end in allowed]
             scale = tabled.factor / quantity.factor
-            sizes: Control = {"median": middle * scale, "sigma": spread * scale, "allowed": ends or [None, None]}
+            told = self.together.process[quantity.name]
+            sizes = Control(median=middle * scale, sigma=spread * scale, allowed=ends or [None, None], process=told)
             quantities[tabled.header] = sizes
-        return {**self._counts, "title": self.plan.title, "quantities": quantities}
+        order, least = self.together.order[1], self.together.least_told
+        counts = self._counts
+        return {**counts, "title": self.plan.title, "quantities": quantities, "order": order, "least_told": least}
 
     def _allowed(self, name: str) -> tuple[float, ...]:
         """The lowest and the highest allowed value of a quantity; empty where there is no limit."""
@@ -229,7 +239,7 @@ class Outcome:
             quantity.header + part: self.figures.get(quantity.name, none)[PARTS[part]] * quantity.factor
             for quantity, part in columns
         }
-        return pd.DataFrame({**texts, **numbers, **after})
+        return pd.DataFrame({**texts, **numbers, **after, **self.together.columns})
 
     def _texts(self) -> dict[str, list[str]]:
         """The columns of words."""

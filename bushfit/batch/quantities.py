@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
+
+import numpy as np
 
 from bushfit.effects import is_parameter, parameter_named, parameter_names
 from bushfit.errors import UnitError, did_you_mean
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion
+from bushfit.reading.measurement import Sweep
 from bushfit.units import agrees, for_people, quantity
 from bushfit.validation import converted
 
@@ -111,6 +114,26 @@ def parameter_quantities(names: Collection[str]) -> list[Quantity]:
     in_order = dict.fromkeys([*parameter_names(), *sorted(filter(is_parameter, names))])
     units = {name: parameter_named(name).unit for name in in_order if name in names}
     return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
+
+
+def curve_of(sweeps: Iterable[Sweep]) -> dict[str, float]:
+    """|K| [SI] by operating point, of at most twelve steps of the first sweep that holds a level, the middle one.
+
+    Levels and steps have three digits, so that bushings of which a rig reached a little more are told alike.
+    """
+    for sweep in sweeps:
+        held, step = (np.array([float(f"{x:.3g}") for x in each]) for each in (sweep.held, sweep.step))
+        levels = [level for level in np.unique(held) if sweep.stepped and np.unique(step[held == level]).size >= 3]
+        if levels:
+            there = held == levels[(len(levels) - 1) // 2]
+            steps = np.unique(step[there])
+            found = {}
+            for x in steps[np.linspace(0, steps.size - 1, min(steps.size, 12)).round().astype(int)].tolist():
+                pair = (x, held[there][0]) if sweep.stepped == "frequency" else (held[there][0], x)
+                point = Point(str(sweep.direction), *pair, sweep.direction.motion.displacement_unit)
+                found[str(point)] = float(np.abs(sweep.stiffness[there & (step == x)]).mean())
+            return found
+    return {}
 
 
 def figures(record: Mapping[str, Any]) -> Iterator[tuple[str, tuple[float | None, ...]]]:

@@ -11,7 +11,7 @@ from typing import Any, cast
 from bushfit.batch import ledger
 from bushfit.batch.document import Found, Record
 from bushfit.batch.manifest import Row, Settings
-from bushfit.batch.quantities import Point
+from bushfit.batch.quantities import Point, curve_of
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import effect_named
@@ -103,7 +103,9 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
         result, diagnosed = _one_by_one(campaign, settings, orders.formats, files)
     found = _verdict(diagnosed.diagnosis) if diagnosed else Found()
     numbers = numbers_of(result, orders.points, found.get("warnings", []))
-    return {"campaign_name": campaign.name, "inputs": inputs, **found, **numbers}
+    dates = (str(test.source.conditions.get("date", "")) for test in tests if test.source)
+    measured: Found = {"date": next(filter(None, dates), None), "curve": curve_of(campaign.sweeps)}
+    return {"campaign_name": campaign.name, "inputs": inputs, **found, **numbers, **measured}
 
 
 def _run(campaign: Campaign, formats: Formats, files: dict[str, bytes]) -> tuple[Result, Diagnosed | None]:

@@ -81,6 +81,7 @@ def command(
         [[bushings]]
         campaign = "batch_7/*/campaign.toml"   # from the list's folder
 
+    Named are bushings that differ from the others by more than chance, what drifts, and with limits the capability.
     --force also removes results of bushings that are no longer listed. Exit status 1 where a row failed or a limit is
     missed. Writes batch.csv, batch.png, batch.json, index.html (control charts), and bushings/<name>/model.json.
     """
@@ -132,10 +133,14 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
     if plan.limits:
         options.say("limits: " + ", ".join(f"{count} {word}" for word, count in outcome.limits.items()))
     options.warn(outcome.notes)
+    for name, each in outcome.together.process.items():
+        if each["capability"]:
+            options.say(f"capability: {name}: {each['capability']}")
     for word, names in (
         ("failed", [f"{name}: {' '.join(error.split())}" for name, error in outcome.errors]),
         ("out of limits", [f"{name}: {words}" for name, words in outcome.missed]),
         ("conditional pass", [f"{name}: {words}" for name, words in outcome.edge]),
+        ("differs", [f"{each['name']}: {each['words']}" for each in outcome.together.differ]),
     ):
         for name in names[:_MOST_SHOWN]:
             options.say(f"{word}: {name}")

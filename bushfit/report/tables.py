@@ -33,7 +33,7 @@ TEXTS = frozenset(
         *("loop", "sweep", "test", "kind", "direction", "fitted"),
         *("effect", "level", "parameters", "why"),
         *("name", "campaign", "folder", "status", "error", "limits", "out of limits", "on the edge", "verdict"),
-        *("named effects", "cannot be told from", "on a bound", "warnings"),
+        *("named effects", "cannot be told from", "on a bound", "warnings", "campaign name", "subgroup", "differs in"),
     )
 )
 #: What stands between the warnings of a bushing in the table of a batch: they hold semicolons.

@@ -191,8 +191,8 @@ def chart(
     drawn = [
         (
             each,
-            _line(x(each.line[0]), y(each.line[1])) if each.line else "",
-            _band(x(each.band[0]), y(each.band[1]), y(each.band[2])) if each.band else "",
+            stroke(x(each.line[0]), y(each.line[1])) if each.line else "",
+            outline(x(each.band[0]), y(each.band[1]), y(each.band[2])) if each.band else "",
             _dots(x(each.points[0]), y(each.points[1])) if each.points else "",
         )
         for each in series
@@ -219,7 +219,7 @@ def _legend(series: Sequence[Series], rules: Sequence[Rule]) -> tuple[list[tuple
     return placed, line if entries else 0
 
 
-def _line(x: Array, y: Array) -> str:
+def stroke(x: Array, y: Array) -> str:
     """A line through pixels, as SVG writes its path; what is not a number parts it."""
     there = np.isfinite(x) & np.isfinite(y)
     runs = np.split(np.arange(x.size), np.flatnonzero(np.diff(there)) + 1)
@@ -227,7 +227,7 @@ def _line(x: Array, y: Array) -> str:
     return "".join(f"M{run}" for run in drawn)
 
 
-def _band(x: Array, low: Array, high: Array) -> str:
+def outline(x: Array, low: Array, high: Array) -> str:
     """The outline of what lies between two lines."""
     there = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
     ends = np.concatenate([low[there], high[there][::-1]])

@@ -1,56 +1,51 @@
-"""The page of a batch: what came of it, a control chart of each quantity, and a row a bushing to sort."""
+"""The page of a batch: what came of it, who differs, control charts, capability, and a row a bushing to sort."""
 
-import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
+from itertools import chain
 from pathlib import Path
-from typing import Self
 from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
-from markupsafe import Markup
 
-from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.file import read_document, require_schema
 from bushfit.report.contents import Contents, Documents, Page, Tables
 from bushfit.report.page import rendered
-from bushfit.report.page.chart import LIMIT, Rule, Series, chart
 from bushfit.report.page.readback import canonical, read_table
-from bushfit.report.tables import BETWEEN
-from bushfit.units import for_people, number, split_header
+from bushfit.report.page.steady import Column, Curves, Quantity
+from bushfit.report.process import ENOUGH, LEVEL
+from bushfit.report.tables import BETWEEN, spread
+from bushfit.units import number, split_header
 from bushfit.validation import Number, WholeNumber, check_tables
 
 #: What "schema" of the document says.
 SCHEMA = "bushfit/batch/1"
-#: Cells of the table, and points of a chart, at most: with these the page stays below 500 kB.
-_MOST_CELLS, _MOST_POINTS = 4000, 400
-#: Charts at most, those with limits first.
-_MOST_CHARTS = 12
-#: Control limits, in standard deviations of the batch about its median, as on Shewhart's charts.
-_CONTROL = 3.0
+#: Cells of the table at most, of which a curve weighs three: with these the page stays below 500 kB.
+_MOST_CELLS = 4000
+#: Quantities with charts at most, those with limits first, and bushings that differ or failed, named at most.
+_MOST_CHARTS, _MOST_NAMED = 12, 20
 #: Bushings that a quantity must be known of for a chart.
 _FEWEST = 3
 #: How the rows are ordered: what needs a look first.
-_ORDER = ("failed", "fail", "conditional fail", "conditional pass")
+_ORDER = ("failed", "fail", "conditional fail", "differs", "conditional pass")
 #: Columns of words, and those that end a row as remarks.
-_WORDS = ("status", "limits", "verdict", "named effects")
-_REMARKS = ("out of limits", "on the edge", "on a bound", "warnings")
-#: What lies further from the median than this, in standard deviations of the batch, is drawn at the edge of a chart.
-_FURTHEST = 12.0
+_WORDS = ("campaign name", "subgroup", "status", "limits", "verdict", "named effects")
+_REMARKS = ("out of limits", "on the edge", "differs in", "on a bound", "warnings")
+#: What curves are compared by, and the column of how far each is off.
+_CURVE, _OFF = "measured stiffness", "measured stiffness off the median [%]"
 #: Limits are told by these words, and coloured so.
 _TONES = {"pass": "good", "conditional pass": "fair", "conditional fail": "bad", "fail": "bad"}
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """quantities: of a column its median, robust standard deviation, and the lowest and highest allowed."""
+class Differing:
+    """differ: a bushing that differs from the others, the number of its row from 1, and by what: robust z."""
 
-    median: Number
-    sigma: Number
-    allowed: tuple[Number | None, Number | None] = (None, None)
+    row: WholeNumber
+    by: Mapping[str, Number]
 
 
 @dataclass(frozen=True)
@@ -63,6 +58,9 @@ class Batch:
     quantities: Mapping[str, Quantity]
     limits: Mapping[str, WholeNumber]
     warnings: tuple[str, ...] = ()
+    differ: tuple[Differing, ...] = ()
+    order: str = "as the manifest lists them"
+    least_told: Number | None = None
 
 
 def is_batch(folder: Path) -> bool:
@@ -105,121 +103,84 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
     """
     batch = check_tables(documents["batch"], None, Batch, kind=ModelError)
     table = canonical(tables["batch"])
-    columns = [_Column.of(name, each, table) for name, each in batch.quantities.items() if name in table]
-    shown = [name for name in _WORDS if name in table and any(table[name])]
+    order = np.argsort(table["order of test [-]"]) if "order of test [-]" in table else np.arange(len(table))
+    named = table["subgroup"].iloc[order].tolist() if "subgroup" in table else [""]
+    known = {name: each for name, each in batch.quantities.items() if name in table}
+    together = np.asarray(order), named if all(named) else []
+    columns = [Column(name, each, table[name].to_numpy(), *together) for name, each in known.items()]
+    by = {each.row - 1: each.by for each in batch.differ if 0 < each.row <= len(table)}
+    shown = [name for name in _WORDS if name in table and (name == "status" or len(set(table[name])) > 1)]
     remarks = [name for name in _REMARKS if name in table]
-    order = _ordered(table)
-    first = order[: max(1, _MOST_CELLS // (len(shown) + len(columns) + 1))]
-    warned = {at: table["warnings"][at].split(BETWEEN) if table["warnings"][at] else [] for at in first}
+    curves = Curves.of(table) if _OFF in table else None
+    listed, important = _ordered(table, by)
+    most = max(1, _MOST_CELLS // (len(shown) + len(columns) + (4 if curves else 1)))
+    first, others = listed[: min(important, most)], listed[important:]
+    sample = [others[at] for at in spread(len(others), max(0, most - len(first)))]
+    chosen = [*first, *sample]
+    warned = {at: table["warnings"][at].split(BETWEEN) if table["warnings"][at] else [] for at in chosen}
     footnotes = list(dict.fromkeys(line for lines in warned.values() for line in lines))
     for at, lines in warned.items():
         table.loc[at, "warnings"] = ", ".join(str(footnotes.index(line) + 1) for line in lines)
     charts = [column for column in columns if np.isfinite(column.known).sum() >= _FEWEST]
     charts.sort(key=lambda column: not column.limits)
-    rows = table.to_dict("records")
+    rows = dict(zip(chosen, table.iloc[chosen].to_dict("records"), strict=True))
+    names, failed = table["name"], table[table["status"] == "failed"][:_MOST_NAMED]
+
+    def link(at: int) -> str:
+        """What the name of a bushing leads to: its report, else its folder, if it has one."""
+        folder = table["folder"][at]
+        return base + quote(folder) + ("/report.html" if folder in reported else "/") if folder else ""
+
+    def cells(at: int) -> Iterator[tuple[str, str]]:
+        """Values, and a tone for what is out of limits or differs."""
+        for column in columns:
+            value, differs = column.known[at], split_header(column.header)[0] in by.get(at, {})
+            tone = "bad" if column.out[at] else "fair" if differs else ""
+            yield "" if np.isnan(value) else number(float(value), 4), tone
+
     context = {
         "batch": batch,
-        "charts": [_chart(column) for column in charts[:_MOST_CHARTS]],
+        "charts": list(chain.from_iterable(column.charts() for column in charts[:_MOST_CHARTS])),
         "left_charts": max(0, len(charts) - _MOST_CHARTS),
-        "heads": [*shown, *(column.header for column in columns)],
+        "columns": columns,
+        "steady": any(
+            found and (found["control"] or found["index"]) for found in (each.found.process for each in columns)
+        ),
+        "curves": curves,
+        "curves_picture": curves.picture({at: names[at] for at in by}) if curves else "",
+        "differ": [
+            (names[at], link(at), table["differs in"][at]) for at in [*by][:_MOST_NAMED] if "differs in" in table
+        ],
+        "heads": [*shown, *(["stiffness off median [%]"] if curves else []), *(column.header for column in columns)],
         "remarked": any(any(table[name]) for name in remarks),
         "footnotes": footnotes,
         "texts": len(shown),
         "rows": [
             {
                 "name": rows[at]["name"],
-                "link": _link(rows[at]["folder"], reported, base),
+                "link": link(at),
                 "words": [rows[at][name] for name in shown],
-                "cells": [(column.cells[at], column.out[at]) for column in columns],
+                "curve": curves.row(at, differs=_CURVE in by.get(at, {})) if curves else "",
+                "off": f"{rows[at][_OFF]:+.1f}" if curves and np.isfinite(rows[at][_OFF]) else "",
+                "cells": cells(at),
                 "remarks": "; ".join(f"{name}: {rows[at][name]}" for name in remarks if rows[at][name]),
             }
-            for at in first
+            for at in chosen
         ],
-        "left_rows": len(order) - len(first),
+        "left": (important - len(first), len(others) - len(sample)),
+        "important": important,
         "tones": _TONES,
-        "failed": [(row["name"], row["error"]) for row in rows if row["status"] == "failed"][:20],
+        "enough": ENOUGH,
+        "level": LEVEL,
+        "failed": [*zip(failed["name"], failed.get("error", failed["name"]), strict=True)],
     }
     return rendered("index.html", context)
 
 
-@dataclass(frozen=True, eq=False)
-class _Column:
-    """A quantity of all bushings in the unit in which people read it, NaN where it is not known, (n,)."""
-
-    header: str
-    known: Array
-    median: float
-    sigma: float
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, name: str, quantity: Quantity, table: pd.DataFrame) -> Self:
-        """A column of the table of the batch."""
-        what, _, unit = name.rpartition(" [")
-        unit, factor = for_people(unit.rstrip("]"), 1.0, quantity.median)
-        low, high = quantity.allowed
-        ends = (-math.inf if low is None else low * factor, math.inf if high is None else high * factor)
-        values = table[name].to_numpy() * factor
-        return cls(f"{what} [{unit}]", values, quantity.median * factor, quantity.sigma * factor, *ends)
-
-    @property
-    def limits(self) -> list[float]:
-        """The ends of what is allowed, as far as there are some."""
-        return [end for end in (self.low, self.high) if math.isfinite(end)]
-
-    @cached_property
-    def out(self) -> Array:
-        """Which bushings are out of limits, (n,) bool."""
-        return (self.known < self.low) | (self.known > self.high)
-
-    @cached_property
-    def cells(self) -> list[str]:
-        """The values as texts."""
-        return ["" if math.isnan(value) else number(value, 4) for value in self.known.tolist()]
-
-
-def _ordered(table: pd.DataFrame) -> list[int]:
-    """Numbers of the rows, those that need a look first, else as they stand."""
+def _ordered(table: pd.DataFrame, differ: Collection[int]) -> tuple[list[int], int]:
+    """Numbers of the rows, those that need a look first, else as they stand; and how many need one."""
     limits = table["limits"] if "limits" in table else [""] * len(table)
     words = [status if status == "failed" else limit for status, limit in zip(table["status"], limits, strict=True)]
-    order = [_ORDER.index(word) if word in _ORDER else len(_ORDER) for word in words]
-    return np.argsort(order, kind="stable").tolist()
-
-
-def _link(folder: str, reported: Collection[str], base: str) -> str:
-    """What the name of a bushing leads to: its report, else its folder, if it has one."""
-    return base + quote(folder) + ("/report.html" if folder in reported else "/") if folder else ""
-
-
-def _chart(column: _Column) -> Markup:
-    """A control chart: values in the manifest's order, median and three standard deviations, limits."""
-    values, median, sigma, out = column.known, column.median, column.sigma, column.out
-    at = np.arange(1.0, values.size + 1.0)
-    reach = [median - _FURTHEST * sigma, median + _FURTHEST * sigma, *column.limits]
-    far = ((values < min(reach)) | (values > max(reach))) & (sigma > 0.0)
-    shown = np.where(far, np.clip(values, min(reach), max(reach)), values)
-    thin = np.arange(values.size) % max(1, -(-values.size // _MOST_POINTS)) == 0
-    looks = (
-        ("", "#1f4e9c", ~out & ~far & thin),
-        ("out of limits", LIMIT, out & _some(out)),
-        ("further out", "#b4500c", far & ~out & _some(far)),
-    )
-    series = [Series(name, color, points=(at[which], shown[which])) for name, color, which in looks if which.any()]
-    rules = [Rule(median, "median")]
-    if sigma > 0.0:
-        rules.append(Rule(median - _CONTROL * sigma, "3 standard deviations", dashes="2 3"))
-        rules.append(Rule(median + _CONTROL * sigma, "", dashes="2 3"))
-    rules += [Rule(end, "" if place else "limit", "6 3", LIMIT) for place, end in enumerate(column.limits)]
-    words = (
-        f"{column.header} of {int(np.isfinite(values).sum())} bushings: median {number(median, 4)}, robust standard "
-        f"deviation {number(sigma, 2)}, {int(out.sum())} out of limits"
-    )
-    unit = (split_header(column.header)[1] or "").replace("-", "")
-    dot = 4.6 if values.size <= 60 else 3.0
-    return chart(column.header, ("bushing, in the manifest's order", unit), series, words, rules=rules, dot=dot)
-
-
-def _some(which: Array) -> Array:
-    """At most so many of the chosen as a chart draws, evenly, (n,) bool."""
-    return (np.cumsum(which) - 1) % max(1, -(-int(which.sum()) // _MOST_POINTS)) == 0
+    order = np.array([_ORDER.index(word) if word in _ORDER else len(_ORDER) for word in words], dtype=int)
+    order[list(differ)] = np.minimum(order[list(differ)], _ORDER.index("differs"))
+    return np.argsort(order, kind="stable").tolist(), int((order < len(_ORDER)).sum())

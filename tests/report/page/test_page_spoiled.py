@@ -12,6 +12,7 @@ from commandline import call
 from reading_html import change
 
 Spoil = Callable[[Path], object]
+NO_CONTROL = {"median": 1.0, "sigma": 1.0, "process": {"control": [1.0]}}
 BATCH = {"schema": "bushfit/batch/1", "title": "x", "rows": 1, "done": 1, "quantities": {}, "limits": {}}
 
 
@@ -60,6 +61,10 @@ OF_BATCH = [
     (written("batch.json", "{"), ("not valid JSON",)),
     (written("batch.json", '{"schema": "x"}'), ("not a batch this version reads",)),
     (without("batch.json"), ("there is no such file",)),
+    (
+        written("batch.json", json.dumps(BATCH | {"quantities": {"a [-]": NO_CONTROL}})),
+        ("batch.json, quantities.a [-].process.", "a key is missing"),
+    ),
     (without("batch.csv"), ("the table of the batch is missing",)),
     (written("batch.csv", "name,status\n"), ("the table of the batch is missing",)),
 ]

@@ -69,8 +69,21 @@
       for (const panel of panels.filter((each) => each.dataset.place === name)) { panel.hidden = !on; }
     }));
   }
-  // Tables that are sorted by the heading that is clicked.
+  // Tables that are sorted by the heading that is clicked, and show the rows that hold what is typed.
   for (const table of document.querySelectorAll("table.sorted")) {
+    const filter = document.createElement("label");
+    const typed = document.createElement("input");
+    const count = document.createElement("output");
+    filter.className = "controls";
+    typed.type = "search";
+    filter.append("Rows with", typed, count);
+    table.parentElement.before(filter);
+    typed.addEventListener("input", () => {
+      const words = typed.value.toLowerCase().split(/\s+/);
+      const rows = [...table.tBodies[0].rows];
+      for (const row of rows) { row.hidden = !words.every((word) => row.textContent.toLowerCase().includes(word)); }
+      count.textContent = `${rows.filter((row) => !row.hidden).length} of ${rows.length}`;
+    });
     [...table.tHead.rows[0].cells].forEach((cell, column) => {
       const button = document.createElement("button");
       button.type = "button";
