@@ -25,6 +25,7 @@ from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.model.model import FIVE, Model
 from bushfit.reading.columns import Rows
+from bushfit.reading.instruments import RECORDINGS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
@@ -33,7 +34,7 @@ from bushfit.reduction.programme import programme
 from bushfit.units import CELSIUS, quantity
 
 #: Endings of test files, which `bushfit init` makes a campaign of.
-TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods")
+TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods", *RECORDINGS)
 
 #: Keys of a test that its file has nothing to do with, and that results carry on.
 _CONDITIONS = ("order", "preload", "date", "operator", "specimen_number")

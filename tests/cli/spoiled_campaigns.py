@@ -44,7 +44,7 @@ IN_CAMPAIGN = [
     ('"loop.csv"', '"loop.csv"\ndelimiter = "x"', "campaign.toml, loops #1.delimiter: this value is not understood", "'comma', 'semicolon', 'tab', 'pipe' or 'blanks'"),
     ('"loop.csv"', '"loop.csv"\ndecimal = ";"', "campaign.toml, loops #1.decimal: this value is not understood", "'.' or ','"),
     ('"loop.csv"', '"loop.csv"\nheader_line = 0', "loop.csv: there is no header on this line", "lines count from 1"),
-    ('"loop.csv"', '"loop.csv"\nsheet = "Tabelle1"', "loop.csv: this is no workbook", "xlsx"),
+    ('"loop.csv"', '"loop.csv"\nsheet = "Tabelle1"', "loop.csv: this is no workbook", "a file with groups"),
     ('direction = "axial"', 'direction = "up"', "campaign.toml, loops #1.direction: this value is not understood", "'axial', 'radial' or 'torsion'"),
     ('direction = "axial"\n\n[[sweeps]]', "\n[[sweeps]]", "campaign.toml, loop.csv: a test without a direction", "direction ="),
     ('file = "sweep.csv"', 'file = "sweep.csv"\namplitude = "rms"', "campaign.toml, sweeps #1.amplitude: this value is not understood", "'zero-to-peak' or 'peak-to-peak'"),
