@@ -17,7 +17,7 @@ from bushfit.inspection.opening import inspect
 from bushfit.inspection.recognition import open_table, recognised
 from bushfit.inspection.record import Inspected
 from bushfit.reading.columns import same_text
-from bushfit.reading.instruments import RECORDINGS
+from bushfit.reading.instruments import word_for_part
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above
 from bushfit.reading.parts import parts_of
@@ -42,8 +42,7 @@ class Source:
     of_book: Labels = NO_LABELS
 
     def __str__(self) -> str:
-        kind = "group" if self.file.suffix.lower() in RECORDINGS else "sheet"
-        return f"{self.file}, {kind} {self.sheet}" if self.sheet else str(self.file)
+        return f"{self.file}, {word_for_part(self.file)} {self.sheet}" if self.sheet else str(self.file)
 
     def without(self, *keys: str) -> "Source":
         """The same of which some keys are not stated."""

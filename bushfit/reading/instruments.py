@@ -44,12 +44,17 @@ _UFF_HINT = "export records or frequency responses as dataset 58"
 _FORMATS = (
     Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", recordings.matlab, _MATLAB_HINT),
     Format("TDMS", (".tdms",), rb"TDSm", recordings.tdms, _HINT),
-    Format("UFF", (".uff", ".unv", ".uf"), rb" {4}-1 *\r?\n +\d+", recordings.uff, _UFF_HINT),
+    Format("UFF", (".uff", ".unv"), rb" {4}-1 *\r?\n +\d+", recordings.uff, _UFF_HINT),
     Format("MDF", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", recordings.mdf, _HINT),
     Format("Parquet or Arrow", (".parquet", ".feather", ".arrow"), rb"PAR1|ARROW1", recordings.arrow, _HINT),
 )
 #: Endings of the files of recordings.
 RECORDINGS = tuple(ending for one in _FORMATS for ending in one.endings)
+
+
+def word_for_part(file: Path) -> str:
+    """What a part of a file is called that may hold a table: the group of a recording, the sheet of a workbook."""
+    return "group" if file.suffix.lower() in RECORDINGS else "sheet"
 
 
 def format_of(data: bytes, file: Path) -> Format | None:

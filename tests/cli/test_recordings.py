@@ -143,6 +143,10 @@ def test_what_a_file_does_not_tell_is_stated_as_of_csv(typed: Run, tmp_path: Pat
     campaign = (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
     assert 'sheet = "top level"' in campaign
     assert "mu" in values(typed("fit-static", "x/campaign.toml", "-o", "y", "--no-plots", "--json"))
+    (tmp_path / "axial.mat").rename(tmp_path / "test.mat")
+    assert (
+        'test.mat, group "top level": nothing says in' in typed("init", "test.mat", *stated, *GEOMETRY, status=2).stderr
+    )
 
 
 def test_properties_say_what_the_lines_above_a_table_say(typed: Run, tmp_path: Path) -> None:
