@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.headers import Column, Vocabulary
+from bushfit.reading.instruments import word_for_part
 from bushfit.reading.layout import FileFormat, Layout, fits
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import named_direction
@@ -194,7 +195,7 @@ class Columns:
         """A place in the file in words: its sheet, line and column, as far as there are such."""
         source = self.source
         parts = [
-            f'{source.kind} "{source.sheet}"' if isinstance(source, Sheet) and source.sheet else None,
+            f'{word_for_part(self.file)} "{source.sheet}"' if source.sheet else None,
             f"{'row' if source.sheet or isinstance(source, Channels) else 'line'} {line}" if line else None,
             f'column "{column.header}"' if column else None,
         ]

@@ -18,6 +18,7 @@ import numpy as np
 from bushfit.errors import MeasurementError
 from bushfit.reading import recordings
 from bushfit.reading.headers import Vocabulary
+from bushfit.reading.layout import Layout, Line
 from bushfit.reading.recordings import Channel, Group
 from bushfit.reading.source import Channels
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
@@ -138,10 +139,14 @@ def _of_one_length(group: Group, format_name: str) -> Iterator[Channels]:
             channels.insert(0, over)
         plain = [part for one in channels for part in _plain(one, several)]
         if plain:
-            names, values, stated, _ = zip(*plain, strict=True)
-            title = f"{group.name}, {len(values[0])} rows".strip(", ") if len(tables) > 1 else group.name
-            labels = tuple(tuple(str(cell) for cell in label) for label in group.labels)
-            yield Channels(title, names=names, units=stated, arrays=values, labels=labels, format=format_name)
+            names, arrays, stated, _ = zip(*plain, strict=True)
+            title = f"{group.name}, {len(arrays[0])} rows".strip(", ") if len(tables) > 1 else group.name
+            header = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, stated, strict=True)]
+            said = [tuple(map(str, label)) for label in group.labels]
+            above = [Line(number, content) for number, content in enumerate([*said, header], start=-len(said))]
+            layout = Layout("", names, 0, stated, None, numbered=True)
+            numeric = frozenset(index for index, values in enumerate(arrays) if values.dtype == float)
+            yield Channels(title, (), layout=layout, numeric=numeric, arrays=arrays, above=above, format=format_name)
 
 
 def _plain(channel: Channel, several: bool) -> Iterator[Channel]:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from bushfit.errors import MeasurementError, did_you_mean
 from bushfit.reading.files import view_bytes
-from bushfit.reading.instruments import format_of, read_groups
-from bushfit.reading.source import Channels, Sheet
+from bushfit.reading.instruments import format_of, read_groups, word_for_part
+from bushfit.reading.source import Sheet
 from bushfit.reading.workbook import is_workbook, read_sheets
 
 #: Parts that an error lists at most; chosen: a line or two.
@@ -35,12 +35,12 @@ def open_part(data: bytes, file: Path, name: str | None, is_usable: Callable[[Sh
     names, found = _read(data, file, name)
     if not names:
         return None
-    kind = "group" if not found or isinstance(found[0], Channels) else "sheet"
+    kind = word_for_part(file)
     if name is not None:
         if own := [part for part in found if part.sheet == name]:
             return own[0]
         raise MeasurementError(
-            "there is no such sheet" if is_workbook(data) else "there is no such group of channels",
+            f"there is no such {kind}",
             file=file,
             found=f'"{name}"',
             expected=_listed(names),

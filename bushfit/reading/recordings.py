@@ -84,13 +84,12 @@ def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
     inner: dict[str, Mapping[str, Any]] = {}
     for name, value in content.items():
         place = f"{path}.{name}" if path else name
-        several = list(value) if isinstance(value, list | np.ndarray) else []
         if name.startswith("__"):
             continue
         if isinstance(value, Mapping):
             inner[place] = value
-        elif several and all(isinstance(one, Mapping) for one in several):
-            inner |= {f"{place}({number})": one for number, one in enumerate(several, start=1)}
+        elif isinstance(value, list):
+            inner |= {f"{place}({n})": one for n, one in enumerate(value, start=1) if isinstance(one, Mapping)}
         elif isinstance(value, np.ndarray) and value.ndim == 1:
             channels.append(Channel(name, value))
         elif isinstance(value, np.ndarray) and value.ndim == 2:

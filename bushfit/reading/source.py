@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,24 +138,16 @@ def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:
 class Sheet:
     """A sheet of a workbook as rows of texts and numbers, "" where a cell is empty.
 
-    `lacks_values` tells whether the workbook has formulas whose values were not saved, which are empty cells, too.
+    `lacks_values` tells whether the workbook has formulas whose values were not saved, which are empty cells, too;
+    `layout` where its table lies, and `numeric` which columns hold numbers alone, where that need not be found.
     """
 
     sheet: str
     content: Sequence[Sequence[str | float]] = ()
     lacks_values: Callable[[], bool] = lambda: False
     encoding: None = None
-    kind: ClassVar[str] = "sheet"
-
-    @property
-    def layout(self) -> Layout | None:
-        """Where its table lies, if that is known and need not be found."""
-        return None
-
-    @property
-    def numeric(self) -> frozenset[int]:
-        """The columns that are known to hold numbers alone, by index."""
-        return frozenset()
+    layout: Layout | None = None
+    numeric: frozenset[int] = frozenset()
 
     def head(self) -> list[Line]:
         """The filled rows at its start."""
@@ -170,37 +162,18 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class Channels(Sheet):
-    """A group of recorded channels of one length as rows of cells, which count from 1.
+    """A group of recorded channels of one length as rows of cells, which count from 1 below the `layout`.
 
-    Args:
-        names, units: of each channel; "" where the file states no unit.
-        arrays: its values, (n,): floats, or texts as objects.
-        labels: what the file says of all channels, each a name and a value, or a line of text.
-        format: of the file, in words.
+    `arrays` are their values, (n,) each, floats or texts as objects; `above` is what the file says of all of them.
     """
 
-    names: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    arrays: tuple[NDArray[Any], ...] = ()
-    labels: tuple[tuple[str, ...], ...] = ()
+    arrays: Sequence[NDArray[Any]] = ()
+    above: Sequence[Line] = ()
     format: str = ""
-    kind: ClassVar[str] = "group"
-
-    @property
-    def layout(self) -> Layout:
-        """Names and units as the file has them, above the first row."""
-        return Layout("", self.names, 0, self.units, None, numbered=True)
-
-    @property
-    def numeric(self) -> frozenset[int]:
-        """The channels of numbers, by index."""
-        return frozenset(index for index, values in enumerate(self.arrays) if values.dtype == float)
 
     def head(self) -> list[Line]:
-        """What is said of the channels, their names, and the first rows."""
-        names = [f"{name} [{unit}]" if unit else name for name, unit in zip(self.names, self.units, strict=True)]
-        above = [Line(number, label) for number, label in enumerate(self.labels, start=-len(self.labels))]
-        return [*above, Line(0, names), *islice(self.lines(0), MOST_HEAD_LINES)]
+        """What is said of the channels, and the first rows."""
+        return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
 
     def lines(self, after: int) -> Iterator[Line]:
         """All rows after a row."""
