@@ -311,12 +311,14 @@ class Columns:
         first cells, as long as these settle the decimal mark.
         """
         scales = {column.index: column.scale for column in wanted.values()}
+        if self.left_out or (isinstance(self.source, Sheet) and not isinstance(self.source, Channels)):
+            return None
         if isinstance(self.source, Channels):
-            read = None if self.left_out else self.source.values(scales)
-            return None if read is None else {role: read[column.index] for role, column in wanted.items()}
+            known = self.source.values(scales)
+            return None if known is None else {role: known[column.index] for role, column in wanted.items()}
         decimals = {way.decimal for way in weigh(islice(self._texts(), _FIRST), self._open_ways()).ways}
         first = next(self.rows(), (0, ()))[1]
-        if isinstance(self.source, Sheet) or len(decimals) > 1 or self.left_out or not fits(first, len(self.headers)):
+        if len(decimals) > 1 or not fits(first, len(self.headers)):
             return None
         numerals = Numerals(decimals.pop())
         cells = [first[column.index] for column in wanted.values()]

@@ -11,17 +11,17 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal, TextIO
+from itertools import chain
+from typing import TYPE_CHECKING, Literal
 
 from bushfit.errors import OutputError, printable
 
 if TYPE_CHECKING:
     import pandas as pd
     from xlsxwriter import Workbook
-    from xlsxwriter.format import Format
 
 #: Commas and decimal points; semicolons and decimal commas; a workbook.
 Form = Literal["csv", "decimal-comma", "xlsx"]
@@ -58,35 +58,18 @@ def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
 
 
 def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
-    """The bytes of a table's file."""
-    form: Form = "decimal-comma" if decimal_comma else "csv"
-    text = io.StringIO()
-    write = _csv_writer(text, form, map(str, table.columns))
-    for cells in _rows(table):
-        write(cells)
-    return text.getvalue().encode(_encoding(form), "replace")
+    """The bytes of a table's file; None and nan become empty cells."""
+    text, point = io.StringIO(), "," if decimal_comma else "."
+    writer = csv.writer(text, delimiter=";" if decimal_comma else ",", lineterminator="\n")
+    writer.writerow([defused(str(header)) for header in table.columns])
+    writer.writerows([_cell(value, point) for value in cells] for cells in _rows(table))
+    # Excel knows UTF-8 by the byte order mark
+    return text.getvalue().encode("utf-8-sig" if decimal_comma else "utf-8", "replace")
 
 
 def _rows(table: pd.DataFrame) -> Iterator[Row]:
     """The rows of a table, with Python's own numbers."""
     return zip(*(column.tolist() for _, column in table.items()), strict=True)
-
-
-def _encoding(form: Form) -> str:
-    """UTF-8, before decimal commas with the byte order mark by which Excel knows it."""
-    return "utf-8-sig" if form == "decimal-comma" else "utf-8"
-
-
-def _csv_writer(stream: TextIO, form: Form, headers: Iterable[str]) -> Callable[[Row], None]:
-    """What writes a row to a stream, below these headers; None and nan become empty cells."""
-    point, delimiter = (",", ";") if form == "decimal-comma" else (".", ",")
-    writer = csv.writer(stream, delimiter=delimiter, lineterminator="\n")
-    writer.writerow([defused(header) for header in headers])
-
-    def write(cells: Row) -> None:
-        writer.writerow([_cell(value, point) for value in cells])
-
-    return write
 
 
 def _cell(value: object, point: str) -> str:
@@ -114,49 +97,35 @@ def undefused(text: str) -> str:
     return text[1:] if text.startswith("'") and _FORMULA.match(text[1:]) else text
 
 
-class _Sheet:
-    """Writes rows of texts and numbers to a sheet as they come, below headers in bold that stay in sight.
+def _write(book: Workbook, name: str, table: pd.DataFrame) -> None:
+    """Write a table to a sheet, below headers in bold that stay in sight, its columns as wide as their texts.
 
     Every text is written as a text: nothing is run as a formula or taken for a link or a number. Cells without a value,
     and nan, stay empty.
+
+    Raises:
+        OutputError: more rows or columns than a sheet has.
     """
-
-    def __init__(self, book: Workbook, name: str, headers: Iterable[str]) -> None:
-        self._sheet = book.add_worksheet(name)
-        self._sheet.freeze_panes(1, 0)
-        self._widths: dict[int, int] = {}
-        self._count = 0
-        self.add(headers, book.add_format({"bold": True}))
-
-    def add(self, cells: Row, look: Format | None = None) -> None:
-        """Write one row.
-
-        Raises:
-            OutputError: more rows or columns than a sheet has.
-        """
+    sheet, bold = book.add_worksheet(name), book.add_format({"bold": True})
+    sheet.freeze_panes(1, 0)
+    for row, cells in enumerate(chain([map(str, table.columns)], _rows(table))):
         for place, cell in enumerate(cells):
             if isinstance(cell, str):
-                self._widen(place, len(cell))
-                status = self._sheet.write_string(self._count, place, _text(cell), look)
+                status = sheet.write_string(row, place, _text(cell), None if row else bold)
             elif cell is not None and math.isfinite(cell):
-                status = self._sheet.write_number(self._count, place, cell)
+                status = sheet.write_number(row, place, cell)
             else:
                 continue
             if status < 0:  # beyond the last row or column of a sheet
                 raise OutputError(
                     "a table is too large for a sheet",
-                    place=self._sheet.name,
+                    place=name,
                     expected="at most 1,048,576 rows and 16,384 columns",
                     hint="--table-format csv has no such limit",
                 )
-        self._count += 1
-
-    def _widen(self, place: int, letters: int) -> None:
-        """Make a column as wide as its widest text, as far as that goes."""
-        width = min(_WIDEST, letters + 1)
-        if width > self._widths.get(place, 0):
-            self._widths[place] = width
-            self._sheet.set_column(place, place, width)
+    for place, (header, column) in enumerate(table.items()):
+        longest = max(len(text) for text in (str(header), *column.tolist()) if isinstance(text, str))
+        sheet.set_column(place, place, min(_WIDEST, longest + 1))
 
 
 def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
@@ -171,9 +140,7 @@ def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
     with Workbook(stream, {"in_memory": True}) as book:
         book.set_properties({"created": _MADE})
         for title, table in tables.items():
-            sheet = _Sheet(book, _sheet_name(title, names), map(str, table.columns))
-            for cells in _rows(table):
-                sheet.add(cells)
+            _write(book, _sheet_name(title, names), table)
     return stream.getvalue()
 
 
