@@ -6,12 +6,12 @@ import logging
 import re
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -86,7 +86,7 @@ def read_groups(data: bytes, file: Path, own: Format) -> tuple[Channels, ...] | 
     """
     with _silenced():
         try:
-            found = [part for group in own.read(data, file) for part in _of_one_length(group, own.name)]
+            found = [part for group in own.read(data, file) for part in _of_one_length(*group, own)]
             problem, said = "holds no channels", {"expected": "numbers", "hint": own.hint}
         except ImportError as error:
             found, problem = [], "takes a package that is not installed"
@@ -118,35 +118,37 @@ def _silenced() -> Iterator[None]:
         sys.unraisablehook = hook
 
 
-def _of_one_length(group: Group, format_name: str) -> Iterator[Channels]:
+def _of_one_length(
+    name: str, channels: Sequence[Channel], said: Sequence[tuple[Any, ...]], own: Format
+) -> Iterator[Channels]:
     """The channels of a group that belong together: of one length, over one base, which goes before them.
 
     Those without a base belong to all bases of their length. A base that is among them by its name is left out.
     """
     lengths: dict[int, dict[bytes, list[Channel]]] = {}
-    for channel in group.channels:
+    for channel in channels:
         if len(channel.values) > 1:
             base = b"" if channel.over is None else channel.over.values.tobytes()
             lengths.setdefault(len(channel.values), {}).setdefault(base, []).append(channel)
     tables: list[list[Channel]] = []
     for bases in lengths.values():
         free = bases.pop(b"", [])
-        tables += [own + free for own in bases.values()] or [free]
-    for channels in tables:
-        over = channels[0].over
-        several = sum(np.iscomplexobj(one.values) for one in channels) > 1
-        if over and over.name not in _BASES.roles([one.name for one in channels]):
-            channels.insert(0, over)
-        plain = [part for one in channels for part in _plain(one, several)]
+        tables += [alike + free for alike in bases.values()] or [free]
+    labels = [tuple(map(str, label)) for label in said]
+    for table in tables:
+        over = table[0].over
+        several = sum(np.iscomplexobj(one.values) for one in table) > 1
+        if over and over.name not in _BASES.roles([one.name for one in table]):
+            table.insert(0, over)
+        plain = [part for one in table for part in _plain(one, several)]
         if plain:
             names, arrays, stated, _ = zip(*plain, strict=True)
-            title = f"{group.name}, {len(arrays[0])} rows".strip(", ") if len(tables) > 1 else group.name
-            header = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, stated, strict=True)]
-            said = [tuple(map(str, label)) for label in group.labels]
-            above = [Line(number, content) for number, content in enumerate([*said, header], start=-len(said))]
+            title = f"{name}, {len(arrays[0])} rows".strip(", ") if len(tables) > 1 else name
+            header = [f"{text} [{unit}]" if unit else text for text, unit in zip(names, stated, strict=True)]
+            above = [Line(number, content) for number, content in enumerate([*labels, header], start=-len(labels))]
             layout = Layout("", names, 0, stated, None, numbered=True)
             numeric = frozenset(index for index, values in enumerate(arrays) if values.dtype == float)
-            yield Channels(title, (), layout=layout, numeric=numeric, arrays=arrays, above=above, format=format_name)
+            yield Channels(title, (), layout=layout, numeric=numeric, arrays=arrays, above=above, format=own.name)
 
 
 def _plain(channel: Channel, several: bool) -> Iterator[Channel]:

@@ -30,10 +30,13 @@ def open_part(data: bytes, file: Path, name: str | None, is_usable: Callable[[Sh
     None where the file is a text.
 
     Raises:
-        MeasurementError: a workbook or recording that cannot be read, or that has no single usable part.
+        MeasurementError: a workbook or recording that cannot be read, or that has no such or no single usable part.
     """
     names, found = _read(data, file, name)
     if not names:
+        if name:
+            expected = "a workbook, or a file with groups of channels"
+            raise MeasurementError("this is no workbook", file=file, found=f'sheet = "{name}"', expected=expected)
         return None
     kind = word_for_part(file)
     if name is not None:

@@ -4,7 +4,6 @@ Each reader is loaded, with its library, when a file needs it. None makes up a u
 """
 
 import io
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -21,7 +20,7 @@ _UFF_QUANTITIES = {
     **{17: ("time", "s", ""), 18: ("frequency", "Hz", "")},
 }
 #: What begins and ends a dataset of UFF.
-_UFF_MARK = re.compile(rb"^ {4}-1 *\r?$", re.MULTILINE)
+_UFF_MARK = b"    -1"
 #: The direction of UFF from which on a displacement is a rotation, and a force a moment.
 _UFF_ROTATIONS = 4
 
@@ -35,12 +34,8 @@ class Channel(NamedTuple):
     over: "Channel | None" = None
 
 
-class Group(NamedTuple):
-    """Channels that a file holds together, and what it says of all of them: names and values, or lines of text."""
-
-    name: str
-    channels: list[Channel]
-    labels: Sequence[tuple[Any, ...]] = ()
+#: Channels that a file holds together: a name, they, and what the file says of all, names and values or lines of text.
+Group = tuple[str, list[Channel], Sequence[tuple[Any, ...]]]
 
 
 def matlab(data: bytes, _: Path) -> Iterator[Group]:
@@ -96,7 +91,7 @@ def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
             channels.extend(Channel(f"{name}(:,{n})", column) for n, column in enumerate(value.T, start=1))
         elif isinstance(value, str):
             labels.append((name, value))
-    yield Group(path, channels, labels)
+    yield path, channels, labels
     for place, struct in inner.items():
         yield from _in_struct(place, struct)
 
@@ -117,7 +112,7 @@ def tdms(data: bytes, _: Path) -> Iterator[Group]:
                 name = "frequency" if units.agrees(unit, "Hz") else "time" if units.agrees(unit, "s") else "x"
                 over = Channel(name, said.get("wf_start_offset", 0.0) + step * np.arange(len(values)), unit)
             channels.append(Channel(channel.name, values, said.get("unit_string", ""), over))
-        yield Group(group.name, channels, [*file.properties.items(), *group.properties.items()])
+        yield group.name, channels, [*file.properties.items(), *group.properties.items()]
 
 
 def mdf(data: bytes, _: Path) -> Iterator[Group]:
@@ -134,7 +129,7 @@ def mdf(data: bytes, _: Path) -> Iterator[Group]:
             signals = file.select([(None, index, number) for number in range(len(group.channels)) if number != master])
             bases = [over and Channel(name, one.timestamps, unit) for one in signals]
             channels = [Channel(one.name, one.samples, one.unit, own) for one, own in zip(signals, bases, strict=True)]
-            yield Group(getattr(said, "acq_name", "") or said.comment or f"group {index + 1}", channels)
+            yield getattr(said, "acq_name", "") or said.comment or f"group {index + 1}", channels, ()
 
 
 def arrow(data: bytes, _: Path) -> Iterator[Group]:
@@ -152,15 +147,17 @@ def arrow(data: bytes, _: Path) -> Iterator[Group]:
     for index, field in enumerate(table.schema):
         said = field.metadata or {}
         unit = (said.get(b"unit") or said.get(b"units") or b"").decode()
-        channels.append(Channel(field.name, frame.iloc[:, index].to_numpy(), unit))
-    yield Group("", channels)
+        column = frame.iloc[:, index]
+        plain = column.dt.tz_localize(None) if getattr(column.dtype, "tz", None) else column
+        channels.append(Channel(field.name, plain.to_numpy(), unit))
+    yield "", channels, ()
 
 
 def uff(data: bytes, file: Path) -> Iterator[Group]:
     """The records of a UFF file together, and each of its complex functions of a frequency by itself."""
     import pyuff
 
-    if len(_UFF_MARK.findall(data)) % 2:
+    if not data.rstrip().endswith(_UFF_MARK):
         raise ValueError("its last dataset has no end")
     book = pyuff.UFF(str(file))
     sets = [book.read_sets(number) for number, kind in enumerate(book.get_set_types()) if kind in (58, 164)]
@@ -183,8 +180,8 @@ def uff(data: bytes, file: Path) -> Iterator[Group]:
             name = "dynamic stiffness" if is_stiffness else f"{name} over {lower.name}"
         if "/" not in unit or _uff_text(one, "orddenom_axis_units_lab"):  # else the unit is that of the ratio
             values, unit = values / lower.values, f"{unit}/{lower.unit}" if unit and lower.unit else ""
-        yield Group(title, [Channel(name, values, unit, over)], [(one[f"id{line}"],) for line in range(1, 6)])
-    yield Group("", records)
+        yield title, [Channel(name, values, unit, over)], [(one[f"id{line}"],) for line in range(1, 6)]
+    yield "", records, ()
 
 
 def _uff_text(function: Mapping[str, Any], key: str) -> str:

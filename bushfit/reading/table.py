@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -86,10 +86,10 @@ class Table(Columns):
             return source, layout, vocabulary
 
         try:
-            source = _source(
-                data, file, stated, lambda part: len(vocabulary.roles(lay_out(part)[1].headers) - {"time"}) > 1
+            part = open_part(
+                data, file, stated.sheet, lambda part: len(vocabulary.roles(lay_out(part)[1].headers) - {"time"}) > 1
             )
-            source, layout, understood = lay_out(source)
+            source, layout, understood = lay_out(part or Text(*to_utf8(data, file, stated.encoding)))
         except csv.Error as error:
             raise MeasurementError("the table cannot be read", file=file, found=str(error)) from error
         if stated.header_line not in (None, layout.header_line):
@@ -251,16 +251,6 @@ class Table(Columns):
             hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
             + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
         )
-
-
-def _source(data: bytes, file: Path, stated: FileFormat, is_usable: Callable[[RowSource], bool]) -> RowSource:
-    """The rows of a file: of a text, or of the sheet or group of channels that is stated or usable."""
-    if part := open_part(data, file, stated.sheet, is_usable):
-        return part
-    if stated.sheet:
-        expected = "a workbook, or a file with groups of channels"
-        raise MeasurementError("this is no workbook", file=file, found=f'sheet = "{stated.sheet}"', expected=expected)
-    return Text(*to_utf8(data, file, stated.encoding))
 
 
 def _is_k(header: str) -> bool:
