@@ -31,8 +31,6 @@ _PATIENCE = 15
 _ZIP_SIGN = b"PK\x03\x04"
 #: First bytes of the older formats of Office.
 _OLD_OFFICE_SIGN = b"\xd0\xcf\x11\xe0"
-#: What makes an archive a workbook (xlsx, xlsb, ods): names of parts, and a part that archives do not compress.
-_OF_BOOKS = (b"xl/workbook.xml", b"xl/workbook.bin", b"mimetypeapplication/vnd.oasis.opendocument.spreadsheet")
 
 
 def is_workbook(data: bytes) -> bool:
@@ -48,13 +46,6 @@ def read_sheets(
     Raises:
         kind: no workbook, or one that takes more memory or time than a workbook may.
     """
-    if not (data.startswith(_OLD_OFFICE_SIGN) or any(part in data for part in _OF_BOOKS)):
-        raise kind(
-            "this is no workbook",
-            file=file,
-            expected="a table as text, or a workbook: xlsx, xlsb, xls or ods",
-            hint="save it as xlsx",
-        )
     book = _known(data)
     wanted = book.get("shown") if name is None else [name]
     if wanted is None or not book["sheets"].keys() >= set(wanted):
@@ -91,8 +82,8 @@ def _asked(data: bytes, file: Path, kind: type[BushfitError], **order: object) -
     except subprocess.TimeoutExpired:
         status, answer = -getattr(signal, "SIGXCPU", 0), {}
     if "error" in answer:
-        hint = "save it again as xlsx, or as CSV"
-        raise kind("the workbook cannot be read", file=file, found=answer["error"], hint=hint)
+        expected, hint = "a table as text, or a workbook: xlsx, xlsb, xls or ods", "save it again as xlsx, or as CSV"
+        raise kind("the workbook cannot be read", file=file, found=answer["error"], expected=expected, hint=hint)
     if status or "too_many" in answer:
         slow = status == -getattr(signal, "SIGXCPU", 0)
         taken = f"more than {_MOST_SECONDS} s of work" if slow else f"more than {_MOST_MEMORY >> 30} GiB of memory"
