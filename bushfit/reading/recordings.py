@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from bushfit import units
 
+#: Values of a file that are read at most; chosen: ten million rows of twenty channels and more, 2 GiB.
+_MOST_VALUES = 1 << 28
 #: Quantities of UFF by their number, with the SI unit, and the factor of dataset 164 to divide values by.
 _UFF_QUANTITIES = {
     **{8: ("displacement", "m", "length"), 9: ("force", "N", "force"), 13: ("force", "N", "force")},
@@ -62,6 +64,7 @@ def _from_hdf5(node: Any) -> Any:
         if fields and all(isinstance(values, list) for values in fields.values()):  # an array of structs
             return [dict(zip(fields, one, strict=True)) for one in zip(*fields.values(), strict=True)]
         return fields
+    _bound(node.size)
     values = node[()]
     if "MATLAB_object_decode" in node.attrs or "MATLAB_empty" in node.attrs:
         return None
@@ -70,6 +73,12 @@ def _from_hdf5(node: Any) -> Any:
     if values.dtype == object:
         return [_from_hdf5(node.file[reference]) for reference in values.ravel()]
     return np.squeeze((values["real"] + 1j * values["imag"] if values.dtype.names else values).T)
+
+
+def _bound(values: int) -> None:
+    """Refuse a file that unpacks to more values than a recording has: some kilobytes may hold terabytes of them."""
+    if values > _MOST_VALUES:
+        raise ValueError(f"it unpacks to {values} values, of which at most {_MOST_VALUES} are read")
 
 
 def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
@@ -137,9 +146,11 @@ def arrow(data: bytes, _: Path) -> Iterator[Group]:
     import pyarrow as pa
 
     if data.startswith(b"PAR1"):
-        from pyarrow.parquet import read_table
+        from pyarrow.parquet import ParquetFile
 
-        table = read_table(pa.BufferReader(data))
+        file = ParquetFile(pa.BufferReader(data))
+        _bound(file.metadata.num_rows * file.metadata.num_columns)
+        table = file.read()
     else:
         table = pa.ipc.open_file(pa.BufferReader(data)).read_all()
     frame = table.to_pandas(ignore_metadata=True)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -91,6 +92,13 @@ def cut(ending: str) -> Callable[[Path], None]:
     return write
 
 
+def bomb(file: Path) -> None:
+    """Some kilobytes of HDF5 that would fill every memory."""
+    recordings.mat73(LOOP, file)
+    with h5py.File(file, "a") as book:
+        book.create_dataset("run1/x", (1, 1 << 40), "f8", chunks=(1, 1 << 20))
+
+
 #: Files that cannot be used, and what their error says.
 SPOILED: list[tuple[str, Callable[[Path], object], tuple[str, ...]]] = [
     ("rates.mf4", of_two_rates, ("no group holds such a table", '"at 100 Hz", "at 20 Hz"', "resample")),
@@ -102,6 +110,7 @@ SPOILED: list[tuple[str, Callable[[Path], object], tuple[str, ...]]] = [
     ("empty.mf4", lambda file: file.write_bytes(b""), ("the file is empty",)),
     ("scalars.mat", lambda file: savemat(file, {"a": 1.0, "b": "text"}), ("holds no channels", "table2struct")),
     ("modes.unv", lambda file: pyuff.UFF(str(file)).write_sets([MILLIMETRES], "overwrite"), ("dataset 58",)),
+    ("bomb.mat", bomb, ("cannot be read", "it unpacks to 1099511627776 values")),
     *((f"cut.{ending}", cut(ending), ("file cannot be read", "cut short")) for ending in recordings.WRITERS),
 ]  # fmt: skip
 
