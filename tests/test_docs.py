@@ -28,6 +28,7 @@ from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.schema import CampaignFile
 from bushfit.cli import cli
 from bushfit.geometry import Direction
+from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.sweeps import read_sweep
 from bushfit.simulation.files import to_files
@@ -183,17 +184,31 @@ def test_the_steps_before_a_merge_are_the_same_wherever_they_stand(root: Path) -
     assert all(repository["repo"] == "local" for repository in hooks)
 
 
-@pytest.mark.parametrize("name", ["loop_axial", "sweep_axial", "sweep_radial"])
-def test_a_workbook_holds_its_csv(root: Path, name: str) -> None:
-    """Of a loop every fifth row."""
-    kind, direction = name.split("_")
+#: Copies of the paper's tests in other formats, with what they do not tell of themselves.
+COPIES: dict[str, dict[str, Any]] = {
+    **{f"cmp_15961_workbook/{name}.xlsx": {} for name in ("loop_axial", "sweep_axial", "sweep_radial")},
+    "cmp_15961_recordings/loop_axial.tdms": {},
+    "cmp_15961_recordings/loop_axial.mat": {
+        "columns": {"displacement": "x"},
+        "units": {"time": "s", "displacement": "mm", "force": "N"},
+    },
+    "cmp_15961_recordings/loop_axial.mf4": {},
+    "cmp_15961_recordings/sweep_radial.parquet": {},
+    "cmp_15961_recordings/sweep_axial.uff": {"written": FileFormat(sheet="0.1 mm"), "at_amplitude": 1e-4},
+}
+
+
+@pytest.mark.parametrize("copy", COPIES)
+def test_files_of_other_formats_hold_their_csv(root: Path, copy: str) -> None:
+    """Of a loop every fifth row; of a UFF file the first rows, which are those of an amplitude."""
+    kind, direction = Path(copy).stem.split("_")
     read: Any = read_loop if kind == "loop" else read_sweep
-    names = (f"cmp_15961/{name}{'_1' * (kind == 'loop')}.csv", f"cmp_15961_workbook/{name}.xlsx")
-    kept, book = (read(root / "data" / file, Direction(direction)) for file in names)
+    kept = read(root / f"data/cmp_15961/{kind}_{direction}{'_1' * (kind == 'loop')}.csv", Direction(direction))
+    own = read(root / "data" / copy, Direction(direction), **COPIES[copy])
     columns = ("time", "displacement", "force") if kind == "loop" else ("frequency", "amplitude", "stiffness", "repeat")
     for column in columns:
-        csv = getattr(kept, column)[:: 5 if kind == "loop" else 1]
-        np.testing.assert_allclose(getattr(book, column), csv, rtol=1e-9 if kind == "loop" else 1e-5, atol=1e-12)
+        csv = getattr(kept, column)[:: 5 if kind == "loop" else 1][: getattr(own, column).size]
+        np.testing.assert_allclose(getattr(own, column), csv, rtol=1e-9 if kind == "loop" else 1e-5, atol=1e-12)
 
 
 def test_the_second_bushing_can_be_made_again(root: Path) -> None:

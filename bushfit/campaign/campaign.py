@@ -26,6 +26,7 @@ from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.model.model import FIVE, Model
 from bushfit.progress import counting
 from bushfit.reading.columns import Rows
+from bushfit.reading.instruments import RECORDINGS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
@@ -34,7 +35,7 @@ from bushfit.reduction.programme import programme
 from bushfit.units import CELSIUS, quantity
 
 #: Endings of test files, which `bushfit init` makes a campaign of.
-TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods")
+TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods", *RECORDINGS)
 
 #: Keys of a test that its file has nothing to do with, and that results carry on.
 _CONDITIONS = ("order", "preload", "date", "operator", "specimen_number")

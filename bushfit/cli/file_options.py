@@ -130,11 +130,13 @@ def options_named() -> Iterator[None]:
 
 
 def direction_error(file: Path, sheet: str | None = None) -> MeasurementError:
-    """The error for a file, or a sheet of it, of a direction that nothing settles."""
+    """The error for a file, or a part of it, of a direction that nothing settles."""
+    from bushfit.reading.instruments import word_for_part
+
     return MeasurementError(
         "nothing says in which direction this was tested",
         file=file,
-        place=sheet and f'sheet "{sheet}"',
+        place=sheet and f'{word_for_part(file)} "{sheet}"',
         found="neither its name nor its columns say axial, radial or torsion",
         expected="a direction",
         hint="state it: --direction axial (or radial, torsion); or where others say another, name the file after it",

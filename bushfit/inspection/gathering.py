@@ -17,10 +17,11 @@ from bushfit.inspection.opening import inspect
 from bushfit.inspection.recognition import open_table, recognised
 from bushfit.inspection.record import Inspected
 from bushfit.reading.columns import same_text
+from bushfit.reading.instruments import word_for_part
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above
+from bushfit.reading.parts import parts_of
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
-from bushfit.reading.workbook import sheets
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Source:
     of_book: Labels = NO_LABELS
 
     def __str__(self) -> str:
-        return f"{self.file}, sheet {self.sheet}" if self.sheet else str(self.file)
+        return f"{self.file}, {word_for_part(self.file)} {self.sheet}" if self.sheet else str(self.file)
 
     def without(self, *keys: str) -> "Source":
         """The same of which some keys are not stated."""
@@ -188,7 +189,7 @@ def _sheets_of(source: Source, stated: Mapping[str, Any]) -> list[Source]:
     if stated.get("sheet"):
         return [source]
     try:
-        names = [sheet.sheet for sheet in sheets(source.file)]
+        names = [part.sheet for part in parts_of(source.file)]
     except BushfitError:  # which the inspection of the file tells
         return [source]
     return [replace(source, sheet=name) for name in names] if len(names) > 1 else [source]
@@ -212,7 +213,7 @@ def _holding_tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
         tests.append(part)
     if tests and tests[0].sheet and without:
         of_book = labels_above(
-            line for sheet in sheets(tests[0].file) if sheet.sheet in without for line in sheet.head()
+            line for part in parts_of(tests[0].file) if part.sheet in without for line in part.head()
         )
         tests = [replace(test, of_book=of_book) for test in tests]
     return tests, left_out

@@ -65,7 +65,8 @@ def keys_from_labels(
         MeasurementError: a sweep of which nothing says the amplitude, or the frequency.
     """
     above = labels_above(line for line in table.source.head() if line.number < table.layout.header_line)
-    sources = {"from its name": by_name, "from the lines above the table": above, "from the other sheets": of_book}
+    written = "from the lines above the table" if table.layout.header_line else "from the properties in the file"
+    sources = {"from its name": by_name, written: above, "from the other sheets": of_book}
     keys: dict[str, Any] = {}
     facts: dict[str, list[str]] = {}
     is_counted = True

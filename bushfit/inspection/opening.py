@@ -22,6 +22,7 @@ from bushfit.reading.layout import DELIMITERS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels
+from bushfit.reading.source import Channels, Sheet
 from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
@@ -179,12 +180,14 @@ def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
 
 def _written(table: Table) -> dict[str, str]:
     """How a file is written, in words by label."""
-    sheet, layout = table.source.sheet, table.layout
-    if sheet:
-        written = {"sheet": sheet, "header": f"row {layout.header_line}"}
+    source, layout = table.source, table.layout
+    if isinstance(source, Channels):
+        written = {"format": source.format} | ({"group": source.sheet} if source.sheet else {})
+    elif isinstance(source, Sheet):
+        written = {"sheet": source.sheet, "header": f"row {layout.header_line}"}
     else:
         written = {
-            "encoding": table.source.encoding or "UTF-8",
+            "encoding": source.encoding or "UTF-8",
             "columns parted by": next(name for name, mark in DELIMITERS.items() if mark == layout.delimiter),
             "decimal mark": "comma" if table.numerals.decimal == "," else "point",
             "header": f"line {layout.header_line}",

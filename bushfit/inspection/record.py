@@ -9,6 +9,7 @@ from typing_extensions import TypedDict
 
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place, Specimen
+from bushfit.reading.instruments import word_for_part
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.validation import plain
 
@@ -117,7 +118,7 @@ class Inspected:
     def label(self) -> str:
         """The name of the file, with the sheet where it has several, and with what columns tell of the test."""
         direction = self.direction if "direction" in [one.role for one in self.columns] else None
-        added = {"sheet": self.entry.get("sheet"), "direction": direction, "part": self.part}
+        added = {word_for_part(self.file): self.entry.get("sheet"), "direction": direction, "part": self.part}
         added |= self.entry.get("rows", {})
         return ", ".join([self.file.name, *(f"{key} {value}" for key, value in added.items() if value)])
 

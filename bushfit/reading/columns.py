@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.headers import Column, Vocabulary
+from bushfit.reading.instruments import word_for_part
 from bushfit.reading.layout import FileFormat, Layout, fits
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import named_direction
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, is_like_number, weigh
 from bushfit.reading.runs import rows_alike
-from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, Sheet, Text, rows
+from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, Channels, RowSource, Sheet, Text, rows
 from bushfit.reading.words import ROW_COLUMNS
 
 #: Rows that are taken apart at a time where a library cannot; chosen: their texts fill some MiB.
@@ -192,10 +193,10 @@ class Columns:
 
     def place(self, line: int | None, column: Column | None) -> str | None:
         """A place in the file in words: its sheet, line and column, as far as there are such."""
-        sheet = self.source.sheet
+        source = self.source
         parts = [
-            f'sheet "{sheet}"' if sheet else None,
-            f"{'row' if sheet else 'line'} {line}" if line else None,
+            f'{word_for_part(self.file)} "{source.sheet}"' if source.sheet else None,
+            f"{'row' if source.sheet or isinstance(source, Channels) else 'line'} {line}" if line else None,
             f'column "{column.header}"' if column else None,
         ]
         return ", ".join(part for part in parts if part) or None
@@ -297,8 +298,8 @@ class Columns:
 
     def _texts(self) -> Iterator[tuple[Place, str]]:
         """Place and text of the columns' cells; those that a workbook holds as numbers are left out."""
-        indices = [column.index for column in self.roles.values()]
-        for line, cells in self.rows():
+        indices = {column.index for column in self.roles.values()} - self.source.numeric
+        for line, cells in self.rows() if indices else ():
             for index in indices:
                 if index < len(cells) and isinstance(cell := cells[index], str):
                     yield (line, index), cell
@@ -309,15 +310,20 @@ class Columns:
         The library takes no thousands separators. So what it reads as numbers needs no more evidence than that of the
         first cells, as long as these settle the decimal mark.
         """
+        scales = {column.index: column.scale for column in wanted.values()}
+        if self.left_out or (isinstance(self.source, Sheet) and not isinstance(self.source, Channels)):
+            return None
+        if isinstance(self.source, Channels):
+            known = self.source.values(scales)
+            return None if known is None else {role: known[column.index] for role, column in wanted.items()}
         decimals = {way.decimal for way in weigh(islice(self._texts(), _FIRST), self._open_ways()).ways}
         first = next(self.rows(), (0, ()))[1]
-        if isinstance(self.source, Sheet) or len(decimals) > 1 or self.left_out or not fits(first, len(self.headers)):
+        if len(decimals) > 1 or not fits(first, len(self.headers)):
             return None
         numerals = Numerals(decimals.pop())
         cells = [first[column.index] for column in wanted.values()]
         if not all(isinstance(cell, str) and numerals.allows(cell) for cell in cells):
             return None  # a library may take a column of TRUE for numbers
-        scales = {column.index: column.scale for column in wanted.values()}
         values = self.source.columns(self.layout, len(first), scales, numerals)
         return None if values is None else {role: values[column.index] for role, column in wanted.items()}
 

@@ -92,6 +92,6 @@ def _undecodable(data: bytes, file: Path, bad: int, encoding: str) -> Measuremen
         file=file,
         place=line_of(data, bad),
         found=f"byte 0x{data[bad]:02x}",
-        expected="a table as text (UTF-8, UTF-16, Latin-1 or GB18030), or an xlsx workbook",
+        expected="a table as text (UTF-8, UTF-16, Latin-1 or GB18030), a workbook, or a recording such as .tdms",
         hint='export it as "CSV UTF-8", or state encoding = "..." in the campaign',
     )

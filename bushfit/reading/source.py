@@ -1,4 +1,4 @@
-"""The rows of a test file, which may be a text in any encoding or a sheet of a workbook."""
+"""The rows of a test file: of a text in any encoding, of a sheet of a workbook, or of a group of recorded channels."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bushfit.reading.files import HEAD_BYTES
 from bushfit.reading.layout import MOST_HEAD_LINES, Layout, Line, is_comment, split
@@ -25,6 +28,8 @@ LEAST_VALUE, LARGEST_VALUE = SIZES
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 #: Signs that part thousands in a number, other than those which may part columns or decimals.
 _SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")
+#: Rows of channels that are made at a time; chosen: they fill some MiB.
+_CHUNK_ROWS = 1 << 14
 #: Thousands that are parted by a blank.
 _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
@@ -36,6 +41,8 @@ class Text:
     data: bytes
     encoding: str | None
     sheet: None = None
+    layout: None = None
+    numeric: frozenset[int] = frozenset()
 
     def head(self) -> list[Line]:
         """The filled lines at its start."""
@@ -131,13 +138,16 @@ def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:
 class Sheet:
     """A sheet of a workbook as rows of texts and numbers, "" where a cell is empty.
 
-    `lacks_values` tells whether the workbook has formulas whose values were not saved, which are empty cells, too.
+    `lacks_values` tells whether the workbook has formulas whose values were not saved, which are empty cells, too;
+    `layout` where its table lies, and `numeric` which columns hold numbers alone, where that need not be found.
     """
 
     sheet: str
-    content: Sequence[Sequence[str | float]]
+    content: Sequence[Sequence[str | float]] = ()
     lacks_values: Callable[[], bool] = lambda: False
     encoding: None = None
+    layout: Layout | None = None
+    numeric: frozenset[int] = frozenset()
 
     def head(self) -> list[Line]:
         """The filled rows at its start."""
@@ -148,6 +158,38 @@ class Sheet:
         for number, cells in enumerate(islice(self.content, after, None), start=after + 1):
             if any(cell != "" for cell in cells):
                 yield Line(number, cells)
+
+
+@dataclass(frozen=True, eq=False)
+class Channels(Sheet):
+    """A group of recorded channels of one length as rows of cells, which count from 1 below the `layout`.
+
+    `arrays` are their values, (n,) each, floats or texts as objects; `above` is what the file says of all of them.
+    """
+
+    arrays: Sequence[NDArray[Any]] = ()
+    above: Sequence[Line] = ()
+    format: str = ""
+
+    def head(self) -> list[Line]:
+        """What is said of the channels, and the first rows."""
+        return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
+
+    def lines(self, after: int) -> Iterator[Line]:
+        """All rows after a row."""
+        for start in range(after, len(self.arrays[0]), _CHUNK_ROWS):
+            chunk = zip(*(values[start : start + _CHUNK_ROWS].tolist() for values in self.arrays), strict=True)
+            yield from (Line(number, cells) for number, cells in enumerate(chunk, start=start + 1))
+
+    def values(self, scales: Mapping[int, float]) -> dict[int, Floats] | None:
+        """The values of channels in SI by their index, (n,) each; None where a cell holds no number that a rig records.
+
+        `scales` has factors to SI by index.
+        """
+        if not self.numeric >= set(scales):
+            return None
+        found = {index: self.arrays[index] * scale for index, scale in scales.items()}
+        return found if all(np.all(np.abs(values) <= LARGEST_VALUE) for values in found.values()) else None
 
 
 #: The rows of a test file.

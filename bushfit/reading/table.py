@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -17,10 +17,10 @@ from bushfit.reading.files import sha256, view_bytes
 from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, plain, split_convention
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.numerals import is_like_number
-from bushfit.reading.source import RowSource, Text
+from bushfit.reading.parts import open_part
+from bushfit.reading.source import RowSource, Sheet, Text
 from bushfit.reading.wide import as_long
 from bushfit.reading.words import OF_MOTION, of_motion
-from bushfit.reading.workbook import is_workbook, open_sheet
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 #: Likeness, from 0 to 1, from which a header is suggested for one that is not there; chosen: one word of two suffices.
@@ -54,8 +54,8 @@ class Table(Columns):
         """Read a file and understand its header.
 
         Args:
-            file: a text in any dialect, or a workbook. Lines of other content may stand above the header, and a row of
-                units below it. A sweep's may be a wide table.
+            file: a text in any dialect, a workbook or a recording. Lines of other content may stand above the header,
+                and a row of units below it. A sweep's may be a wide table.
             names: for each role the headers it usually goes by, LOOP_COLUMNS or SWEEP_COLUMNS.
             columns, stated_units: header and unit of roles, where it is no usual one, or the file does not tell it.
             stated: what the file does not tell of its format.
@@ -73,8 +73,10 @@ class Table(Columns):
         vocabulary = Vocabulary(of_motion(names, motion), columns or {})
 
         def lay_out(source: RowSource) -> tuple[RowSource, Layout, Vocabulary]:
-            delimiter = "" if source.sheet else DELIMITERS[stated.delimiter] if stated.delimiter else None
-            layout = find_layout(source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line)
+            delimiter = "" if isinstance(source, Sheet) else DELIMITERS[stated.delimiter] if stated.delimiter else None
+            layout = source.layout or find_layout(
+                source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line
+            )
             if (
                 "amplitude" in names
                 and stated.header_line is None
@@ -84,8 +86,10 @@ class Table(Columns):
             return source, layout, vocabulary
 
         try:
-            source = _source(data, file, stated, lambda sheet: len(vocabulary.roles(lay_out(sheet)[1].headers)) > 1)
-            source, layout, understood = lay_out(source)
+            part = open_part(
+                data, file, stated.sheet, lambda part: len(vocabulary.roles(lay_out(part)[1].headers) - {"time"}) > 1
+            )
+            source, layout, understood = lay_out(part or Text(*to_utf8(data, file, stated.encoding)))
         except csv.Error as error:
             raise MeasurementError("the table cannot be read", file=file, found=str(error)) from error
         if stated.header_line not in (None, layout.header_line):
@@ -247,15 +251,6 @@ class Table(Columns):
             hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
             + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
         )
-
-
-def _source(data: bytes, file: Path, stated: FileFormat, is_usable: Callable[[RowSource], bool]) -> RowSource:
-    """The rows of a file: of a text, or of the sheet of a workbook that is stated or usable."""
-    if is_workbook(data):
-        return open_sheet(data, file, stated.sheet, is_usable)
-    if stated.sheet:
-        raise MeasurementError("this is no workbook", file=file, found=f'sheet = "{stated.sheet}"', expected="xlsx")
-    return Text(*to_utf8(data, file, stated.encoding))
 
 
 def _is_k(header: str) -> bool:

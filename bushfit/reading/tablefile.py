@@ -11,9 +11,10 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Literal
 
 from bushfit.errors import OutputError, printable
@@ -21,12 +22,9 @@ from bushfit.errors import OutputError, printable
 if TYPE_CHECKING:
     import pandas as pd
     from xlsxwriter import Workbook
-    from xlsxwriter.format import Format
 
 #: Commas and decimal points; semicolons and decimal commas; a workbook.
 Form = Literal["csv", "decimal-comma", "xlsx"]
-#: Cells of a row.
-Row = Iterable[str | float | None]
 #: The start of a text that a spreadsheet takes for a formula, in ASCII or full width, even after blanks.
 _FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
 #: What parts the lines of a text.
@@ -116,49 +114,36 @@ def undefused(text: str) -> str:
     return text[1:] if text.startswith("'") and _FORMULA.match(text[1:]) else text
 
 
-class _Sheet:
-    """Writes rows of texts and numbers to a sheet as they come, below headers in bold that stay in sight.
+def _write(book: Workbook, name: str, table: pd.DataFrame) -> None:
+    """Write a table to a sheet, below headers in bold that stay in sight, its columns as wide as their texts.
 
     Every text is written as a text: nothing is run as a formula or taken for a link or a number. Cells without a value,
     and nan, stay empty.
+
+    Raises:
+        OutputError: more rows or columns than a sheet has.
     """
-
-    def __init__(self, book: Workbook, name: str, headers: Iterable[str]) -> None:
-        self._sheet = book.add_worksheet(name)
-        self._sheet.freeze_panes(1, 0)
-        self._widths: dict[int, int] = {}
-        self._count = 0
-        self.add(headers, book.add_format({"bold": True}))
-
-    def add(self, cells: Row, look: Format | None = None) -> None:
-        """Write one row.
-
-        Raises:
-            OutputError: more rows or columns than a sheet has.
-        """
+    sheet, bold = book.add_worksheet(name), book.add_format({"bold": True})
+    sheet.freeze_panes(1, 0)
+    rows = zip(*(column.tolist() for _, column in table.items()), strict=True)  # Python's own numbers
+    for row, cells in enumerate(chain([tuple(map(str, table.columns))], rows)):
         for place, cell in enumerate(cells):
             if isinstance(cell, str):
-                self._widen(place, len(cell))
-                status = self._sheet.write_string(self._count, place, _text(cell), look)
+                status = sheet.write_string(row, place, _text(cell), None if row else bold)
             elif cell is not None and math.isfinite(cell):
-                status = self._sheet.write_number(self._count, place, cell)
+                status = sheet.write_number(row, place, cell)
             else:
                 continue
             if status < 0:  # beyond the last row or column of a sheet
                 raise OutputError(
                     "a table is too large for a sheet",
-                    place=self._sheet.name,
+                    place=name,
                     expected="at most 1,048,576 rows and 16,384 columns",
                     hint="--table-format csv has no such limit",
                 )
-        self._count += 1
-
-    def _widen(self, place: int, letters: int) -> None:
-        """Make a column as wide as its widest text, as far as that goes."""
-        width = min(_WIDEST, letters + 1)
-        if width > self._widths.get(place, 0):
-            self._widths[place] = width
-            self._sheet.set_column(place, place, width)
+    for place, (header, column) in enumerate(table.items()):
+        longest = max(len(text) for text in (str(header), *column.tolist()) if isinstance(text, str))
+        sheet.set_column(place, place, min(_WIDEST, longest + 1))
 
 
 def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
@@ -173,9 +158,7 @@ def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
     with Workbook(stream, {"in_memory": True}) as book:
         book.set_properties({"created": _MADE})
         for title, table in tables.items():
-            sheet = _Sheet(book, _sheet_name(title, names), map(str, table.columns))
-            for cells in zip(*(column.tolist() for _, column in table.items()), strict=True):  # Python's own numbers
-                sheet.add(cells)
+            _write(book, _sheet_name(title, names), table)
     return stream.getvalue()
 
 

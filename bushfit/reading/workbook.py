@@ -1,4 +1,4 @@
-"""The sheets of an xlsx workbook.
+"""The sheets of a workbook: xlsx, xlsb, xls or ods.
 
 python-calamine reads them: exactly, and imported in a millisecond where openpyxl takes 170. It does so in a process of
 its own (`workbook_process`), because an archive of some kilobytes may hold sheets of terabytes.
@@ -9,15 +9,14 @@ import marshal
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from bushfit.errors import BushfitError, MeasurementError, did_you_mean
+from bushfit.errors import BushfitError, MeasurementError
 from bushfit.reading import workbook_process
-from bushfit.reading.files import view_bytes
 from bushfit.reading.source import Sheet
 
 #: Cells that all sheets which are read span together at most; chosen: a full sheet of ten columns.
@@ -28,55 +27,15 @@ _MOST_MEMORY = 2 << 30
 _MOST_SECONDS = 30
 #: By how much longer it is waited for on a machine with much else to do.
 _PATIENCE = 15
-#: First bytes of a zip archive, which an xlsx workbook is.
+#: First bytes of a zip archive, which newer workbooks are.
 _ZIP_SIGN = b"PK\x03\x04"
 #: First bytes of the older formats of Office.
 _OLD_OFFICE_SIGN = b"\xd0\xcf\x11\xe0"
-#: The part that makes an archive an xlsx workbook, by its name, which archives do not compress.
-_OF_XLSX = b"xl/workbook.xml"
-#: Sheets that an error lists at most; chosen: a line or two.
-_MOST_LISTED = 12
 
 
 def is_workbook(data: bytes) -> bool:
     """Whether the first bytes of a file are those of a workbook or of another archive."""
     return data.startswith((_ZIP_SIGN, _OLD_OFFICE_SIGN))
-
-
-def open_sheet(data: bytes, file: Path, name: str | None, is_usable: Callable[[Sheet], bool]) -> Sheet:
-    """The sheet of a workbook that holds the table: the one that is stated by its name, or else the only usable one.
-
-    Raises:
-        MeasurementError: no xlsx workbook, one that is far too large, or no single usable sheet.
-    """
-    names, sheets = read_sheets(data, file, name)
-    if name is not None:
-        if sheets:
-            return sheets[0]
-        hint = did_you_mean(name, names)
-        raise MeasurementError(
-            "there is no such sheet", file=file, found=f'"{name}"', expected=_listed(names), hint=hint
-        )
-    usable = [sheet for sheet in sheets if is_usable(sheet)] if len(sheets) > 1 else sheets
-    if len(usable) == 1:
-        return usable[0]
-    raise MeasurementError(
-        "more than one sheet holds such a table" if usable else "no sheet holds such a table",
-        file=file,
-        found=_listed([sheet.sheet for sheet in usable or sheets]),
-        expected="one",
-        hint='choose it in the campaign: sheet = "..."',
-    )
-
-
-def sheets(file: Path) -> list[Sheet]:
-    """The visible sheets of a workbook; none where the file is no workbook.
-
-    Raises:
-        MeasurementError: no xlsx workbook, or one that is far too large.
-    """
-    data = view_bytes(file, MeasurementError)
-    return read_sheets(data, file)[1] if is_workbook(data) else []
 
 
 def read_sheets(
@@ -85,15 +44,8 @@ def read_sheets(
     """The names of all sheets of a workbook, and the sheet of a name, or else all visible ones, or all if none is.
 
     Raises:
-        kind: no xlsx workbook, or one that takes more memory or time than a workbook may.
+        kind: no workbook, or one that takes more memory or time than a workbook may.
     """
-    if _OF_XLSX not in data:
-        raise kind(
-            "this is no xlsx workbook",
-            file=file,
-            expected="a table as text, or an xlsx workbook",
-            hint="save it as xlsx",
-        )
     book = _known(data)
     wanted = book.get("shown") if name is None else [name]
     if wanted is None or not book["sheets"].keys() >= set(wanted):
@@ -130,8 +82,8 @@ def _asked(data: bytes, file: Path, kind: type[BushfitError], **order: object) -
     except subprocess.TimeoutExpired:
         status, answer = -getattr(signal, "SIGXCPU", 0), {}
     if "error" in answer:
-        hint = "save it again as xlsx, or as CSV"
-        raise kind("the workbook cannot be read", file=file, found=answer["error"], hint=hint)
+        expected, hint = "a table as text, or a workbook: xlsx, xlsb, xls or ods", "save it again as xlsx, or as CSV"
+        raise kind("the workbook cannot be read", file=file, found=answer["error"], expected=expected, hint=hint)
     if status or "too_many" in answer:
         slow = status == -getattr(signal, "SIGXCPU", 0)
         taken = f"more than {_MOST_SECONDS} s of work" if slow else f"more than {_MOST_MEMORY >> 30} GiB of memory"
@@ -143,7 +95,3 @@ def _asked(data: bytes, file: Path, kind: type[BushfitError], **order: object) -
             hint="save the sheet as CSV",
         )
     return answer
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(f'"{name}"' for name in names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")

@@ -74,6 +74,9 @@ def _cell(value: object) -> str | float:
 
 
 def _not_computed(data: bytes) -> bool:
+    """Whether an xlsx workbook has a formula without its value; an xls has a value for each."""
+    if not data.startswith(b"PK"):
+        return False
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         for part in archive.infolist():
             with archive.open(part) as stream:

@@ -32,7 +32,7 @@ IN_CAMPAIGN = [
     ('"loop.csv"', '"loop.csv"\nunits = {force = "mm" }', 'loop.csv, line 1, column "force [N]": two units for the force', "one unit, from the header, the units row or the campaign"),
     ('"loop.csv"', '"loop.csv"\nencoding = "klingon"', "loop.csv: unknown encoding", 'a name such as "utf-8", "utf-16", "cp1252", "latin-1" or "gb18030"'),
     ('"loop.csv"', '"loop.csv"\nheader_line = 0', "loop.csv: there is no header on this line", "lines count from 1"),
-    ('"loop.csv"', '"loop.csv"\nsheet = "Tabelle1"', "loop.csv: this is no workbook", "xlsx"),
+    ('"loop.csv"', '"loop.csv"\nsheet = "Tabelle1"', "loop.csv: this is no workbook", "a file with groups"),
     ('direction = "axial"', 'direction = "up"', "campaign.toml, loops #1.direction: this value is not understood", "'axial', 'radial' or 'torsion'"),
     ('direction = "axial"\n\n[[sweeps]]', "\n[[sweeps]]", "campaign.toml, loop.csv: a test without a direction", "direction ="),
     ('file = "sweep.csv"', 'file = "sweep.csv"\namplitude = "rms"', "campaign.toml, sweeps #1.amplitude: this value is not understood", "'zero-to-peak' or 'peak-to-peak'"),

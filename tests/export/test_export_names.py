@@ -19,6 +19,7 @@ from bushfit.reading.tablefile import to_xlsx
 from bushfit.report import spreadsheets
 
 #: Names that break out of what is not escaped: line ends, comment marks, cards, keywords, formulas, markup, quotes.
+#: Halves of characters are in no name: files with them are refused, and pandas beside pyarrow holds no such text.
 NASTY = [
     "a\nPBUSH          1       K     1.0\n$",
     "a\r\n*STEP\n** ",

@@ -6,6 +6,7 @@ import io
 import sys
 import zipfile
 from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,11 @@ import bombs
 import numpy as np
 import openpyxl
 import pytest
+import xlwt
 from dialects import HEADERS, NUMBERS, UNITS
+from odf.opendocument import OpenDocumentSpreadsheet
+from odf.table import Table, TableCell, TableRow
+from odf.text import P
 from texts import refused
 
 from bushfit.errors import MeasurementError
@@ -69,6 +74,41 @@ SHEETS: dict[str, Sheets] = {
 @pytest.mark.parametrize("case", SHEETS)
 def test_sheets_read_to_the_same_numbers(case: str, tmp_path: Path) -> None:
     assert np.array_equal(forces(workbook(SHEETS[case], tmp_path)), FORCE)
+
+
+def xls(rows: list[list[object]], file: Path) -> None:
+    """By a library of the format, with a date, a format of numbers, and the title merged over the columns."""
+    book = xlwt.Workbook()
+    sheet = book.add_sheet("Loop")
+    sheet.write_merge(0, 0, 0, 2, "Axial")
+    sheet.write(1, 1, datetime(2026, 2, 1), xlwt.easyxf(num_format_str="DD.MM.YYYY"))
+    for number, row in enumerate(rows, start=2):
+        for column, cell in enumerate(row):
+            sheet.write(number, column, cell, xlwt.easyxf(num_format_str="0.0"))
+    book.save(str(file))
+
+
+def ods(rows: list[list[object]], file: Path) -> None:
+    """With formulas that have their values."""
+    book, sheet = OpenDocumentSpreadsheet(), Table(name="Loop")
+    for row in rows:
+        line = TableRow()
+        for cell in row:
+            number = {} if isinstance(cell, str) else {"valuetype": "float", "value": cell, "formula": f"of:={cell}"}
+            own = TableCell(**(number or {"valuetype": "string"}))
+            own.addElement(P(text=str(cell)))
+            line.addElement(own)
+        sheet.addElement(line)
+    book.spreadsheet.addElement(sheet)
+    book.save(str(file))
+
+
+@pytest.mark.parametrize("write", [xls, ods])
+def test_workbooks_of_other_formats_read_to_the_same_numbers(
+    write: Callable[[list[list[object]], Path], None], tmp_path: Path
+) -> None:
+    write(table("loop"), tmp_path / f"test.{write.__name__}")
+    assert np.array_equal(forces(tmp_path / f"test.{write.__name__}"), FORCE)
 
 
 def test_a_sweep_and_a_loop_in_one_workbook(tmp_path: Path) -> None:
