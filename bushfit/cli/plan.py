@@ -55,7 +55,7 @@ _MOST_VALUES = 6
     option(
         "--target targets",
         "NAME=SIZE",
-        '95 % interval to reach, either way: "mu=2 %", "stiffness=1 %", "loss_factor.axial=5 %"; may be given again.',
+        'Interval (95 %) to reach: "mu=2 %", "stiffness=1 %"; may be given again.',
         multiple=True,
     ),
     option("--parameters", "NAME,...", "Whose errors count, with --for parameters [all]."),
@@ -91,8 +91,7 @@ def command(
     """Choose the tests that would tell most, within what the rig can do.
 
     It starts from the tests of CAMPAIGN, from its [compound] (hardness = "61 Shore A", filler = "27 phr") where there
-    are none, or from MODEL.json or a folder of results. Rivals and targets take no more hours than they need; a target
-    that is missed is explained, with exit status 1.
+    are none, or from MODEL.json or a folder of results. A target that is missed is explained, with exit status 1.
 
     Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml to simulate.
     """
