@@ -10,11 +10,11 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
-from bushfit.diagnosis.currency import Ledger, RigErrors, Worth
+from bushfit.diagnosis.currency import Ledger, Worth
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, FaultyPlace, Meeting, MissingEffect, effects, places, unnamed
 from bushfit.diagnosis.priors import FAR
-from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
+from bushfit.diagnosis.rig_errors import RigErrors, rig_errors, scattering_alone
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data import Data

@@ -1,7 +1,8 @@
 """Errors of the rig as columns: what a run, a level or a loop shares, and what wanders along a run."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from math import log
 
@@ -9,7 +10,6 @@ import numpy as np
 from scipy.special import chdtri
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.currency import Block, Node, RigErrors
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
@@ -20,6 +20,81 @@ from bushfit.fitting.rig_class import ASSUMED, of_class
 _RUN, _LEVEL, _WAVE, _LOOP = range(4)
 #: Points of a run, from which on it can wander.
 _FEWEST = 4
+
+
+@dataclass(frozen=True)
+class Node:
+    """One size of each of the rig's errors, with the logarithm of its weight.
+
+    Args:
+        scatter: standard deviation of a sweep's point, relative to the one that counts.
+        errors: standard deviations by kind of error, in units of the rig's class.
+        wide: whether errors of levels are larger than the class allows.
+    """
+
+    scatter: float
+    errors: tuple[float, ...]
+    log_weight: float
+    wide: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Rows of the tests that share errors of the rig, and no others.
+
+    Args:
+        rows: their numbers, (n,).
+        columns: whitened residuals that an error of the class makes of them, (w, n).
+        kinds: number of each error's kind, (w,).
+        scatters: whether the rows scatter as sweeps' points do, which nodes change.
+    """
+
+    rows: Array
+    columns: Array
+    kinds: Array
+    scatters: bool
+
+
+@dataclass(frozen=True, eq=False)
+class RigErrors:
+    """The rig's errors in some tests, which are the same whatever the model."""
+
+    blocks: Sequence[Block]
+    nodes: Sequence[Node]
+
+    @cached_property
+    def scatter(self) -> Array:
+        """Of each node, (nodes,)."""
+        return np.array([node.scatter for node in self.nodes])
+
+    @cached_property
+    def within(self) -> Array:
+        """Which nodes are within the class of the rig, (nodes,) bool."""
+        return np.array([not node.wide for node in self.nodes])
+
+    @cached_property
+    def width(self) -> int:
+        """Most errors of a block."""
+        return max((len(block.kinds) for block in self.blocks), default=0)
+
+    @cached_property
+    def roots(self) -> tuple[Array, Array]:
+        """At every node and block L^-1 D of S = 1 + D W W^T D = L L^T, (nodes, blocks, w, w), and ln|S|, (nodes,).
+
+        Notes: times the products of errors with any rows it is what is to be taken off the products of those rows.
+        """
+        inner = np.zeros((len(self.blocks), self.width, self.width))
+        kinds = np.full(inner.shape[:2], -1)
+        for number, block in enumerate(self.blocks):
+            size = len(block.kinds)
+            inner[number, :size, :size] = block.columns @ block.columns.T
+            kinds[number, :size] = block.kinds
+        scatters = np.array([block.scatters for block in self.blocks], dtype=bool)
+        share = np.where(scatters, 1.0 / self.scatter[:, None], 1.0)[..., None]
+        errors = np.array([(*node.errors, 0.0) for node in self.nodes])[:, kinds] * share
+        root = np.linalg.cholesky(np.eye(self.width) + errors[..., None] * inner * errors[..., None, :])
+        log_size = 2.0 * np.sum(np.log(np.einsum("nbii->nbi", root)), axis=(1, 2))
+        return np.linalg.inv(root) * (errors * share)[..., None, :], log_size
 
 
 def scattering_alone(evidence: Evidence) -> Evidence:

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import kstest, multivariate_normal, norm
 
-from bushfit.diagnosis.currency import Block, Group, Ledger, Node, RigErrors
+from bushfit.diagnosis.currency import Group, Ledger
 from bushfit.diagnosis.priors import SIZES
+from bushfit.diagnosis.rig_errors import Block, Node, RigErrors
 from bushfit.effects.contract import Array
 
 #: Two errors of the rig within its class, and one of levels beyond it.
