@@ -41,7 +41,7 @@ LIBRARIES = {
     "DuckDB": ("import duckdb", "found = len(duckdb.read_csv(str(file)).fetchnumpy()['time [s]'])"),
 }
 BUSHFIT = (
-    "import pandas, scipy.optimize\n"
+    "import lmfit, pandas, scipy.optimize\n"
     "from bushfit import units\n"
     "units.factor('mm', 'm')  # imports what knows units\n"
     "from bushfit.campaign.campaign import Campaign\n"
