@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from bushfit.campaign.schema import SimulateSettings
@@ -66,11 +67,16 @@ def drawn(curves: Mapping[str, Curve], file: Path) -> None:
     for axes, (label, unit) in zip(figure.subplots(1, 2), (("time [s]", 0), ("memory [MB]", 1)), strict=True):
         for name, curve in curves.items():
             axes.loglog([*curve], [point[unit] for point in curve.values()], "o-", ms=3.5, lw=1.2, label=name)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5)) if axis is axes.yaxis else LogLocator(100))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+            axis.set_minor_formatter(NullFormatter())
+        axes.set_ylim(1 if unit == 0 else 100, 20 if unit == 0 else 1000)
         axes.set_xlabel("tests, or rows of the one loop", fontsize=8)
         axes.set_ylabel(label, fontsize=8)
         axes.tick_params(labelsize=7)
         axes.grid(color="#d9d9d9", lw=0.5)
-    axes.legend(fontsize=7, frameon=False)
+    axes.legend(fontsize=7, frameon=False, loc="lower right")
     figure.savefig(file)
 
 
