@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING
 
 from bushfit.cli.options import Parameter, file_option, in_order, option, option_of, place_option, under
 from bushfit.errors import UnitError, naming
-from bushfit.units import quantity
+from bushfit.units import quantity, stepped
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import PredictSettings
 
-#: Values of a grid at most: more is a typing error in the step.
-_MOST_VALUES = 100_000
 #: SI units of the options of a grid, by their keys.
 _UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 
@@ -98,7 +96,6 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
             raise UnitError("frequencies and amplitudes are above zero", found=text, expected=expected)
         if not counted:
             return values
-        start, stop, step = values
-        if not (step > 0 and stop >= start > 0 and (stop - start) / step < _MOST_VALUES):
+        if not (counted_up := stepped(*values)):
             raise UnitError("start:stop:step does not count upward", found=text, expected=expected)
-        return tuple(start + i * step for i in range(int((stop - start) / step * (1 + 1e-9)) + 1))
+        return counted_up

@@ -71,18 +71,13 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
     frequencies = np.array(PAPER_FREQUENCIES)
     if result.measured is None:
         return frequencies, amplitudes
-    low, high = result.measured.frequency
-    inside = frequencies[(frequencies >= low * (1 - MARGIN)) & (frequencies <= high * (1 + MARGIN))]
+    inside = _inside(frequencies, [result.measured.frequency])
     if inside.size < 2:
-        inside = _distinct(np.geomspace(low, high, _FREQUENCIES))
+        inside = _distinct(np.geomspace(*result.measured.frequency, _FREQUENCIES))
     if direction.is_rotation:
         return inside, amplitudes
     per_displacement = result.model.unit_strain(direction if isinstance(direction, Specimen) else Direction.AXIAL)
-    least, most = (strain / per_displacement for strain in result.measured.strain)
-    reached = amplitudes[(amplitudes >= least * (1 - MARGIN)) & (amplitudes <= most * (1 + MARGIN))]
-    if reached.size < 2:
-        reached = _even(least, most, _AMPLITUDES)
-    return inside, reached
+    return inside, _within(amplitudes, [np.array(result.measured.strain) / per_displacement], _AMPLITUDES)
 
 
 def common_grid(

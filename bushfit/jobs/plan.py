@@ -55,7 +55,7 @@ class Planned:
             "tests": [_run(*pair) for pair in zip(found.planned.tests, found.planned.minutes.tolist(), strict=True)],
             "hours_planned": found.planned.hours,
             "hours_standard": found.standard.hours,
-            "hours_left": found.hours_left,
+            "hours_left": wanted.hours - found.planned.hours,
             "enough": found.enough,
             "targets": dict(self._targets()),
             "parameters": {
