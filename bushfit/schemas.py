@@ -1,7 +1,7 @@
 """JSON Schemas (draft 2020-12) of the JSON files that bushfit writes, and of the TOML files that it is given.
 
-They are made on demand of the types by which these files are read and written, descriptions from their docstrings, so
-that none can be out of date.
+They are made on demand of the types by which these files are read and written, descriptions from what these say of
+their keys: in the docstring of a dataclass, beside each key of a TypedDict. So none can be out of date.
 """
 
 import importlib
@@ -11,7 +11,9 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
+
+from typing_extensions import Doc, get_type_hints, is_typeddict
 
 from bushfit.errors import BushfitError, did_you_mean
 
@@ -98,12 +100,12 @@ def _generator(way: str) -> Any:
 
 
 def _explained(made: dict[str, Any], kind: type) -> dict[str, Any]:
-    """The schema of a table with what the docstrings of its type say of it and of its keys."""
+    """The schema of a table with what its type says of it and of its keys."""
     from bushfit.validation import in_table
 
     properties: dict[str, Any] = made["properties"]
-    told: dict[str, str] = {}
-    for each in reversed([kind, *getattr(kind, "__orig_bases__", kind.__mro__[1:])]):
+    told = _beside_keys(kind) if is_typeddict(kind) else {}
+    for each in reversed(kind.__mro__):
         told |= _arguments(inspect.cleandoc(each.__doc__ or ""))
     for key in properties.keys() & told.keys():
         properties[key] = {**properties[key], "description": told[key]}
@@ -124,6 +126,14 @@ def _arguments(docstring: str) -> dict[str, str]:
     found = _ARGS.search(re.sub(r"\bNone\b", "null", docstring))
     entries = _ARG.findall(found[1]) if found else []
     return {name: " ".join(words.split()) for names, words in entries for name in names.split(", ")}
+
+
+def _beside_keys(kind: type) -> dict[str, str]:
+    """What a TypedDict says of each key beside it."""
+    hints = get_type_hints(kind, include_extras=True)
+    parts = ((key, part) for key, hint in hints.items() for part in (hint, *get_args(hint)))  # as in NotRequired[...]
+    beside = ((key, each) for key, part in parts for each in getattr(part, "__metadata__", ()))
+    return {key: each.documentation for key, each in beside if isinstance(each, Doc)}
 
 
 def _tidied(node: Any) -> Any:

@@ -198,6 +198,14 @@ def alike(values: Sequence[float], digits: int, least: int = 0) -> list[str]:
     return [text(value) for value in values]
 
 
+def stepped(start: float, stop: float, step: float) -> tuple[float, ...]:
+    """Values from start to stop, both of them; none where they do not count upward from above zero, or are beyond
+    100 000, by a typing error in the step."""
+    if not (0.0 < start <= stop and step > 0.0 and (stop - start) / step < 100_000):
+        return ()
+    return tuple(start + i * step for i in range(int((stop - start) / step * (1.0 + 1e-9)) + 1))  # with the last one
+
+
 def told(unit: str, *values: float, digits: int = 3) -> str:
     """Positive numbers of one unit as people read them, each once: 1.09 MPa, 5 to 155 Hz, 0.0221 um."""
     unit, factor = for_people(unit, 1.0, math.sqrt(abs(min(values) * max(values))))

@@ -3,9 +3,9 @@
 Their JSON Schemas are made of these types, and the type checker holds to them what is written.
 """
 
-from typing import Literal, NotRequired
+from typing import Annotated, Literal, NotRequired
 
-from typing_extensions import TypedDict
+from typing_extensions import Doc, TypedDict
 
 from bushfit.diagnosis.document import Verdict
 from bushfit.model.result import End
@@ -13,147 +13,114 @@ from bushfit.report.process import Process
 
 
 class Found(TypedDict, total=False):
-    """What was found of one bushing of a batch.
+    """What was found of one bushing of a batch."""
 
-    Args:
-        campaign_name: of the campaign.
-        inputs: SHA-256 of the campaign, its tests and a model, by file.
-        verdict: of diagnose, where it was asked.
-        effects: that diagnose named.
-        alternatives: what the tests cannot tell the effects from.
-        warnings: what a user must know before using the numbers.
-        parameters: by name: value, least and largest of the 95 % interval, standard error, and the SI unit that all
-            four are in; null what is not known.
-        at_bound: parameters that came to rest on the least or largest value that they may have.
-        nrmse: root mean square difference of model and tests, relative; null where nothing was fitted.
-        reduced_chi_square: mean square residual in units of noise; null where nothing was fitted.
-        points: by operating point, then "stiffness" [N/m, or N m/rad, or Pa] and "loss factor" [1]: value, least and
-            largest of the 95 % band.
-        date: of the first test for which the campaign states one.
-        curve: |K| [N/m, N m/rad or Pa] by operating point, as the first sweep measured it at the level in its middle.
-    """
-
-    campaign_name: str
-    inputs: dict[str, str]
-    verdict: Verdict
-    effects: list[str]
-    alternatives: list[str]
-    warnings: list[str]
-    parameters: dict[str, list[float | str | None]]
-    at_bound: dict[str, End]
-    nrmse: float | None
-    reduced_chi_square: float | None
-    points: dict[str, dict[str, list[float | None]]]
-    date: str | None
-    curve: dict[str, float]
+    campaign_name: Annotated[str, Doc("of the campaign.")]
+    inputs: Annotated[dict[str, str], Doc("SHA-256 of the campaign, its tests and a model, by file.")]
+    verdict: Annotated[Verdict, Doc("of diagnose, where it was asked.")]
+    effects: Annotated[list[str], Doc("that diagnose named.")]
+    alternatives: Annotated[list[str], Doc("what the tests cannot tell the effects from.")]
+    warnings: Annotated[list[str], Doc("what a user must know before using the numbers.")]
+    parameters: Annotated[
+        dict[str, list[float | str | None]],
+        Doc(
+            "by name: value, least and largest of the 95 % interval, standard error, and the SI unit that all four "
+            "are in; null what is not known."
+        ),
+    ]
+    at_bound: Annotated[
+        dict[str, End],
+        Doc("parameters that came to rest on the least or largest value that they may have."),
+    ]
+    nrmse: Annotated[
+        float | None,
+        Doc("root mean square difference of model and tests, relative; null where nothing was fitted."),
+    ]
+    reduced_chi_square: Annotated[
+        float | None,
+        Doc("mean square residual in units of noise; null where nothing was fitted."),
+    ]
+    points: Annotated[
+        dict[str, dict[str, list[float | None]]],
+        Doc(
+            'by operating point, then "stiffness" [N/m, or N m/rad, or Pa] and "loss factor" [1]: value, least and '
+            "largest of the 95 % band."
+        ),
+    ]
+    date: Annotated[str | None, Doc("of the first test for which the campaign states one.")]
+    curve: Annotated[
+        dict[str, float],
+        Doc("|K| [N/m, N m/rad or Pa] by operating point, as the first sweep measured it at the level in its middle."),
+    ]
 
 
 class Record(Found):
-    """What was found of one bushing of a batch, and the hashes by which a later run can tell whether it still holds.
+    """What was found of one bushing of a batch, and the hashes by which a later run can tell whether it still holds."""
 
-    Args:
-        schema: of this file.
-        status: done, or failed; of a failed row nothing was found.
-        seconds: that the row took [s].
-        error: why the row failed, in words.
-        key: hash of what was asked, and of the version that answers.
-        files: SHA-256 of the result files beside this one, by name.
-        kept: whether the record was taken over from an earlier run; in memory only.
-    """
-
-    schema: Literal["bushfit/row/2"]
-    status: Literal["done", "failed"]
-    seconds: float
-    error: NotRequired[str]
-    key: NotRequired[str]
-    files: NotRequired[dict[str, str]]
-    kept: NotRequired[bool]
+    schema: Annotated[Literal["bushfit/row/2"], Doc("of this file.")]
+    status: Annotated[Literal["done", "failed"], Doc("done, or failed; of a failed row nothing was found.")]
+    seconds: Annotated[float, Doc("that the row took [s].")]
+    error: NotRequired[Annotated[str, Doc("why the row failed, in words.")]]
+    key: NotRequired[Annotated[str, Doc("hash of what was asked, and of the version that answers.")]]
+    files: NotRequired[Annotated[dict[str, str], Doc("SHA-256 of the result files beside this one, by name.")]]
+    kept: NotRequired[Annotated[bool, Doc("whether the record was taken over from an earlier run; in memory only.")]]
 
 
 class Failure(TypedDict):
-    """A bushing that came to nothing.
+    """A bushing that came to nothing."""
 
-    Args:
-        name: of the bushing.
-        error: why, in words.
-    """
-
-    name: str
-    error: str
+    name: Annotated[str, Doc("of the bushing.")]
+    error: Annotated[str, Doc("why, in words.")]
 
 
 class Scatter(TypedDict):
-    """The middle and the scatter of a quantity over the batch.
+    """The middle and the scatter of a quantity over the batch."""
 
-    Args:
-        median: in the unit.
-        sigma: robust standard deviation, in the unit.
-        unit: of both.
-    """
-
-    median: float
-    sigma: float
-    unit: str
+    median: Annotated[float, Doc("in the unit.")]
+    sigma: Annotated[float, Doc("robust standard deviation, in the unit.")]
+    unit: Annotated[str, Doc("of both.")]
 
 
 class Control(TypedDict):
-    """The middle and the scatter of a column of the table, and what is allowed.
+    """The middle and the scatter of a column of the table, and what is allowed."""
 
-    Args:
-        median: in the unit of the column.
-        sigma: robust standard deviation, in the unit of the column.
-        allowed: least and largest, in the unit of the column; null where there is no limit.
-        process: what the order of test tells of it.
-    """
-
-    median: float
-    sigma: float
-    allowed: list[float | None]
-    process: Process
+    median: Annotated[float, Doc("in the unit of the column.")]
+    sigma: Annotated[float, Doc("robust standard deviation, in the unit of the column.")]
+    allowed: Annotated[
+        list[float | None],
+        Doc("least and largest, in the unit of the column; null where there is no limit."),
+    ]
+    process: Annotated[Process, Doc("what the order of test tells of it.")]
 
 
 class Differing(TypedDict):
-    """A bushing that differs from the others of its batch by more than chance.
+    """A bushing that differs from the others of its batch by more than chance."""
 
-    Args:
-        name: of the bushing.
-        row: of the table, from 1.
-        by: robust z, by quantity: parameters before what follows from them, each the clearest first.
-        p: probability by chance of the clearest, all bushings and quantities counted (Holm).
-        words: the same in words.
-    """
-
-    name: str
-    row: int
-    by: dict[str, float]
-    p: float
-    words: str
+    name: Annotated[str, Doc("of the bushing.")]
+    row: Annotated[int, Doc("of the table, from 1.")]
+    by: Annotated[
+        dict[str, float],
+        Doc("robust z, by quantity: parameters before what follows from them, each the clearest first."),
+    ]
+    p: Annotated[float, Doc("probability by chance of the clearest, all bushings and quantities counted (Holm).")]
+    words: Annotated[str, Doc("the same in words.")]
 
 
 class Counts(TypedDict):
-    """What came of a batch, row by row.
+    """What came of a batch, row by row."""
 
-    Args:
-        schema: of this document.
-        rows: how many there are.
-        done: how many of them are done.
-        failed: the others, and why.
-        limits: bushings by how they meet the limits.
-        missed: names of the bushings that miss a limit.
-        conditional: names of those that pass on condition: the value is within, its interval reaches over the limit.
-        warnings: what could not be judged, and other things to know.
-        differ: bushings that differ from the others by more than chance.
-    """
-
-    schema: Literal["bushfit/batch/1"]
-    rows: int
-    done: int
-    failed: list[Failure]
-    limits: dict[str, int]
-    missed: list[str]
-    conditional: list[str]
-    warnings: list[str]
-    differ: list[Differing]
+    schema: Annotated[Literal["bushfit/batch/1"], Doc("of this document.")]
+    rows: Annotated[int, Doc("how many there are.")]
+    done: Annotated[int, Doc("how many of them are done.")]
+    failed: Annotated[list[Failure], Doc("the others, and why.")]
+    limits: Annotated[dict[str, int], Doc("bushings by how they meet the limits.")]
+    missed: Annotated[list[str], Doc("names of the bushings that miss a limit.")]
+    conditional: Annotated[
+        list[str],
+        Doc("names of those that pass on condition: the value is within, its interval reaches over the limit."),
+    ]
+    warnings: Annotated[list[str], Doc("what could not be judged, and other things to know.")]
+    differ: Annotated[list[Differing], Doc("bushings that differ from the others by more than chance.")]
 
 
 class BatchFile(Counts):

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from bushfit.effects import is_parameter, parameter_named, parameter_names
 from bushfit.errors import CampaignError, naming
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
-from bushfit.units import quantity, sized, temperature
+from bushfit.units import quantity, sized, stepped, temperature
 from bushfit.validation import LARGEST_NUMBER, converted, unknown_key
 
 #: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
@@ -54,16 +54,14 @@ def table(convert: Callable[[dict[str, Any]], Any], written: Mapping[str, Any] |
 
 
 def _frequencies(raw: dict[str, Any]) -> list[str]:
-    """A list of frequencies as texts from { start, stop, step }, with both ends; 100 000 at most, more than any sweep
-    has."""
+    """A list of frequencies as texts from { start, stop, step }, with both ends."""
     expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
     if set(raw) != {"start", "stop", "step"}:
         raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
-    start, stop, step = (quantity(raw[key], "Hz") for key in ("start", "stop", "step"))
-    if not (0.0 < start <= stop and step > 0.0 and (stop - start) / step < 100_000):
+    values = stepped(*(quantity(raw[key], "Hz") for key in ("start", "stop", "step")))
+    if not values:
         raise CampaignError("this is no range of frequencies", found=str(raw), expected="0 < start <= stop, step > 0")
-    count = int((stop - start) / step * (1.0 + 1e-9)) + 1  # rounding must not drop the last step
-    return [f"{value!r} Hz" for value in (start + step * np.arange(count)).tolist()]
+    return [f"{value!r} Hz" for value in values]
 
 
 _HERTZ = text("a number with a unit of Hz")

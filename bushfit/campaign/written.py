@@ -34,9 +34,13 @@ def specimen_lines(specimen: Specimen) -> list[str]:
 
 def table_lines(kind: str, file: str, place: Place, temperature: Any = None) -> list[str]:
     """The lines of one of [[loops]] or [[sweeps]]: the file, what was tested, and at what temperature [K], if one."""
-    tested = f"specimen = {toml_value(place.name)}" if isinstance(place, Specimen) else f'direction = "{place}"'
     warm = [] if temperature is None else [f'temperature = "{temperature - CELSIUS:.6g} degC"']
-    return ["", f"[[{kind}]]", f"file = {toml_value(file)}", tested, *warm]
+    return ["", f"[[{kind}]]", f"file = {toml_value(file)}", place_line(place), *warm]
+
+
+def place_line(place: Place) -> str:
+    """The line that says what a test is made on."""
+    return f"specimen = {toml_value(place.name)}" if isinstance(place, Specimen) else f'direction = "{place}"'
 
 
 def toml_value(value: Any) -> str:

@@ -10,7 +10,7 @@ import click
 from bushfit.cli import completion
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options
-from bushfit.cli.options import FILE, command_called, option, option_of, place_option, under
+from bushfit.cli.options import FILE, command_called, option, place_option, under
 from bushfit.cli.show import new_table
 from bushfit.errors import naming
 from bushfit.progress import counting
@@ -62,17 +62,13 @@ def command(
     from bushfit.campaign.campaign import load_campaign
     from bushfit.effects import effect_named
     from bushfit.jobs.compare import MOST, Compare
-    from bushfit.jobs.provenance import command_line, repeated_options
+    from bushfit.jobs.provenance import command_line, options_typed
 
     if families is None and not 2 <= len(sources) <= MOST:
         raise click.UsageError(f"2 to {MOST} results are compared; one campaign alone with '--families' after it.")
     if families is not None and len(sources) > 1:
         raise click.UsageError("'--families' is of one campaign.")
-    words = repeated_options(
-        families=[families] if families is not None else [],
-        direction=directions,
-        **{option_of(name)[2:]: [text] for name, text in grids.items() if text},
-    )
+    words = options_typed(families=families, direction=directions, **grids)
     job = Compare(asked_for(directions, grids), command_line("compare", *map(str, sources), *words))
     if families is not None:
         names = () if families == _ALL else tuple(name.replace(" ", "") for name in families.split(","))

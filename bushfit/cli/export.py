@@ -6,8 +6,8 @@ from typing import Literal
 import click
 
 from bushfit.cli.common import Options, open_model, with_options
-from bushfit.cli.grids import TEMPERATURE, asked_for, grid_options, kelvin, positive
-from bushfit.cli.options import FILE, command_called, file_option, option, place_option, under
+from bushfit.cli.grids import asked_for, kelvin, positive, where_predicted
+from bushfit.cli.options import FILE, command_called, option, under
 
 
 @command_called(
@@ -35,13 +35,7 @@ from bushfit.cli.options import FILE, command_called, file_option, option, place
     ),
     option("--accuracy", "ERROR", "Largest error of the modulus that an fmu may have [1 %].", default="1 %"),
 )
-@under(
-    "Where it is predicted",
-    place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
-    grid_options("the campaign's"),
-    TEMPERATURE,
-    file_option("--campaign", "Take the grid of this campaign."),
-)
+@where_predicted("Take the grid of this campaign.")
 @with_options("results/<name>", "tables", "pictures")
 def command(
     model: Path,

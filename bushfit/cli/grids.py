@@ -6,20 +6,15 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from bushfit.cli.options import Parameter, in_order, option, option_of
+from bushfit.cli.options import Parameter, file_option, in_order, option, option_of, place_option, under
 from bushfit.errors import UnitError, naming
-from bushfit.units import quantity
+from bushfit.units import quantity, stepped
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import PredictSettings
 
-#: Values of a grid at most: more is a typing error in the step.
-_MOST_VALUES = 100_000
 #: SI units of the options of a grid, by their keys.
 _UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
-
-#: Option of what is predicted at one temperature.
-TEMPERATURE: Parameter = option("--temperature", "TEMP", 'Such as "40 degC", if the model knows it [23 degC].')
 
 
 def grid_options(usual: str) -> Parameter:
@@ -33,12 +28,19 @@ def grid_options(usual: str) -> Parameter:
     )
 
 
-def asked_for(directions: Sequence[str], grids: Mapping[str, str | None]) -> PredictSettings:
-    """Places, and the values of the options of a grid in SI; None where they were not given.
+def where_predicted(campaign: str) -> Parameter:
+    """Where and at which temperature a model is predicted; `campaign` says what is taken of one."""
+    return under(
+        "Where it is predicted",
+        place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
+        grid_options("the campaign's"),
+        option("--temperature", "TEMP", 'Such as "40 degC", if the model knows it [23 degC].'),
+        file_option("--campaign", campaign),
+    )
 
-    Raises:
-        UnitError: as `parse_grid`.
-    """
+
+def asked_for(directions: Sequence[str], grids: Mapping[str, str | None]) -> PredictSettings:
+    """Places, and the values of the options of a grid in SI; None where they were not given."""
     from bushfit.campaign.schema import PredictSettings
 
     axes = {key: parse_grid(grids[key], option_of(key), unit) for key, unit in _UNITS.items()}
@@ -61,11 +63,7 @@ def positive(text: str | None, option: str, unit: str) -> float | None:
 
 
 def kelvin(text: str | None) -> float | None:
-    """The value of --temperature [K]; None where it was not given.
-
-    Raises:
-        UnitError: no temperature with its unit.
-    """
+    """The value of --temperature [K]; None where it was not given."""
     from bushfit.units import temperature
 
     with naming(place="--temperature"):
@@ -98,7 +96,6 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
             raise UnitError("frequencies and amplitudes are above zero", found=text, expected=expected)
         if not counted:
             return values
-        start, stop, step = values
-        if not (step > 0 and stop >= start > 0 and (stop - start) / step < _MOST_VALUES):
+        if not (counted_up := stepped(*values)):
             raise UnitError("start:stop:step does not count upward", found=text, expected=expected)
-        return tuple(start + i * step for i in range(int((stop - start) / step * (1 + 1e-9)) + 1))
+        return counted_up

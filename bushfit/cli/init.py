@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from bushfit.geometry import Bushing
     from bushfit.inspection.gathering import Source
     from bushfit.inspection.record import Inspected, InspectionDocument
-_Seen = TypeVar("_Seen")
 #: Sides of the rubber whose radius or diameter is asked for.
 _SIDES = ("inner", "outer")
 
@@ -64,20 +63,19 @@ def command(
 
     questions = Questions.of(options, no_input=no_input)
     usual = (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
-    if name is None and questions and not any(sizes.values()):
+    if name is None and questions.asked and not any(sizes.values()):
         name = click.prompt("name of the bushing", default=usual, err=True)
     name = name or usual
     folder, target = options.folder(name), "campaign.toml"
     if options.output and options.output.suffix == ".toml":
         folder, target = options.output.parent, options.output.name
-    settle = questions.settled if questions else _as_stated
     size = partial(_bushing, name)
-    bushing = settle(sizes, size) if any(sizes.values()) else None
+    bushing = questions.settled(sizes, size) if any(sizes.values()) else None
     check_free(folder, [target], force=options.force)
     seen, left_out = _usable(files, stated, questions, is_sized=bushing is not None)
     seen = with_specimens_named(seen)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
-        bushing = settle(sizes, size)
+        bushing = questions.settled(sizes, size)
     table = bushing and bushing[1]
     if len({one.part for one in seen if one.part}) > 1:
         target = target if options.output and options.output.suffix == ".toml" else "batch.toml"
@@ -142,15 +140,12 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
 
 
 def _usable(
-    files: Sequence[Path], stated: Mapping[str, Any], questions: Questions | None, *, is_sized: bool
+    files: Sequence[Path], stated: Mapping[str, Any], questions: Questions, *, is_sized: bool
 ) -> tuple[list[Inspected], list[str]]:
     """The loops and sweeps among files, each of a known direction or specimen, and why others are left out.
 
     `is_sized` says whether sizes of a bushing are given: then a file that names a direction is a test of it, and no
     block in shear.
-
-    Raises:
-        MeasurementError: a file that the user names is another, with the way on.
     """
     from bushfit.inspection.gathering import gather
 
@@ -160,9 +155,8 @@ def _usable(
         raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
     seen: list[Inspected] = []
     others = list(left_out)
-    settle = questions.settled if questions else _as_stated
-    for source in sources if questions else counting("tests looked at", sources):
-        one = settle(source.stated, partial(_look, source, is_sized=is_sized, is_asked=questions is not None))
+    for source in sources if questions.asked else counting("tests looked at", sources):
+        one = questions.settled(source.stated, partial(_look, source, is_sized=is_sized, is_asked=questions.asked))
         if one.kind != "history":
             seen.append(one)
             continue
@@ -176,11 +170,6 @@ def _usable(
             )
         others.append(f"{source}: a raw stepped-sine history; {hint}")
     return seen, others
-
-
-def _as_stated(stated: Mapping[str, Any], look: Callable[[Mapping[str, Any]], _Seen]) -> _Seen:
-    """What comes of what is stated, where nobody is asked."""
-    return look(stated)
 
 
 def _look(source: Source, stated: Mapping[str, Any], *, is_sized: bool, is_asked: bool) -> Inspected:

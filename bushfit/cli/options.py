@@ -156,24 +156,25 @@ def file_option(name: str, words: str) -> Parameter:
 
 #: What a command writes that has forms, and the option of these.
 Written = Literal["tables", "pictures", "pages"]
-_TABLE_FORMAT: Parameter = option(
-    "--table-format",
-    "FORM",
-    "csv, decimal-comma (German Excel) or xlsx [csv].",
-    type=click.Choice(get_args(Form)),
-    default="csv",
-    envvar="BUSHFIT_TABLE_FORMAT",
-    show_envvar=True,
-)
-_PLOT_FORMAT: Parameter = option(
-    "--plot-format",
-    "FORM",
-    "png, svg, pdf; may be given again [png].",
-    type=click.Choice(get_args(Picture)),
-    multiple=True,
-    default=["png"],
-    envvar="BUSHFIT_PLOT_FORMAT",
-    show_envvar=True,
-)
-_NO_REPORT: Parameter = flag("--no-report", "Write no page (HTML).")
-FORMS: dict[Written, Parameter] = {"tables": _TABLE_FORMAT, "pictures": _PLOT_FORMAT, "pages": _NO_REPORT}
+FORMS: dict[Written, Parameter] = {
+    "tables": option(
+        "--table-format",
+        "FORM",
+        "csv, decimal-comma (German Excel) or xlsx [csv].",
+        type=click.Choice(get_args(Form)),
+        default="csv",
+        envvar="BUSHFIT_TABLE_FORMAT",
+        show_envvar=True,
+    ),
+    "pictures": option(
+        "--plot-format",
+        "FORM",
+        "png, svg, pdf; may be given again [png].",
+        type=click.Choice(get_args(Picture)),
+        multiple=True,
+        default=["png"],
+        envvar="BUSHFIT_PLOT_FORMAT",
+        show_envvar=True,
+    ),
+    "pages": flag("--no-report", "Write no page (HTML)."),
+}

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from bushfit.cli.common import Options, open_model, with_options
-from bushfit.cli.grids import TEMPERATURE, asked_for, grid_options, kelvin, positive
-from bushfit.cli.options import FILE, command_called, file_option, flag, option, place_option, under
+from bushfit.cli.grids import asked_for, kelvin, positive, where_predicted
+from bushfit.cli.options import FILE, command_called, file_option, flag, option, under
 from bushfit.cli.show import new_table, tell_tests
 
 if TYPE_CHECKING:
@@ -21,13 +21,7 @@ _MOST_AMPLITUDES = 8
 
 @command_called("predict", 'data/arm_bushing/truth.json --frequencies "10:100:10 Hz" --amplitudes "0.1, 0.5 mm"')
 @click.argument("model", metavar="MODEL.json", type=FILE)
-@under(
-    "Where it is predicted",
-    place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
-    grid_options("the campaign's"),
-    TEMPERATURE,
-    file_option("--campaign", "Take its grid, and show its sweeps beside."),
-)
+@where_predicted("Take its grid, and show its sweeps beside.")
 @under(
     "What is predicted besides",
     file_option("--bushing", "Another one, of the same compound: [bushing] of this TOML file."),

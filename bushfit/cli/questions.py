@@ -39,16 +39,17 @@ _Seen = TypeVar("_Seen")
 
 @dataclass(frozen=True)
 class Questions:
-    """Questions of one command; the last answer to one is offered when it comes again."""
+    """Questions of one command, where somebody is `asked`; the last answer to one is offered when it comes again."""
 
     options: Options
+    asked: bool
     _answers: dict[_Key, Any] = field(default_factory=lambda: {_COUNTING: None})
 
     @classmethod
-    def of(cls, options: Options, *, no_input: bool) -> Questions | None:
-        """None where nobody is there to answer, or wants to be asked."""
+    def of(cls, options: Options, *, no_input: bool) -> Questions:
+        """Those of a command, none where nobody is there to answer, or wants to be asked."""
         asked = not (no_input or options.quiet or options.as_json) and sys.stdin is not None and sys.stdin.isatty()
-        return cls(options) if asked else None
+        return cls(options, asked)
 
     def settled(self, stated: Mapping[str, Any], look: Callable[[Mapping[str, Any]], _Seen]) -> _Seen:
         """What comes of what is stated, with answers to what the errors of that ask for."""
@@ -57,6 +58,8 @@ class Questions:
             try:
                 return look(_together(stated, given))
             except BushfitError as error:
+                if not self.asked:
+                    raise
                 told = type(error)(**{**vars(error), "hint": None})
                 wanted = _wanted(error)
                 new = [key for key in wanted if key not in given and not stated.get(key[0])]

@@ -125,11 +125,7 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
 
 
 def _resonance_table(file: Path, stated: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
-    """The table of a resonance test; None of a file that has none of its columns, unless a mass or the like is stated.
-
-    Raises:
-        MeasurementError, UnitError: a file that cannot be read, where a mass is stated.
-    """
+    """The table of a resonance test; None of a file without any of its columns, unless a mass or the like is stated."""
     from bushfit.inspection.recognition import open_table
     from bushfit.reading.resonance import is_resonance
     from bushfit.reading.words import RESONANCE_COLUMNS

@@ -4,9 +4,9 @@ Its JSON Schema is made of these types, and the type checker holds to them what 
 """
 
 from dataclasses import dataclass
-from typing import Literal, NotRequired
+from typing import Annotated, Literal, NotRequired
 
-from typing_extensions import TypedDict
+from typing_extensions import Doc, TypedDict
 
 from bushfit.diagnosis.holdout import HeldOut, Skipped
 from bushfit.model.result import Usable
@@ -15,135 +15,97 @@ Verdict = Literal["consistent", "named", "ambiguous", "described", "partly", "un
 
 
 class SizeEntry(TypedDict):
-    """A parameter of an effect, with its uncertainty where it is part of the model to use.
+    """A parameter of an effect, with its uncertainty where it is part of the model to use."""
 
-    Args:
-        value: in the unit.
-        stderr: standard error, in the unit; null where the parameter was not fitted.
-        ci95: least and largest value of the 95 % interval; null where the parameter was not fitted.
-        unit: SI; "1" of a ratio.
-    """
-
-    value: float
-    stderr: float | None
-    ci95: list[float] | None
-    unit: str
+    value: Annotated[float, Doc("in the unit.")]
+    stderr: Annotated[float | None, Doc("standard error, in the unit; null where the parameter was not fitted.")]
+    ci95: Annotated[
+        list[float] | None,
+        Doc("least and largest value of the 95 % interval; null where the parameter was not fitted."),
+    ]
+    unit: Annotated[str, Doc('SI; "1" of a ratio.')]
 
 
 class EffectEntry(TypedDict):
-    """An effect or a mistake in the record that was added, or that leads a set of look-alikes.
+    """An effect or a mistake in the record that was added, or that leads a set of look-alikes."""
 
-    Args:
-        name: of the effect or mistake.
-        level: whether it belongs to the material, the component, the rig and so on; "unresolved" where it has twins.
-        twins: effects of the rig that no such test tells from it.
-        replaces: the branch of the paper that it stands in place of, or null.
-        test: of a mistake in the record, the test in which it was made; else null.
-        sentence: what it is, in words.
-        correction: of a mistake, where it was made and what to write into the campaign; else null.
-        parameters: by name.
-        evidence: why it was named, in words.
-        alternatives: what these tests cannot tell it from.
-    """
-
-    name: str
-    level: str
-    twins: list[str]
-    replaces: str | None
-    test: str | None
-    sentence: str
-    correction: str | None
-    parameters: dict[str, SizeEntry]
-    evidence: str
-    alternatives: list[str]
+    name: Annotated[str, Doc("of the effect or mistake.")]
+    level: Annotated[
+        str,
+        Doc('whether it belongs to the material, the component, the rig and so on; "unresolved" where it has twins.'),
+    ]
+    twins: Annotated[list[str], Doc("effects of the rig that no such test tells from it.")]
+    replaces: Annotated[str | None, Doc("the branch of the paper that it stands in place of, or null.")]
+    test: Annotated[str | None, Doc("of a mistake in the record, the test in which it was made; else null.")]
+    sentence: Annotated[str, Doc("what it is, in words.")]
+    correction: Annotated[
+        str | None,
+        Doc("of a mistake, where it was made and what to write into the campaign; else null."),
+    ]
+    parameters: Annotated[dict[str, SizeEntry], Doc("by name.")]
+    evidence: Annotated[str, Doc("why it was named, in words.")]
+    alternatives: Annotated[list[str], Doc("what these tests cannot tell it from.")]
 
 
 #: The keys have a unit that is no name in Python, so that this type is made by a call.
 WhereEntry = TypedDict(
     "WhereEntry",
     {
-        "direction": str,
-        "kind": Literal["sweep", "loop"],
-        "frequency_Hz": list[float],
-        "amplitude_mm": NotRequired[list[float]],
-        "amplitude_deg": NotRequired[list[float]],
-        "amplitude_%": NotRequired[list[float]],
-        "component": Literal["storage", "loss", "force"],
-        "excess": float,
-        "reading": str,
+        "direction": Annotated[str, Doc("of the bushing, or a specimen by its name.")],
+        "kind": Annotated[Literal["sweep", "loop"], Doc("of the tests.")],
+        "frequency_Hz": Annotated[list[float], Doc("least and largest [Hz].")],
+        "amplitude_mm": NotRequired[
+            Annotated[list[float], Doc("least and largest, zero-to-peak [mm], of a displacement.")]
+        ],
+        "amplitude_deg": NotRequired[
+            Annotated[list[float], Doc("least and largest, zero-to-peak [deg], of a rotation.")]
+        ],
+        "amplitude_%": NotRequired[Annotated[list[float], Doc("least and largest, zero-to-peak [%], of a strain.")]],
+        "component": Annotated[Literal["storage", "loss", "force"], Doc("of the stiffness, or the force of a loop.")],
+        "excess": Annotated[float, Doc("root mean square of the smooth misfit there, in units of its own noise.")],
+        "reading": Annotated[str, Doc("the same as a sentence.")],
     },
 )
-WhereEntry.__doc__ = """One region in which model and measurement disagree.
-
-Args:
-    direction: of the bushing, or a specimen by its name.
-    kind: of the tests.
-    frequency_Hz: least and largest [Hz].
-    amplitude_mm: least and largest, zero-to-peak [mm], of a displacement.
-    amplitude_deg: least and largest, zero-to-peak [deg], of a rotation.
-    amplitude_%: least and largest, zero-to-peak [%], of a strain.
-    component: of the stiffness, or the force of a loop.
-    excess: root mean square of the smooth misfit there, in units of its own noise.
-    reading: the same as a sentence.
-"""
+WhereEntry.__doc__ = "One region in which model and measurement disagree."
 
 
 class BeforeAfter(TypedDict):
-    """Root mean square residual in units of noise: 1 is the floor.
+    """Root mean square residual in units of noise: 1 is the floor."""
 
-    Args:
-        before: of the model as it came.
-        after: of the model with what was added; or, of a mistake, if the record is put right.
-    """
-
-    before: float | None
-    after: float | None
+    before: Annotated[float | None, Doc("of the model as it came.")]
+    after: Annotated[
+        float | None,
+        Doc("of the model with what was added; or, of a mistake, if the record is put right."),
+    ]
 
 
 class GapEntry(TypedDict):
-    """How far model and tests lie apart, in units of noise.
+    """How far model and tests lie apart, in units of noise."""
 
-    Args:
-        calibration: on the data that were fitted.
-        heldout: on data that were left out and predicted from the rest; null where nothing can be left out.
-        parts: the held-out figures part by part.
-        skipped: parts that were not held out.
-    """
-
-    calibration: BeforeAfter
-    heldout: BeforeAfter | None
-    parts: tuple[HeldOut, ...]
-    skipped: tuple[Skipped, ...]
+    calibration: Annotated[BeforeAfter, Doc("on the data that were fitted.")]
+    heldout: Annotated[
+        BeforeAfter | None,
+        Doc("on data that were left out and predicted from the rest; null where nothing can be left out."),
+    ]
+    parts: Annotated[tuple[HeldOut, ...], Doc("the held-out figures part by part.")]
+    skipped: Annotated[tuple[Skipped, ...], Doc("parts that were not held out.")]
 
 
 class OddsEntry(TypedDict):
-    """One explanation of a gap.
+    """One explanation of a gap."""
 
-    Args:
-        words: what it is.
-        probability: if anything is missing.
-        chances: the same for people.
-    """
-
-    words: str
-    probability: float
-    chances: str
+    words: Annotated[str, Doc("what it is.")]
+    probability: Annotated[float, Doc("if anything is missing.")]
+    chances: Annotated[str, Doc("the same for people.")]
 
 
 class UsableEntry(TypedDict):
-    """Within what model.json meets the tests, at the worst of all places: 95 % of the points lie nearer.
+    """Within what model.json meets the tests, at the worst of all places: 95 % of the points lie nearer."""
 
-    Args:
-        stiffness: relative difference of |K|.
-        loss_factor: difference of the loss factor.
-        held_out: whether each point was predicted from a fit without its run.
-        places: the same place by place.
-    """
-
-    stiffness: float
-    loss_factor: float
-    held_out: bool
-    places: tuple[Usable, ...]
+    stiffness: Annotated[float, Doc("relative difference of |K|.")]
+    loss_factor: Annotated[float, Doc("difference of the loss factor.")]
+    held_out: Annotated[bool, Doc("whether each point was predicted from a fit without its run.")]
+    places: Annotated[tuple[Usable, ...], Doc("the same place by place.")]
 
 
 @dataclass(frozen=True)
@@ -163,35 +125,27 @@ class Description:
 
 
 class DiagnosisFile(TypedDict):
-    """Where model and tests disagree, and what is missing.
+    """Where model and tests disagree, and what is missing."""
 
-    Args:
-        schema: of this file.
-        verdict: in a word: nothing is missing; named, and the gap is closed; several that cannot be told apart; a gap
-            without a name, described; most of it named; a gap that nothing explains.
-        summary: the verdict in a sentence.
-        nothing: probability that nothing is missing beyond noise and tolerance.
-        odds: what may explain the gap, the most probable first; what is left of 1 is for what is not told.
-        effects: what was added, or the leaders of sets that cannot be told apart.
-        where: regions of disagreement before anything was added.
-        remainder: regions of disagreement that stay.
-        description: of a gap without a name; else null.
-        gap: how far model and tests lie apart, before and after.
-        usable: within what model.json meets the tests; null where nothing was fitted.
-        next_test: the measurement that would decide or confirm; empty where there is none.
-        warnings: what else a user must know.
-    """
-
-    schema: Literal["bushfit/diagnosis/3"]
-    verdict: Verdict
-    summary: str
-    nothing: float
-    odds: list[OddsEntry]
-    effects: list[EffectEntry]
-    where: list[WhereEntry]
-    remainder: list[WhereEntry]
-    description: Description | None
-    gap: GapEntry
-    usable: UsableEntry | None
-    next_test: str
-    warnings: list[str]
+    schema: Annotated[Literal["bushfit/diagnosis/3"], Doc("of this file.")]
+    verdict: Annotated[
+        Verdict,
+        Doc(
+            "in a word: nothing is missing; named, and the gap is closed; several that cannot be told apart; a gap "
+            "without a name, described; most of it named; a gap that nothing explains."
+        ),
+    ]
+    summary: Annotated[str, Doc("the verdict in a sentence.")]
+    nothing: Annotated[float, Doc("probability that nothing is missing beyond noise and tolerance.")]
+    odds: Annotated[
+        list[OddsEntry],
+        Doc("what may explain the gap, the most probable first; what is left of 1 is for what is not told."),
+    ]
+    effects: Annotated[list[EffectEntry], Doc("what was added, or the leaders of sets that cannot be told apart.")]
+    where: Annotated[list[WhereEntry], Doc("regions of disagreement before anything was added.")]
+    remainder: Annotated[list[WhereEntry], Doc("regions of disagreement that stay.")]
+    description: Annotated[Description | None, Doc("of a gap without a name; else null.")]
+    gap: Annotated[GapEntry, Doc("how far model and tests lie apart, before and after.")]
+    usable: Annotated[UsableEntry | None, Doc("within what model.json meets the tests; null where nothing was fitted.")]
+    next_test: Annotated[str, Doc("the measurement that would decide or confirm; empty where there is none.")]
+    warnings: Annotated[list[str], Doc("what else a user must know.")]

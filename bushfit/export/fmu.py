@@ -16,7 +16,7 @@ from xml.etree import ElementTree as ET
 from bushfit.campaign.naming import folder_name
 from bushfit.export.compiler import SYSTEMS, libraries
 from bushfit.export.contract import Exported, Order
-from bushfit.export.in_time import FIELDS, TABLES, InTime, in_time, neutral
+from bushfit.export.in_time import FIELDS, ONE, TABLES, InTime, in_time
 from bushfit.geometry import Place, Unit
 from bushfit.version import __version__
 
@@ -86,7 +86,7 @@ def model_c(found: InTime) -> str:
     lines.append("const Direction directions[DIRECTIONS] = {")
     known = [field for own in FIELDS.values() for field in own]
     for own, lever in zip(found.fields, found.levers, strict=True):
-        neutrals = {field: neutral(field) for field in known if field not in own}
+        neutrals = {field: int(field in ONE) for field in known if field not in own}
         set_ = {**neutrals, **{field: reference[name] for field, name in own.items()}}
         lines.append(
             f"    {{{', '.join(f'.{field} = {place}' for field, place in set_.items())}, .lever = {lever!r}}},"

@@ -18,7 +18,13 @@ NO_LOOPS = "no law in time: loops, overtones and transients need another format 
 def of_tables(order: Order, form: Form) -> Iterator[str]:
     """What linear tables over frequency, one set an amplitude, do not carry, and what that costs."""
     for prediction in directions(order):
-        yield from _of_direction(order, prediction, form)
+        own, place = tables(prediction), prediction.direction
+        yield from _of_amplitude(own)
+        if own[0].frequency.size > 1:
+            yield f"{place}: between its frequencies |K| is up to {_percent(_between(order, own, form))} off"
+        else:
+            yield f"{place}: one frequency, {number(own[0].frequency[0], 4)} Hz: K and loss are constants"
+        yield from of_band(prediction)
     yield from of_all(order)
 
 
@@ -33,18 +39,7 @@ def of_all(order: Order) -> Iterator[str]:
         yield f"specimens: {', '.join(specimens)}"
 
 
-def _of_direction(order: Order, prediction: Prediction, form: Form) -> Iterator[str]:
-    """Amplitude, what lies between the frequencies, and the band of one direction."""
-    own, place = tables(prediction), prediction.direction
-    yield from of_amplitude(own)
-    if own[0].frequency.size > 1:
-        yield f"{place}: between its frequencies |K| is up to {_percent(_between(order, own, form))} off"
-    else:
-        yield f"{place}: one frequency, {number(own[0].frequency[0], 4)} Hz: K and loss are constants"
-    yield from of_band(prediction)
-
-
-def of_amplitude(own: Sequence[Table]) -> Iterator[str]:
+def _of_amplitude(own: Sequence[Table]) -> Iterator[str]:
     """What it costs that a property of a solver has one amplitude; nothing where there is but one."""
     if len(own) > 1:
         taken = middle(own)

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from typing_extensions import TypedDict
+from typing_extensions import Doc, TypedDict
 
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place, Specimen
@@ -42,43 +42,31 @@ class ColumnSeen:
 
 
 class InspectedFile(TypedDict):
-    """A file, or a sheet of a workbook, and what was found in it.
+    """A file, or a sheet of a workbook, and what was found in it."""
 
-    Args:
-        file: as it was named.
-        sheet: of a workbook; null where there is one only.
-        kind: a hysteresis loop, a sweep, or the raw history of a stepped sine.
-        direction: of the test, or specimen; null where neither file nor options say it.
-        written: how the file is written, by label: encoding, delimiter, decimal mark and so on.
-        columns: all of them, in order.
-        facts: in words, by label.
-        assumed: what was assumed, with the option or key that says otherwise; null where nothing was.
-        odd: a sentence for each thing that is odd.
-    """
-
-    file: str
-    sheet: str | int | None
-    kind: Kind
-    direction: str | None
-    written: dict[str, str]
-    columns: tuple[ColumnSeen, ...]
-    facts: dict[str, str]
-    assumed: str | None
-    odd: list[str]
+    file: Annotated[str, Doc("as it was named.")]
+    sheet: Annotated[str | int | None, Doc("of a workbook; null where there is one only.")]
+    kind: Annotated[Kind, Doc("a hysteresis loop, a sweep, or the raw history of a stepped sine.")]
+    direction: Annotated[str | None, Doc("of the test, or specimen; null where neither file nor options say it.")]
+    written: Annotated[
+        dict[str, str],
+        Doc("how the file is written, by label: encoding, delimiter, decimal mark and so on."),
+    ]
+    columns: Annotated[tuple[ColumnSeen, ...], Doc("all of them, in order.")]
+    facts: Annotated[dict[str, str], Doc("in words, by label.")]
+    assumed: Annotated[
+        str | None,
+        Doc("what was assumed, with the option or key that says otherwise; null where nothing was."),
+    ]
+    odd: Annotated[list[str], Doc("a sentence for each thing that is odd.")]
 
 
 class InspectionDocument(TypedDict):
-    """What test files hold.
+    """What test files hold."""
 
-    Args:
-        files: that can be used.
-        left_out: a sentence for each file or sheet that holds no test.
-        campaign: the text for a campaign, or a whole one.
-    """
-
-    files: list[InspectedFile]
-    left_out: list[str]
-    campaign: str
+    files: Annotated[list[InspectedFile], Doc("that can be used.")]
+    left_out: Annotated[list[str], Doc("a sentence for each file or sheet that holds no test.")]
+    campaign: Annotated[str, Doc("the text for a campaign, or a whole one.")]
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,13 @@ from bushfit.campaign.schema import PredictSettings
 from bushfit.diagnosis.evidence import result_of
 from bushfit.diagnosis.families import FittedFamily, fit_families
 from bushfit.effects import Level
+from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.assess import lack_of_fit
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.jobs.fits import Fit
-from bushfit.jobs.grid import AMPLITUDES, common_grid
+from bushfit.jobs.grid import asked_or, common_grid
 from bushfit.jobs.predict import columns_of
 from bushfit.model.document import BushingTable
 from bushfit.model.file import model_document, versions
@@ -274,14 +275,12 @@ class Compare:
         alike = [place for place in places if all(a.motion is b.motion for a, b in combinations(place, 2))]
         return alike or [[_COMPOUND] * len(results)]
 
-    def _grid(self, results: Sequence[Result], places: Sequence[Place], sweeps: Sequence[Sweep]) -> Any:
+    def _grid(self, results: Sequence[Result], places: Sequence[Place], sweeps: Sequence[Sweep]) -> tuple[Array, Array]:
         """The points asked for, else those that all were fitted at."""
         if len({place.motion for place in places}) > 1:
             found = ", ".join(f"{place}: {place.motion.words[0]}" for place in places)
             raise ModelError("a place that is not one kind of motion in all", found=found, expected="one kind")
-        frequencies, amplitudes = common_grid(results, places, sweeps)
-        asked = getattr(self.asked, AMPLITUDES[places[0].motion])
-        return self.asked.frequencies or frequencies, asked or amplitudes
+        return asked_or(common_grid(results, places, sweeps), self.asked, places[0])
 
 
 def _family_to_use(families: Sequence[FittedFamily], entries: Sequence[Entry]) -> str:

@@ -12,7 +12,7 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import FitError, typed
 from bushfit.fitting.data import Data
 from bushfit.jobs.fits import Fit, Fitted
-from bushfit.jobs.provenance import campaign_document, document_of, repeated_options
+from bushfit.jobs.provenance import campaign_document, document_of, options_typed
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.knowledge import look_alikes
@@ -80,10 +80,9 @@ class Diagnose:
     def _options(self) -> tuple[str, ...]:
         """What was asked for, as it is typed."""
         mine, usual = self.settings, Settings()
-        options = repeated_options(model=["MODEL.json"] if self.model else [], adopt=mine.adopt, without=mine.without)
-        if mine.max_effects != usual.max_effects:
-            options += ("--max-effects", str(mine.max_effects))
-        return options + (("--tolerance", f"{mine.tolerance:g}") if mine.tolerance != usual.tolerance else ())
+        model, sizes = "MODEL.json" if self.model else None, ("max_effects", "tolerance")
+        changed = {key: f"{getattr(mine, key):g}" for key in sizes if getattr(mine, key) != getattr(usual, key)}
+        return options_typed(model=model, adopt=mine.adopt, without=mine.without, **changed)
 
 
 def with_plan(found: Diagnosis, path: Path) -> Diagnosis:

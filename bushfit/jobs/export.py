@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
-from typing_extensions import TypedDict
+from typing_extensions import Doc, TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.errors import ModelError
@@ -33,27 +34,17 @@ FORMATS = {
 
 
 class FormatEntry(TypedDict):
-    """One format.
+    """One format."""
 
-    Args:
-        files: by name.
-        left_out: what it cannot carry, and the error that this costs over the exported grid.
-    """
-
-    files: list[str]
-    left_out: list[str]
+    files: Annotated[list[str], Doc("by name.")]
+    left_out: Annotated[list[str], Doc("what it cannot carry, and the error that this costs over the exported grid.")]
 
 
 class ExportDocument(TypedDict):
-    """What was exported.
+    """What was exported."""
 
-    Args:
-        formats: by name.
-        warnings: what a user must know before using the numbers.
-    """
-
-    formats: dict[str, FormatEntry]
-    warnings: list[str]
+    formats: Annotated[dict[str, FormatEntry], Doc("by name.")]
+    warnings: Annotated[list[str], Doc("what a user must know before using the numbers.")]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.master_curve import can_shift
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
-from bushfit.jobs.provenance import campaign_document, document_of, repeated_options
+from bushfit.jobs.provenance import campaign_document, document_of, options_typed
 from bushfit.model.result import Result
 from bushfit.report.artifacts import fit_contents, temperature_contents
 from bushfit.report.contents import Contents, Kinds
@@ -111,10 +111,7 @@ class Fit:
     def run(self, data: Data) -> Fitted:
         added = self._added(data.campaign)
         result = fit_joint(data, effects=with_base(added), directions=self.directions or None, profile=self.profile)
-        options = (
-            *repeated_options(direction=self.directions, effect=self.effects),
-            *(["--profile"] if self.profile else []),
-        )
+        options = options_typed(direction=self.directions, effect=self.effects, profile=self.profile)
         kinds = kinds_of_test(data.campaign, added)
         return Fitted("model", kinds, data, (("joint fit", result),), campaign_document(data, "fit", options))
 

@@ -25,7 +25,7 @@ _AMPLITUDES_OF = {
     STRAINING: (0.01, 0.02, 0.05),
 }
 #: Keys of [predict] that have the amplitudes of each motion.
-AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
+_AMPLITUDE_KEYS = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
 #: Frequencies of a grid where the paper's were not measured.
 _FREQUENCIES = 9
 #: Amplitudes of a grid where the paper's were not measured.
@@ -36,12 +36,11 @@ _SLOW = 1.0
 _MOST_STEPS = 10
 
 
-def grid_at(
-    asked: PredictSettings, result: Result, place: Place, sweeps: Sequence[Sweep] = ()
-) -> tuple[Sequence[float] | Array, Sequence[float] | Array]:
-    """Frequencies and amplitudes at a place as they are asked for, else those of `default_grid`."""
-    frequencies, amplitudes = default_grid(result, place, sweeps)
-    return asked.frequencies or frequencies, getattr(asked, AMPLITUDES[place.motion]) or amplitudes
+def asked_or(usual: tuple[Array, Array], asked: PredictSettings, place: Place) -> tuple[Array, Array]:
+    """Frequencies and amplitudes at a place as they are asked for, else the usual ones."""
+    every = asked.frequencies, getattr(asked, _AMPLITUDE_KEYS[place.motion])
+    frequencies, amplitudes = (np.array(stated or own) for stated, own in zip(every, usual, strict=True))
+    return frequencies, amplitudes
 
 
 def grid_settings(asked: PredictSettings, campaign: Campaign | None) -> PredictSettings:
@@ -71,18 +70,13 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
     frequencies = np.array(PAPER_FREQUENCIES)
     if result.measured is None:
         return frequencies, amplitudes
-    low, high = result.measured.frequency
-    inside = frequencies[(frequencies >= low * (1 - MARGIN)) & (frequencies <= high * (1 + MARGIN))]
+    inside = _inside(frequencies, [result.measured.frequency])
     if inside.size < 2:
-        inside = _distinct(np.geomspace(low, high, _FREQUENCIES))
+        inside = _distinct(np.geomspace(*result.measured.frequency, _FREQUENCIES))
     if direction.is_rotation:
         return inside, amplitudes
     per_displacement = result.model.unit_strain(direction if isinstance(direction, Specimen) else Direction.AXIAL)
-    least, most = (strain / per_displacement for strain in result.measured.strain)
-    reached = amplitudes[(amplitudes >= least * (1 - MARGIN)) & (amplitudes <= most * (1 + MARGIN))]
-    if reached.size < 2:
-        reached = _even(least, most, _AMPLITUDES)
-    return inside, reached
+    return inside, _within(amplitudes, [np.array(result.measured.strain) / per_displacement], _AMPLITUDES)
 
 
 def common_grid(

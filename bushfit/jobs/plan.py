@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Place, place_named
-from bushfit.jobs.grid import grid_at, grid_settings
+from bushfit.jobs.grid import asked_or, default_grid, grid_settings
 from bushfit.jobs.plan_document import Checked, PlanFile, PlannedRun, Reached, Rivalry, Shown, TargetEntry
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
@@ -55,7 +55,7 @@ class Planned:
             "tests": [_run(*pair) for pair in zip(found.planned.tests, found.planned.minutes.tolist(), strict=True)],
             "hours_planned": found.planned.hours,
             "hours_standard": found.standard.hours,
-            "hours_left": found.hours_left,
+            "hours_left": wanted.hours - found.planned.hours,
             "enough": found.enough,
             "targets": dict(self._targets()),
             "parameters": {
@@ -179,7 +179,8 @@ class PlanTests:
         settings = grid_settings(self.asked, campaign)
         places = [place_named(name, result.specimens) for name in settings.directions or ()]
         for place in places or usual:
-            frequencies, amplitudes = grid_at(settings, result, place, campaign.sweeps if campaign else ())
+            usual_grid = default_grid(result, place, campaign.sweeps if campaign else ())
+            frequencies, amplitudes = asked_or(usual_grid, settings, place)
             amplitude, frequency = np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
             yield Points(place, frequency.ravel(), amplitude.ravel())
 

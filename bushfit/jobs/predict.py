@@ -18,7 +18,7 @@ from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
 from bushfit.fitting.data_sets import SweepData, sweep_data
 from bushfit.geometry import Direction, Place, Specimen, place_named
-from bushfit.jobs.grid import grid_at, grid_settings
+from bushfit.jobs.grid import asked_or, default_grid, grid_settings
 from bushfit.model.arms import Arms, model_arms
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Result, Usable
@@ -186,7 +186,7 @@ class Predict:
         beside = [sweep for sweep in known if self._at_temperature(result.model, sweep)]
         notes = (*notes, *(f"{sweep.name}: {note}" for sweep in known for note in sweep.notes))
         shown, places = beside if campaign else None, self.places(result, campaign)
-        grids = [grid_at(settings, result, place, sweeps) for place in places]
+        grids = [asked_or(default_grid(result, place, sweeps), settings, place) for place in places]
         predictions = [
             predict(result, place, *grid, sweeps=shown, temperature=self.temperature)
             for place, grid in zip(places, grids, strict=True)

@@ -38,9 +38,16 @@ def command_line(command: str, *words: str) -> str:
     return " ".join(["bushfit", command, *(typed(Path(word)) for word in words)])
 
 
-def repeated_options(**options: Iterable[str]) -> tuple[str, ...]:
-    """The words of options that may be given again, each with all its values."""
-    return tuple(word for name, values in options.items() for value in values for word in (f"--{name}", value))
+def options_typed(**options: str | bool | Iterable[str] | None) -> tuple[str, ...]:
+    """The words of options by their keys: a value, each of several, or a flag that is set; none of None."""
+    words = list[str]()
+    for key, value in options.items():
+        name = "--" + key.replace("_", "-")
+        if isinstance(value, bool | None):
+            words += [name] if value else []
+        else:
+            words += [word for each in ([value] if isinstance(value, str) else value) for word in (name, each)]
+    return tuple(words)
 
 
 def _test(data_set: DataSet) -> dict[str, Any]:

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Required
+from typing import Annotated, Any, Required
 
-from typing_extensions import TypedDict
+from typing_extensions import Doc, TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.diagnosis.document import DiagnosisFile
@@ -25,23 +25,19 @@ from bushfit.report.page import report_page
 
 
 class RunDocument(TypedDict, total=False):
-    """What the whole chain found.
+    """What the whole chain found."""
 
-    Args:
-        static: the fit of the loops; where there are loops.
-        dynamic: the paper's two steps; where there are loops and sweeps.
-        joint: the joint fit; where the model to use is another.
-        model: the model to use: the joint fit, or the model with what diagnose added.
-        diagnosis: where model and tests disagree; where a parameter is free.
-        warnings: what a user must know of the model to use and of what it predicts.
-    """
-
-    static: ModelFile
-    dynamic: ModelFile
-    joint: ModelFile
-    model: Required[ModelFile]
-    diagnosis: DiagnosisFile
-    warnings: list[str]
+    static: Annotated[ModelFile, Doc("the fit of the loops; where there are loops.")]
+    dynamic: Annotated[ModelFile, Doc("the paper's two steps; where there are loops and sweeps.")]
+    joint: Annotated[ModelFile, Doc("the joint fit; where the model to use is another.")]
+    model: Required[
+        Annotated[
+            ModelFile,
+            Doc("the model to use: the joint fit, or the model with what diagnose added."),
+        ]
+    ]
+    diagnosis: Annotated[DiagnosisFile, Doc("where model and tests disagree; where a parameter is free.")]
+    warnings: Annotated[list[str], Doc("what a user must know of the model to use and of what it predicts.")]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

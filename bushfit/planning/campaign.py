@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.campaign.written import body_lines, toml_value
+from bushfit.campaign.written import body_lines, place_line, toml_value
 from bushfit.effects import BASE, qualified
 from bushfit.geometry import Specimen
 from bushfit.model.model import Model
@@ -82,8 +82,7 @@ def _model_lines(model: Model) -> Iterator[str]:
 
 def _test_lines(test: Test) -> Iterator[str]:
     """The lines of one test: what it states other than the default."""
-    place = test.direction
-    yield f"specimen = {toml_value(place.name)}" if isinstance(place, Specimen) else f'direction = "{place}"'
+    yield place_line(test.direction)
     for each in fields(test):
         value = getattr(test, each.name)
         if each.name not in ("direction", "temperature") and value != each.default:

@@ -9,7 +9,7 @@ from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.geometry import ROTATION, TRANSLATION, Direction, Place
-from bushfit.planning.contract import Knowledge, Test, Wanted
+from bushfit.planning.contract import Knowledge, Test, Wanted, operating_points
 from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
 
 #: Time to bring the rig to another run, for its control to settle [s]; chosen.
@@ -115,11 +115,10 @@ def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates:
 
 def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
     """A test less the steps that are beyond the limits of the rig or what rubber bears; None where too few are left."""
+    bearable = _bearable(known, rig, test.direction, *operating_points(test))
     if isinstance(test, SimulatedLoop):
-        bearable = _bearable(known, rig, test.direction, np.array([test.frequency]), np.array([test.amplitude]))
         return test if bearable.all() else None
-    frequency, amplitude = (values.ravel() for values in test.points)
-    kept = np.array(test.steps)[_bearable(known, rig, test.direction, frequency, amplitude)]
+    kept = np.array(test.steps)[bearable]
     if kept.size < 2:
         return None
     steps = tuple(kept.tolist())

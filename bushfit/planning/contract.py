@@ -244,8 +244,3 @@ class Plan:
     missed: tuple[str | None, ...] = ()
     enough: str | None = None
     notes: tuple[str, ...] = ()
-
-    @property
-    def hours_left(self) -> float:
-        """Of the rig, that no test takes."""
-        return self.wanted.hours - self.planned.hours

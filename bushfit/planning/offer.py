@@ -14,7 +14,7 @@ from bushfit.model.covariance import Z95
 from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
 from bushfit.planning.contract import Knowledge, Test, Wanted
 from bushfit.planning.criterion import Budget, View, distances
-from bushfit.planning.sensitivity import Column, Grid, relative_slopes
+from bushfit.planning.sensitivity import Grid, relative_slopes
 from bushfit.planning.targets import ENDLESS, Goal, goals
 
 #: The 90 % quantile of the normal distribution.
@@ -45,14 +45,10 @@ class Offer:
         return Grid(self.known, self.tests)
 
     @cached_property
-    def columns(self) -> list[Column]:
-        return self.grid.columns
-
-    @cached_property
     def views(self) -> list[View]:
         """The likeliest model's, beside the effects that it lacks; each rival's, beside what the others differ by."""
         data_sets = self.grid.data_sets
-        effects = np.array([column.values for column in self.columns])
+        effects = np.array([column.values for column in self.grid.columns])
         views = [View.of(self.grid, self.known, effects)]
         left = [residual(rival.model, data_sets) for rival in self.known.rivals]
         for i, rival in enumerate(self.known.rivals):

@@ -219,7 +219,7 @@ class _Planner:
         """Effects that so many runs of each test show less well than the standard programme."""
         reached = noncentrality_of(self.offer.views[0].together(counts))[0]
         short = np.sqrt(reached) < 0.995 * np.sqrt(self.least)  # what the numbers are good for
-        return list(dict.fromkeys(self.offer.columns[i].effect.name for i in np.flatnonzero(short)))
+        return list(dict.fromkeys(self.offer.grid.columns[i].effect.name for i in np.flatnonzero(short)))
 
     @cached_property
     def standard_runs(self) -> list[int]:
@@ -237,7 +237,9 @@ class _Planner:
     def least(self) -> Array:
         """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
         reached = noncentrality_of(self.offer.views[0].together(self._counts(self.standard_runs)))[0]
-        seen = [column.reach * np.sqrt(size) >= FOUND for column, size in zip(self.offer.columns, reached, strict=True)]
+        seen = [
+            column.reach * np.sqrt(size) >= FOUND for column, size in zip(self.offer.grid.columns, reached, strict=True)
+        ]
         return np.where(seen, reached, 0.0)
 
     def _drifting(self, counts: Array) -> Drifting:
@@ -282,8 +284,8 @@ class _Planner:
 
     def _visible(self, reached: Array, drifting: float) -> Iterator[Visible]:
         """The smallest amount found of each effect that the standard programme shows, in the shape it shows best."""
-        for effect in dict.fromkeys(column.effect for column in self.offer.columns):
-            mine = [i for i, column in enumerate(self.offer.columns) if column.effect is effect]
+        for effect in dict.fromkeys(column.effect for column in self.offer.grid.columns):
+            mine = [i for i, column in enumerate(self.offer.grid.columns) if column.effect is effect]
             best = mine[int(np.argmax(self.least[mine]))]
             if self.least[best] > 0.0:
                 amount = effect.amount

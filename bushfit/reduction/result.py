@@ -3,11 +3,11 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Required
+from typing import Annotated, Required
 
 import numpy as np
 from numpy.typing import NDArray
-from typing_extensions import TypedDict
+from typing_extensions import Doc, TypedDict
 
 from bushfit.geometry import Place
 from bushfit.units import for_people, number
@@ -21,26 +21,16 @@ _MOST_LISTED = 5
 
 
 class ReductionDocument(TypedDict, total=False):
-    """A sweep that histories or a resonance test were reduced to.
+    """A sweep that histories or a resonance test were reduced to."""
 
-    Args:
-        direction, specimen: what was tested: one of the two.
-        points: the columns of sweep.csv, by header.
-        warnings: what a user must know before using the numbers.
-        campaign: the text for a campaign.
-        mass_kg: that stood on the mount [kg]; of a resonance test, as the next two.
-        resonance_Hz: frequency of the largest transmissibility [Hz].
-        transmissibility_at_resonance: the largest.
-    """
-
-    direction: str
-    specimen: str
-    points: Required[dict[str, list[float | str | None]]]
-    warnings: Required[list[str]]
-    campaign: Required[str]
-    mass_kg: float
-    resonance_Hz: float
-    transmissibility_at_resonance: float
+    direction: Annotated[str, Doc("what was tested: one of the two.")]
+    specimen: Annotated[str, Doc("what was tested: one of the two.")]
+    points: Required[Annotated[dict[str, list[float | str | None]], Doc("the columns of sweep.csv, by header.")]]
+    warnings: Required[Annotated[list[str], Doc("what a user must know before using the numbers.")]]
+    campaign: Required[Annotated[str, Doc("the text for a campaign.")]]
+    mass_kg: Annotated[float, Doc("that stood on the mount [kg]; of a resonance test, as the next two.")]
+    resonance_Hz: Annotated[float, Doc("frequency of the largest transmissibility [Hz].")]
+    transmissibility_at_resonance: Annotated[float, Doc("the largest.")]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,8 @@
 """What compare writes as JSON, key by key. Its JSON Schema is made of these types; the type checker holds to them."""
 
-from typing import Literal, NotRequired
+from typing import Annotated, Literal, NotRequired
 
-from typing_extensions import TypedDict
+from typing_extensions import Doc, TypedDict
 
 from bushfit.diagnosis.holdout import Skipped
 from bushfit.model.document import BushingTable
@@ -17,134 +17,101 @@ SCHEMA: SchemaName = "bushfit/compare/1"
 
 
 class ComparedEntry(TypedDict):
-    """One of what is compared.
+    """One of what is compared."""
 
-    Args:
-        label: A, the reference, or B and so on.
-        name: of the bushing, or the model family.
-        source: file or folder that it was read from.
-        sha256: of the model file or campaign; null where it came from none.
-        bushing: null where specimens of the compound alone are known.
-        effects: of its model.
-        reduced_chi_square: mean square residual in units of noise; null where it was not fitted.
-        nrmse: root mean square difference of model and tests, relative; null where it was not fitted.
-        measured: what it was fitted at; null where it was not fitted.
-        inputs: the files of the tests that it was fitted to, with the conditions that the campaign states.
-    """
-
-    label: str
-    name: str
-    source: str
-    sha256: str | None
-    bushing: BushingTable | None
-    effects: list[str]
-    reduced_chi_square: Number | None
-    nrmse: Number | None
-    measured: Range | None
-    inputs: tuple[Source, ...]
+    label: Annotated[str, Doc("A, the reference, or B and so on.")]
+    name: Annotated[str, Doc("of the bushing, or the model family.")]
+    source: Annotated[str, Doc("file or folder that it was read from.")]
+    sha256: Annotated[str | None, Doc("of the model file or campaign; null where it came from none.")]
+    bushing: Annotated[BushingTable | None, Doc("null where specimens of the compound alone are known.")]
+    effects: Annotated[list[str], Doc("of its model.")]
+    reduced_chi_square: Annotated[
+        Number | None,
+        Doc("mean square residual in units of noise; null where it was not fitted."),
+    ]
+    nrmse: Annotated[
+        Number | None,
+        Doc("root mean square difference of model and tests, relative; null where it was not fitted."),
+    ]
+    measured: Annotated[Range | None, Doc("what it was fitted at; null where it was not fitted.")]
+    inputs: Annotated[
+        tuple[Source, ...],
+        Doc("the files of the tests that it was fitted to, with the conditions that the campaign states."),
+    ]
 
 
 class Joint(TypedDict):
-    """All parameters of two results together, correlations counted.
+    """All parameters of two results together, correlations counted."""
 
-    Args:
-        p: probability by chance of such differences.
-        parameters: how many count.
-    """
-
-    p: Number
-    parameters: int
+    p: Annotated[Number, Doc("probability by chance of such differences.")]
+    parameters: Annotated[int, Doc("how many count.")]
 
 
 class Pair(TypedDict):
-    """One result against the reference.
+    """One result against the reference."""
 
-    Args:
-        reference: label of the reference.
-        other: label of the other.
-        shared_inputs: files that both were fitted to.
-        joint: all parameters together; null where none is tested.
-        parameters: each that both have.
-        places: by place, the columns of differences.csv: values, differences, and whether they are sure.
-    """
-
-    reference: str
-    other: str
-    shared_inputs: list[str]
-    joint: Joint | None
-    parameters: list[ParameterContrast]
-    places: dict[str, dict[str, list[Number | None] | list[Literal["yes", "no"]]]]
+    reference: Annotated[str, Doc("label of the reference.")]
+    other: Annotated[str, Doc("label of the other.")]
+    shared_inputs: Annotated[list[str], Doc("files that both were fitted to.")]
+    joint: Annotated[Joint | None, Doc("all parameters together; null where none is tested.")]
+    parameters: Annotated[list[ParameterContrast], Doc("each that both have.")]
+    places: Annotated[
+        dict[str, dict[str, list[Number | None] | list[Literal["yes", "no"]]]],
+        Doc("by place, the columns of differences.csv: values, differences, and whether they are sure."),
+    ]
 
 
 class HeldOutPart(TypedDict):
-    """A part of the tests that was held out.
+    """A part of the tests that was held out."""
 
-    Args:
-        part: which.
-        first: root mean square of the first family there, in units of noise.
-        heldout: that of this family.
-    """
-
-    part: str
-    first: Number
-    heldout: Number
+    part: Annotated[str, Doc("which.")]
+    first: Annotated[Number, Doc("root mean square of the first family there, in units of noise.")]
+    heldout: Annotated[Number, Doc("that of this family.")]
 
 
 class Family(TypedDict):
-    """A model family on the one campaign.
+    """A model family on the one campaign."""
 
-    Args:
-        label: as in `compared`.
-        name: effects that it adds, or puts in place of a branch, joined by +.
-        parameters: fitted.
-        reduced_chi_square: mean square residual in units of noise.
-        bic: chi-square + parameters ln n; lower is better.
-        heldout: root mean square of what was held out, in units of noise; null where nothing can be.
-        first_there: that of the first family on the same parts.
-        gain: by how much the mean square of what was held out is less than that of the first, low and high of its 95 %
-            interval; null where nothing can be held out, and of the first.
-        p: probability by chance of so large a gain or loss, over all families (Holm).
-        probability: of all families compared, by the evidence of the tests, a smooth error of the model counted where
-            they are likelier with it; none where an older file does not say.
-        parts: each part that was held out.
-        skipped: each that was not, and why.
-        words: whether it is nearer to what was held out than the first; empty of the first.
-    """
-
-    label: str
-    name: str
-    parameters: int
-    reduced_chi_square: Number
-    bic: Number
-    heldout: Number | None
-    first_there: Number | None
-    gain: tuple[Number, Number, Number] | None
-    p: Number | None
-    probability: NotRequired[Number]
-    parts: list[HeldOutPart]
-    skipped: list[Skipped]
-    words: str
+    label: Annotated[str, Doc("as in `compared`.")]
+    name: Annotated[str, Doc("effects that it adds, or puts in place of a branch, joined by +.")]
+    parameters: Annotated[int, Doc("fitted.")]
+    reduced_chi_square: Annotated[Number, Doc("mean square residual in units of noise.")]
+    bic: Annotated[Number, Doc("chi-square + parameters ln n; lower is better.")]
+    heldout: Annotated[
+        Number | None,
+        Doc("root mean square of what was held out, in units of noise; null where nothing can be."),
+    ]
+    first_there: Annotated[Number | None, Doc("that of the first family on the same parts.")]
+    gain: Annotated[
+        tuple[Number, Number, Number] | None,
+        Doc(
+            "by how much the mean square of what was held out is less than that of the first, low and high of its 95 "
+            "% interval; null where nothing can be held out, and of the first."
+        ),
+    ]
+    p: Annotated[Number | None, Doc("probability by chance of so large a gain or loss, over all families (Holm).")]
+    probability: NotRequired[
+        Annotated[
+            Number,
+            Doc(
+                "of all families compared, by the evidence of the tests, a smooth error of the model counted where "
+                "they are likelier with it; none where an older file does not say."
+            ),
+        ]
+    ]
+    parts: Annotated[list[HeldOutPart], Doc("each part that was held out.")]
+    skipped: Annotated[list[Skipped], Doc("each that was not, and why.")]
+    words: Annotated[str, Doc("whether it is nearer to what was held out than the first; empty of the first.")]
 
 
 class ComparisonFile(TypedDict):
-    """compare.json: several results side by side, or model families on one campaign.
+    """compare.json: several results side by side, or model families on one campaign."""
 
-    Args:
-        schema: of this file.
-        compared: what is compared, the reference first.
-        pairs: each other against the reference.
-        families: how each meets the tests; null where none were asked for.
-        words: what differs, or how much may differ that is not seen.
-        warnings: what a user must know before using the numbers.
-        command: as it was typed; empty where it was made otherwise.
-        versions: of bushfit, and of the packages that the numbers rest on.
-    """
-
-    schema: SchemaName
-    compared: list[ComparedEntry]
-    pairs: list[Pair]
-    families: list[Family] | None
-    words: list[str]
-    warnings: list[str]
-    command: str
-    versions: dict[str, str]
+    schema: Annotated[SchemaName, Doc("of this file.")]
+    compared: Annotated[list[ComparedEntry], Doc("what is compared, the reference first.")]
+    pairs: Annotated[list[Pair], Doc("each other against the reference.")]
+    families: Annotated[list[Family] | None, Doc("how each meets the tests; null where none were asked for.")]
+    words: Annotated[list[str], Doc("what differs, or how much may differ that is not seen.")]
+    warnings: Annotated[list[str], Doc("what a user must know before using the numbers.")]
+    command: Annotated[str, Doc("as it was typed; empty where it was made otherwise.")]
+    versions: Annotated[dict[str, str], Doc("of bushfit, and of the packages that the numbers rest on.")]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Annotated
 
-from typing_extensions import TypedDict
+from typing_extensions import Doc, TypedDict
 
 from bushfit.campaign.written import body_lines, table_lines
 from bushfit.errors import typed
@@ -16,15 +17,10 @@ from bushfit.simulation.measured import Simulated
 
 
 class SimulationDocument(TypedDict):
-    """A simulated campaign.
+    """A simulated campaign."""
 
-    Args:
-        truth: the model behind it, as in truth.json.
-        files: that were written, by name.
-    """
-
-    truth: ModelFile
-    files: list[str]
+    truth: Annotated[ModelFile, Doc("the model behind it, as in truth.json.")]
+    files: Annotated[list[str], Doc("that were written, by name.")]
 
 
 def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
