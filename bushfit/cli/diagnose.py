@@ -142,8 +142,13 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
         size = f"{value} {unit}".removesuffix(" -")
         console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
     if effect["twins"]:
-        known = "its level is not known" if effect["alternatives"] else "its size is known, its level is not"
-        console.print(f"    {known}: it could as well be {' or '.join(effect['twins'])}")
+        names = " or ".join((effect["name"], *effect["twins"]))
+        size, told = (
+            ("", "the tests do not tell")
+            if effect["alternatives"]
+            else ("how large it is, the tests tell; ", "they do not")
+        )
+        console.print(f"    {size}whether it is {names}, {told}")
     if effect["correction"]:
         console.print(f"    the line that puts it right: {escape(effect['correction'])}")
     if effect["alternatives"]:
