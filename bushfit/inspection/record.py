@@ -96,9 +96,7 @@ class Inspected:
     Args:
         file, kind, measured: the file, what it holds, and its content in SI.
         direction: of the test; None where neither file nor options say it.
-        written: how the file is written, by label: encoding, delimiter, decimal mark and so on.
-        columns: all of them, in order.
-        facts, odd: what its content tells, see `Findings`.
+        written, columns, facts, odd: as `InspectedFile` has them.
         entry: keys of its table in a campaign besides `file` and `direction`, as TOML has them.
         counted: whether the header of a sweep says how amplitudes are counted.
     """

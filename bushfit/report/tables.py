@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bushfit.diagnosis.record import Diagnosis
+from bushfit.diagnosis.record import Diagnosis, level_of
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.fitting.master_curve import Shifted
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Display, Place
-from bushfit.model.arms import Arms
+from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.prediction.comparison import Comparison, Contrast, relative
@@ -136,8 +136,6 @@ def shaken_table(found: PredictedResonance) -> pd.DataFrame:
 def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:
     """Maxwell arms, a row an arm, and before them the spring that stands beside: modulus, stiffness at each place,
     relaxation time."""
-    from bushfit.model.arms import arm_rows
-
     names, moduli, times = zip(*arm_rows(model, arms), strict=True)
     modulus = np.array(moduli)
     columns = {"in place of": names, "relaxation time [s]": times, "shear modulus [MPa]": 1e-6 * modulus}
@@ -260,8 +258,6 @@ def shift_factors_table(found: Sequence[Shifted]) -> pd.DataFrame:
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """Every effect of the library, judged: score, gain, probability, parameters, and why it won or lost."""
-    from bushfit.diagnosis.record import level_of
-
     rows = [
         {
             "effect": judged.name,
