@@ -75,7 +75,6 @@ def with_specimens_named(files: Sequence[Inspected]) -> list[Inspected]:
 
 
 def _specimens(files: Sequence[Inspected]) -> Iterator[str]:
-    """The table of each specimen that was tested."""
     for body in dict.fromkeys(seen.direction for seen in files if isinstance(seen.direction, Specimen)):
         yield "\n".join([*specimen_lines(body), ""])
 

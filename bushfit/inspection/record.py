@@ -81,12 +81,8 @@ class InspectionDocument(TypedDict):
     campaign: str
 
 
-@dataclass(frozen=True)
-class Findings:
-    """What the content of a file tells: facts in words, by label, and a sentence for each thing that is odd."""
-
-    facts: Mapping[str, str]
-    odd: tuple[str, ...] = ()
+#: What the content of a file tells: facts in words, by label, and a sentence for each thing that is odd.
+Findings = tuple[dict[str, str], list[str]]
 
 
 @dataclass(frozen=True, eq=False)

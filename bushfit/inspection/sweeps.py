@@ -66,7 +66,7 @@ def look_at_sweep(sweep: Sweep, labels: Labels) -> Findings:
         *_negative_loss(sweep),
         *_doubtful_loss(sweep),
     ]
-    return Findings(facts, tuple(odd))
+    return facts, odd
 
 
 def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
@@ -203,7 +203,6 @@ def _missed_level(sweep: Sweep) -> Iterator[str]:
 
 
 def _negative_loss(sweep: Sweep) -> Iterator[str]:
-    """A sentence on points whose loss factor is below zero."""
     bad = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if bad.size:
         level = shown_amplitude(sweep.direction, sweep.amplitude[bad[0]])

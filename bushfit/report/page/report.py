@@ -114,7 +114,6 @@ def _of_tables(found: ReportData) -> Iterator[Iterator[str]]:
 
 
 def _bodies(result: Result) -> Iterator[tuple[str, str]]:
-    """What was tested, and its sizes."""
     if bushing := result.model.bushing:
         yield "Bushing", tube(bushing)
     for specimen in result.specimens:

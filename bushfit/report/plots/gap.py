@@ -200,7 +200,6 @@ def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
 
 
 def _draw_scale(figure: SubFigure, maps: Sequence[Axes], edges: Array, colors: ScalarMappable) -> None:
-    """Draw the scale of colours below the maps."""
     bar = figure.colorbar(colors, ax=maps, location="bottom", shrink=0.76, aspect=42, pad=0.03, extendfrac=0.04)
     every = 1 if edges.size <= 14 else 2  # numbers of more would run together
     from_end = np.minimum(np.arange(edges.size), np.arange(edges.size)[::-1])
@@ -251,7 +250,6 @@ def _draw_loops(
 
 
 def _words(side: Side) -> list[str]:
-    """The sentences below the panels."""
     maps, loops = bool(side.maps), bool(side.loops)
     repeated = any(drawn.repeated for drawn in side.maps.values())
     within = " and ".join(["within 2 (maps)"] * maps + ["in the grey (loops)"] * loops)

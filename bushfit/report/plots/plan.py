@@ -71,7 +71,6 @@ def _draw(axes: Axes, tests: Sequence[Test], color: str) -> None:
 
 
 def _name_sizes(axes: Axes, sizes: Sequence[int]) -> None:
-    """Say what markers stand for."""
     shown = [sizes[place] for place in spread(len(sizes), 4)]
     looks: dict[str, Any] = {"color": style.GREY, "ls": "", "mec": "white", "mew": 0.3}
     handles = [Line2D([], [], marker="o", ms=_ONE_RUN * np.sqrt(size), **looks) for size in shown]
@@ -81,7 +80,6 @@ def _name_sizes(axes: Axes, sizes: Sequence[int]) -> None:
 
 
 def _draw_errors(axes: Axes, plan: Plan, programmes: dict[str, Programme]) -> None:
-    """The error of each parameter: now, planned, standard."""
     errors = {name: programme.errors for name, programme in programmes.items()} | {"known now": plan.knowledge.errors}
     places = np.arange(len(plan.knowledge.names))
     for (name, values), marker in zip(errors.items(), "os^", strict=True):
