@@ -242,7 +242,6 @@ class Outcome:
         return pd.DataFrame({**texts, **numbers, **after, **self.together.columns})
 
     def _texts(self) -> dict[str, list[str]]:
-        """The columns of words."""
         rows, records, judgements = self.plan.rows, self.records, self.judgements
         done = [record["status"] == "done" for record in records]
         texts: dict[str, list[str]] = {
@@ -297,7 +296,6 @@ class Outcome:
 
 
 def _case(suite: str, row: Row, record: Record, judged: Judgement | None) -> TestCase:
-    """One bushing as a test case."""
     from junitparser import Error, Failure, TestCase
 
     case = TestCase(_printable(row.name), suite, record["seconds"])

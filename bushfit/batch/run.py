@@ -22,7 +22,7 @@ from bushfit.errors import OutputError
 from bushfit.progress import counting
 from bushfit.report.contents import Kinds, Picture
 from bushfit.report.folder import check_free as check_writable
-from bushfit.report.folder import write_files
+from bushfit.report.folder import unwritable, write_files
 
 #: All that is written of the whole batch: what is said of it, its table, picture and page.
 KINDS = Kinds(("batch",), ("batch",), ("batch",), ("index",))
@@ -104,9 +104,7 @@ def run(plan: Plan, workers: Pool, tell: Callable[[Outcome], None]) -> Outcome:
                 file.replace(output / file.name)
             return outcome
     except OSError as error:
-        raise OutputError(
-            "the results cannot be written", file=output, found=error.strerror or str(error), hint="free some space"
-        ) from error
+        raise unwritable(output, error) from error
 
 
 def _worked(plan: Plan, workers: Pool) -> Outcome:

@@ -14,6 +14,7 @@ from bushfit.batch.manifest import Row, Settings
 from bushfit.batch.quantities import Point, curve_of
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.diagnosis.record import Diagnosis
+from bushfit.diagnosis.record import Settings as How
 from bushfit.effects import effect_named
 from bushfit.errors import BatchError, BushfitError
 from bushfit.fitting.data import Data
@@ -125,7 +126,7 @@ def _one_by_one(
     from bushfit.jobs.predict import Predict
 
     commands = settings.commands or ()
-    result = load_result(Path(settings.model)) if settings.model else None
+    start = result = load_result(Path(settings.model)) if settings.model else None
     data = Data.of(campaign) if set(commands) - {"predict"} else None
     diagnosed = joint = None
     if "fit" in commands and data:
@@ -136,7 +137,10 @@ def _one_by_one(
             made["joint.json"] = made.pop("model.json")
         files |= made
     if "diagnose" in commands and data:
-        diagnosed = replace(_diagnose(settings), joint=joint).run(data)
+        asked = {key: getattr(settings, key) for key in ("max_effects", "tolerance", "adopt", "without")}
+        asked["unresolved"] = start and start.unresolved
+        how = How(**{key: value for key, value in asked.items() if value is not None})
+        diagnosed = Diagnose(how, start.model if start else None, joint=joint).run(data)
         result = diagnosed.result
         files |= formats.files(diagnosed.contents)
     assert result is not None  # the manifest has seen to it that there is a model
@@ -156,17 +160,6 @@ def _verdict(diagnosis: Diagnosis) -> Found:
         ],
         "warnings": list(diagnosis.notes),
     }
-
-
-def _diagnose(settings: Settings) -> Diagnose:
-    from bushfit.diagnosis.record import Settings as How
-    from bushfit.jobs.diagnose import Diagnose
-
-    asked = {key: getattr(settings, key) for key in ("max_effects", "tolerance", "adopt", "without")}
-    start = load_result(Path(settings.model)) if settings.model else None
-    asked["unresolved"] = start and start.unresolved
-    how = How(**{key: value for key, value in asked.items() if value is not None})
-    return Diagnose(how, start.model if start else None)
 
 
 def numbers_of(result: Result, points: Sequence[Point], notes: Sequence[str]) -> Found:

@@ -75,7 +75,6 @@ def with_specimens_named(files: Sequence[Inspected]) -> list[Inspected]:
 
 
 def _specimens(files: Sequence[Inspected]) -> Iterator[str]:
-    """The table of each specimen that was tested."""
     for body in dict.fromkeys(seen.direction for seen in files if isinstance(seen.direction, Specimen)):
         yield "\n".join([*specimen_lines(body), ""])
 
@@ -97,7 +96,9 @@ def file_text(seen: Inspected, folder: Path | None = None) -> str:
 
     Without a folder the file is named by its full path.
     """
-    name = _path_from(seen.file, folder)
+    name = seen.file.resolve().as_posix()
+    with suppress(ValueError):  # another drive, where no path leads
+        name = Path(os.path.relpath(seen.file, folder)).as_posix() if folder else name
     direction = f'"{seen.direction}"' if seen.direction else '"..."  # axial or radial: the file does not say'
     if seen.kind == "history":
         word = f'"{name}"' if " " in name else name
@@ -106,11 +107,3 @@ def file_text(seen: Inspected, folder: Path | None = None) -> str:
     lines = [f"[[{_TABLES[seen.kind]}]]", f"file = {toml_value(name)}"]
     lines += [] if isinstance(seen.direction, Specimen) else [f"direction = {direction}"]
     return "\n".join([*lines, *_key_lines(seen.entry), ""])
-
-
-def _path_from(file: Path, folder: Path | None) -> str:
-    """The path of a file from a folder, with forward slashes; its full path where none leads there."""
-    if folder is not None:
-        with suppress(ValueError):  # another drive
-            return Path(os.path.relpath(file, folder)).as_posix()
-    return file.resolve().as_posix()

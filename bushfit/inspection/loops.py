@@ -69,7 +69,7 @@ def look_at_loop(loop: Loop, labels: Labels) -> Findings:
             f"the motion is off zero by {number(to_length * mean_motion, 3)} {length}, "
             f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the loop counts from its own middle"
         )
-    return Findings(facts, tuple(odd))
+    return facts, odd
 
 
 def look_at_history(history: Loop, labels: Labels) -> Findings:
@@ -90,13 +90,13 @@ def look_at_history(history: Loop, labels: Labels) -> Findings:
         "sampling": f"{sampling(history)}, {min(step.rows_per_cycle for step in steps):.3g} rows a cycle at least",
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
     }
-    odd = (
+    odd = [
         *(history.source.notes if history.source else ()),
         *wrong_labels(labels, history.direction, levels, frequencies),
         *odd_channels(history),
         *reduction.warnings,
-    )
-    return Findings(facts, odd)
+    ]
+    return facts, odd
 
 
 def _too_slow(drive: Drive) -> Iterator[str]:
@@ -133,7 +133,7 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Fi
         facts[f"loop {place}"] = "; ".join(filter(None, (motion, noise, left_out)))
         odd += [f"loop {place}: {note}" for note in (*drive.notes, *_changing(drive)) if note != left_out]
     facts["sampling"] = sampling(record) if record.timed else "no time in the file"
-    return Findings(facts, tuple(odd))
+    return facts, odd
 
 
 def _listed(values: Sequence[float], between: str = ", ") -> str:

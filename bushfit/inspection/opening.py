@@ -56,23 +56,23 @@ def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) 
     if "at_amplitude" in outside.keys:
         entry.pop("amplitude", None)  # counted already
     entry |= outside.keys
-    odd: list[str] = []
+    turned: list[str] = []
     measured: Loop | Sweep
     kind: Kind
     if is_sweep:
         measured = read_sweep(**_keywords(file, read_as, entry, SweepFile))
-        kind, found = "sweep", look_at_sweep(measured, by_name)
+        kind, (facts, odd) = "sweep", look_at_sweep(measured, by_name)
     else:
-        measured, entry, odd = _read_loop(file, read_as, entry, table)
-        kind, found = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile))
+        measured, entry, turned = _read_loop(file, read_as, entry, table)
+        kind, (facts, odd) = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile))
     columns = _columns(table, is_sweep=is_sweep)
-    facts, counted = {**found.facts, **outside.facts}, outside.is_counted
+    facts, counted = facts | outside.facts, outside.is_counted
     if is_sweep and (amplitude := table.roles.get("amplitude")):
         counted = amplitude.convention is not None
         if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):
             facts["amplitudes"] += f', half of "{amplitude.header}", which counts peak-to-peak'
-    odd += found.odd
-    return Inspected(file, kind, direction, _written(table), columns, facts, tuple(odd), entry, measured, counted)
+    found = tuple(turned + odd)
+    return Inspected(file, kind, direction, _written(table), columns, facts, found, entry, measured, counted)
 
 
 def read_history(file: Path, stated: Mapping[str, Any]) -> tuple[Loop, Direction | None]:
@@ -154,12 +154,13 @@ def _look(measured: Loop, by_name: Labels, keywords: Mapping[str, Any]) -> tuple
     loops = programme(measured, **keywords)
     if len(loops) > 1:
         return "loop", look_at_programme(measured, loops, by_name)
-    found = look_at_loop(loops[0], by_name)
+    facts, odd = look_at_loop(loops[0], by_name)
     if fast or len(points) > 1:
         what = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
-        either = f"a motion {what} is taken for a loop; should it be a stepped sine, bushfit reduce makes points of it"
-        found = Findings(found.facts, (*found.odd, either))
-    return "loop", found
+        odd.append(
+            f"a motion {what} is taken for a loop; should it be a stepped sine, bushfit reduce makes points of it"
+        )
+    return "loop", (facts, odd)
 
 
 def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
@@ -179,7 +180,6 @@ def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
 
 
 def _written(table: Table) -> dict[str, str]:
-    """How a file is written, in words by label."""
     source, layout = table.source, table.layout
     if isinstance(source, Channels):
         written = {"format": source.format} | ({"group": source.sheet} if source.sheet else {})

@@ -69,12 +69,8 @@ class InspectionDocument(TypedDict):
     campaign: Annotated[str, Doc("the text for a campaign, or a whole one.")]
 
 
-@dataclass(frozen=True)
-class Findings:
-    """What the content of a file tells: facts in words, by label, and a sentence for each thing that is odd."""
-
-    facts: Mapping[str, str]
-    odd: tuple[str, ...] = ()
+#: What the content of a file tells: facts in words, by label, and a sentence for each thing that is odd.
+Findings = tuple[dict[str, str], list[str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +80,7 @@ class Inspected:
     Args:
         file, kind, measured: the file, what it holds, and its content in SI.
         direction: of the test; None where neither file nor options say it.
-        written: how the file is written, by label: encoding, delimiter, decimal mark and so on.
-        columns: all of them, in order.
-        facts, odd: what its content tells, see `Findings`.
+        written, columns, facts, odd: as `InspectedFile` has them.
         entry: keys of its table in a campaign besides `file` and `direction`, as TOML has them.
         counted: whether the header of a sweep says how amplitudes are counted.
     """

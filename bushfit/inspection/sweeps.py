@@ -66,7 +66,7 @@ def look_at_sweep(sweep: Sweep, labels: Labels) -> Findings:
         *_negative_loss(sweep),
         *_doubtful_loss(sweep),
     ]
-    return Findings(facts, tuple(odd))
+    return facts, odd
 
 
 def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
@@ -79,7 +79,9 @@ def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
         np.array([float(f"{value:.9g}") for value in values])
         for values in (np.abs(sweep.stiffness), np.angle(sweep.stiffness))
     )
-    finest = _finest(magnitude)
+    # the value of one in the last digit, if all have as many digits as the longest
+    digits = max(len(f"{value:.8e}".partition("e")[0].replace(".", "").rstrip("0")) for value in magnitude)
+    finest = 10.0 ** (np.floor(np.log10(magnitude)) + 1 - digits)
     copies, expected, first = 0, 0.0, sweep.frequency.size
     for rows in rows_alike(sweep.frequency, sweep.amplitude):
         points = np.stack((magnitude[rows], phase[rows]))
@@ -95,12 +97,6 @@ def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
             f"{copies} row{verb} digit by digit, the first of them at {sweep.frequency[first]:.4g} Hz (data row "
             f"{first + 1}): copied, not measured again?"
         )
-
-
-def _finest(values: Array) -> Array:
-    """The value of one in the last digit of each value, if all have as many digits as the longest, (n,)."""
-    digits = max(len(f"{value:.8e}".partition("e")[0].replace(".", "").rstrip("0")) for value in values)
-    return 10.0 ** (np.floor(np.log10(values)) + 1 - digits)
 
 
 def _untold_repeats(sweep: Sweep) -> Iterator[str]:
@@ -207,7 +203,6 @@ def _missed_level(sweep: Sweep) -> Iterator[str]:
 
 
 def _negative_loss(sweep: Sweep) -> Iterator[str]:
-    """A sentence on points whose loss factor is below zero."""
     bad = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if bad.size:
         level = shown_amplitude(sweep.direction, sweep.amplitude[bad[0]])

@@ -148,7 +148,7 @@ class SideBySide:
                 str(family["parameters"]),
                 "" if entry["nrmse"] is None else f"{number(100.0 * entry['nrmse'], 2)} %",
                 number(family["reduced_chi_square"], 3),
-                "" if share is None else f"{number(100.0 * share, 2)} %" if share >= _LEAST_ODDS else "< 0.1 %",
+                "" if share is None else f"{number(100.0 * share, 2)} %" if share >= _LEAST_CHANCE else "< 0.1 %",
                 *("" if each is None else number(each, 3) for each in (family["heldout"], family["first_there"])),
                 f"{parts} of {parts + len(family['skipped'])}",
             ]
@@ -262,8 +262,6 @@ def _flat(pair: Pair, row: ParameterContrast) -> dict[str, Any]:
     }
 
 
-#: Odds that are told as so small that none are.
-_LEAST_ODDS = 0.001
 #: Heads of `family_cells`, and of `parameter_cells` without the labels of the two results.
 FAMILY_HEADS = ("family", "parameters", "NRMSE", "chi2", "odds", "held out", "first there", "parts")
 

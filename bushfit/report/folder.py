@@ -69,7 +69,7 @@ def check_free(folder: Path, names: list[str], *, force: bool) -> None:
         standing = [name for name in names if os.path.lexists(folder / name)]
         folders = [name for name in standing if (folder / name).is_dir()]
     except OSError as error:
-        raise _unwritable(folder, error) from error
+        raise unwritable(folder, error) from error
     if folders:
         raise OutputError(
             "a folder stands where a file goes",
@@ -130,7 +130,7 @@ def write_files(
                     ready.rename(place / _DECIDED)
                     _end_decided(place)
     except OSError as error:
-        raise _unwritable(folder, error) from error
+        raise unwritable(folder, error) from error
 
 
 def _record(place: Path, ready: Path, files: Mapping[str, bytes], by: str | None, *, force: bool) -> None:
@@ -202,7 +202,6 @@ def _staged(home: Path, files: Mapping[str, bytes]) -> Iterator[Path]:
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write new files into a folder and flush them to the disk."""
     with ExitStack() as opened:
         streams = [opened.enter_context((folder / name).open("xb")) for name in files]
         for stream, content in zip(streams, files.values(), strict=True):
@@ -258,7 +257,7 @@ def _end_decided(place: Path) -> None:
         decided.rmdir()
 
 
-def _unwritable(folder: Path, error: OSError) -> OutputError:
+def unwritable(folder: Path, error: OSError) -> OutputError:
     """What is told of a failure of the disk."""
     return OutputError(
         "the results cannot be written",

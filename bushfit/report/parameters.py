@@ -52,13 +52,8 @@ def parameter_rows(result: Result) -> Iterator[Row]:
         shown, *texts = alike([value * factor, *known], digits, least=2)
         ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
         error = "" if stderr is None else alike([stderr * factor], 2)[0]
-        yield Row(name, _state(name, result), shown, error, " to ".join(ends), unit, parameter.meaning)
-
-
-def _state(name: str, result: Result) -> str:
-    if name in result.at_bound:
-        return f"at {result.at_bound[name]}"
-    return "" if name in result.fitted else "held"
+        state = f"at {result.at_bound[name]}" if name in result.at_bound else "held" * (name not in result.fitted)
+        yield Row(name, state, shown, error, " to ".join(ends), unit, parameter.meaning)
 
 
 def _digits(value: float, stderr: float | None) -> int:

@@ -28,21 +28,25 @@ def plan_contents(plan: Plan) -> Contents:
 def plan_sheet(plan: Plan) -> pd.DataFrame:
     """A row for each run of the rig, in the order in which they are made.
 
-    Amplitudes count zero-to-peak. The force is what the model expects at most, so that a load cell can be chosen.
+    Amplitudes count zero-to-peak. The force, moment or stress is what the model expects at most, to choose a load cell.
     """
     tests = plan.planned.tests
     counts, seen, rows = Counter(tests), Counter[Test](), []
     for order, (test, minutes) in enumerate(zip(tests, plan.planned.minutes, strict=True), start=1):
         seen[test] += 1
+        (frequency, amplitude), (length, force, _) = operating_points(test), test.direction.display
+        stiffness = np.abs(plan.knowledge.model.stiffness(test.direction, frequency, amplitude))
+        most = number(force.factor * float(np.max(stiffness * amplitude)), 2)
         rows.append(
             {
                 "order": order,
                 "direction": str(test.direction),
                 "test": "loop" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}",
-                **_motion(test),
+                "amplitude": f"{_listed(length.factor * amplitude)} {length.name}",
+                "frequency [Hz]": _listed(frequency),
                 "cycles": str(test.cycles) if isinstance(test, SimulatedLoop) else "until steady",
                 "repeat": f"{seen[test]} of {counts[test]}",
-                **_force(plan, test),
+                "force up to": f"{most} {force.name}",
                 "minutes": round(float(minutes), 1),
                 "minutes so far": round(float(np.sum(plan.planned.minutes[:order])), 1),
                 "what for": plan.purposes[test],
@@ -51,21 +55,6 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=_COLUMNS)
 
 
-def _motion(test: Test) -> dict[str, str]:
-    """Amplitudes and frequencies in the units of engineers."""
-    unit, factor = test.direction.display.displacement
-    frequency, amplitude = operating_points(test)
-    return {"amplitude": f"{_listed(factor * amplitude)} {unit}", "frequency [Hz]": _listed(frequency)}
-
-
 def _listed(values: Array) -> str:
     """The distinct numbers among some, in their order."""
     return " ".join(dict.fromkeys(number(value, 4) for value in values.tolist()))
-
-
-def _force(plan: Plan, test: Test) -> dict[str, str]:
-    """The largest force, moment or stress expected, zero-to-peak."""
-    frequency, amplitude = operating_points(test)
-    stiffness = np.abs(plan.knowledge.model.stiffness(test.direction, frequency, amplitude))
-    unit, factor = test.direction.display.force
-    return {"force up to": f"{number(factor * float(np.max(stiffness * amplitude)), 2)} {unit}"}

@@ -30,7 +30,10 @@ def xlsx(order: Order) -> Exported:
 
 def _tables(order: Order) -> dict[str, pd.DataFrame]:
     """All tables by name: two for each place, the parameters, and the provenance."""
-    found = {"parameters": parameters_table(order.result), "provenance": _provenance(order)}
+    found = {
+        "parameters": parameters_table(order.result),
+        "provenance": pd.DataFrame(_said(order), columns=["what", "value"]),
+    }
     for name, prediction in zip(place_names(order.places), order.predictions, strict=True):
         display = order.units.display(prediction.direction.motion) if order.units else None
         while {name, f"{name} wide"} & found.keys():  # a specimen may have any name
@@ -60,12 +63,8 @@ def parameters_table(result: Result) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _provenance(order: Order) -> pd.DataFrame:
-    """Where the tables come from, and what a user must know: a line each."""
-    return pd.DataFrame(_said(order), columns=["what", "value"])
-
-
 def _said(order: Order) -> Iterator[tuple[str, str]]:
+    """Where the tables come from, and what a user must know: a line each."""
     result, bushing = order.result, order.result.model.bushing
     yield "bushing", result.name
     if bushing:

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bushfit.diagnosis.record import Diagnosis
+from bushfit.diagnosis.record import Diagnosis, level_of
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.fitting.master_curve import Shifted
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Display, Place
-from bushfit.model.arms import Arms
+from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.prediction.comparison import Comparison, Contrast, relative
@@ -83,23 +83,20 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     moved, _, resisted = words(prediction.direction)
     force = f"{resisted} [{stiffness}]"
-    names, scales = (force, "loss factor [-]", f"storage {force}", f"loss {force}"), (factor, 1.0, factor, factor)
 
-    def values(of: Prediction, end: str = "value") -> list[Array]:
-        bands = of.stiffness, of.loss_factor, of.storage_stiffness, of.loss_stiffness
-        return [getattr(band, end) * scale for band, scale in zip(bands, scales, strict=True)]
+    def four(of: Prediction) -> dict[str, tuple[Any, float]]:
+        loss, storage = (of.loss_factor, 1.0), (of.storage_stiffness, factor)
+        parts = (of.stiffness, factor), loss, storage, (of.loss_stiffness, factor)
+        return dict(zip((force, "loss factor [-]", f"storage {force}", f"loss {force}"), parts, strict=True))
 
-    ends = zip(names, values(prediction, "low"), values(prediction, "high"), strict=True)
-    columns = {
-        "frequency [Hz]": prediction.frequency,
-        f"{moved} [{length}]": prediction.amplitude * length_factor,
-        **dict(zip(names, values(prediction), strict=True)),
-        **{f"{name}, {end}": of for name, low, high in ends for end, of in (("low", low), ("high", high))},
-    }
-    if prediction.if_rigs:
-        columns |= {f"{name}, {IF_RIGS}": of for name, of in zip(names, values(prediction.if_rigs), strict=True)}
+    columns = {"frequency [Hz]": prediction.frequency, f"{moved} [{length}]": prediction.amplitude * length_factor}
+    columns |= {name: band.value * scale for name, (band, scale) in four(prediction).items()}
+    for name, (band, scale) in four(prediction).items():
+        columns |= {f"{name}, low": band.low * scale, f"{name}, high": band.high * scale}
+    for name, (band, scale) in four(prediction.if_rigs).items() if prediction.if_rigs else ():
+        columns[f"{name}, {IF_RIGS}"] = band.value * scale
     if (measured := prediction.measured) is not None:
-        columns |= {f"measured {names[0]}": np.abs(measured) * factor, f"measured {names[1]}": loss_factor(measured)}
+        columns |= {f"measured {force}": np.abs(measured) * factor, "measured loss factor [-]": loss_factor(measured)}
     return pd.DataFrame(columns)
 
 
@@ -109,19 +106,14 @@ def wide_table(prediction: Prediction, display: Display | None = None) -> pd.Dat
     A point that the grid lacks is an empty cell.
     """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
-    frequency, row = np.unique(prediction.frequency, return_inverse=True)
-    amplitude, column = np.unique(prediction.amplitude, return_inverse=True)
-    parts = {
-        words(prediction.direction)[2]: (stiffness, prediction.stiffness.value * factor),
-        "loss factor": ("-", prediction.loss_factor.value),
-    }
-    headers, columns = ["frequency [Hz]"], [frequency]
-    for name, (unit, values) in parts.items():
-        grid = np.full((amplitude.size, frequency.size), np.nan)
-        grid[column, row] = values
-        headers += [f"{name} {level * length_factor:.10g} {length} [{unit}]" for level in amplitude]
-        columns += [*grid]
-    return pd.DataFrame(np.transpose(columns), columns=headers)
+    resisted = words(prediction.direction)[2]
+    points = pd.DataFrame({"frequency [Hz]": prediction.frequency, "amplitude": prediction.amplitude})
+    points[resisted], points["loss factor"] = prediction.stiffness.value * factor, prediction.loss_factor.value
+    units = {resisted: stiffness, "loss factor": "-"}
+    wide = points.pivot_table([*units], "frequency [Hz]", "amplitude", "last")[[*units]]
+    levels: list[Any] = wide.columns.tolist()
+    wide.columns = [f"{name} {level * length_factor:.10g} {length} [{units[name]}]" for name, level in levels]
+    return wide.reset_index()
 
 
 def shaken_table(found: PredictedResonance) -> pd.DataFrame:
@@ -144,8 +136,6 @@ def shaken_table(found: PredictedResonance) -> pd.DataFrame:
 def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:
     """Maxwell arms, a row an arm, and before them the spring that stands beside: modulus, stiffness at each place,
     relaxation time."""
-    from bushfit.model.arms import arm_rows
-
     names, moduli, times = zip(*arm_rows(model, arms), strict=True)
     modulus = np.array(moduli)
     columns = {"in place of": names, "relaxation time [s]": times, "shear modulus [MPa]": 1e-6 * modulus}
@@ -268,8 +258,6 @@ def shift_factors_table(found: Sequence[Shifted]) -> pd.DataFrame:
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """Every effect of the library, judged: score, gain, probability, parameters, and why it won or lost."""
-    from bushfit.diagnosis.record import level_of
-
     rows = [
         {
             "effect": judged.name,

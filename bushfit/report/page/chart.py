@@ -138,7 +138,6 @@ class Axis:
         return [(float(self(math.tan(math.radians(angle)))), number(angle, 4)) for angle in degrees]
 
     def _round_values(self) -> list[float]:
-        """Round values within."""
         values = self._decades() if self.log else []
         if len(values) < 2:
             raw = (self.high - self.low) / 5  # as many ticks, or a few more

@@ -52,7 +52,6 @@ def _last_cycles(place: Place, rows: pd.DataFrame, frequencies: dict[str, float]
 
 
 def _charts(place: Place, loops: dict[str, Array]) -> list[Markup]:
-    """Hysteresis loops of a place, and what of them is left."""
     moved, resisting, _ = place.motion.words
     unit = place.display.force.name
     labels = f"{moved} [{place.display.displacement.name}]", f"{resisting} [{unit}]"

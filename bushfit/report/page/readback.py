@@ -161,11 +161,8 @@ def read_results(folder: Path) -> Contents:
     documents = {name: read_document(file) for name, file in files.items()}
     specimens = ReportData.of(documents, {}, files).result.specimens
     tables = {name: read_table(folder, name) for name in (*_TABLES, *place_names([*Direction, *specimens]))}
-    return Contents(documents, {name: partial(_given, table) for name, table in tables.items() if table is not None})
-
-
-def _given(table: pd.DataFrame) -> pd.DataFrame:
-    return table
+    made = {name: partial(pd.DataFrame, table) for name, table in tables.items() if table is not None}
+    return Contents(documents, made)
 
 
 def canonical(table: pd.DataFrame) -> pd.DataFrame:

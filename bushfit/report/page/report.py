@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bushfit.diagnosis.document import BeforeAfter, EffectEntry, GapEntry
+from bushfit.diagnosis.document import EffectEntry, GapEntry
 from bushfit.diagnosis.record import odds_in_words
 from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Place, Specimen
 from bushfit.model.document import TestTable
@@ -49,7 +49,7 @@ MOST = 12
 def report_context(found: ReportData) -> dict[str, Any]:
     """All that the template of a report asks for."""
     result, diagnosis, campaign, tests = found.result, found.diagnosis, found.campaign, found.tests
-    gaps = _gaps(diagnosis["gap"]) if diagnosis else []
+    gaps = [*_gaps(diagnosis["gap"])] if diagnosis else []
     report = campaign.report if campaign else {}
     every = sweeps_of(found)
     return {
@@ -114,7 +114,6 @@ def _of_tables(found: ReportData) -> Iterator[Iterator[str]]:
 
 
 def _bodies(result: Result) -> Iterator[tuple[str, str]]:
-    """What was tested, and its sizes."""
     if bushing := result.model.bushing:
         yield "Bushing", tube(bushing)
     for specimen in result.specimens:
@@ -189,21 +188,14 @@ def _files(found: ReportData) -> list[tuple[str, str]]:
     return list(dict.fromkeys((file, sha256) for file, sha256 in (*named, *inputs) if file and sha256))
 
 
-def _gaps(gap: GapEntry) -> list[tuple[str, str, str]]:
+def _gaps(gap: GapEntry) -> Iterator[tuple[str, str, str]]:
     """Root mean square of what is left before and after, in units of noise: held out first."""
-
-    def cells(sizes: BeforeAfter | None) -> tuple[str, str]:
-        if sizes is None:
-            return "not testable", ""
-        before, after = (
-            f"{each:.2f}" if each is not None else "not known" for each in (sizes["before"], sizes["after"])
-        )
-        return before, after
-
-    return [
-        ("held out, predicted from the other tests", *cells(gap["heldout"])),
-        ("data fitted", *cells(gap["calibration"])),
-    ]
+    parts = {"held out, predicted from the other tests": gap["heldout"], "data fitted": gap["calibration"]}
+    for words, sizes in parts.items():
+        ends = (sizes["before"], sizes["after"]) if sizes else ()
+        known = ["not known" if end is None else f"{end:.2f}" for end in ends]
+        before, after = known or ("not testable", "")
+        yield words, before, after
 
 
 def _tabled(found: ReportData) -> list[tuple[str, ...]]:

@@ -248,7 +248,8 @@ def levels_of(found: ReportData, rows: pd.DataFrame, held: str) -> list[Level]:
     levels = list[Level]()
     for (*own, level), there in groups:
         words = (each if isinstance(each, str) else f"{number(each, 3)} °C" for each in own)
-        levels.append(Level(", ".join([*words, level_name(level, held)]), level, there))
+        name = level if isinstance(level, str) else told(split_header(held)[1] or "", level)
+        levels.append(Level(", ".join([*words, name]), level, there))
     return levels
 
 
@@ -298,11 +299,6 @@ def by_stepped(
     for stepped, names in kinds.items():
         along, held = (amplitude, frequency) if stepped == "amplitude" else (frequency, amplitude)
         yield stepped, along, held if stepped else "test", rows[rows["test"].isin(names)]
-
-
-def level_name(level: float | str, held: str) -> str:
-    """A held value as people read it, with the unit of its header; the name of a test as it is."""
-    return level if isinstance(level, str) else told(split_header(held)[1] or "", level)
 
 
 def _predicted(

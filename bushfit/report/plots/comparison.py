@@ -1,10 +1,9 @@
 """Several results over one grid: stiffness and loss factor with bands, and below how far each is off the first."""
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from bushfit.report.compared import Line, SideBySide
+from bushfit.report.compared import SideBySide
 from bushfit.report.plots import style
 
 #: Width of a line [point].
@@ -28,7 +27,11 @@ def comparison_figure(found: SideBySide) -> Figure:
     for i, sides in enumerate(shown):
         for axes, panel in zip(grid[2 * i : 2 * i + 2].flat, sides.panels, strict=True):
             for line in panel.lines:
-                _draw(axes, looks[line.label], line)
+                look, along = looks[line.label], {"ls": _DASHES[line.level], "lw": _LINE, **style.POINT}
+                markers = {"marker": look.marker, "markevery": max(line.x.size // _MARKS, 1)}
+                axes.plot(line.x, line.value, color=look.color, **markers, **along)
+                # bands of several results lie on each other
+                axes.fill_between(line.x, line.low, line.high, color=look.color, alpha=0.18, lw=0)
             style.label_axes(axes, sides.along, panel.header if panel.least else f"{sides.place} {panel.header}")
             style.log_if_wide(axes, panel.lines[0].x)
             if panel.least:
@@ -46,12 +49,3 @@ def comparison_figure(found: SideBySide) -> Figure:
         "compare.json and the terminal say what holds at all points at once.",
     )
     return figure
-
-
-def _draw(axes: Axes, look: style.Style, line: Line) -> None:
-    """A line with its band."""
-    drawn = {"color": look.color, "ls": _DASHES[line.level], "lw": _LINE, "marker": look.marker}
-    axes.plot(line.x, line.value, markevery=max(line.x.size // _MARKS, 1), **drawn, **style.POINT)
-    axes.fill_between(
-        line.x, line.low, line.high, color=look.color, alpha=0.18, lw=0
-    )  # bands of several results lie on each other

@@ -127,7 +127,6 @@ def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Fig
 
 
 def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[LoopData]) -> None:
-    """Force over displacement of one direction's loops."""
     (unit, length), force_units, _ = direction.display
     largest = max(float(np.abs(data_set.drive.force).max()) for data_set in data_sets)
     force_unit, factor = for_people(*force_units, largest)
@@ -146,7 +145,6 @@ def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[
 
 
 def _draw_over_phase(axes: Axes, model: Model, data_sets: Sequence[LoopData]) -> None:
-    """Residuals of one direction's loops over the phase of the cycle, and their means."""
     style.label_axes(axes, "phase after the upper turn [deg]", "residual / noise")
     for data_set, look in zip(data_sets, style.styles(len(data_sets), "loop"), strict=True):
         rows, residual = _drawn_rows(data_set), data_set.misfit(model)

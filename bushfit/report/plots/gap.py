@@ -20,7 +20,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import loop_labels, loops_legend
-from bushfit.report.plots.misfit import Curve, Map, Side, columns, has_holes, side_of
+from bushfit.report.plots.misfit import Map, Side, columns, side_of
 from bushfit.report.plots.points import SECTORS, Kind, by_direction, by_kind
 from bushfit.report.plots.prediction import axis_label
 from bushfit.units import told
@@ -200,7 +200,6 @@ def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
 
 
 def _draw_scale(figure: SubFigure, maps: Sequence[Axes], edges: Array, colors: ScalarMappable) -> None:
-    """Draw the scale of colours below the maps."""
     bar = figure.colorbar(colors, ax=maps, location="bottom", shrink=0.76, aspect=42, pad=0.03, extendfrac=0.04)
     every = 1 if edges.size <= 14 else 2  # numbers of more would run together
     from_end = np.minimum(np.arange(edges.size), np.arange(edges.size)[::-1])
@@ -217,14 +216,14 @@ def _draw_scale(figure: SubFigure, maps: Sequence[Axes], edges: Array, colors: S
 
 
 def _draw_loops(
-    row: Sequence[Axes], direction: Place, data_sets: Sequence[LoopData], sides: Sequence[Sequence[Curve]]
+    row: Sequence[Axes], direction: Place, data_sets: Sequence[LoopData], sides: Sequence[Sequence[tuple[Array, Array]]]
 ) -> None:
     """Draw what is left of one direction's loops over the phase of the cycle, before and after on one scale."""
-    furthest = max(float(np.abs(curve.values).max()) for curves in sides for curve in curves)
+    furthest = max(float(np.abs(values).max()) for curves in sides for _, values in curves)
     for axes, curves in zip(row, sides, strict=True):
         style.label_axes(axes, "phase after the upper turn [deg]", "")
         for curve, look in zip(curves, style.styles(len(curves), "loop"), strict=True):
-            axes.plot(curve.phase, curve.values, color=look.color, ls=look.dashes, lw=1.3)
+            axes.plot(*curve, color=look.color, ls=look.dashes, lw=1.3)
         if furthest > _FAR:
             axes.set_yscale("symlog", linthresh=_NEAR, linscale=0.7)
             powers = 10.0 ** np.arange(1, int(np.log10(furthest)) + 1)
@@ -251,11 +250,12 @@ def _draw_loops(
 
 
 def _words(side: Side) -> list[str]:
-    """The sentences below the panels."""
     maps, loops = bool(side.maps), bool(side.loops)
     repeated = any(drawn.repeated for drawn in side.maps.values())
     within = " and ".join(["within 2 (maps)"] * maps + ["in the grey (loops)"] * loops)
     merged = max((drawn.merged for drawn in side.maps.values()), default=1)
+    points = [drawn.points for drawn in side.maps.values()]
+    holes = any(each.along.size < np.unique(each.along).size * np.unique(each.held).size for each in points)
     of = [*["its repeats"] * repeated, *[f"up to {merged} neighbouring rows"] * (merged > 1)]
     across = "frequency across, amplitude"
     if any(kind.stepped != "frequency" for kind in side.maps):
@@ -264,7 +264,7 @@ def _words(side: Side) -> list[str]:
         f"Maps: {across} upwards; pale grey: model and measurement agree within the noise. A bar in a cell: 3 and more "
         "below." * maps,
         f"A cell is the mean of {' and of '.join(of)}, in units of the noise of that mean." * bool(of),
-        "White: not measured." * any(has_holes(drawn.points) for drawn in side.maps.values()),
+        "White: not measured." * holes,
         f"Loops: measured less model over the cycle, means over {360 // SECTORS} deg, in units of the noise of that "
         "mean." * loops,
         f"Where the model is right, 95 % lie {within}.",

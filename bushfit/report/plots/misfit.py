@@ -34,20 +34,16 @@ class Map(NamedTuple):
     merged: int
 
 
-class Curve(NamedTuple):
-    """Measured less model over the cycle of a loop [deg], over the noise of a sector's mean."""
-
-    phase: Array
-    values: Array
-
-
 class Side(NamedTuple):
-    """A column: a model's title and all that is drawn of it."""
+    """A column: a model's title and all that is drawn of it.
+
+    Of each loop the phase of the cycle [deg], and measured less model over the noise of a sector's mean.
+    """
 
     title: str
     gap: float
     maps: Mapping[Kind, Map]
-    loops: Mapping[Place, Sequence[Curve]]
+    loops: Mapping[Place, Sequence[tuple[Array, Array]]]
 
 
 def columns(before: Model, after: Model, later: Mapping[DataSet, DataSet]) -> list[tuple[Model, str]]:
@@ -84,9 +80,9 @@ def _map(model: Model, kind: Kind, data_sets: Sequence[SweepData]) -> Map:
 
     Repeats differ by what scatters from point to point and by what each block shares: both average out.
     """
-    repeated = bool(Repeats.of(data_sets).count.max() > 1)
     axes = kind.axis, held_with(kind.axis)
     along, held = (np.concatenate([getattr(data_set, name) for data_set in data_sets]) for name in axes)
+    repeated = bool(Repeats.at(along, held).count.max() > 1)
     if kind.stepped is None:
         held = np.repeat(np.arange(1.0, len(data_sets) + 1.0), [data_set.frequency.size for data_set in data_sets])
     row = map_rows(held)
@@ -119,12 +115,7 @@ def map_rows(held: Array) -> Array:
     return means[row[place]]
 
 
-def _curve(model: Model, data_set: LoopData) -> Curve:
-    """Mean residual of each sector of a loop's cycle over the noise of that mean."""
+def _curve(model: Model, data_set: LoopData) -> tuple[Array, Array]:
+    """Phase of the cycle [deg], and mean residual of each sector of a loop's cycle over the noise of that mean."""
     phase, shares = over_sectors(data_set)
-    return Curve(phase, -shares @ data_set.misfit(model) / data_set.drive.row_noise.error_of_sums(shares))
-
-
-def has_holes(points: Repeats) -> bool:
-    """Whether a row lacks a point that another has."""
-    return points.along.size < np.unique(points.along).size * np.unique(points.held).size
+    return phase, -shares @ data_set.misfit(model) / data_set.drive.row_noise.error_of_sums(shares)

@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 
 from bushfit.campaign.schema import SimulatedLoop
 from bushfit.effects.contract import Array
-from bushfit.geometry import Place
 from bushfit.planning.contract import Plan, Programme, Test, operating_points
 from bushfit.report.plots import style
 from bushfit.report.tables import spread
@@ -37,7 +36,10 @@ def plan_figure(plan: Plan) -> Figure:
         ends = np.concatenate([_points(test) for test in tests if test.direction == place])
         for axes, (name, programme) in zip(row, programmes.items(), strict=True):
             _draw(axes, [test for test in programme.tests if test.direction == place], _COLORS[name])
-            _label_axes(axes, place, ends)
+            style.label_axes(axes, "frequency [Hz]", f"{place} amplitude [{place.display.displacement.name}]")
+            for along, values in zip(("x", "y"), ends.T, strict=True):
+                style.logarithmic(axes, values, along)  # type: ignore[arg-type]
+                axes.set(**{f"{along}lim": (values.min() / 1.6, values.max() * 1.6)})
     for axes, (name, programme) in zip(grid[0], programmes.items(), strict=True):
         title = f"{name}: {len(programme.tests)} runs in {number(programme.hours, 2)} h"
         axes.set_title(title, loc="left", **style.NAMES)
@@ -68,15 +70,7 @@ def _draw(axes: Axes, tests: Sequence[Test], color: str) -> None:
         axes.plot(*_points(test).T, marker=_MARKERS[loop], ms=diameter, **drawn)
 
 
-def _label_axes(axes: Axes, place: Place, ends: Array) -> None:
-    style.label_axes(axes, "frequency [Hz]", f"{place} amplitude [{place.display.displacement.name}]")
-    for along, values in zip(("x", "y"), ends.T, strict=True):
-        style.logarithmic(axes, values, along)  # type: ignore[arg-type]
-        axes.set(**{f"{along}lim": (values.min() / 1.6, values.max() * 1.6)})
-
-
 def _name_sizes(axes: Axes, sizes: Sequence[int]) -> None:
-    """Say what markers stand for."""
     shown = [sizes[place] for place in spread(len(sizes), 4)]
     looks: dict[str, Any] = {"color": style.GREY, "ls": "", "mec": "white", "mew": 0.3}
     handles = [Line2D([], [], marker="o", ms=_ONE_RUN * np.sqrt(size), **looks) for size in shown]
@@ -86,7 +80,6 @@ def _name_sizes(axes: Axes, sizes: Sequence[int]) -> None:
 
 
 def _draw_errors(axes: Axes, plan: Plan, programmes: dict[str, Programme]) -> None:
-    """The error of each parameter: now, planned, standard."""
     errors = {name: programme.errors for name, programme in programmes.items()} | {"known now": plan.knowledge.errors}
     places = np.arange(len(plan.knowledge.names))
     for (name, values), marker in zip(errors.items(), "os^", strict=True):

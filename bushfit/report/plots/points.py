@@ -92,15 +92,6 @@ class Repeats:
     rows: Array
 
     @classmethod
-    def of(cls, data_sets: Sequence[SweepData]) -> Repeats:
-        """The points of the sweeps' rows; none where there is no sweep."""
-        amplitude, frequency = (
-            np.concatenate([np.empty(0), *(getattr(data_set, name) for data_set in data_sets)])
-            for name in ("amplitude", "frequency")
-        )
-        return cls.at(frequency, amplitude)
-
-    @classmethod
     def at(cls, along: Array, held: Array) -> Repeats:
         """The points of some rows, each (n,)."""
         spots, place = np.unique(np.stack((held, along)), axis=1, return_inverse=True)
@@ -119,8 +110,9 @@ class Repeats:
 def means(data_sets: Sequence[SweepData]) -> Points:
     """Mean, least and largest value over the repeats of each operating point; rows without weight do not count."""
     data_sets = [data_set.with_weight() for data_set in data_sets]
-    repeats = Repeats.of(data_sets)
-    stiffness = np.concatenate([np.empty(0, dtype=complex), *(data_set.measured for data_set in data_sets)])
+    rows = [(data_set.frequency, data_set.amplitude, data_set.measured) for data_set in data_sets]
+    frequency, amplitude, stiffness = np.hstack([np.empty((3, 0), dtype=complex), *rows])
+    repeats = Repeats.at(frequency.real, amplitude.real)
 
     def band(quantity: Callable[[Array], Array]) -> Band:
         values = quantity(stiffness)

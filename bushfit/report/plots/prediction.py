@@ -142,7 +142,9 @@ def draw(
         line, point = (Band(factor * band.value, factor * band.low, factor * band.high) for band in bands)
         for look, level, spots in zip(looks, levels, marked, strict=True):
             at = getattr(lines, held) == level
-            _draw_line(axes, look, x, line, at)
+            stroke = "_" if at.sum() == 1 else ""  # a band of one point has no width
+            axes.plot(x[at], line.value[at], color=look.color, ls=look.dashes, lw=_LINE, marker=stroke, ms=14.0)
+            axes.fill_between(x[at], line.low[at], line.high[at], color=look.color, alpha=0.22, lw=0)
             if if_rigs is not None:
                 other = factor * getattr(if_rigs, kind).value[at]
                 axes.plot(x[at], other, color=look.color, lw=_DOUBLE)
@@ -184,13 +186,6 @@ def _spots(held: Array, levels: Array, inside: Array) -> list[Array]:
     off = np.abs(np.where(alone, nominal(held), held)[:, None] / levels - 1.0)
     nearest = off == np.min(off, axis=1, keepdims=True)
     return list((inside[:, None] & nearest & (off <= _SAME)).T)
-
-
-def _draw_line(axes: Axes, look: style.Style, x: Array, band: Band, at: Array) -> None:
-    """A line with its band; a stroke where it has but one point."""
-    marker = "_" if at.sum() == 1 else ""
-    axes.plot(x[at], band.value[at], color=look.color, ls=look.dashes, lw=_LINE, marker=marker, ms=14.0)
-    axes.fill_between(x[at], band.low[at], band.high[at], color=look.color, alpha=0.22, lw=0)
 
 
 def pair_labels(place: Place, largest: float) -> tuple[float, tuple[str, str]]:

@@ -89,7 +89,6 @@ def _draw_points(
 
 
 def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, style.Style]) -> None:
-    """Noise and distortion of the points over frequency."""
     for level, look in looks.items():
         mine = steps[steps["level"] == level]
         noise = np.hypot(mine["gain_error"], mine["phase_error"]) / 2**0.5
