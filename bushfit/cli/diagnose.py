@@ -143,12 +143,10 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
         console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
     if effect["twins"]:
         names = " or ".join((effect["name"], *effect["twins"]))
-        size, told = (
-            ("", "the tests do not tell")
-            if effect["alternatives"]
-            else ("how large it is, the tests tell; ", "they do not")
-        )
-        console.print(f"    {size}whether it is {names}, {told}")
+        if effect["alternatives"]:
+            console.print(f"    whether it is {names}, the tests do not tell")
+        else:
+            console.print(f"    how large it is, the tests tell; whether it is {names}, they do not")
     if effect["correction"]:
         console.print(f"    the line that puts it right: {escape(effect['correction'])}")
     if effect["alternatives"]:

@@ -191,7 +191,7 @@ class Effect:
         corrects: the direction, or specimen, whose stiffness formula it scales by a fitted factor; where the effect is
             in a model, that formula's own error needs no warning. None where it scales no formula.
         twins: names of effects, of the rig above all, with the same equation for all tests. Of such twins the one that
-            belongs to the bushing, which is this one, is proposed; its size is then known, and which of the two it is, is not.
+            belongs to the bushing, which is this one, is proposed; how large it is, is then known, which it is, not.
         replaces: the branch of the paper that it stands in place of; None where it is added to the others.
         under: what of a test's circumstances it depends on, by the names of `Circumstances`.
         assumption: what a prediction takes of these where they are not known, for its user; none of the rig's effects.
