@@ -80,7 +80,7 @@ def of_its_fits(bushings: Path, count: int, folder: Path) -> float:
 def seconds(bushings: Path, count: int, jobs: int, folder: Path) -> float:
     plan = plan_of(bushings, count, folder)
     begin = time.perf_counter()
-    summary = run(plan, LocalPool(jobs), str, lambda _: None)
+    summary = run(plan, LocalPool(jobs), lambda _: None)
     assert summary.status["done"] == count
     return time.perf_counter() - begin
 

@@ -79,8 +79,9 @@ def plan(folder: Path, data: bytes) -> None:
         if not source.loops and not source.sweeps:
             planned = PlanTests(hours=1.0).run(source)
             to_json(planned.document)
-            file.write_bytes(planned.campaign)
-            load_campaign(file)
+            for content in planned.campaign.values():
+                file.write_bytes(content)
+                load_campaign(file)
 
 
 def model(folder: Path, data: bytes) -> None:
