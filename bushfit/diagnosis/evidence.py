@@ -88,12 +88,6 @@ class Evidence:
         ends = np.cumsum([data_set.size for data_set in self.data_sets]).tolist()
         return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
 
-    def embedded(self, values: Array, data_set: DataSet) -> Array:
-        """Residuals of one data set among those of all, 0 elsewhere, (n,)."""
-        row = np.zeros(self.residual.size)
-        row[self.place[data_set]] = values
-        return row
-
 
 def fit(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Evidence:
     """Fit every parameter of a model but the held ones, from its own values.

@@ -127,3 +127,8 @@ class Offer:
     def apart(self, counts: Array, pairs: Array) -> Array:
         """Expected chi-square between the rivals of each pair by so many runs of each test, (pairs,)."""
         return distances([view.together(counts) for view in self.views[1:]])[0, *pairs]
+
+
+def smallest_found(noncentrality: float) -> float:
+    """The smallest amount that is found, of a column with this noncentrality for a unit; inf where it is not seen."""
+    return FOUND / float(np.sqrt(noncentrality)) if noncentrality > 0.0 else np.inf

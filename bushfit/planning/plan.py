@@ -17,7 +17,7 @@ from bushfit.geometry import Place, Specimen
 from bushfit.planning.candidates import standard_tests
 from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible, Wanted
 from bushfit.planning.criterion import Budget, Criterion, best_runs, filled, noncentrality_of, root_of
-from bushfit.planning.offer import FOUND, RIVALS_APART, Offer
+from bushfit.planning.offer import FOUND, RIVALS_APART, Offer, smallest_found
 from bushfit.planning.order import Drifting, ordered
 from bushfit.planning.sensitivity import Information
 from bushfit.planning.targets import ENDLESS, Goal, percent, untested
@@ -290,9 +290,9 @@ class _Planner:
             if self.least[best] > 0.0:
                 amount = effect.amount
                 yield Visible(
-                    effect.name, qualified(effect, amount), amount.unit, amount.typical * _found(reached[best])
+                    effect.name, qualified(effect, amount), amount.unit, amount.typical * smallest_found(reached[best])
                 )
-        yield Visible("drift", "drift.gain", "1", _found(drifting))
+        yield Visible("drift", "drift.gain", "1", smallest_found(drifting))
 
     def _missed(self, counts: Array, goal: Goal) -> str | None:
         """By what so many runs of each test fail a target; None where they meet it."""
@@ -394,8 +394,3 @@ def _differences(test: Test) -> int:
     """Degrees of freedom of the scatter that a repeat of a test tells."""
     steps = len(test.steps) if isinstance(test, SimulatedSweep) else 0
     return steps - 1 if steps >= FEWEST_STEPS else 0
-
-
-def _found(noncentrality: float) -> float:
-    """The smallest amount that is found, of a column with this noncentrality for a unit; inf where it is not seen."""
-    return FOUND / float(np.sqrt(noncentrality)) if noncentrality > 0.0 else np.inf

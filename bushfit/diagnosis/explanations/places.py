@@ -72,12 +72,12 @@ def _place(
 
 
 def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
-    levels = Counter(str(sweep.direction) for sweep in sweeps for _ in np.unique(sweep.held))
+    levels = Counter(_direction(sweep) for sweep in sweeps for _ in np.unique(sweep.held))
     for sweep in sweeps:
         for held in np.unique(sweep.held):
             here = sweep.held == held
             words = sweep.line_words(int(np.argmax(here)))
-            if levels[str(sweep.direction)] > 1:  # in this file or in others
+            if levels[_direction(sweep)] > 1:  # in this file or in others
                 columns = _off(evidence, [sweep], [here], sloping=True)
                 yield _place(evidence, words, "level", [sweep], [here], columns)
             numbers = np.unique(sweep.repeat[here])
