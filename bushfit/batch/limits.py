@@ -29,7 +29,7 @@ from bushfit.campaign.toml import read_toml
 from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
 from bushfit.units import number, quantity
 from bushfit.validation import converted
 

@@ -9,10 +9,9 @@ from pydantic import BeforeValidator, Field
 from bushfit.campaign.quantities import Count, Frequency, Share, Temperature, motion, table, text
 from bushfit.errors import CampaignError
 from bushfit.geometry import Direction
-from bushfit.reading.headers import AmplitudeConvention
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Stepped, Waveform
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.validation import Name, Text, converted, unknown_key
 
 

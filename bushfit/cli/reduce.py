@@ -127,8 +127,8 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
 def _resonance_table(file: Path, stated: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
     """The table of a resonance test; None of a file without any of its columns, unless a mass or the like is stated."""
     from bushfit.inspection.recognition import open_table
+    from bushfit.reading.headers import RESONANCE_COLUMNS
     from bushfit.reading.resonance import is_resonance
-    from bushfit.reading.words import RESONANCE_COLUMNS
 
     said = any(value is not None for value in shaker.values())
     try:

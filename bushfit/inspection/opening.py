@@ -18,6 +18,7 @@ from bushfit.inspection.loops import look_at_history, look_at_loop, look_at_prog
 from bushfit.inspection.recognition import direction_of, place_of, recognised
 from bushfit.inspection.record import ColumnSeen, Findings, Inspected, Kind
 from bushfit.inspection.sweeps import look_at_sweep
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.layout import DELIMITERS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
@@ -25,7 +26,6 @@ from bushfit.reading.names import NO_LABELS, Labels
 from bushfit.reading.source import Channels, Sheet
 from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reduction.programme import programme
 from bushfit.reduction.steps import sines
 from bushfit.validation import check_tables

@@ -9,12 +9,11 @@ import numpy as np
 
 from bushfit.geometry import Place, stated_strain
 from bushfit.reading.columns import Rows
-from bushfit.reading.headers import Column
+from bushfit.reading.headers import LOOP_COLUMNS, Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Loop, Waveform, rebuild_time, source_of
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS
 
 #: Rows of the shortest loop; chosen: fewer do not show a shape.
 _FEWEST_LOOP_ROWS = 10

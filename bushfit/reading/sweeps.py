@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from bushfit import units as si
 from bushfit.geometry import Place, stated_strain
 from bushfit.reading.columns import Rows
-from bushfit.reading.headers import AmplitudeConvention, Column
+from bushfit.reading.headers import OF_MOTION, SWEEP_COLUMNS, AmplitudeConvention, Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import SAME_TEMPERATURE, Complex, Floats, Stepped, Sweep, source_of
 from bushfit.reading.runs import runs_of
 from bushfit.reading.table import Table
-from bushfit.reading.words import OF_MOTION, SWEEP_COLUMNS
 
 #: The pairs of columns that each make a complex stiffness, in order of preference.
 STIFFNESS_PAIRS = (

@@ -12,15 +12,22 @@ from bushfit import units
 from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.columns import Columns, Rows
-from bushfit.reading.encoding import to_utf8
-from bushfit.reading.files import sha256, view_bytes
-from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, plain, split_convention
+from bushfit.reading.files import sha256, to_utf8, view_bytes
+from bushfit.reading.headers import (
+    OF_MOTION,
+    Column,
+    Heading,
+    Vocabulary,
+    is_angular,
+    of_motion,
+    plain,
+    split_convention,
+)
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.parts import open_part
 from bushfit.reading.source import RowSource, Sheet, Text
 from bushfit.reading.wide import as_long
-from bushfit.reading.words import OF_MOTION, of_motion
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 #: Likeness, from 0 to 1, from which a header is suggested for one that is not there; chosen: one word of two suffices.

@@ -20,11 +20,11 @@ from bushfit.jobs.plan import PlanTests
 from bushfit.jobs.predict import Predict
 from bushfit.jobs.report import report as reported
 from bushfit.model.file import load_result, to_document
+from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.resonance import read_resonance
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
-from bushfit.reading.words import RESONANCE_COLUMNS
 from bushfit.report.contents import pages_of
 from bushfit.report.folder import to_json
 

@@ -10,8 +10,7 @@ import pytest
 
 from bushfit.errors import CampaignError, MeasurementError
 from bushfit.geometry import Direction
-from bushfit.reading.encoding import detect, to_utf8
-from bushfit.reading.files import read_utf8, view_bytes
+from bushfit.reading.files import detect, read_utf8, to_utf8, view_bytes
 from bushfit.reading.loops import read_loop
 
 

@@ -11,9 +11,8 @@ from dialects import DIALECTS, expected
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
-from bushfit.reading.headers import Heading, Vocabulary, plain, split_convention
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Heading, Vocabulary, plain, split_convention
 from bushfit.reading.sweeps import read_sweep
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 
 LOOPS, SWEEPS = Vocabulary(LOOP_COLUMNS, {}), Vocabulary(SWEEP_COLUMNS, {})
 

@@ -9,11 +9,11 @@ from dialects import DIALECTS
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
+from bushfit.reading.headers import LOOP_COLUMNS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.numerals import Numerals
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS
 
 
 @pytest.mark.parametrize(

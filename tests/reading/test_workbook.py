@@ -178,7 +178,7 @@ def test_a_sheet_that_is_not_asked_for_is_not_read(tmp_path: Path) -> None:
 def test_cells_of_all_sheets_count_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Which are asked for one after the other, too."""
     file = workbook({"A": table("loop"), "B": table("loop")}, tmp_path)
-    monkeypatch.setattr("bushfit.reading.workbook._MOST_CELLS", 300)
+    monkeypatch.setattr("bushfit.reading.parts._MOST_CELLS", 300)
     with pytest.raises(MeasurementError, match='more, with sheet "B"'):
         forces(file)
     assert np.array_equal(forces(file, sheet="A"), FORCE)
@@ -190,7 +190,7 @@ def test_cells_of_all_sheets_count_together(tmp_path: Path, monkeypatch: pytest.
 @pytest.mark.slow
 def test_a_workbook_takes_so_much_time_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "test.xlsx").write_bytes(bombs.workbook([bombs.EMPTY * 5]))
-    monkeypatch.setattr("bushfit.reading.workbook._MOST_SECONDS", 1)
+    monkeypatch.setattr("bushfit.reading.parts._MOST_SECONDS", 1)
     with pytest.raises(MeasurementError, match="more than 1 s of work"):
         forces(tmp_path / "test.xlsx")
 
