@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.campaign.compound import Compound
-from bushfit.campaign.files import LoopFile, SweepFile
+from bushfit.campaign.files import LoopFile, SweepFile, place_tested
 from bushfit.campaign.head import ReportSettings, embedded
-from bushfit.campaign.places import place_tested
 from bushfit.campaign.schema import (
     CampaignFile,
     FitSettings,

@@ -8,9 +8,8 @@ import numpy as np
 from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
 from bushfit.campaign.compound import Compound
-from bushfit.campaign.files import LoopFile, SweepFile
+from bushfit.campaign.files import PLACE_KEYS, LoopFile, SweepFile, with_places
 from bushfit.campaign.head import ReportSettings
-from bushfit.campaign.places import PLACE_KEYS, with_places
 from bushfit.campaign.quantities import (
     LARGEST_SHAKEN,
     SHAKEN,

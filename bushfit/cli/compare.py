@@ -62,7 +62,7 @@ def command(
     from bushfit.campaign.campaign import load_campaign
     from bushfit.effects import effect_named
     from bushfit.jobs.compare import MOST, Compare
-    from bushfit.jobs.provenance import command_line, options_typed
+    from bushfit.jobs.fits import command_line, options_typed
 
     if families is None and not 2 <= len(sources) <= MOST:
         raise click.UsageError(f"2 to {MOST} results are compared; one campaign alone with '--families' after it.")

@@ -22,8 +22,7 @@ from bushfit.errors import naming
 from bushfit.units import for_people, number
 
 if TYPE_CHECKING:
-    from bushfit.jobs.plan import Planned
-    from bushfit.jobs.plan_document import PlanFile, Shown
+    from bushfit.jobs.plan import PlanFile, Planned, Shown
     from bushfit.planning.check import Check
     from bushfit.planning.contract import Aim
 

@@ -16,7 +16,7 @@ from bushfit.units import alike, for_people, number
 
 if TYPE_CHECKING:
     from bushfit.fitting.procedures import TwoStep
-    from bushfit.jobs.run import Ran
+    from bushfit.jobs.diagnose import Ran
     from bushfit.model.result import Range, Result
 
 #: Standard errors up to which two fits are said to agree.
@@ -38,7 +38,7 @@ def command(task: Task) -> None:
     Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
     diagnosis.json, candidates.csv, report.html; as table and plot: loops, sweeps, gap, axial, radial, each specimen.
     """
-    from bushfit.jobs.run import Run
+    from bushfit.jobs.diagnose import Run
 
     task.perform(Run(), tell_run, _model_to_use)
 

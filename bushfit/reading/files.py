@@ -16,6 +16,21 @@ _LARGEST_BYTES = 1 << 30
 HEAD_BYTES = 1 << 18
 #: Bytes that are checked at a time; chosen: few enough to be held beside the file, enough to be fast.
 CHUNK_BYTES = 1 << 22
+#: Byte order marks, and Python's name of the encoding that each tells. UTF-32's begins with UTF-16's.
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+#: Share of zeros among every other byte from which a text is taken for UTF-16; ASCII has nearly all of them zero.
+_LEAST_ZERO_SHARE = 0.3
+#: Runs of bytes beyond ASCII that are compared; chosen: many times those of a header.
+_MOST_RUNS = 1 << 16
+#: A run of bytes beyond ASCII.
+_HIGH_RUN = re.compile(rb"[\x80-\xff]+")
+#: Two bytes of GB2312: its punctuation and its 3755 commonest characters. Western accents make few such pairs.
+_COMMON_CHINESE = re.compile(rb"(?:[\xa1-\xa3\xb0-\xd7][\xa1-\xfe])+")
 
 
 def view_bytes(
@@ -110,23 +125,6 @@ def sha256(data: bytes) -> Future[str]:
     digest = thread.submit(lambda: hashlib.sha256(data).hexdigest())
     thread.shutdown(wait=False)
     return digest
-
-
-#: Byte order marks, and Python's name of the encoding that each tells. UTF-32's begins with UTF-16's.
-_MARKS = (
-    (codecs.BOM_UTF8, "utf-8-sig"),
-    (codecs.BOM_UTF32_LE, "utf-32"),
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
-)
-#: Share of zeros among every other byte from which a text is taken for UTF-16; ASCII has nearly all of them zero.
-_LEAST_ZERO_SHARE = 0.3
-#: Runs of bytes beyond ASCII that are compared; chosen: many times those of a header.
-_MOST_RUNS = 1 << 16
-#: A run of bytes beyond ASCII.
-_HIGH_RUN = re.compile(rb"[\x80-\xff]+")
-#: Two bytes of GB2312: its punctuation and its 3755 commonest characters. Western accents make few such pairs.
-_COMMON_CHINESE = re.compile(rb"(?:[\xa1-\xa3\xb0-\xd7][\xa1-\xfe])+")
 
 
 def to_utf8(data: bytes, file: Path, stated: str | None = None) -> tuple[bytes, str]:

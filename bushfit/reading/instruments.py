@@ -38,6 +38,12 @@ _UFF_QUANTITIES = {
 _UFF_MARK = b"    -1"
 #: The direction of UFF from which on a displacement is a rotation, and a force a moment.
 _UFF_ROTATIONS = 4
+#: The names that a base of recording goes by.
+_BASES = Vocabulary({"time": LOOP_COLUMNS["time"], "frequency": SWEEP_COLUMNS["frequency"]}, {})
+#: What may be done about files without channels.
+_HINT = "export it again, with its channels"
+_MATLAB_HINT = 'save vectors, or structs of them, with -v7; a table by way of table2struct(T, "ToScalar", true)'
+_UFF_HINT = "export records or frequency responses as dataset 58"
 
 
 class Channel(NamedTuple):
@@ -226,10 +232,6 @@ def _uff_axis(
     return Channel(name, values / factors.get(factor, 1.0), si)
 
 
-#: The names that a base of recording goes by.
-_BASES = Vocabulary({"time": LOOP_COLUMNS["time"], "frequency": SWEEP_COLUMNS["frequency"]}, {})
-
-
 class Format(NamedTuple):
     """A format of recordings: its name, endings and pattern of the start of files, what reads them, and a hint."""
 
@@ -240,10 +242,6 @@ class Format(NamedTuple):
     hint: str
 
 
-#: What may be done about files without channels.
-_HINT = "export it again, with its channels"
-_MATLAB_HINT = 'save vectors, or structs of them, with -v7; a table by way of table2struct(T, "ToScalar", true)'
-_UFF_HINT = "export records or frequency responses as dataset 58"
 #: The formats of recordings.
 _FORMATS = (
     Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", matlab, _MATLAB_HINT),

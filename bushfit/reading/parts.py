@@ -34,6 +34,10 @@ _PATIENCE = 15
 _ZIP_SIGN = b"PK\x03\x04"
 #: First bytes of the older formats of Office.
 _OLD_OFFICE_SIGN = b"\xd0\xcf\x11\xe0"
+#: Parts that an error lists at most; chosen: a line or two.
+_MOST_LISTED = 12
+#: What to do about a test whose channels lie in several groups.
+_ONE_GROUP = "a test needs its channels in one group, at one rate and of one length: resample those that differ"
 
 
 def is_workbook(data: bytes) -> bool:
@@ -98,12 +102,6 @@ def _asked(data: bytes, file: Path, kind: type[BushfitError], **order: object) -
             hint="save the sheet as CSV",
         )
     return answer
-
-
-#: Parts that an error lists at most; chosen: a line or two.
-_MOST_LISTED = 12
-#: What to do about a test whose channels lie in several groups.
-_ONE_GROUP = "a test needs its channels in one group, at one rate and of one length: resample those that differ"
 
 
 def parts_of(file: Path) -> Sequence[Sheet]:
