@@ -1,4 +1,4 @@
-"""The tables [[loops]] and [[sweeps]] of a campaign file: a test's file, what it does not say itself, and what was tested."""
+"""The tables [[loops]] and [[sweeps]] of a campaign file: a file, what it does not say itself, and what was tested."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""What the commands share: their options, where results go, how far long work is, and the order of work on a campaign."""
+"""What the commands share: options, where results go, how far long work is, and the order of work on a campaign."""
 
 from __future__ import annotations
 
