@@ -30,17 +30,17 @@ def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", lar
         CampaignError: the file is missing, too large, no TOML, or has keys or values that are not understood.
         UnitError: a quantity without a unit, or with one that does not fit.
     """
-    return check_tables(_parse(path, what, largest), path, schema)
+    return check_tables(_parsed(path, what, largest), path, schema)
 
 
-def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
+def _parsed(path: Path, what: str, largest: int) -> dict[str, Any]:
     data = read_utf8(path, CampaignError, largest=largest, hint=f"give {what}, not a measurement")
-    if chain := _DEEP_KEY.search(data):
-        raise _too_deep(path, line_of(data, chain.start()))
+    chain = _DEEP_KEY.search(data)
     try:
-        tables = tomllib.loads(data.decode("utf-8-sig"))
-        repr(tables)  # an error may have to quote any part of it
-        return tables
+        if not chain:
+            tables = tomllib.loads(data.decode("utf-8-sig"))
+            repr(tables)  # an error may have to quote any part of it
+            return tables
     except ValueError as error:
         reason = re.fullmatch(r"(?P<problem>.*) \(at (?P<place>.*)\)", str(error), re.DOTALL)
         raise CampaignError(
@@ -53,16 +53,10 @@ def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
         ) from error
     except RecursionError:
         pass
-    raise _too_deep(path, None)  # outside of `except`: an error of a thousand frames cannot be pickled
-
-
-def _too_deep(file: Path, place: str | None) -> CampaignError:
-    return CampaignError(
-        "the tables are nested too deeply",
-        file=file,
-        place=place,
-        expected="keys of a few parts, such as simulate.effects.inertia.mass",
-    )
+    expected = "keys of a few parts, such as simulate.effects.inertia.mass"
+    place = line_of(data, chain.start()) if chain else None
+    # outside of `except`: an error of a thousand frames cannot be pickled
+    raise CampaignError("the tables are nested too deeply", file=path, place=place, expected=expected)
 
 
 def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[str]:

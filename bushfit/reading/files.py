@@ -44,7 +44,10 @@ def view_bytes(
     """
     try:
         if not file.exists():
-            raise _missing(file, kind)
+            siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
+            hint = did_you_mean(file.name, siblings) or "check the path for a typing error"
+            expected = "an existing file; a relative path counts from the folder of the file that names it"
+            raise kind("there is no such file", file=file, expected=expected, hint=hint)
         if not file.is_file():
             found = "a folder" if file.is_dir() else "a device"
             raise kind("this is not a file", file=file, found=found, expected="a file")
@@ -83,17 +86,6 @@ def read_utf8(
             hint="save it as UTF-8, or convert it: iconv -f LATIN1 -t UTF-8 old > new",
         )
     return data
-
-
-def _missing(file: Path, kind: type[BushfitError]) -> BushfitError:
-    """The error for a file that is not there, with the name beside it that is most alike."""
-    siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
-    return kind(
-        "there is no such file",
-        file=file,
-        expected="an existing file; a relative path counts from the folder of the file that names it",
-        hint=did_you_mean(file.name, siblings) or "check the path for a typing error",
-    )
 
 
 def not_utf8(data: bytes) -> int | None:

@@ -71,7 +71,11 @@ def read_loop(
     if time is None:
         time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
     else:
-        _check_increases(table, wanted["time"], time)
+        later, hint = "a later time on every row", "if a column tells runs, bushfit init makes a loop of each"
+        table.refuse(np.append(False, time[1:] <= time[:-1]), wanted["time"], "time does not increase", later, hint)
+        if time[-1] - time[0] < LEAST_VALUE:
+            expected = f"{LEAST_VALUE:g} s or more"
+            raise table.error("the record takes no time", column=wanted["time"], expected=expected)
     source = source_of(file, listed_as, table.sha256, temperature, conditions, table.not_understood())
     timed = "time" in values
     return Loop(
@@ -119,11 +123,3 @@ def _check_sense(table: Table, column: Column, displacement: Floats, force: Floa
             if force_sign == 1
             else "take force_sign = -1 out of the campaign",
         )
-
-
-def _check_increases(table: Table, column: Column, time: Floats) -> None:
-    """Refuse a time that does not increase from row to row."""
-    expected, hint = "a later time on every row", "if a column tells runs, bushfit init makes a loop of each"
-    table.refuse(np.append(False, time[1:] <= time[:-1]), column, "time does not increase", expected, hint)
-    if time[-1] - time[0] < LEAST_VALUE:
-        raise table.error("the record takes no time", column=column, expected=f"{LEAST_VALUE:g} s or more")

@@ -30,19 +30,12 @@ _MOST_MEMORY = 2 << 30
 _MOST_SECONDS = 30
 #: By how much longer it is waited for on a machine with much else to do.
 _PATIENCE = 15
-#: First bytes of a zip archive, which newer workbooks are.
-_ZIP_SIGN = b"PK\x03\x04"
-#: First bytes of the older formats of Office.
-_OLD_OFFICE_SIGN = b"\xd0\xcf\x11\xe0"
+#: First bytes of a zip archive, which newer workbooks are, and of the older formats of Office.
+_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 #: Parts that an error lists at most; chosen: a line or two.
 _MOST_LISTED = 12
 #: What to do about a test whose channels lie in several groups.
 _ONE_GROUP = "a test needs its channels in one group, at one rate and of one length: resample those that differ"
-
-
-def is_workbook(data: bytes) -> bool:
-    """Whether the first bytes of a file are those of a workbook or of another archive."""
-    return data.startswith((_ZIP_SIGN, _OLD_OFFICE_SIGN))
 
 
 def read_sheets(
@@ -157,7 +150,7 @@ def _read(data: bytes, file: Path, name: str | None = None) -> tuple[Sequence[st
         if isinstance(groups, MeasurementError):
             raise groups
         return [group.sheet for group in groups], groups
-    return read_sheets(data, file, name) if is_workbook(data) else ((), ())
+    return read_sheets(data, file, name) if data.startswith(_WORKBOOKS) else ((), ())
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -286,19 +286,15 @@ def _convention(table: Table, column: Column | None, stated: AmplitudeConvention
 def _complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tuple[Complex, Floats]:
     """Complex stiffness and loss factor by one of STIFFNESS_PAIRS, (n,) each."""
     size, loss = (values[role] for role in pair)
-    match pair:
-        case (_, "loss_stiffness"):
-            return size + 1j * loss, loss / size
-        case ("stiffness", "phase"):
-            return size * np.exp(1j * loss), _tangent(loss)
-    factor = _tangent(loss) if pair[1] == "phase" else loss
+    if pair[1] == "loss_stiffness":
+        return size + 1j * loss, loss / size
+    factor = loss
+    if pair[1] == "phase":
+        factor = np.where(np.abs(loss) < np.pi / 2, np.tan(loss), np.nan)  # none from 90 deg on
+    if pair == ("stiffness", "phase"):
+        return size * np.exp(1j * loss), factor
     storage = size / np.hypot(1.0, factor) if pair[0] == "stiffness" else size
     return storage * (1.0 + 1j * factor), factor
-
-
-def _tangent(phase: Floats) -> Floats:
-    """The loss factor of a phase [rad], (n,); nan from 90 deg on."""
-    return np.where(np.abs(phase) < np.pi / 2, np.tan(phase), np.nan)
 
 
 def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64] | None:
