@@ -23,6 +23,7 @@ from bushfit.model.file import load_result, to_document
 from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.resonance import read_resonance
+from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
 from bushfit.report.contents import pages_of
@@ -98,7 +99,7 @@ def workbook(folder: Path, data: bytes) -> None:
     file = folder / "table.xlsx"
     file.write_bytes(bombs.workbook(data.split(b"\n====\n"), texts=TEXTS))
     with clear_errors():
-        read_sweep(file, Direction.AXIAL)
+        read_sweep(file, Direction.AXIAL, SweepFile(file=file.name))
     look_into(file)
 
 

@@ -23,8 +23,8 @@ from texts import refused
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
-from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 
 Sheets = dict[str, list[list[object]]]
@@ -52,7 +52,7 @@ def workbook(sheets: Sheets, folder: Path) -> Path:
 
 
 def forces(file: Path, **stated: Any) -> Any:
-    return read_loop(file, Direction.AXIAL, written=FileFormat(**stated)).force
+    return read_loop(file, Direction.AXIAL, LoopFile(file=file.name, **stated)).force
 
 
 FORCE = np.array([float(row[2]) for row in NUMBERS["loop"]])
@@ -113,7 +113,10 @@ def test_workbooks_of_other_formats_read_to_the_same_numbers(
 
 def test_a_sweep_and_a_loop_in_one_workbook(tmp_path: Path) -> None:
     file = workbook({"Loop": table("loop", "french"), "Sweep": table("sweep", "spanish")}, tmp_path)
-    assert np.array_equal(read_sweep(file, Direction.AXIAL).frequency, [float(row[0]) for row in NUMBERS["sweep"]])
+    assert np.array_equal(
+        read_sweep(file, Direction.AXIAL, SweepFile(file=file.name)).frequency,
+        [float(row[0]) for row in NUMBERS["sweep"]],
+    )
     assert np.array_equal(forces(file, sheet="Loop"), FORCE)
 
 

@@ -1,18 +1,32 @@
 """The tables [[loops]] and [[sweeps]] of a campaign file: a file, what it does not say itself, and what was tested."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from bushfit.campaign.quantities import Count, Frequency, Share, Temperature, motion, table, text
 from bushfit.errors import CampaignError, naming
 from bushfit.geometry import Direction, Place, Specimen
+from bushfit.reading.columns import Rows
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.measurement import Stepped, Waveform
-from bushfit.validation import Name, Text, converted, unknown_key
+from bushfit.reading.measurement import Floats, Source, Stepped, Waveform, rebuild_time
+from bushfit.units import CELSIUS
+from bushfit.validation import (
+    Count,
+    Frequency,
+    Name,
+    Share,
+    Temperature,
+    Text,
+    converted,
+    motion,
+    table,
+    text,
+    unknown_key,
+)
 
 #: Keys of a table that tell it.
 PLACE_KEYS = ("direction", "specimen")
@@ -118,6 +132,17 @@ class TestFile(FileFormat):
     operator: Text | None = None
     specimen_number: Text | None = None
 
+    def source(self, sha256: str, temperature: float | None, notes: Iterable[str]) -> Source:
+        """The provenance of the test: its file, and the conditions that results carry on, a temperature [K] in degC."""
+        stated = {key: getattr(self, key) for key in ("order", "preload", "date", "operator", "specimen_number")}
+        degrees = None if temperature is None else round(temperature - CELSIUS, 6)
+        known = {key: each for key, each in {**stated, "temperature_degC": degrees}.items() if each is not None}
+        return Source(Path(self.file), sha256, known, tuple(notes))
+
+    def taken(self, *, shared: bool) -> Rows:
+        """The rows that make the test; others may be in the same file."""
+        return Rows(self.direction, self.specimen_number, self.rows, shared)
+
 
 @dataclass(frozen=True)
 class LoopFile(TestFile):
@@ -149,6 +174,12 @@ class LoopFile(TestFile):
                     hint='state waveform = "sine" beside it' if self.frequency and not self.rate else None,
                 )
             )
+
+    def clock(self, displacement: Floats) -> Floats:
+        """Time of each row [s], (n,), of a file without it; its motion is a triangle unless stated."""
+        return rebuild_time(
+            displacement, rate=self.rate, frequency=self.frequency, waveform=self.waveform or "triangle"
+        )
 
 
 @dataclass(frozen=True)
