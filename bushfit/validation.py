@@ -1,7 +1,8 @@
 """Checks a parsed TOML or JSON file against dataclasses with pydantic, whose errors become the project's own.
 
-It knows no campaign and no model, but the kinds of values in their files: texts such as "10 mm" become SI. A table of the file is a frozen dataclass. Where the keys of a field stand in the
-table itself and not under the field's own name, the field says so with `field(metadata=standing_in_table(keys))`.
+It knows no campaign and no model, but the kinds of values in their files: texts such as "10 mm" become SI. A table of
+the file is a frozen dataclass. Where the keys of a field stand in the table itself and not under the field's own name,
+the field says so with `field(metadata=standing_in_table(keys))`.
 """
 
 import re
