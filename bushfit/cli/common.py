@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import wraps
 from pathlib import Path
 from threading import Timer
@@ -107,14 +107,23 @@ class _Console(Console):
 
 @dataclass(frozen=True)
 class Options:
-    """Options that every command takes."""
+    """Options that every command takes; those of forms only where it writes what has them."""
 
-    output: Path | None
-    verbose: bool
-    quiet: bool
-    as_json: bool
-    formats: Formats
-    force: bool
+    output: Path | None = None
+    verbose: bool = False
+    quiet: bool = False
+    as_json: bool = False
+    force: bool = False
+    no_plots: bool = False
+    no_report: bool = False
+    table_format: Form = Formats.table_form
+    plot_format: Sequence[Picture] = Formats.picture_forms
+
+    @property
+    def formats(self) -> Formats:
+        """What is written of a result, and in which forms."""
+        pictures = tuple(dict.fromkeys(self.plot_format))
+        return Formats(True, not self.no_plots, not self.no_report, self.table_format, pictures)
 
     def folder(self, name: str, form: str = "{}") -> Path:
         """Where results go: --output, or results/<name>, in which `form` says what stands around it."""
@@ -174,27 +183,10 @@ def with_options(folder: str, *written: Written) -> Parameter:
 
     def decorate(function: Function) -> Function:
         @wraps(function)
-        def wrapped(
-            output: Path | None,
-            verbose: bool,
-            quiet: bool,
-            as_json: bool,
-            no_plots: bool,
-            force: bool,
-            table_format: Form = Formats.table_form,
-            plot_format: Sequence[Picture] = Formats.picture_forms,
-            no_report: bool = False,
-            **others: Any,
-        ) -> Any:
-            formats = Formats(
-                pictures=not no_plots,
-                pages=not no_report,
-                table_form=table_format,
-                picture_forms=tuple(dict.fromkeys(plot_format)),
-            )
-            options = Options(output, verbose, quiet, as_json, formats, force)
+        def wrapped(**given: Any) -> Any:
+            options = Options(**{each.name: given.pop(each.name) for each in fields(Options) if each.name in given})
             with shown_on(options.console):
-                return function(options=options, **others)
+                return function(options=options, **given)
 
         return in_order(
             wrapped,
