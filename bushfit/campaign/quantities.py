@@ -1,18 +1,25 @@
-"""Model parameters of a campaign file by name: texts such as "1.1 MPa" become SI."""
+"""What only a campaign file states: model parameters by name, and [compound], of a rubber before it is tested."""
 
 import re
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from bushfit.effects import is_parameter, parameter_named, parameter_names
-from bushfit.errors import CampaignError, naming
+from bushfit.errors import CampaignError, UnitError, naming
 from bushfit.units import quantity, sized
-from bushfit.validation import LARGEST_NUMBER, unknown_key
+from bushfit.validation import LARGEST_NUMBER, converted, text, unknown_key
 
 #: The second to the power of alpha, at the end of the unit of m.
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
+#: Polymers whose density is known, by the names that rubber engineers use; NR is natural rubber.
+Polymer = Literal["natural", "SBR", "EPDM", "NBR", "CR", "IIR"]
+#: Hardness between which Gent's relation is used [Shore A]: outside of it a durometer hardly tells rubbers apart.
+_HARDNESS = (20.0, 90.0)
+#: Carbon black at most [phr]: more is not mixed into rubber that is to move.
+_MOST_FILLER = 120.0
 
 
 def parameter_value(place: str, name: str, raw: Any) -> float:
@@ -77,3 +84,57 @@ def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
                 raise CampaignError("these limits hold no value", place=name, found=str(raw[name]), expected=expected)
             table |= {key: float(end) for key, end in zip(("min", "max"), ends, strict=True) if key in table}
     return settings
+
+
+def hardness(raw: object) -> float:
+    """The number of a text such as "61 Shore A".
+
+    Raises:
+        UnitError: no such text.
+        CampaignError: a hardness for which Gent's relation does not hold.
+    """
+    found = _number(raw, r"sh(?:ore)?\.?\s*a", "a hardness", '"61 Shore A"')
+    if not _HARDNESS[0] <= found <= _HARDNESS[1]:
+        expected = f"{_HARDNESS[0]:g} to {_HARDNESS[1]:g} Shore A"
+        raise CampaignError("no modulus follows from this hardness", found=str(raw), expected=expected)
+    return found
+
+
+def filler(raw: object) -> float:
+    """The carbon black per hundred parts of rubber of a text such as "27 phr", or "27 phr carbon black".
+
+    Raises:
+        UnitError: no such text.
+        CampaignError: more filler than there is in bushings.
+    """
+    found = _number(raw, r"phr(?:\s+(?:of\s+)?carbon[\s-]black)?", "a filler", '"27 phr", of carbon black')
+    if found > _MOST_FILLER:
+        raise CampaignError("impossible filler", found=str(raw), expected=f"0 to {_MOST_FILLER:g} phr of carbon black")
+    return found
+
+
+def _number(raw: object, unit: str, what: str, expected: str) -> float:
+    """The number before a unit that pint does not know."""
+    match = re.fullmatch(rf"\s*(\d{{1,4}}(?:\.\d{{1,6}})?)\s*(?:{unit})\s*", str(raw), re.ASCII | re.IGNORECASE)
+    if not (isinstance(raw, str) and match):
+        raise UnitError(f"this is not {what}", found=str(raw), expected=expected)
+    return float(match[1])
+
+
+def _written(read: Any, example: str) -> Any:
+    return converted(lambda raw, _: read(raw), text(f"such as {example}"))
+
+
+@dataclass(frozen=True)
+class Compound:
+    """[compound]: a rubber that was not tested yet, for `bushfit plan`.
+
+    Args:
+        hardness: [Shore A].
+        filler: carbon black, parts by weight per hundred of rubber [phr].
+        rubber: the polymer.
+    """
+
+    hardness: Annotated[float, _written(hardness, '"61 Shore A"')]
+    filler: Annotated[float, _written(filler, '"27 phr"')]
+    rubber: Polymer = "natural"

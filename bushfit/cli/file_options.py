@@ -9,8 +9,7 @@ from typing import Any
 
 import click
 
-from bushfit.cli import completion
-from bushfit.cli.options import FILE, Function, Parameter, in_order, option, option_of, under
+from bushfit.cli.options import DIRECTIONS, FILE, Function, Parameter, in_order, option, option_of, under
 from bushfit.errors import BushfitError, MeasurementError
 
 #: What a test file does not say itself, as keys of a campaign, with metavar and words: of loops and sweeps, ...
@@ -41,7 +40,7 @@ _AS_WRITTEN = {
 _NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
 #: Types of what is stated, by key; else a text.
 TYPES: dict[str, click.ParamType[Any]] = {
-    "direction": click.Choice(completion.DIRECTIONS),
+    "direction": click.Choice(DIRECTIONS),
     "waveform": click.Choice(["sine", "triangle"]),
     "amplitude": click.Choice(["zero-to-peak", "peak-to-peak"]),
     **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),

@@ -25,7 +25,7 @@ Notes:
 
 import numpy as np
 
-from bushfit.campaign.compound import Compound
+from bushfit.campaign.quantities import Compound
 from bushfit.effects import BASE
 from bushfit.geometry import Bushing
 from bushfit.model.covariance import Z95

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import load_campaign, model_of
-from bushfit.campaign.compound import Compound
+from bushfit.campaign.quantities import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.planning.campaign import campaign_toml, settings_of

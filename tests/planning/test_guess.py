@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.campaign.compound import Compound, Polymer, filler, hardness
+from bushfit.campaign.quantities import Compound, Polymer, filler, hardness
 from bushfit.errors import BushfitError, CampaignError, UnitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint

@@ -15,8 +15,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from bushfit.errors import BushfitError, printable
-from bushfit.jobs.report import report
 from bushfit.report.contents import pages_of
+from bushfit.report.page import folder_contents
 
 #: A page at most [bytes].
 LARGEST = 500_000
@@ -167,4 +167,4 @@ def page_of(folder: Path) -> str:
 
 def made_of(folder: Path) -> str:
     """The report that is made of what stands in a folder."""
-    return pages_of(report(folder))["report.html"].decode()
+    return pages_of(folder_contents(folder))["report.html"].decode()
