@@ -121,10 +121,6 @@ def _number(raw: object, unit: str, what: str, expected: str) -> float:
     return float(match[1])
 
 
-def _written(read: Any, example: str) -> Any:
-    return converted(lambda raw, _: read(raw), text(f"such as {example}"))
-
-
 @dataclass(frozen=True)
 class Compound:
     """[compound]: a rubber that was not tested yet, for `bushfit plan`.
@@ -135,6 +131,6 @@ class Compound:
         rubber: the polymer.
     """
 
-    hardness: Annotated[float, _written(hardness, '"61 Shore A"')]
-    filler: Annotated[float, _written(filler, '"27 phr"')]
+    hardness: Annotated[float, converted(lambda raw, _: hardness(raw), text('such as "61 Shore A"'))]
+    filler: Annotated[float, converted(lambda raw, _: filler(raw), text('such as "27 phr"'))]
     rubber: Polymer = "natural"

@@ -254,7 +254,10 @@ class Questions:
         given: dict[_Key, Any] = {}
         while True:
             try:
-                return look(_together(stated, given))
+                every = dict(stated)
+                for (name, role), answer in given.items():
+                    every |= {f"{name}s": {**every.get(f"{name}s", {}), role: answer}} if role else {name: answer}
+                return look(every)
             except BushfitError as error:
                 if not self.asked:
                     raise
@@ -279,14 +282,6 @@ class Questions:
             key = ("frequency", "") if name == "rate" and "Hz" in known else key
         self._answers[key] = known
         return {key: known}
-
-
-def _together(stated: Mapping[str, Any], given: Mapping[_Key, Any]) -> dict[str, Any]:
-    """What is stated of a test, and the answers."""
-    every = dict(stated)
-    for (name, role), answer in given.items():
-        every |= {f"{name}s": {**every.get(f"{name}s", {}), role: answer}} if role else {name: answer}
-    return every
 
 
 def _wanted(error: BushfitError) -> list[_Key]:

@@ -103,7 +103,12 @@ class Table(Columns):
             found = f"header_line = {stated.header_line}"
             raise MeasurementError("there is no header on this line", file=file, found=found, hint="lines count from 1")
         table = cls(file, source, layout, stated, {}, checksum, names, motion)
-        table._check_header()
+        if len(table.headers) < 2:
+            found = table.headers[0] if table.headers else "nothing"
+            expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
+            raise table.header_error("there is only one column", found=found, expected=expected)
+        if all(is_like_number(cell) for cell in table.headers):
+            raise table.header_error("there is no header", expected=_EXPECTED_HEADER)
         named = columns or {} if understood is vocabulary else {}
         table = replace(table, roles=table._recognise(understood, named, stated_units or {}))
         return table if rows is None else table.taking(rows)
@@ -178,17 +183,6 @@ class Table(Columns):
                 expected=expected,
                 hint=hint,
             )
-
-    def _check_header(self) -> None:
-        """Refuse a header of one cell, or of numbers alone."""
-        if len(self.headers) < 2:
-            raise self.header_error(
-                "there is only one column",
-                found=self.headers[0] if self.headers else "nothing",
-                expected=f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks",
-            )
-        if all(is_like_number(cell) for cell in self.headers):
-            raise self.header_error("there is no header", expected=_EXPECTED_HEADER)
 
     def _recognise(
         self, vocabulary: Vocabulary, columns: Mapping[str, str], stated_units: Mapping[str, str]
