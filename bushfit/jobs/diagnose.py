@@ -93,9 +93,9 @@ class Diagnose:
             found = replace(found, result=found.odds.averaged((self.joint or Fit().run(data)).result))
         mine, usual = self.settings, Settings()
         sizes = ((key, getattr(mine, key), getattr(usual, key)) for key in ("max_effects", "tolerance"))
-        asked = {"model": "MODEL.json"} if self.model else {}
-        asked |= {key: f"{size:g}" for key, size, default in sizes if size != default}
-        options = options_typed(adopt=mine.adopt, without=mine.without, **asked)
+        changed = {key: f"{size:g}" for key, size, default in sizes if size != default}
+        start = "MODEL.json" if self.model else None
+        options = options_typed(model=start, adopt=mine.adopt, without=mine.without, **changed)
         return Diagnosed(campaign_document(data, "diagnose", options), found)
 
 
