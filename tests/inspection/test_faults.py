@@ -19,8 +19,8 @@ from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import Labels
-from bushfit.reading.rawtable import raw_sweep_table
 from bushfit.reading.stated import LoopFile
+from bushfit.simulation.files import raw_sweep_table
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
 

@@ -13,7 +13,7 @@ from bushfit.geometry import Direction, Specimen
 from bushfit.inspection.gathering import gather
 from bushfit.inspection.opening import inspect
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
+from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 
 INFO = pd.DataFrame([["Customer", "ACME"], ["Temperature", "23 degC"], ["Operator", "3"], ["Preload", "2 kN"]])
 

@@ -15,7 +15,7 @@ from bushfit.inspection.draft import file_text
 from bushfit.inspection.opening import inspect
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
-from bushfit.reading.rawtable import raw_loop_table
+from bushfit.simulation.files import raw_loop_table
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed
 
