@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bushfit.campaign.head import ReportSettings, embedded
-from bushfit.campaign.quantities import Compound
+from bushfit.campaign.quantities import Compound, ReportSettings, embedded
 from bushfit.campaign.schema import (
     CampaignFile,
     FitSettings,
