@@ -228,8 +228,7 @@ def _tell(options: Options, seen: Inspected) -> None:
     facts = seen.facts
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
-    place = seen.file.parent / seen.label
-    options.say(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
+    options.say(f"{seen.file.parent / seen.label}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
     options.warn([f"{seen.label}: {sentence}" for sentence in seen.odd])
     if seen.assumed:
         options.say(f"  {seen.assumed}")

@@ -116,8 +116,7 @@ def command(
     _tell(options, outcome)
     if count and outcome.plan.planned.tests:
         outcome = replace(outcome, check=_checked(options, outcome, count, seed))
-    files = {**options.formats.files(outcome.contents), **outcome.campaign}
-    options.write(folder, files, outcome.document)
+    options.write(folder, {**options.formats.files(outcome.contents), **outcome.campaign}, outcome.document)
     if outcome.plan.planned.tests:
         options.say(f"next: make the tests in the order of {folder / options.formats.table('plan')}")
     if missed := [name for name, target in outcome.document["targets"].items() if not target["met"]]:

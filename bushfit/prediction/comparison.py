@@ -174,8 +174,7 @@ def compare(
 
 def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
     """The comparisons with the probabilities of all their parameters taken together."""
-    tested = [row.p for each in comparisons for row in each.parameters if row.p is not None]
-    found = iter(holm(tested))
+    found = iter(holm([row.p for each in comparisons for row in each.parameters if row.p is not None]))
 
     def counted(row: ParameterContrast) -> ParameterContrast:
         return row if row.p is None else replace(row, holm=next(found))

@@ -165,8 +165,7 @@ class Vocabulary:
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str) -> Heading | None:
-        marked = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header)))
-        whole = marked.translate(_SPELLINGS)
+        whole = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header))).translate(_SPELLINGS)
         text, convention = split_convention(whole)
         if plain(header) in self._roles:  # a campaign may name a header with its unit
             name, unit = units.split_header(text)

@@ -90,8 +90,7 @@ class Loop:
 
     def at(self, rows: slice | NDArray[np.bool_]) -> Loop:
         """The record of these rows alone."""
-        channels = {name: getattr(self, name)[rows] for name in ("time", "displacement", "force")}
-        return replace(self, **channels)
+        return replace(self, **{name: getattr(self, name)[rows] for name in ("time", "displacement", "force")})
 
 
 @dataclass(frozen=True, eq=False)
