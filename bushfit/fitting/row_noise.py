@@ -109,7 +109,7 @@ class RowNoise:
 
     def _coloured(self, rows: Array, delay: int = 0) -> Array:
         """Independent numbers as the noise, over b_0, that they stand for, so many rows late, (..., n)."""
-        late = np.zeros((rows.shape[-1], rows[..., 0].size))  # its filter is banded: solved, no module of filters loaded
+        late = np.zeros((rows.shape[-1], rows[..., 0].size))  # a banded system: no module of filters is loaded
         late[delay:] = rows.reshape(late.shape[::-1])[:, : len(late) - delay].T
         band = np.repeat((self.filter / self.filter[0])[:, None], len(late), axis=1)
         return solve_banded((self.order, 0), band, late).T.reshape(rows.shape)

@@ -14,6 +14,7 @@ import errno
 import hashlib
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -33,6 +34,8 @@ _DECIDED = ".bushfit-decided"
 #: Name of the record, in a folder of results, of the files that each command wrote there: as JSON their SHA-256 by
 #: command and name, and the names that the last one took away.
 _RECORD = ".bushfit.json"
+#: Characters of a document that steer a terminal; the ends of its lines do not.
+_STEERING = re.compile(rf"(?!\n){CONTROL.pattern}")
 #: Most files of a folder that is exchanged [files]; one that holds more is no folder of results, and linking its files
 #: would take longer than moving the new ones in.
 _MOST_LINKED = 2000
@@ -49,8 +52,7 @@ class _Record:
 def to_json(document: Mapping[str, Any]) -> bytes:
     """A document as the bytes of its file, in which no character steers a terminal."""
     text = json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False)
-    safe = "\n".join(CONTROL.sub(lambda sign: f"\\u{ord(sign[0]):04x}", line) for line in text.split("\n"))
-    return f"{safe}\n".encode()
+    return (_STEERING.sub(lambda sign: f"\\u{ord(sign[0]):04x}", text) + "\n").encode()
 
 
 def check_free(folder: Path, names: list[str], *, force: bool) -> None:
