@@ -18,14 +18,13 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from bushfit.batch.quantities import At, Point
-from bushfit.campaign.naming import folder_name
-from bushfit.campaign.quantities import Share
 from bushfit.campaign.toml import read_toml
 from bushfit.effects import Effect, effect_named
 from bushfit.effects.mistakes import candidate_named
 from bushfit.errors import CampaignError
 from bushfit.reading.files import read_utf8
-from bushfit.validation import Text, check_tables, converted, unknown_key
+from bushfit.reading.tablefile import folder_name
+from bushfit.validation import Share, Text, check_tables, converted, unknown_key
 
 Command = Literal["run", "fit", "diagnose", "predict"]
 

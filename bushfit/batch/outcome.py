@@ -21,7 +21,7 @@ from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, PARTS, STIFFNESS, Quan
 from bushfit.batch.together import Together
 from bushfit.batch.work import Orders
 from bushfit.effects.contract import Array
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
 from bushfit.report.contents import Contents, Formats
 from bushfit.report.tables import BETWEEN
 

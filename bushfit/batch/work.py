@@ -111,7 +111,7 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
 
 def _run(campaign: Campaign, formats: Formats, files: dict[str, bytes]) -> tuple[Result, Diagnosed | None]:
     """The whole chain, as `bushfit run` does it; the tables of the prediction come in any case, as of predict."""
-    from bushfit.jobs.run import Run
+    from bushfit.jobs.diagnose import Run
 
     ran = Run().run(Data.of(campaign))
     files |= formats.files(ran.contents) | replace(formats, tables=True).files(ran.predicted.contents)

@@ -13,11 +13,11 @@ from collections.abc import Collection, Mapping, Sequence
 from importlib.resources import files
 from xml.etree import ElementTree as ET
 
-from bushfit.campaign.naming import folder_name
 from bushfit.export.compiler import SYSTEMS, libraries
 from bushfit.export.contract import Exported, Order
 from bushfit.export.in_time import FIELDS, ONE, TABLES, InTime, in_time
 from bushfit.geometry import Place, Unit
+from bushfit.reading.tablefile import folder_name
 from bushfit.version import __version__
 
 #: The sources that all FMUs share.

@@ -8,11 +8,11 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from bushfit.campaign.naming import folder_name
-from bushfit.campaign.written import specimen_lines, toml_value
+from bushfit.campaign.toml import specimen_lines, toml_value
 from bushfit.errors import CampaignError
 from bushfit.geometry import Specimen
 from bushfit.inspection.record import Inspected
+from bushfit.reading.tablefile import folder_name
 
 #: For each kind of test the array of tables that lists it in a campaign.
 _TABLES = {"loop": "loops", "sweep": "sweeps"}

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign.campaign import reader_keywords
-from bushfit.campaign.files import LoopFile, SweepFile
 from bushfit.errors import BushfitError, MeasurementError, naming
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.inspection.labels import keys_from_labels, labels_of_file, temperatures_of
@@ -18,14 +17,15 @@ from bushfit.inspection.loops import look_at_history, look_at_loop, look_at_prog
 from bushfit.inspection.recognition import direction_of, place_of, recognised
 from bushfit.inspection.record import ColumnSeen, Findings, Inspected, Kind
 from bushfit.inspection.sweeps import look_at_sweep
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.layout import DELIMITERS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels
 from bushfit.reading.source import Channels, Sheet
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reduction.programme import programme
 from bushfit.reduction.steps import sines
 from bushfit.validation import check_tables
@@ -64,7 +64,7 @@ def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) 
         kind, (facts, odd) = "sweep", look_at_sweep(measured, by_name)
     else:
         measured, entry, turned = _read_loop(file, read_as, entry, table)
-        kind, (facts, odd) = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile))
+        kind, (facts, odd) = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile)["test"])
     columns = _columns(table, is_sweep=is_sweep)
     facts, counted = facts | outside.facts, outside.is_counted
     if is_sweep and (amplitude := table.roles.get("amplitude")):
@@ -142,7 +142,7 @@ def _read_loop(
     return turned, {**entry, **_TURNED}, [odd]
 
 
-def _look(measured: Loop, by_name: Labels, keywords: Mapping[str, Any]) -> tuple[Kind, Findings]:
+def _look(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findings]:
     """The kind of a recorded test, a loop, a programme of loops or a history, with its facts and oddities."""
     steps = sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in steps}
@@ -151,7 +151,7 @@ def _look(measured: Loop, by_name: Labels, keywords: Mapping[str, Any]) -> tuple
     if len(points) > 1 and fast:
         with suppress(MeasurementError):  # no steady sine after all
             return "history", look_at_history(measured, by_name)
-    loops = programme(measured, **keywords)
+    loops = programme(measured, test)
     if len(loops) > 1:
         return "loop", look_at_programme(measured, loops, by_name)
     facts, odd = look_at_loop(loops[0], by_name)

@@ -10,13 +10,12 @@ from bushfit.campaign.schema import SpecimenTable
 from bushfit.errors import BushfitError, NoTestError, typed
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.reading.columns import Rows
-from bushfit.reading.headers import Vocabulary
+from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary, of_motion
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.sweeps import STIFFNESS_PAIRS
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, of_motion
 from bushfit.validation import check_tables
 
 #: Sizes of a block in shear, as [[specimens]] has them.

@@ -15,8 +15,8 @@ from bushfit.inspection.record import Findings, told_frequencies
 from bushfit.reading.measurement import Sweep, loss_factor
 from bushfit.reading.names import Labels
 from bushfit.reading.runs import rows_alike
+from bushfit.reduction.arrays import MEDIAN_TO_SIGMA
 from bushfit.reduction.result import MISSED_LEVEL
-from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 from bushfit.units import number
 
 #: Standard deviations from which a point is off its repeats, or a block off the others; chosen: no noise goes that far.

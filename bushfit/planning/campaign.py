@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.campaign.written import body_lines, place_line, toml_value
+from bushfit.campaign.toml import body_lines, place_line, toml_value
 from bushfit.effects import BASE, qualified
 from bushfit.geometry import Specimen
 from bushfit.model.model import Model

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bushfit.campaign.naming import folder_name
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import Level
 from bushfit.fitting.data_sets import LoopData, SweepData
@@ -18,6 +17,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import rig_effects, warnings_of
 from bushfit.prediction.stiffness import Prediction, predict
+from bushfit.reading.tablefile import folder_name
 from bushfit.report import plots, tables
 from bushfit.report.compared import SideBySide
 from bushfit.report.contents import Contents

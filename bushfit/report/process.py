@@ -16,7 +16,7 @@ from typing_extensions import Doc, TypedDict
 
 from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
 from bushfit.units import number
 
 #: Values that control limits are made of, and that others are held against, at least; and those from which limits are

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bushfit.batch.limits import Judge, Limits, Verdict, judge, read_limits
 from bushfit.batch.quantities import at_point, parameter_quantities
 from bushfit.errors import BushfitError
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
 
 NAN = math.nan
 finite = st.floats(-1e3, 1e3)

@@ -18,10 +18,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.campaign.naming import folder_name
 from bushfit.campaign.toml import read_toml
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, UnitError
 from bushfit.geometry import Bushing, Direction
+from bushfit.reading.tablefile import folder_name
 
 BUSHING = """
 [bushing]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from shell import CAMPAIGN
 
-from bushfit.cli import main, progress
+from bushfit.cli import common, main
 
 SIMULATE = ("simulate", "model/model.json")
 
@@ -36,7 +36,7 @@ def said(work: Path, monkeypatch: pytest.MonkeyPatch, heard: io.StringIO, *words
 
 
 def test_a_terminal_is_shown_how_far_it_is(work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(progress, "_PATIENCE", 0.0)
+    monkeypatch.setattr(common, "_PATIENCE", 0.0)
     told = said(work, monkeypatch, Terminal(), *SIMULATE, "-o", tmp_path / "x")
     assert "sweeps simulated" in told
     assert "0 of 2" in told
@@ -53,7 +53,7 @@ def test_a_terminal_is_shown_how_far_it_is(work: Path, tmp_path: Path, monkeypat
 def test_nobody_else_is(
     work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, heard: type, patience: float, more: tuple[str, ...]
 ) -> None:
-    monkeypatch.setattr(progress, "_PATIENCE", patience)
+    monkeypatch.setattr(common, "_PATIENCE", patience)
     told = said(work, monkeypatch, heard(), *SIMULATE, *more, "-o", tmp_path / "x")
     assert "simulated " not in told
     assert "\x1b[?25" not in told, "the cursor is left alone"

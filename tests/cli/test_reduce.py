@@ -14,6 +14,7 @@ from shell import BUSHING, Run, names, refused
 
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
+from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
 
 RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
@@ -28,7 +29,7 @@ def test_a_raw_record_becomes_a_sweep_that_fits(
     assert names(tmp_path / "x") == {"sweep.csv", "reduce.png"}
     assert "15 points found" in done.stderr
 
-    sweep = read_sweep(tmp_path / "x/sweep.csv", Direction.AXIAL)
+    sweep = read_sweep(tmp_path / "x/sweep.csv", Direction.AXIAL, SweepFile(file="sweep.csv"))
     off = sweep.stiffness / paper_model.stiffness(Direction.AXIAL, sweep.frequency, sweep.amplitude_reached) - 1.0
     print(f"raw record with noise: |K| and phase of 15 points within {abs(off).max():.1e}")
     assert abs(off).max() < 3e-3

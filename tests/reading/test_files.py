@@ -10,9 +10,9 @@ import pytest
 
 from bushfit.errors import CampaignError, MeasurementError
 from bushfit.geometry import Direction
-from bushfit.reading.encoding import detect, to_utf8
-from bushfit.reading.files import read_utf8, view_bytes
+from bushfit.reading.files import detect, read_utf8, to_utf8, view_bytes
 from bushfit.reading.loops import read_loop
+from bushfit.reading.stated import LoopFile
 
 
 def test_bytes_come_as_they_are_up_to_a_number_and_the_error_is_of_the_kind_asked_for(tmp_path: Path) -> None:
@@ -37,7 +37,7 @@ def test_a_file_that_changes_while_it_is_read(then: int, found: str, tmp_path: P
 
     (tmp_path / "loop.csv").write_text("time_s,displacement_mm,force_N\n" + "\n" * 9_599_969)
     with pytest.raises(MeasurementError, match=f"file changes while it is read\n  found: {found} bytes\n  try: wait"):
-        read_loop(Changing(tmp_path / "loop.csv"), Direction.AXIAL)
+        read_loop(Changing(tmp_path / "loop.csv"), Direction.AXIAL, LoopFile(file="loop.csv"))
 
 
 def test_bytes_tell_their_encoding_unless_it_is_stated() -> None:

@@ -9,11 +9,12 @@ from dialects import DIALECTS
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
+from bushfit.reading.headers import LOOP_COLUMNS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.numerals import Numerals
+from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS
 
 
 @pytest.mark.parametrize(
@@ -75,4 +76,4 @@ def test_numbers_in_two_ways_are_refused(tmp_path: Path) -> None:
     text = DIALECTS["German"].text().replace("62,598", "62.598")
     (tmp_path / "loop.csv").write_text(text)
     with pytest.raises(MeasurementError, match=r"line 4[\s\S]*another way[\s\S]*decimal comma"):
-        read_loop(tmp_path / "loop.csv", Direction.AXIAL)
+        read_loop(tmp_path / "loop.csv", Direction.AXIAL, LoopFile(file="loop.csv"))

@@ -10,9 +10,9 @@ import pytest
 
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
+from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.resonance import ResonanceTest, is_resonance, read_resonance
 from bushfit.reading.table import Table
-from bushfit.reading.words import RESONANCE_COLUMNS
 from bushfit.reduction.resonance import transmissibility
 
 G = 9.80665

@@ -10,9 +10,9 @@ import pytest
 from texts import LOOP
 
 from bushfit.errors import MeasurementError, NoColumnError, UnitError
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 
 
 def opened(text: str, folder: Path, **stated: object) -> Table:

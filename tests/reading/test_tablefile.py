@@ -19,6 +19,7 @@ from bushfit.geometry import Direction
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.tablefile import Form, defused, ending, to_bytes, to_csv
 
@@ -38,7 +39,10 @@ def test_tests_are_read_back(form: Form, direction: Direction, tmp_path: Path) -
     files = [tmp_path / f"{name}.{ending(form)}" for name in ("loop", "sweep")]
     for file, table in zip(files, (raw_loop_table(loop), raw_sweep_table(sweep)), strict=True):
         file.write_bytes(to_bytes(file.stem, table, form))
-    found, swept = read_loop(files[0], direction), read_sweep(files[1], direction)
+    found, swept = (
+        read_loop(files[0], direction, LoopFile(file="")),
+        read_sweep(files[1], direction, SweepFile(file="")),
+    )
     for column in ("time", "displacement", "force"):
         written = getattr(loop, column)
         np.testing.assert_allclose(getattr(found, column), written, rtol=1e-6, atol=1e-9 * np.abs(written).max())

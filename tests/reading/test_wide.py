@@ -14,6 +14,7 @@ from texts import refused, sweep_from
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 from bushfit.reading.measurement import Sweep
+from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
 
 FREQUENCIES = ("5", "15", "25", "35")
@@ -123,7 +124,7 @@ def test_every_form_reads_from_a_workbook(form: str, tmp_path: Path) -> None:
     for row in csv.reader(FORMS[form], delimiter=";"):
         sheet.append([number(cell) if cell and cell.replace(",", "").isdecimal() else cell or None for cell in row])
     book.save(tmp_path / "book.xlsx")
-    check(read_sweep(tmp_path / "book.xlsx", Direction.AXIAL))
+    check(read_sweep(tmp_path / "book.xlsx", Direction.AXIAL, SweepFile(file="book.xlsx")))
 
 
 def test_amplitudes_peak_to_peak_are_halved(tmp_path: Path) -> None:

@@ -23,8 +23,8 @@ from texts import refused
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
-from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 
 Sheets = dict[str, list[list[object]]]
@@ -52,7 +52,7 @@ def workbook(sheets: Sheets, folder: Path) -> Path:
 
 
 def forces(file: Path, **stated: Any) -> Any:
-    return read_loop(file, Direction.AXIAL, written=FileFormat(**stated)).force
+    return read_loop(file, Direction.AXIAL, LoopFile(file=file.name, **stated)).force
 
 
 FORCE = np.array([float(row[2]) for row in NUMBERS["loop"]])
@@ -113,7 +113,10 @@ def test_workbooks_of_other_formats_read_to_the_same_numbers(
 
 def test_a_sweep_and_a_loop_in_one_workbook(tmp_path: Path) -> None:
     file = workbook({"Loop": table("loop", "french"), "Sweep": table("sweep", "spanish")}, tmp_path)
-    assert np.array_equal(read_sweep(file, Direction.AXIAL).frequency, [float(row[0]) for row in NUMBERS["sweep"]])
+    assert np.array_equal(
+        read_sweep(file, Direction.AXIAL, SweepFile(file=file.name)).frequency,
+        [float(row[0]) for row in NUMBERS["sweep"]],
+    )
     assert np.array_equal(forces(file, sheet="Loop"), FORCE)
 
 
@@ -178,7 +181,7 @@ def test_a_sheet_that_is_not_asked_for_is_not_read(tmp_path: Path) -> None:
 def test_cells_of_all_sheets_count_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Which are asked for one after the other, too."""
     file = workbook({"A": table("loop"), "B": table("loop")}, tmp_path)
-    monkeypatch.setattr("bushfit.reading.workbook._MOST_CELLS", 300)
+    monkeypatch.setattr("bushfit.reading.parts._MOST_CELLS", 300)
     with pytest.raises(MeasurementError, match='more, with sheet "B"'):
         forces(file)
     assert np.array_equal(forces(file, sheet="A"), FORCE)
@@ -190,7 +193,7 @@ def test_cells_of_all_sheets_count_together(tmp_path: Path, monkeypatch: pytest.
 @pytest.mark.slow
 def test_a_workbook_takes_so_much_time_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "test.xlsx").write_bytes(bombs.workbook([bombs.EMPTY * 5]))
-    monkeypatch.setattr("bushfit.reading.workbook._MOST_SECONDS", 1)
+    monkeypatch.setattr("bushfit.reading.parts._MOST_SECONDS", 1)
     with pytest.raises(MeasurementError, match="more than 1 s of work"):
         forces(tmp_path / "test.xlsx")
 

@@ -24,8 +24,8 @@ from bushfit.model.document import CampaignTable, TestTable
 from bushfit.model.file import from_document, read_document, require_schema
 from bushfit.model.result import Result
 from bushfit.reading.files import read_utf8, view_bytes
+from bushfit.reading.parts import read_sheets
 from bushfit.reading.tablefile import for_each_distinct, in_a_line, undefused
-from bushfit.reading.workbook import read_sheets
 from bushfit.report.artifacts import place_names
 from bushfit.report.contents import Contents, Documents, Tables
 from bushfit.report.tables import TEXTS, required

@@ -12,7 +12,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from bushfit.effects.contract import Array
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
 from bushfit.report.page import filled
 from bushfit.report.page.chart import DASHES, LIMIT, Axis, Rule, Series, chart, colors, outline, span_of, stroke
 from bushfit.report.process import Process, charted

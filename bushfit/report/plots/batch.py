@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from bushfit.effects.contract import Array
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
 from bushfit.report.plots import style
 from bushfit.units import number
 
