@@ -18,10 +18,20 @@ import numpy as np
 
 from bushfit.effects import Level as EffectLevel
 from bushfit.effects.contract import Array
-from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import Form, Level, by_dof, commented, directions, of_levels, real, stated, tables, to_bytes
-from bushfit.export.losses import of_tables
-from bushfit.export.systems import MM_T_S_N, UnitSystem
+from bushfit.export.contract import MM_T_S_N, Exported, Order, UnitSystem
+from bushfit.export.deck import (
+    Form,
+    Level,
+    by_dof,
+    commented,
+    directions,
+    of_levels,
+    of_tables,
+    real,
+    stated,
+    tables,
+    to_bytes,
+)
 from bushfit.geometry import Specimen
 from bushfit.units import number
 

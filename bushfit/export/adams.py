@@ -17,8 +17,20 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import DOFS, Table, commented, directions, heading, middle, real, stated, tables, to_bytes
-from bushfit.export.losses import of_all, of_band
+from bushfit.export.deck import (
+    DOFS,
+    Table,
+    commented,
+    directions,
+    heading,
+    middle,
+    of_all,
+    of_band,
+    real,
+    stated,
+    tables,
+    to_bytes,
+)
 from bushfit.geometry import ROTATION, TRANSLATION, Direction
 from bushfit.prediction.caveats import percent_off
 from bushfit.reading.measurement import loss_factor

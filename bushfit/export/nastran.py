@@ -13,10 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import Form, Level, by_dof, of_levels, real, to_bytes
-from bushfit.export.losses import of_tables
-from bushfit.export.systems import MM_T_S_N, UnitSystem
+from bushfit.export.contract import MM_T_S_N, Exported, Order, UnitSystem
+from bushfit.export.deck import Form, Level, by_dof, of_levels, of_tables, real, to_bytes
 
 #: Characters of a field in the small and in the large format.
 _SMALL, _LARGE = 8, 16

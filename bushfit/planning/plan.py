@@ -14,11 +14,18 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.repeats import FEWEST_STEPS
 from bushfit.geometry import Place, Specimen
-from bushfit.planning.candidates import standard_tests
 from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible, Wanted
-from bushfit.planning.criterion import Budget, Criterion, best_runs, filled, noncentrality_of, root_of
-from bushfit.planning.offer import FOUND, RIVALS_APART, Offer, smallest_found
-from bushfit.planning.order import Drifting, ordered
+from bushfit.planning.criterion import (
+    Budget,
+    Criterion,
+    Drifting,
+    best_runs,
+    filled,
+    noncentrality_of,
+    ordered,
+    root_of,
+)
+from bushfit.planning.offer import FOUND, RIVALS_APART, Offer, smallest_found, standard_tests
 from bushfit.planning.sensitivity import Information
 from bushfit.planning.targets import ENDLESS, Goal, percent, untested
 from bushfit.reading.measurement import loss_factor

@@ -15,8 +15,7 @@ from bushfit.model.result import Misfit, Result
 from bushfit.prediction.caveats import of_points, warnings_of
 from bushfit.report.page.chart import MOST_PLACES
 from bushfit.report.page.corner import corner
-from bushfit.report.page.gap import gap_panels
-from bushfit.report.page.loops import loop_panels
+from bushfit.report.page.gap import gap_panels, loop_panels
 from bushfit.report.page.readback import ReportData
 from bushfit.report.page.sweeps import amplitude_panels, cole_cole_panels, frequency_panels, sweeps_of
 from bushfit.report.parameters import interval_kind, parameter_rows

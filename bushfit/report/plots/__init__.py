@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bushfit.report.plots import (  # noqa: F401
-        arms,
         batch,
         comparison,
         fits,
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
         plan,
         prediction,
         reduction,
-        resonance,
         style,
     )
 

@@ -20,8 +20,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import loop_labels, loops_legend
-from bushfit.report.plots.misfit import Map, Side, columns, side_of
-from bushfit.report.plots.points import SECTORS, Kind, by_direction, by_kind
+from bushfit.report.plots.points import SECTORS, Kind, Map, Side, by_direction, by_kind, columns, side_of
 from bushfit.report.plots.prediction import axis_label
 from bushfit.units import told
 

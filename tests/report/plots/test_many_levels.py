@@ -24,7 +24,7 @@ from bushfit.reduction.steps import Reduction, Step
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.inspection import inspection_figure
-from bushfit.report.plots.misfit import map_rows
+from bushfit.report.plots.points import map_rows
 from bushfit.report.plots.prediction import fine_grid, prediction_figure
 from bushfit.report.plots.reduction import reduction_figure
 from bushfit.report.plots.style import to_image
