@@ -180,8 +180,11 @@ def look_at_loop(loop: Loop, labels: Labels) -> Findings:
         *odd_channels(loop),
         *drive.notes,
         *_changing(drive),
-        *_too_slow(drive),
     ]
+    if drive.frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
+        mistakes = [mistake.in_words(drive.loop) for mistake in MISTAKES.values() if mistake.time < 1.0]
+        minutes = number(1.0 / drive.frequency / 60.0, 2)
+        odd.append(f"one cycle takes {minutes} min, as hardly any test does, unless {', or '.join(mistakes)}")
     if _OFF_ZERO * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and drive.datum is not None:
         odd.append(
             f"the motion is off zero by {number(to_length * mean_motion, 3)} {length}, "
@@ -217,14 +220,6 @@ def look_at_history(history: Loop, labels: Labels) -> Findings:
     return facts, odd
 
 
-def _too_slow(drive: Drive) -> Iterator[str]:
-    """A sentence on a loop that takes longer than any laboratory waits, and on what the file may say instead."""
-    if drive.frequency * _LONGEST_CYCLE < 1.0:
-        mistakes = [mistake for mistake in MISTAKES.values() if mistake.time < 1.0]
-        unless = ", or ".join(mistake.in_words(drive.loop) for mistake in mistakes)
-        yield f"one cycle takes {number(1.0 / drive.frequency / 60.0, 2)} min, as hardly any test does, unless {unless}"
-
-
 def look_at_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Findings:
     """Facts and oddities of a record that holds several loops, in order.
 
@@ -239,7 +234,7 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Fi
     facts = {
         "programme": f"{len(loops)} loops in one record: {_listed([factor * size for size in amplitudes])} {unit} "
         f"at {_listed(frequencies)} Hz, {_listed([min(cycles), max(cycles)], ' to ')} cycles used of each; "
-        f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out",
+        f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out"
     }
     odd = [*wrong_labels(labels, record.direction, amplitudes, frequencies), *odd_channels(record)]
     for place, (loop, drive) in enumerate(zip(loops, drives, strict=True), start=1):
@@ -259,44 +254,8 @@ def _listed(values: Sequence[float], between: str = ", ") -> str:
     return between.join(dict.fromkeys(f"{value:.3g}" for value in values))
 
 
-class _EndCycles(NamedTuple):
-    """Force amplitude, mean force and mean motion of the cycles at both ends of a loop, (k,) each.
-
-    `error` is the noise of the force over the root of the rows of a cycle [N or N m].
-    """
-
-    amplitude: Array
-    mean_force: Array
-    mean_motion: Array
-    error: float
-
-
-def _end_cycles(drive: Drive) -> _EndCycles | None:
-    """The first and the last cycles of a loop; None where it has only one, or too few rows in each."""
-    loop, count = drive.loop, int(drive.cycles + 0.01)
-    if count < 2:
-        return None
-    phase = (loop.time - loop.time[0]) * drive.frequency
-    numbers = sorted({*range(min(count, _MOST_END_CYCLES)), *range(max(count - _MOST_END_CYCLES, 0), count)})
-    outliers = drive.outliers["force"].rows
-    parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), outliers) for n in numbers]
-    rows = min(part.size for part in parts)
-    order = resolved_order(rows, 7)  # a loop of rubber has next to nothing beyond
-    if rows < 4 * order:
-        return None
-    fitted = [
-        cycle_harmonics(phase[part], np.stack((loop.force[part], loop.displacement[part]), axis=1), order)
-        for part in parts
-    ]
-    mean_force, mean_motion = np.array([mean for mean, *_ in fitted]).T
-    amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
-    error = max(drive.noise, *(left[0] for *_, left in fitted)) * np.sqrt(1.0 / rows)
-    return _EndCycles(amplitude, mean_force, mean_motion, error)
-
-
-def _settling(cycles: _EndCycles, least: float, name: str, unit: Unit) -> Iterator[str]:
-    """A sentence where the force amplitude changes over the cycles, by `least` or more [N or N m]."""
-    force, error = cycles.amplitude, cycles.error
+def _settling(force: Array, error: float, least: float, name: str, unit: Unit) -> Iterator[str]:
+    """A sentence where the force amplitude of the end cycles, (k,), changes by `least` or more [N or N m]."""
     change, last_change = force[-1] - force[0], force[-1] - force[-2]
     # the standard error of an amplitude is sqrt(2) `error`, that of a difference of two is 2 `error`
     if abs(change) > max(_REAL_CHANGE * 2.0 * error, least):
@@ -317,15 +276,28 @@ def _drifting(mean: Array, least: float, name: str, unit: Unit) -> Iterator[str]
 
 
 def _changing(drive: Drive) -> Iterator[str]:
-    """Sentences where force amplitude, mean force or mean motion change from cycle to cycle."""
-    cycles = _end_cycles(drive)
-    if cycles is None:
+    """Sentences where force amplitude, mean force or mean motion change over the cycles at both ends of a loop; none
+    where it has only one, or too few rows in each."""
+    loop, count = drive.loop, int(drive.cycles + 0.01)
+    if count < 2:
         return
-    loop = drive.loop
+    phase = (loop.time - loop.time[0]) * drive.frequency
+    numbers = sorted({*range(min(count, _MOST_END_CYCLES)), *range(max(count - _MOST_END_CYCLES, 0), count)})
+    outliers = drive.outliers["force"].rows
+    parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), outliers) for n in numbers]
+    rows = min(part.size for part in parts)
+    order = resolved_order(rows, 7)  # a loop of rubber has next to nothing beyond
+    if rows < 4 * order:
+        return
+    both = np.stack((loop.force, loop.displacement), axis=1)
+    fitted = [cycle_harmonics(phase[part], both[part], order) for part in parts]
+    mean_force, mean_motion = np.array([mean for mean, *_ in fitted]).T
+    amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
+    error = max(drive.noise, *(left[0] for *_, left in fitted)) * np.sqrt(1.0 / rows)  # of the force [N or N m]
     (motion, force, _), units = loop.direction.motion.words, loop.direction.display
     least = _WORTH_TELLING * np.ptp(loop.force) / 2.0
-    yield from _settling(cycles, least, force, units.force)
-    yield from _drifting(cycles.mean_force, max(_REAL_CHANGE * 1.5 * cycles.error, least), force, units.force)
+    yield from _settling(amplitude, error, least, force, units.force)
+    yield from _drifting(mean_force, max(_REAL_CHANGE * 1.5 * error, least), force, units.force)
     # a time that was made from the motion turns its noise into drift
     least_drift = 2.0 * _WORTH_TELLING * drive.amplitude if loop.timed else least_prominence(loop.displacement)
-    yield from _drifting(cycles.mean_motion, least_drift, motion, units.displacement)
+    yield from _drifting(mean_motion, least_drift, motion, units.displacement)

@@ -186,10 +186,10 @@ def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) 
     read_as = direction or Direction.AXIAL
     entry = _entry(SweepFile if is_sweep else LoopFile, stated, table, direction)
     by_name = labels_of_file(file, stated)
-    outside = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
-    if "at_amplitude" in outside.keys:
+    said, told, counted = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
+    if "at_amplitude" in said:
         entry.pop("amplitude", None)  # counted already
-    entry |= outside.keys
+    entry |= said
     turned: list[str] = []
     measured: Loop | Sweep
     kind: Kind
@@ -200,7 +200,7 @@ def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) 
         measured, entry, turned = _read_loop(file, read_as, entry, table)
         kind, (facts, odd) = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile))
     columns = _columns(table, is_sweep=is_sweep)
-    facts, counted = facts | outside.facts, outside.is_counted
+    facts |= told
     if is_sweep and (amplitude := table.roles.get("amplitude")):
         counted = amplitude.convention is not None
         if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):

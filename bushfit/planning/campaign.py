@@ -83,7 +83,11 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
     ]
     for kind, tests in (("loops", settings.loops), ("sweeps", settings.sweeps)):
         for test in tests:
-            lines += ["", f"[[simulate.{kind}]]", *_test_lines(test)]
+            lines += ["", f"[[simulate.{kind}]]", place_line(test.direction)]
+            for each in fields(test):  # what it states other than the default
+                value = getattr(test, each.name)
+                if each.name not in ("direction", "temperature") and value != each.default:
+                    lines.append(_line(each.name, value, test))
     return "\n".join(lines) + "\n"
 
 
@@ -96,15 +100,6 @@ def _model_lines(model: Model) -> Iterator[str]:
         for parameter in record.parameters:
             value = _number(model.values[qualified(record, parameter)])
             yield f"{parameter.name} = {value if parameter.unit == '1' else toml_value(f'{value} {parameter.unit}')}"
-
-
-def _test_lines(test: Test) -> Iterator[str]:
-    """The lines of one test: what it states other than the default."""
-    yield place_line(test.direction)
-    for each in fields(test):
-        value = getattr(test, each.name)
-        if each.name not in ("direction", "temperature") and value != each.default:
-            yield _line(each.name, value, test)
 
 
 def _line(key: str, value: Any, test: Test | None = None) -> str:

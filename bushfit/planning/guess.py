@@ -97,15 +97,9 @@ def guess(bushing: Bushing, compound: Compound) -> Knowledge:
     weight = at_reading / (1.0 + at_reading.real)
     of_order = -_ORDER * (weight * (np.log(_READING / _MIDDLE) + 0.5j * np.pi)).real
     spring = np.array([1.0, -weight.real, of_order, 0.0, 0.0])
-    slopes = np.outer([1.0, 1.0, 0.0, 1.0, 0.0], spring) + np.array(
-        [
-            [0.0, 0.0, 0.0, 0.0, 0.0],
-            [0.0, 1.0, -_ORDER * np.log(_MIDDLE), 0.0, 0.0],
-            [0.0, 0.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, 0.0, 1.0, 1.0],
-            [0.0, 0.0, 0.0, 0.0, 1.0],
-        ]
-    )
+    slopes = np.outer([1.0, 1.0, 0.0, 1.0, 0.0], spring) + np.diag([0.0, 1.0, 1.0, 1.0, 1.0])
+    slopes[1, 2] -= _ORDER * np.log(_MIDDLE)
+    slopes[3, 4] += 1.0
     scaled = slopes * errors
     covariance = scaled @ scaled.T
     widths = zip(FIVE, np.exp(Z95 * np.sqrt(np.diag(covariance))).tolist(), strict=True)

@@ -49,11 +49,6 @@ def minutes(test: Test, rig: RigSettings) -> float:
     return (_RUN_SECONDS + per_point * test.points[0].size) / 60.0
 
 
-def setup_minutes(rig: RigSettings) -> float:
-    """Time of a change of direction; half an hour where the rig states none (chosen)."""
-    return 30.0 if rig.minutes_per_setup is None else rig.minutes_per_setup / 60.0
-
-
 def standard_tests(known: Knowledge, wanted: Wanted) -> list[Test]:
     """Every run of the standard programme once: the paper's, axial and radial; of specimens, the axial ones.
 
@@ -237,13 +232,13 @@ class Offer:
             else (test.direction, test.stepped, test.held)
             for test in self.tests
         ]
-        known = list(dict.fromkeys(lines))
+        known, setup = list(dict.fromkeys(lines)), self.wanted.rig.minutes_per_setup
         return Budget(
             np.array([minutes(test, self.wanted.rig) for test in self.tests]),
             np.array([places.index(test.direction) for test in self.tests]),
             np.array([known.index(line) for line in lines]),
             np.array([1000 * (test.direction in self.wanted.places) for test in self.tests]),
-            setup_minutes(self.wanted.rig),
+            30.0 if setup is None else setup / 60.0,  # half an hour where the rig states none (chosen)
             np.inf,
         )
 

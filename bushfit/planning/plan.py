@@ -129,8 +129,11 @@ class _Planner:
         standard = self._drifting(self._counts(self.standard_runs)).noncentrality(self.standard_runs)
         for place in np.unique(self.budget.place[counts > 0]):
             mine = np.flatnonzero((counts > 0) & (self.budget.place == place))
-            again = mine[self.budget.runs[mine] > 1]
-            if mine.size > 2 and (counts[mine].max() < 2 or self._drift_shown(counts) < standard):
+            again, drifting = mine[self.budget.runs[mine] > 1], self._drifting(counts)
+            if mine.size > 2 and (
+                counts[mine].max() < 2
+                or drifting.noncentrality(ordered(counts, self.budget.place, drifting)) < standard
+            ):
                 quickest = again[np.argsort(self.budget.minutes[again])][:4]
                 counts = min(self._once_more(counts, quickest), key=self.strict.together, default=counts)
         return self._with_scatter(counts)
@@ -156,10 +159,6 @@ class _Planner:
         """What the interval of a goal does not hold because nothing was tested there, nor is by so many runs."""
         place = goal.target.place
         return untested(self.offer.known, place, self._tested(counts)) if place else None
-
-    def _drift_shown(self, counts: Array) -> float:
-        """Noncentrality of a drift by so many runs of each test, in their best order."""
-        return (drifting := self._drifting(counts)).noncentrality(ordered(counts, self.budget.place, drifting))
 
     def _with_scatter(self, counts: Array) -> Array:
         """The runs with further repeats of sweeps, until a fit can tell their scatter from what repeats differ by, as
@@ -266,6 +265,8 @@ class _Planner:
         found = view.together(counts)
         off, covariance = view.off(found)[0], np.linalg.inv(found.own[0])
         gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.offer.slopes, off, self.offer.slopes))
+        wanted, model = self.offer.wanted.points, self.offer.known.model
+        loss = np.concatenate([loss_factor(model.stiffness(at.place, at.frequency, at.amplitude)) for at in wanted])
         moved = root_of(found.own[0]) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
         # tests alone leave open what they tell less of than rounding; without tests errors are beyond all use
         values, vectors = np.linalg.eigh(found.own[0] - view.prior)
@@ -276,18 +277,12 @@ class _Planner:
             np.sqrt(np.diag(off))[:k],
             np.linalg.norm(alone, axis=1)[:k],
             gain,
-            phase * (1.0 + np.square(self._loss_factor())),
+            phase * (1.0 + np.square(loss)),
             float(self.offer.apart(counts, self.offer.tellable).min()) if self.offer.known.rivals else None,
             tuple(goal.half(off) for goal in self.offer.goals),
             tuple(self._visible(noncentrality_of(found)[0], drifting.noncentrality(runs))),
             0.01 * float(np.abs(moved[:k]).max()),
         )
-
-    def _loss_factor(self) -> Array:
-        """Of the model at the points wanted, (n,)."""
-        model = self.offer.known.model
-        stiffness = [model.stiffness(each.place, each.frequency, each.amplitude) for each in self.offer.wanted.points]
-        return np.concatenate([loss_factor(each) for each in stiffness])
 
     def _visible(self, reached: Array, drifting: float) -> Iterator[Visible]:
         """The smallest amount found of each effect that the standard programme shows, in the shape it shows best."""

@@ -65,7 +65,13 @@ def check_free(folder: Path, names: list[str], *, force: bool) -> None:
             raise OutputError(
                 "the output is not a folder", file=folder, expected="a folder", hint="another -o/--output"
             )
-        _check_writable(folder)
+        # the folder, or the nearest one above it that exists, has to take new files
+        place = folder.absolute()
+        nearest = next(path for path in (place, *place.parents) if os.path.lexists(path))
+        if nearest.exists() and not nearest.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(nearest))
+        if not os.access(nearest, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, "no right to write there", str(nearest))
         standing = [name for name in names if os.path.lexists(folder / name)]
         folders = [name for name in standing if (folder / name).is_dir()]
     except OSError as error:
@@ -83,16 +89,6 @@ def check_free(folder: Path, names: list[str], *, force: bool) -> None:
             found=", ".join(standing),
             hint="--force replaces them; -o/--output names another folder",
         )
-
-
-def _check_writable(folder: Path) -> None:
-    """Raise OSError unless the folder, or the nearest one above it that exists, takes new files."""
-    place = folder.absolute()
-    nearest = next(path for path in (place, *place.parents) if os.path.lexists(path))
-    if nearest.exists() and not nearest.is_dir():
-        raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(nearest))
-    if not os.access(nearest, os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, "no right to write there", str(nearest))
 
 
 def write_files(
@@ -118,7 +114,9 @@ def write_files(
     try:
         place = folder.resolve()
         with _parents(place.parent):
-            inside = place.is_dir() and (len(files) == 1 or not _exchangeable(place))
+            fixed = place in (Path.cwd(), *Path.cwd().parents) or place.is_mount()  # the working folder, or a drive
+            exchangeable = len(files) > 1 and not fixed and os.access(place.parent, os.W_OK)
+            inside = place.is_dir() and not exchangeable
             with _staged(place if inside else place.parent, files) as ready, disk.locked(place.parent):
                 _end_decided(place)
                 check_free(folder, list(files), force=force)
@@ -141,8 +139,9 @@ def _record(place: Path, ready: Path, files: Mapping[str, bytes], by: str | None
     known = _recorded(place)
     if by is None or not (known.written or len(files) > 1):
         return
-    before = known.written.get(by, {})
-    left = {name: digest for name, digest in before.items() if name not in files and _digest(place / name) == digest}
+    there = {place / name: (name, digest) for name, digest in known.written.get(by, {}).items() if name not in files}
+    mine = {file: hashlib.sha256(file.read_bytes()).hexdigest() for file in there if file.is_file()}
+    left = dict(there[file] for file, digest in mine.items() if there[file][1] == digest)
     written = {
         command: {name: digest for name, digest in names.items() if name not in files and not (force and name in left)}
         for command, names in known.written.items()
@@ -163,11 +162,6 @@ def _recorded(folder: Path) -> _Record:
         return _Record()
     names = {*record.removed, *(name for names in record.written.values() for name in names)}
     return record if all(Path(name).name == name for name in names) else _Record()
-
-
-def _digest(file: Path) -> str | None:
-    """SHA-256 of a file; None where there is none."""
-    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else None
 
 
 @contextmanager
@@ -194,20 +188,16 @@ def _staged(home: Path, files: Mapping[str, bytes]) -> Iterator[Path]:
     try:
         ready = stage / "new"
         ready.mkdir()
-        _write(ready, files)
+        with ExitStack() as opened:
+            streams = [opened.enter_context((ready / name).open("xb")) for name in files]
+            for stream, content in zip(streams, files.values(), strict=True):
+                stream.write(content)
+                stream.flush()
+            disk.flush([stream.fileno() for stream in streams])
         yield ready
     finally:
         shutil.rmtree(stage, ignore_errors=True)
         claim.close()
-
-
-def _write(folder: Path, files: Mapping[str, bytes]) -> None:
-    with ExitStack() as opened:
-        streams = [opened.enter_context((folder / name).open("xb")) for name in files]
-        for stream, content in zip(streams, files.values(), strict=True):
-            stream.write(content)
-            stream.flush()
-        disk.flush([stream.fileno() for stream in streams])
 
 
 @cache  # once a run is enough: a batch writes into one folder a thousand times
@@ -216,12 +206,6 @@ def _clear_abandoned(home: Path) -> None:
     for stage in home.glob(_STAGE + "????????"):
         if disk.is_abandoned(stage):
             shutil.rmtree(stage, ignore_errors=True)
-
-
-def _exchangeable(place: Path) -> bool:
-    """Whether a folder may be exchanged for another: not the working folder or one above it, nor a mounted drive."""
-    here = Path.cwd()
-    return place not in (here, *here.parents) and not place.is_mount() and os.access(place.parent, os.W_OK)
 
 
 def _exchanged(ready: Path, place: Path) -> bool:

@@ -51,6 +51,8 @@ def comparison_context(found: SideBySide) -> dict[str, Any]:
     places = found.places[: min(MOST_PLACES, _MOST_CURVES // curves)]
     shown = [found.sides(place) for place in places]
     entries = [_entry(entry) for entry in document["compared"]]
+    looks = dict(zip(names, colors(len(names)), strict=True))
+    most = max(_FEWEST, _MOST_POINTS // max(sum(len(panel.lines) for sides in shown for panel in sides.panels), 1))
     body = document["compared"][0]["bushing"]
     title = f"{others[0]} against {named}" if len(others) == 1 else f"{len(others)} results against {named}"
     return {
@@ -63,13 +65,11 @@ def comparison_context(found: SideBySide) -> dict[str, Any]:
         "sizes": [row for place in places for row in _sizes(found, place)],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*found.family_cells()],
-        "judged": len(others) + document["words"][0].startswith("use ")
-        if families
-        else 0,  # older files give no advice
+        "judged": families and len(others) + document["words"][0].startswith("use "),  # older files give no advice
         "most": MOST,
         "cells": parameter_cells,
         "chance": chance,
-        "places": _panels(shown, dict(zip(names, colors(len(names)), strict=True))),
+        "places": [PlacePanel(s.place, [_picture(s, panel, looks, most) for panel in s.panels], []) for s in shown],
         "left_places": len(found.places) - len(places),
         "tabled": _tabled(found, places),
         "files": _files(document["compared"]),
@@ -104,13 +104,6 @@ def _sizes(found: SideBySide, place: str) -> Iterator[dict[str, Any]]:
             said = f"sure at {count} {len(table)} points" if sure else "not shown"
             row[f"{key}_sure"] = said if certain else "of unknown error"
         yield row
-
-
-def _panels(shown: Sequence[Sides], looks: dict[str, str]) -> list[PlacePanel]:
-    """Four pictures a place: stiffness and loss factor of all, and below how far they are off the first."""
-    curves = sum(len(panel.lines) for sides in shown for panel in sides.panels)
-    most = max(_FEWEST, _MOST_POINTS // max(curves, 1))
-    return [PlacePanel(s.place, [_picture(s, panel, looks, most) for panel in s.panels], []) for s in shown]
 
 
 def _picture(sides: Sides, panel: Panel, looks: dict[str, str], most: int) -> Markup:
@@ -157,13 +150,8 @@ def _corners(
             sides = alike([row[f"{who} {what}"] for who in ("reference", "other")], 4)
             sure = row[f"{difference}, sure"] == "yes"
             cells.append((*(side + of for side in sides), shown + percent, " to ".join(ends), sure))
-        yield (
-            place,
-            label,
-            f"{number(row['frequency [Hz]'], 4)} Hz",
-            told(length or "", row[heads.amplitude]),
-            *cells,
-        )
+        at = f"{number(row['frequency [Hz]'], 4)} Hz", told(length or "", row[heads.amplitude])
+        yield place, label, *at, *cells
 
 
 def _files(compared: Sequence[ComparedEntry]) -> list[tuple[str, str]]:

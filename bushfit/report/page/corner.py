@@ -44,6 +44,10 @@ def corner(result: Result) -> Markup | None:
             else:
                 cells.append((*at, "", "", "", False))
     unknown = [f"{row.name}: {' '.join(words)}" for row in rows if (words := _untold(row, result))]
+    diagonal = []
+    for n, row in enumerate(rows):
+        lines = filter(None, (row.value, f"± {row.error}" if row.error else "", row.unit.replace("-", "")))
+        diagonal.append((_LEFT + _PITCH * n, _TOP + _PITCH * n, row.name, [*lines], _untold(row, result)))
     alt = f"95 % confidence ellipses of pairs of parameters; correlations {', '.join(told)}"
     context = {
         "title": "Which values go together",
@@ -53,27 +57,18 @@ def corner(result: Result) -> Markup | None:
         "cells": cells,
         "side": _CELL,
         "pitch": _PITCH,
-        "diagonal": [(_LEFT + _PITCH * n, _TOP + _PITCH * n, *_named(row, result)) for n, row in enumerate(rows)],
+        "diagonal": diagonal,
         "ends": [*_ends(rows)],
     }
     return Markup(filled("corner.html", context))
-
-
-def _named(row: Row, result: Result) -> tuple[str, list[str], Sequence[str]]:
-    """A parameter by name, its value, error and unit, and what the tests do not tell of it, a line each."""
-    lines = [row.value, f"± {row.error}" if row.error else "", row.unit.replace("-", "")]
-    return row.name, [line for line in lines if line], _untold(row, result)
 
 
 def _untold(row: Row, result: Result) -> Sequence[str]:
     """In short lines what the tests do not tell of a parameter; none where they tell its value."""
     if not row.error:
         return row.state or "at least value", "no information"
-    return (
-        ("unknown by", "100 % or more")
-        if result.covariance.half(row.name) >= abs(result.model.values[row.name])
-        else ()
-    )
+    wide = result.covariance.half(row.name) >= abs(result.model.values[row.name])
+    return ("unknown by", "100 % or more") if wide else ()
 
 
 def _drawn(result: Result, pair: tuple[str, str], correlation: float, left: float, top: float) -> tuple[str, str]:

@@ -101,18 +101,15 @@ def gap_panels(found: ReportData) -> list[Panel]:
         if shown:
             changed = any(len(cells.sides) > 1 for cells in shown)
             heads = ("before", "after") if changed else ("model and tests",)
-            picture = maps(f"{place}: measured less model, %", heads, shown, _in_words(place, heads, shown))
+            parts = []
+            for cells in shown:
+                sizes = (np.sqrt(np.nanmean(np.square(cells.side(at)))) for at in range(len(heads)))
+                sides = (f"{head} {number(float(size), 2)} %" for head, size in zip(heads, sizes, strict=True))
+                parts.append(f"{cells.name}: {', '.join(sides)}")
+            words = f"Measured less model, {place}, root mean square of the cells; {'; '.join(parts)}"
+            picture = maps(f"{place}: measured less model, %", heads, shown, words)
             panels.append(Panel(str(place), [picture], []))
     return panels
-
-
-def _in_words(place: Place, heads: Sequence[str], shown: Sequence[Cells]) -> str:
-    """Maps in words: the root mean square of what is left."""
-    parts = []
-    for cells in shown:
-        sizes = (number(float(np.sqrt(np.nanmean(np.square(cells.side(at))))), 2) for at in range(len(heads)))
-        parts.append(f"{cells.name}: " + ", ".join(f"{head} {size} %" for head, size in zip(heads, sizes, strict=True)))
-    return f"Measured less model, {place}, root mean square of the cells; {'; '.join(parts)}"
 
 
 def _maps_at(place: Place, gap: pd.DataFrame, found: ReportData) -> Iterator[Cells]:

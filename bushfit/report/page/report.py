@@ -11,7 +11,7 @@ from bushfit.diagnosis.document import EffectEntry, GapEntry
 from bushfit.diagnosis.record import odds_in_words
 from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Place, Specimen
 from bushfit.model.document import TestTable
-from bushfit.model.result import Misfit, Result
+from bushfit.model.result import Misfit
 from bushfit.prediction.caveats import of_points, warnings_of
 from bushfit.report.page.chart import MOST_PLACES
 from bushfit.report.page.corner import corner
@@ -51,12 +51,14 @@ def report_context(found: ReportData) -> dict[str, Any]:
     gaps = [*_gaps(diagnosis["gap"])] if diagnosis else []
     report = campaign.report if campaign else {}
     every = sweeps_of(found)
+    bodies = [("Bushing", tube(result.model.bushing))] if result.model.bushing else []
+    bodies += [(f"Specimen {specimen}", _specimen(specimen)) for specimen in result.specimens]
     return {
         "name": campaign.name if campaign else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
         "head": {key.replace("_", " ").capitalize(): value for key, value in report.items()},
         "logo": campaign.logo if campaign else None,
-        "facts": [*_bodies(result), *conditions(test.conditions for test in tests)],
+        "facts": [*bodies, *conditions(test.conditions for test in tests)],
         "tests": [_tested(test, result.tests) for test in tests[:MOST]],
         "conditioned": any(test.conditions for test in tests),
         "more_tests": max(0, len(tests) - MOST),
@@ -110,13 +112,6 @@ def _of_tables(found: ReportData) -> Iterator[Iterator[str]]:
             measured = None if measured is None else np.where(measured == 0.0, np.nan, measured)
             grid = numbers(table, *headers) / [[1.0], [length], [unit]]
             yield of_points(found.result, place, grid, rigs, measured, None)
-
-
-def _bodies(result: Result) -> Iterator[tuple[str, str]]:
-    if bushing := result.model.bushing:
-        yield "Bushing", tube(bushing)
-    for specimen in result.specimens:
-        yield f"Specimen {specimen}", _specimen(specimen)
 
 
 def tube(bushing: Bushing) -> str:

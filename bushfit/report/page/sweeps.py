@@ -105,14 +105,9 @@ class Sweeps:
         labels = _four(self.place)[2], _four(self.place)[3]
         series = [
             Series(
-                curve.name,
-                color,
-                dashes,
-                (curve.model[3], curve.model[4]),
-                None,
-                (curve.measured[3], curve.measured[4]),
+                each.name, color, dashes, (each.model[3], each.model[4]), points=(each.measured[3], each.measured[4])
             )
-            for curve, color, dashes in self._looks()
+            for each, color, dashes in self._looks()
         ]
         words = self._in_words(4, labels[1], split_header(labels[0])[0])
         return chart(f"{self.place}: Cole-Cole", labels, series, words)
@@ -204,12 +199,9 @@ def _payne(found: ReportData, place: Place, rows: pd.DataFrame) -> Sweeps | None
 
 def _notes(sweeps: Sweeps) -> list[str]:
     """What a reader has to know of the pictures of some sweeps."""
-    notes = []
-    if sweeps.predicted:
-        notes.append("Lines with 95 % bands: prediction, without effects of the rig.")
-    else:
-        notes.append("Lines without bands: the model at the measured points.")
-    notes.append("Points: measured, mean of the repeats.")
+    predicted = "Lines with 95 % bands: prediction, without effects of the rig."
+    lines = predicted if sweeps.predicted else "Lines without bands: the model at the measured points."
+    notes = [lines, "Points: measured, mean of the repeats."]
     if any(curve.rigs is not None for curve in sweeps.curves):
         notes.append("Broken grey lines: the same if what was added is the rig's; the bands span both.")
     if sweeps.left_out:

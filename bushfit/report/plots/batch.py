@@ -123,8 +123,11 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     count = f": {len(panel.missed)} out" if panel.missed else ""
     axes.set_title(panel.title + count, fontsize=style.SMALL, loc="left", color=_OUT if count else style.INK, pad=3)
     _name(axes, panel, (low, high), names)
-    if cloud:
-        _histogram(axes, shown)
+    if cloud:  # how many bushings lie where, at the right edge
+        counts, edges = np.histogram(shown, bins=60, range=axes.get_ylim())
+        side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
+        side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)
+        side.set_axis_off()
 
 
 def _reach(values: Array, allowed: Sequence[float], ends: Array | None) -> tuple[float, float]:
@@ -183,11 +186,3 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
             parse_math=False,
             zorder=5,
         )
-
-
-def _histogram(axes: Axes, values: Array) -> None:
-    """Draw how many bushings lie where, at the right edge."""
-    counts, edges = np.histogram(values, bins=60, range=axes.get_ylim())
-    side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
-    side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)
-    side.set_axis_off()

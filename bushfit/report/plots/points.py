@@ -207,7 +207,11 @@ def side_of(
     squares = sum(np.square(data_set.residual(model)).sum() for data_set in later.values())
     gap = float(np.sqrt(squares / max(sum(data_set.counted for data_set in later.values()), 1)))
     maps = {kind: _map(model, kind, [cast("SweepData", later[test]) for test in each]) for kind, each in sweeps.items()}
-    curves = {place: [_curve(model, cast("LoopData", later[test])) for test in each] for place, each in loops.items()}
+    curves: dict[Place, list[tuple[Array, Array]]] = {place: [] for place in loops}
+    for place, test in ((place, cast("LoopData", later[test])) for place, each in loops.items() for test in each):
+        phase, shares = over_sectors(test)
+        noise = test.drive.row_noise.error_of_sums(shares)
+        curves[place].append((phase, -shares @ test.misfit(model) / noise))
     return Side(name, gap, maps, curves)
 
 
@@ -249,9 +253,3 @@ def map_rows(held: Array) -> Array:
     _, row = np.unique(row, return_inverse=True)
     means = np.exp(np.bincount(row, size) / np.bincount(row))
     return means[row[place]]
-
-
-def _curve(model: Model, data_set: LoopData) -> tuple[Array, Array]:
-    """Phase of the cycle [deg], and mean residual of each sector of a loop's cycle over the noise of that mean."""
-    phase, shares = over_sectors(data_set)
-    return phase, -shares @ data_set.misfit(model) / data_set.drive.row_noise.error_of_sums(shares)
