@@ -17,8 +17,7 @@ from bushfit.jobs.plan_document import Checked, PlanFile, PlannedRun, Reached, R
 from bushfit.model.result import Result
 from bushfit.planning.campaign import Check, campaign_toml
 from bushfit.planning.contract import Aim, Knowledge, Plan, Points, Programme, Target, Test, Wanted, motions
-from bushfit.planning.guess import guess
-from bushfit.planning.knowledge import of_campaign, of_result, rig_of
+from bushfit.planning.knowledge import guess, of_campaign, of_result, rig_of
 from bushfit.planning.offer import RIVALS_APART
 from bushfit.planning.plan import plan
 from bushfit.report.artifacts import plan_contents

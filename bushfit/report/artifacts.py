@@ -122,7 +122,7 @@ def comparison_contents(document: Mapping[str, Any]) -> Contents:
     """`compare`, document, picture and page; and `parameters`, `differences` and, of families, `families`, tables."""
     names = ("parameters", *(["families"] if document["families"] else []), "differences")
     made = {name: partial(lambda name: SideBySide.of(document).tables()[name], name) for name in names}
-    picture = {"compare": lambda: plots.comparison.comparison_figure(SideBySide.of(document))}
+    picture = {"compare": lambda: plots.batch.comparison_figure(SideBySide.of(document))}
     return Contents({"compare": document}, made, picture)
 
 

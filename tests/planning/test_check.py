@@ -12,7 +12,7 @@ from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, 
 from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.planning.campaign import Check, campaign_toml, check, settings_of
 from bushfit.planning.contract import Noise, Plan, Points, Test, Wanted
-from bushfit.planning.guess import guess
+from bushfit.planning.knowledge import guess
 from bushfit.planning.plan import plan
 from bushfit.report.artifacts import plan_sheet
 

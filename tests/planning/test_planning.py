@@ -33,8 +33,7 @@ from bushfit.planning.criterion import (
     noncentrality_of,
     ordered,
 )
-from bushfit.planning.guess import guess
-from bushfit.planning.knowledge import noise_of, of_campaign, of_result
+from bushfit.planning.knowledge import guess, noise_of, of_campaign, of_result
 from bushfit.planning.offer import FOUND, RIVALS_APART, candidates, minutes
 from bushfit.planning.plan import plan
 from bushfit.planning.sensitivity import Grid, relative_slopes

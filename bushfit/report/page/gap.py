@@ -85,7 +85,7 @@ def _charts(place: Place, loops: dict[str, Array]) -> list[Markup]:
 
 
 #: Most columns and rows of a map of cells: each is then some pixels wide and high.
-_MOST_COLUMNS, _MOST_ROWS = 24, 12
+_MOST_COLUMNS, _MOST_LEVELS = 24, 12
 #: Letters of the name of a row at most.
 _LONGEST = 24
 
@@ -139,7 +139,7 @@ def _map(part: str, levels: Sequence[Level], along: Array, ends: tuple[str, str,
     """One map: means over the rows of the levels that fall into a cell, before and after; `along` of all rows, (n,)."""
     table = pd.concat([level.rows for level in levels])
     place = np.repeat(np.arange(len(levels)), [len(level.rows) for level in levels])
-    (row, first), (column, columns) = _binned(place, _MOST_ROWS), _binned(along, _MOST_COLUMNS)
+    (row, first), (column, columns) = _binned(place, _MOST_LEVELS), _binned(along, _MOST_COLUMNS)
     cell, size = row * len(columns) + column, len(first) * len(columns)
     count = np.bincount(cell, minlength=size)
     sides = []

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bushfit.report.plots import (  # noqa: F401
         batch,
-        comparison,
         fits,
         gap,
         inspection,
