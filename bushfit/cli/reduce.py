@@ -120,7 +120,7 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
         reduced_table(reduction),
         reduction.warnings,
         lambda options: _tell(options, reduction),
-        lambda: plots.reduction.reduction_figure(reduction, histories, title),
+        lambda: plots.inspection.reduction_figure(reduction, histories, title),
     )
 
 
@@ -178,7 +178,7 @@ def _resonance(
         resonance_table(reduction),
         reduction.warnings,
         lambda options: _tell_resonance(options, reduction),
-        lambda: plots.reduction.resonance_figure(reduction, title),
+        lambda: plots.inspection.resonance_figure(reduction, title),
         {"mass_kg": mass, "resonance_Hz": frequency, "transmissibility_at_resonance": largest},
     )
 

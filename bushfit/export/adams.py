@@ -82,7 +82,15 @@ def export(order: Order) -> Exported:
         shared.append(f"the units asked for, {order.units}: the file states its own, which Adams converts")
     files, losses = dict[str, bytes](), list[str]()
     for kind in _KINDS:
-        own = [_frequency_lost(element, kind) for element in elements]
+        own = []
+        for element in elements:  # what one curve and one damping cost over the grid of a direction
+            pairs = [(element.stiffness(kind, table), table.stiffness) for table in element.tables]
+            found, exact = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+            loss = number(float(np.max(np.abs(loss_factor(found) - loss_factor(exact)))), 2)
+            own.append(
+                f"{element.reference.direction}, {kind}: frequency, one damping, of {number(element.at, 4)} Hz: over "
+                f"the grid |K| is {percent_off(np.abs(found / exact))} off, the loss factor up to {loss}"
+            )
         files[f"bushing_{kind}.bus"] = to_bytes(_file(order, elements, kind, [*own, *shared]))
         losses += own
     return Exported(files, (*losses, *shared))
@@ -102,17 +110,6 @@ def _element(own: Sequence[Table]) -> _Element:
     row = (reference.frequency.size - 1) // 2  # the middle of the frequencies, the lower of two
     at, there = float(reference.frequency[row]), complex(reference.stiffness[row])
     return _Element(own, moved, resisting, reference, at, there)
-
-
-def _frequency_lost(element: _Element, kind: str) -> str:
-    """What one curve and one damping cost over the grid of a direction."""
-    pairs = [(element.stiffness(kind, table), table.stiffness) for table in element.tables]
-    found, exact = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    loss = number(float(np.max(np.abs(loss_factor(found) - loss_factor(exact)))), 2)
-    return (
-        f"{element.reference.direction}, {kind}: frequency, one damping, of {number(element.at, 4)} Hz: over the grid "
-        f"|K| is {percent_off(np.abs(found / exact))} off, the loss factor up to {loss}"
-    )
 
 
 def _file(order: Order, elements: Sequence[_Element], kind: str, losses: Sequence[str]) -> Iterator[str]:

@@ -123,18 +123,9 @@ class Order:
     temperature: float | None = None
     day: str | None = None
 
-    def remarks(self, losses: Iterable[str]) -> list[tuple[str, str]]:
-        """What every format says beside its numbers: the campaign, where it holds, what it leaves out, all warnings."""
-        found = warnings_of(self.result, [prediction.warnings for prediction in self.predictions])
-        return [*self._about(), *(("left out", loss) for loss in losses), *(("warning", line) for line in found)]
-
-    @property
-    def under(self) -> Circumstances:
-        """What the rubber is under."""
-        return Circumstances(self.temperature)
-
-    def _about(self) -> Iterator[tuple[str, str]]:
-        """The campaign, its days, the temperature, and of each place within what the tests were fitted."""
+    def remarks(self, losses: Iterable[str]) -> Iterator[tuple[str, str]]:
+        """What every format says beside its numbers: the campaign and its days, the temperature, of each place within
+        what the tests were fitted, what it leaves out, all warnings."""
         campaign, measured, model = self.result.campaign, self.result.measured, self.result.model
         if campaign:
             days = sorted({str(test.conditions["date"]) for test in campaign.tests if "date" in test.conditions})
@@ -143,16 +134,23 @@ class Order:
         if model.knows_temperature:
             warmth = number((self.temperature or REFERENCE) - CELSIUS, 3)
             yield "temperature", f"{warmth} degC, as if it were the same at all times and throughout"
-        if measured is None:
-            return
-        warm = [kelvin - CELSIUS for kelvin in measured.temperature or ()]
-        for place in self.places:
-            unit, factor = place.display.displacement
-            reached = [factor * strain / model.unit_strain(place) for strain in measured.strain]
-            parts = [str(place), told("Hz", *measured.frequency), told(unit, *reached)]
-            parts.append(told("degC", *warm) if warm else "temperature not stated")
-            parts.append("fitted there" if str(place) in measured.directions else "not fitted there")
-            yield "valid", ", ".join(parts)
+        if measured:
+            for place in self.places:
+                unit, factor = place.display.displacement
+                reached = [factor * strain / model.unit_strain(place) for strain in measured.strain]
+                warm = [kelvin - CELSIUS for kelvin in measured.temperature or ()]
+                parts = [str(place), told("Hz", *measured.frequency), told(unit, *reached)]
+                parts.append(told("degC", *warm) if warm else "temperature not stated")
+                parts.append("fitted there" if str(place) in measured.directions else "not fitted there")
+                yield "valid", ", ".join(parts)
+        yield from (("left out", loss) for loss in losses)
+        warnings = warnings_of(self.result, [prediction.warnings for prediction in self.predictions])
+        yield from (("warning", line) for line in warnings)
+
+    @property
+    def under(self) -> Circumstances:
+        """What the rubber is under."""
+        return Circumstances(self.temperature)
 
     @property
     def places(self) -> tuple[Place, ...]:

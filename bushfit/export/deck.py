@@ -178,11 +178,18 @@ NO_LOOPS = "no law in time: loops, overtones and transients need another format 
 
 def of_tables(order: Order, form: Form) -> Iterator[str]:
     """What linear tables over frequency, one set an amplitude, do not carry, and what that costs."""
+    model = order.result.model.without(EffectLevel.INSTRUMENT)
     for prediction in directions(order):
         own, place = tables(prediction), prediction.direction
         yield from _of_amplitude(own)
         if own[0].frequency.size > 1:
-            yield f"{place}: between its frequencies |K| is up to {_percent(_between(order, own, form))} off"
+            worst = 0.0
+            for table in own:  # straight lines between its rows, halfway between two frequencies
+                halfway = 0.5 * (table.frequency[1:] + table.frequency[:-1])
+                lines = (0.5 * (part[1:] + part[:-1]) for part in form.parts(table.frequency, table.stiffness))
+                exact = model.stiffness(place, halfway, table.amplitude, under=order.under)
+                worst = max(worst, float(np.max(np.abs(form.joined(halfway, *lines) / exact - 1.0))))
+            yield f"{place}: between its frequencies |K| is up to {number(100.0 * worst, 2)} % off"
         else:
             yield f"{place}: one frequency, {number(own[0].frequency[0], 4)} Hz: K and loss are constants"
         yield from of_band(prediction)
@@ -217,22 +224,7 @@ def of_band(prediction: Prediction) -> Iterator[str]:
     """The 95 % band, and the other reading where an effect may as well be the rig's."""
     place, band = prediction.direction, prediction.stiffness
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
-        yield f"{place}: the 95 % band, up to {_percent(width)} of |K| either way"
+        yield f"{place}: the 95 % band, up to {number(100.0 * width, 2)} % of |K| either way"
     if prediction.if_rigs:
         off = percent_off(prediction.if_rigs.stiffness.value / band.value)
         yield f"{place}: the other reading, by which |K| is {off} if what is unresolved is the rig's"
-
-
-def _between(order: Order, own: Sequence[Table], form: Form) -> float:
-    """Largest relative error of straight lines between the rows of tables, halfway between two frequencies."""
-    model, worst = order.result.model.without(EffectLevel.INSTRUMENT), 0.0
-    for table in own:
-        halfway = 0.5 * (table.frequency[1:] + table.frequency[:-1])
-        lines = (0.5 * (part[1:] + part[:-1]) for part in form.parts(table.frequency, table.stiffness))
-        exact = model.stiffness(table.direction, halfway, table.amplitude, under=order.under)
-        worst = max(worst, float(np.max(np.abs(form.joined(halfway, *lines) / exact - 1.0))))
-    return worst
-
-
-def _percent(share: float) -> str:
-    return f"{number(100.0 * share, 2)} %"

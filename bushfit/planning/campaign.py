@@ -7,7 +7,7 @@ Notes:
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -27,7 +27,6 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Specimen
-from bushfit.model.model import Model
 from bushfit.planning.contract import Noise, Plan, Test
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
@@ -79,8 +78,14 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
         "# All repeats of a sweep follow each other here; the order on the rig is that of the sheet.",
         *body_lines(known.model.bushing, dict.fromkeys(each for each in tested if isinstance(each, Specimen))),
         *("", "[simulate]", *(_line(key, getattr(settings, key)) for key in _SETTINGS)),
-        *_model_lines(known.model),
+        *("", "[simulate.parameters]"),
     ]
+    for record in known.model.records:
+        lines += [] if record.name in BASE else ["", f"[simulate.effects.{toml_value(record.name)}]"]
+        for parameter in record.parameters:
+            value = _number(known.model.values[qualified(record, parameter)])
+            text = value if parameter.unit == "1" else toml_value(f"{value} {parameter.unit}")
+            lines.append(f"{parameter.name} = {text}")
     for kind, tests in (("loops", settings.loops), ("sweeps", settings.sweeps)):
         for test in tests:
             lines += ["", f"[[simulate.{kind}]]", place_line(test.direction)]
@@ -89,17 +94,6 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
                 if each.name not in ("direction", "temperature") and value != each.default:
                     lines.append(_line(each.name, value, test))
     return "\n".join(lines) + "\n"
-
-
-def _model_lines(model: Model) -> Iterator[str]:
-    """The lines of [simulate.parameters] and of each added effect, in SI."""
-    yield from ("", "[simulate.parameters]")
-    for record in model.records:
-        if record.name not in BASE:
-            yield from ("", f"[simulate.effects.{toml_value(record.name)}]")
-        for parameter in record.parameters:
-            value = _number(model.values[qualified(record, parameter)])
-            yield f"{parameter.name} = {value if parameter.unit == '1' else toml_value(f'{value} {parameter.unit}')}"
 
 
 def _line(key: str, value: Any, test: Test | None = None) -> str:

@@ -118,18 +118,7 @@ def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates:
 
 def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
     """A test less the steps that are beyond the limits of the rig or what rubber bears; None where too few are left."""
-    bearable = _bearable(known, rig, test.direction, *operating_points(test))
-    if isinstance(test, SimulatedLoop):
-        return test if bearable.all() else None
-    kept = np.array(test.steps)[bearable]
-    if kept.size < 2:
-        return None
-    steps = tuple(kept.tolist())
-    return replace(test, frequencies=steps) if test.stepped == "frequency" else replace(test, amplitudes=steps)
-
-
-def _bearable(known: Knowledge, rig: RigSettings, place: Place, frequency: Array, size: Array) -> Array:
-    """Which operating points the rig and the rubber can do, (n,) bool; a strain of 1/2, or what it has borne."""
+    (frequency, size), place = operating_points(test), test.direction
     force = np.abs(known.model.stiffness(place, frequency, size)) * size
     limits = [(frequency, rig.max_frequency)]
     if place.motion is TRANSLATION:
@@ -137,10 +126,16 @@ def _bearable(known: Knowledge, rig: RigSettings, place: Place, frequency: Array
         limits += [(force, rig.max_force), (size, rig.max_displacement), (speed, rig.max_velocity)]
     elif place.motion is ROTATION:
         limits += [(force, rig.max_moment), (size, rig.max_rotation)]
-    fine = size * known.model.unit_strain(place) <= max(0.5, known.strain or 0.0)
+    bearable = size * known.model.unit_strain(place) <= max(0.5, known.strain or 0.0)  # or what it has borne
     for reached, limit in limits:
-        fine &= reached <= (limit or np.inf) * (1.0 + 1e-9)  # rounding
-    return fine
+        bearable &= reached <= (limit or np.inf) * (1.0 + 1e-9)  # rounding
+    if isinstance(test, SimulatedLoop):
+        return test if bearable.all() else None
+    kept = np.array(test.steps)[bearable]
+    if kept.size < 2:
+        return None
+    steps = tuple(kept.tolist())
+    return replace(test, frequencies=steps) if test.stepped == "frequency" else replace(test, amplitudes=steps)
 
 
 def _rounded(value: float) -> float:

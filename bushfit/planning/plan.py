@@ -79,8 +79,15 @@ class _Planner:
 
     @cached_property
     def best(self) -> Array:
-        """So many runs of each test, (tests,); none where no test fits into the hours."""
-        return self._with_repeats(self._choice())
+        """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be; none
+        where no test fits into the hours."""
+        kept, standard = self.kept, self._counts(self.standard_runs)
+        best = best_runs(self._criterion(_PENALTY), self.budget, kept, kept)
+        if self._lacking(best):
+            starts = [best, *([] if kept.any() else [np.minimum(standard, self.budget.runs)])]
+            every = (best_runs(self.strict, self.budget, start, kept) for start in starts)
+            best = min(every, key=self.strict.together)
+        return self._with_repeats(best)
 
     @property
     def reaches(self) -> bool:
@@ -109,19 +116,12 @@ class _Planner:
             )
         planned = self._programme(ordered(best, self.budget.place, self._drifting(best)) if best.any() else [])
         before, standard = self._programme([]), self._programme(self.standard_runs)
-        missed, reasons = tuple(self._missed(best, goal) for goal in self.offer.goals), self._purposes(best)
+        missed, reasons = tuple(self._missed(best, goal) for goal in self.offer.goals), dict[Test, str]()
+        for test in np.flatnonzero(best).tolist():
+            lost = self._lost(best, np.where(np.arange(best.size) == test, 0, best))
+            reasons[self.offer.tests[test]] = lost or "shows effects that the model lacks"
         enough, notes = self._enough(planned, missed), tuple(self._notes(planned, missed))
         return Plan(self.offer.known, self.offer.wanted, before, planned, standard, reasons, missed, enough, notes)
-
-    def _choice(self) -> Array:
-        """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be."""
-        kept, standard = self.kept, self._counts(self.standard_runs)
-        best = best_runs(self._criterion(_PENALTY), self.budget, kept, kept)
-        if self._lacking(best):
-            starts = [best, *([] if kept.any() else [np.minimum(standard, self.budget.runs)])]
-            every = (best_runs(self.strict, self.budget, start, kept) for start in starts)
-            best = min(every, key=self.strict.together)
-        return best
 
     def _with_repeats(self, counts: Array) -> Array:
         """The runs with a test of each place made twice, that a drift shows as in the standard programme, in place of
@@ -320,14 +320,6 @@ class _Planner:
             return f"{number(self.hours, 3)} h are too few, about {hours} h would do"
         reached = percent(goal.half(self.offer.off(more)))
         return f"{hours} h would reach {reached}, and no further run would take a quarter per cent off that"
-
-    def _purposes(self, counts: Array) -> dict[Test, str]:
-        """In words, of each test with all its repeats, what of the aim would be lost without it."""
-        found = {}
-        for test in np.flatnonzero(counts).tolist():
-            without = np.where(np.arange(counts.size) == test, 0, counts)
-            found[self.offer.tests[test]] = self._lost(counts, without) or "shows effects that the model lacks"
-        return found
 
     def _lost(self, counts: Array, without: Array) -> str | None:
         """What fewer runs lose of the aim, the worst of it; None of next to nothing."""

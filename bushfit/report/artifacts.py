@@ -106,16 +106,14 @@ def measured_contents(result: Result, fitted: Sequence[SweepData], left: Sequenc
 def diagnosis_contents(diagnosis: Diagnosis, title: str) -> Contents:
     """`gap` and `candidates` of a diagnosis, tables, and a picture of the gap."""
     before, after, held = diagnosis.before, diagnosis.after, diagnosis.holdout
-    tests = before.data_sets, after.data_sets
 
     def picture() -> Any:
         words = f"{diagnosis.verdict}: {diagnosis.summary}"
         words += f". Held out, {held.before:.2f} x noise before and {held.after:.2f} after" if held.parts else ""
-        return plots.gap.gap_figure(before.model, after.model, tests[0], title, words, mended=tests[1])
+        return plots.gap.gap_figure(before.model, after.model, before.data_sets, title, words, mended=after.data_sets)
 
-    gap = partial(tables.gap_table, before.model, after.model, *tests, diagnosis.result.model)
     candidates = {"candidates": partial(tables.candidates_table, diagnosis)}
-    return Contents.shown("gap", gap, picture) | Contents(tables=candidates)
+    return Contents.shown("gap", partial(tables.gap_table, diagnosis), picture) | Contents(tables=candidates)
 
 
 def comparison_contents(document: Mapping[str, Any]) -> Contents:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from markupsafe import Markup
 
 from bushfit.geometry import Bushing
@@ -71,7 +70,7 @@ def comparison_context(found: SideBySide) -> dict[str, Any]:
         "chance": chance,
         "places": [PlacePanel(s.place, [_picture(s, panel, looks, most) for panel in s.panels], []) for s in shown],
         "left_places": len(found.places) - len(places),
-        "tabled": _tabled(found, places),
+        "tabled": [*_tabled(found, places)][: 2 * _ROWS],
         "files": _files(document["compared"]),
     }
 
@@ -125,33 +124,29 @@ def _picture(sides: Sides, panel: Panel, looks: dict[str, str], most: int) -> Ma
     return chart(f"{sides.place}: {what}", labels, series, alt, log=log, rules=rules, least=panel.least)
 
 
-def _tabled(found: SideBySide, places: Sequence[str]) -> list[tuple[Any, ...]]:
-    """Values of the first and of each other at some corners of the grid, with the intervals of their differences."""
+def _tabled(found: SideBySide, places: Sequence[str]) -> Iterator[tuple[Any, ...]]:
+    """Values of the first and of each other at some corners of the grid, with the intervals of their differences.
+
+    Rows of cells: place, label, frequency, amplitude; then of stiffness and loss factor both values, their difference
+    with its interval, and whether it is more than chance at all points at once.
+    """
     tables = [(label, place, table) for place in places for label, table in found.at(place).items()]
     most = max(_ROWS // max(len(tables), 1), 1)
     amplitudes = min(most, _AMPLITUDES)
-    rows = (row for each in tables for row in _corners(*each, amplitudes, min(most // amplitudes, _FREQUENCIES)))
-    return list(rows)[: 2 * _ROWS]
-
-
-def _corners(
-    label: str, place: str, table: pd.DataFrame, amplitudes: int, frequencies: int
-) -> Iterator[tuple[Any, ...]]:
-    """Rows of cells: place, label, frequency, amplitude; then of stiffness and loss factor both values, their
-    difference with its interval, and whether it is more than chance at all points at once."""
-    heads = Heads.of(table)
-    ((_, length), (_, unit)) = (split_header(header) for header in heads[:2])
-    kinds = ((heads.stiffness, heads.relative, f" {unit}", 100.0, " %"), ("loss factor [-]", heads.loss, "", 1.0, ""))
-    for row in corners(table, heads.amplitude, amplitudes, frequencies):
-        cells = []
-        for what, difference, of, scale, percent in kinds:
-            value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))
-            shown, *ends = (signed(each, high - low) for each in (value, low, high))
-            sides = alike([row[f"{who} {what}"] for who in ("reference", "other")], 4)
-            sure = row[f"{difference}, sure"] == "yes"
-            cells.append((*(side + of for side in sides), shown + percent, " to ".join(ends), sure))
-        at = f"{number(row['frequency [Hz]'], 4)} Hz", told(length or "", row[heads.amplitude])
-        yield place, label, *at, *cells
+    for label, place, table in tables:
+        heads, loss = Heads.of(table), "loss factor [-]"
+        ((_, length), (_, unit)) = (split_header(header) for header in heads[:2])
+        kinds = ((heads.stiffness, heads.relative, f" {unit}", 100.0, " %"), (loss, heads.loss, "", 1.0, ""))
+        for row in corners(table, heads.amplitude, amplitudes, min(most // amplitudes, _FREQUENCIES)):
+            cells = []
+            for what, difference, of, scale, percent in kinds:
+                value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))
+                shown, *ends = (signed(each, high - low) for each in (value, low, high))
+                sides = alike([row[f"{who} {what}"] for who in ("reference", "other")], 4)
+                sure = row[f"{difference}, sure"] == "yes"
+                cells.append((*(side + of for side in sides), shown + percent, " to ".join(ends), sure))
+            at = f"{number(row['frequency [Hz]'], 4)} Hz", told(length or "", row[heads.amplitude])
+            yield place, label, *at, *cells
 
 
 def _files(compared: Sequence[ComparedEntry]) -> list[tuple[str, str]]:

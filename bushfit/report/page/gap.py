@@ -124,15 +124,12 @@ def _maps_at(place: Place, gap: pd.DataFrame, found: ReportData) -> Iterator[Cel
     loops = complete(mine[mine["kind"] == "loop"], "time [s]", "frequency [Hz]", moved_of(place))
     if len(loops):  # means over 15 deg of the cycle
         levels = levels_of(found, loops, "test")
-        turned = np.concatenate([_phase(place, level.rows) for level in levels])
-        yield _map("force", levels, np.floor(turned * 24), ("upper turn", "cycle", "360 deg"))
-
-
-def _phase(place: Place, rows: pd.DataFrame) -> Array:
-    """Phase of the rows of a loop after the upper turn of its motion, in cycles, (n,)."""
-    time, frequency, moved = numbers(rows, "time [s]", "frequency [Hz]", moved_of(place))
-    first = np.mean((moved - moved.mean()) * np.exp(-2j * np.pi * time * frequency))
-    return (time * frequency + np.angle(first) / (2.0 * np.pi)) % 1.0
+        turned = list[Array]()  # phase of the rows after the upper turn of the motion, in cycles
+        for level in levels:
+            time, frequency, moved = numbers(level.rows, "time [s]", "frequency [Hz]", moved_of(place))
+            first = np.mean((moved - moved.mean()) * np.exp(-2j * np.pi * time * frequency))
+            turned.append((time * frequency + np.angle(first) / (2.0 * np.pi)) % 1.0)
+        yield _map("force", levels, np.floor(np.concatenate(turned) * 24), ("upper turn", "cycle", "360 deg"))
 
 
 def _map(part: str, levels: Sequence[Level], along: Array, ends: tuple[str, str, str]) -> Cells:

@@ -12,7 +12,7 @@ from scipy.special import fdtri
 
 from bushfit.diagnosis.document import EffectEntry, GapEntry
 from bushfit.diagnosis.record import odds_in_words
-from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Place, Specimen
+from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Specimen
 from bushfit.model.document import TestTable
 from bushfit.model.model import FIVE
 from bushfit.model.result import Misfit, Result
@@ -87,7 +87,7 @@ def report_context(found: ReportData) -> dict[str, Any]:
         "places": frequency_panels(every),
         "payne": amplitude_panels(found),
         "cole_cole": cole_cole_panels(every),
-        "tabled": _tabled(found),
+        "tabled": [*_tabled(found)],
         "loops": loop_panels(found),
         "gap": gap_panels(found),
         "gaps": gaps,
@@ -196,29 +196,30 @@ def _gaps(gap: GapEntry) -> Iterator[tuple[str, str, str]]:
         yield words, before, after
 
 
-def _tabled(found: ReportData) -> list[tuple[str, ...]]:
-    """Predicted values at some corners of the grid of each place, their bands, and what was measured there."""
+def _tabled(found: ReportData) -> Iterator[tuple[str, ...]]:
+    """Predicted values at some corners of the grid of each place, their bands, and what was measured there.
+
+    Rows of cells: place, unit, frequency, amplitude; |K| and loss angle, each with its band and as measured; loss
+    factor, K' and K''.
+    """
     places = [(found.tables[name], place) for name, place in found.places.items() if name in found.tables]
     frequencies = min(max(_ROWS // max(_AMPLITUDES * len(places), 1), 1), _FREQUENCIES)
-    return [row for table, place in places[:MOST_PLACES] for row in _corners(table, place, frequencies)]
-
-
-def _corners(table: pd.DataFrame, place: Place, frequencies: int) -> Iterator[tuple[str, ...]]:
-    """Rows of cells: place, unit, frequency, amplitude; |K| and loss angle, each with its band and as measured; loss
-    factor, K' and K''."""
-    amplitude, stiffness, _ = columns_of(place)
-    names, parts = (stiffness, "loss factor [-]"), (f"storage {stiffness}", f"loss {stiffness}")
-    band = [f"{name}, {end}" for name in names for end in ("low", "high")]
-    (length, _), _, (unit, _) = place.display
-    known = complete(table, "frequency [Hz]", amplitude, *names, *band, *parts)
-    for row in corners(known, amplitude, _AMPLITUDES, frequencies):
-        cells = [str(place), unit, f"{number(row['frequency [Hz]'], 4)} Hz", told(length, row[amplitude])]
+    for table, place in places[:MOST_PLACES]:
+        amplitude, stiffness, _ = columns_of(place)
+        names, parts = (stiffness, "loss factor [-]"), (f"storage {stiffness}", f"loss {stiffness}")
+        band = [f"{name}, {end}" for name in names for end in ("low", "high")]
+        (length, _), _, (unit, _) = place.display
+        known = complete(table, "frequency [Hz]", amplitude, *names, *band, *parts)
         kinds: tuple[tuple[str, int, Callable[[float], float]], ...] = ((names[0], 4, float), (names[1], 3, _degrees))
-        for name, digits, shown in kinds:
-            value, *ends = alike([shown(row[key]) for key in (name, f"{name}, low", f"{name}, high")], digits, least=2)
-            measured = row.get(f"measured {name}", np.nan)
-            cells += [value, " to ".join(ends), "" if np.isnan(measured) else alike([shown(measured)], digits)[0]]
-        yield *cells, *(alike([row[name]], 4)[0] for name in (names[1], *parts))
+        for row in corners(known, amplitude, _AMPLITUDES, frequencies):
+            cells = [str(place), unit, f"{number(row['frequency [Hz]'], 4)} Hz", told(length, row[amplitude])]
+            for name, digits, shown in kinds:
+                ends = [shown(row[key]) for key in (name, f"{name}, low", f"{name}, high")]
+                value, *ends_told = alike(ends, digits, least=2)
+                measured = row.get(f"measured {name}", np.nan)
+                cells += [value, " to ".join(ends_told)]
+                cells.append("" if np.isnan(measured) else alike([shown(measured)], digits)[0])
+            yield *cells, *(alike([row[name]], 4)[0] for name in (names[1], *parts))
 
 
 def _degrees(loss_factor: float) -> float:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
         master_curve,
         plan,
         prediction,
-        reduction,
         style,
     )
 

@@ -29,7 +29,9 @@ def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> F
     grid, levels = figure.subplots(len(places), 2, squeeze=False), []
     for place, (stiffness, loss) in zip(places, grid, strict=True):
         mine = [each for each in found if each.sweep.direction is place]
-        level = _level(mine)
+        reached = np.sort(np.concatenate([each.sweep.amplitude for each in mine]))
+        near = np.searchsorted(reached, _NEAR * reached) - np.arange(reached.size)
+        level = float(np.median(reached[near.argmax() :][: near.max()]))  # near it most points lie
         levels.append(
             f"{place} {number(level * place.display.displacement.factor, 3)} {place.display.displacement.name}"
         )
@@ -78,13 +80,6 @@ def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -
         "Points: what each sweep asks for by itself, bars 95 %.",
     )
     return figure
-
-
-def _level(found: Sequence[Shifted]) -> float:
-    """An amplitude near which most points lie [SI]."""
-    reached = np.sort(np.concatenate([each.sweep.amplitude for each in found]))
-    near = np.searchsorted(reached, _NEAR * reached) - np.arange(reached.size)
-    return float(np.median(reached[near.argmax() :][: near.max()]))
 
 
 def _degree(found: Shifted) -> float:
