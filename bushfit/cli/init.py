@@ -81,7 +81,7 @@ def command(
     tests; an option holds for all files of its kind. Writes campaign.toml, or -o my_bushing.toml.
     """
     from bushfit.geometry import Specimen
-    from bushfit.inspection.draft import campaign_text, campaigns_of_parts, with_specimens_named
+    from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named
 
     questions = Questions.of(options, no_input=no_input)
     usual = (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
@@ -197,7 +197,7 @@ def _usable(
 def _look(source: Source, stated: Mapping[str, Any], *, is_sized: bool, is_asked: bool) -> Inspected:
     """A test of which this is stated; where somebody `is_asked`, how amplitudes count is not taken for granted."""
     from bushfit.geometry import Specimen
-    from bushfit.inspection.recognition import BLOCK_KEYS
+    from bushfit.inspection.opening import BLOCK_KEYS
 
     source = replace(source, stated=stated)
     with options_named():

@@ -41,8 +41,8 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     file cannot be used, the others are told, nothing is written, exit status 2. Writes inspect.png, and inspect_2.png
     and so on of more than five files.
     """
-    from bushfit.inspection.draft import pasted_text, with_specimens_named
     from bushfit.inspection.gathering import gather, with_contradictions
+    from bushfit.inspection.record import pasted_text, with_specimens_named
 
     sources, left_out = gather(files, stated)
     tell_left_out(options, left_out)

@@ -22,7 +22,7 @@ from bushfit.units import for_people, number
 
 if TYPE_CHECKING:
     from bushfit.jobs.plan import PlanFile, Planned, Shown
-    from bushfit.planning.check import Check
+    from bushfit.planning.campaign import Check
     from bushfit.planning.contract import Aim
 
 #: Hours of the rig at most: months, as a typing error.
@@ -218,7 +218,7 @@ def _tell_effects(options: Options, document: PlanFile) -> None:
 def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check:
     """The plan simulated, with a table of what was predicted and found."""
     from bushfit.batch import pool
-    from bushfit.planning.check import Found, check
+    from bushfit.planning.campaign import Found, check
     from bushfit.progress import counting
 
     def every(seeds: Sequence[int], work: Callable[[Sequence[int]], list[Found]]) -> Iterator[tuple[int, Found]]:

@@ -120,13 +120,13 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
         reduced_table(reduction),
         reduction.warnings,
         lambda options: _tell(options, reduction),
-        lambda: plots.reduction.reduction_figure(reduction, histories, title),
+        lambda: plots.inspection.reduction_figure(reduction, histories, title),
     )
 
 
 def _resonance_table(file: Path, stated: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
     """The table of a resonance test; None of a file without any of its columns, unless a mass or the like is stated."""
-    from bushfit.inspection.recognition import open_table
+    from bushfit.inspection.opening import open_table
     from bushfit.reading.headers import RESONANCE_COLUMNS
     from bushfit.reading.resonance import is_resonance
 
@@ -146,7 +146,7 @@ def _resonance(
 ) -> _Reduced:
     """A resonance test, reduced."""
     from bushfit.geometry import Direction
-    from bushfit.inspection.recognition import direction_of
+    from bushfit.inspection.opening import direction_of
     from bushfit.reading.resonance import read_resonance
     from bushfit.reduction.resonance import reduce_resonance
     from bushfit.report.tables import resonance_table
@@ -178,7 +178,7 @@ def _resonance(
         resonance_table(reduction),
         reduction.warnings,
         lambda options: _tell_resonance(options, reduction),
-        lambda: plots.resonance.resonance_figure(reduction, title),
+        lambda: plots.inspection.resonance_figure(reduction, title),
         {"mass_kg": mass, "resonance_Hz": frequency, "transmissibility_at_resonance": largest},
     )
 

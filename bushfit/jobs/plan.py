@@ -16,15 +16,13 @@ from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Place, place_named
 from bushfit.jobs.grid import asked_or, default_grid, grid_settings
 from bushfit.model.result import Result
-from bushfit.planning.campaign import campaign_toml
-from bushfit.planning.check import Check
+from bushfit.planning.campaign import Check, campaign_toml
 from bushfit.planning.contract import Aim, Knowledge, Plan, Points, Programme, Target, Test, Wanted, motions
-from bushfit.planning.guess import guess
-from bushfit.planning.knowledge import of_campaign, of_result, rig_of
+from bushfit.planning.knowledge import guess, of_campaign, of_result, rig_of
 from bushfit.planning.offer import RIVALS_APART
 from bushfit.planning.plan import plan
+from bushfit.report.artifacts import plan_contents
 from bushfit.report.contents import Contents, Kinds
-from bushfit.report.planned import plan_contents
 
 #: Quantities of predictions that may be targets.
 PREDICTED = ("stiffness", "loss_factor")

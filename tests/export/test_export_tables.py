@@ -10,8 +10,7 @@ import openpyxl
 import pandas as pd
 import pytest
 
-from bushfit.export.contract import Order
-from bushfit.export.systems import UnitSystem
+from bushfit.export.contract import Order, UnitSystem
 from bushfit.geometry import Direction, Specimen
 from bushfit.prediction.stiffness import Band, predict
 from bushfit.report import spreadsheets

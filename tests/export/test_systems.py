@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bushfit.errors import UnitError
-from bushfit.export.systems import UnitSystem
+from bushfit.export.contract import UnitSystem
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
 
 #: In SI.

@@ -11,8 +11,8 @@ from looking import NOISE, SEEDS, look, plan
 
 from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
 from bushfit.geometry import Direction
-from bushfit.inspection.draft import file_text
 from bushfit.inspection.opening import inspect
+from bushfit.inspection.record import file_text
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
 from bushfit.simulation.files import raw_loop_table

@@ -10,12 +10,11 @@ from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.quantities import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.geometry import Bushing, Direction, Specimen
-from bushfit.planning.campaign import campaign_toml, settings_of
-from bushfit.planning.check import Check, check
+from bushfit.planning.campaign import Check, campaign_toml, check, settings_of
 from bushfit.planning.contract import Noise, Plan, Points, Test, Wanted
-from bushfit.planning.guess import guess
+from bushfit.planning.knowledge import guess
 from bushfit.planning.plan import plan
-from bushfit.report.planned import plan_sheet
+from bushfit.report.artifacts import plan_sheet
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
 RIG = RigSettings(gain_error=0.005, phase_error=0.0044, max_force=5e3, max_frequency=200.0)

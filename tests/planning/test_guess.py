@@ -16,7 +16,7 @@ from bushfit.geometry import Bushing
 from bushfit.model.covariance import Z95
 from bushfit.model.model import FIVE
 from bushfit.planning.contract import Knowledge
-from bushfit.planning.guess import gent_modulus, guess
+from bushfit.planning.knowledge import gent_modulus, guess
 
 BUSHING = Bushing("guessed", 0.010, 0.018, 0.034)
 #: Table 1 of Garcia Tarrago et al. 2007; the compound is that of its section 2: 61 Shore A, 27 phr, natural rubber.

@@ -44,11 +44,10 @@ from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Sweep
 from bushfit.reduction.steps import reduce
 from bushfit.report.artifacts import prediction_contents
-from bushfit.report.plots.arms import arms_figure
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
-from bushfit.report.plots.inspection import inspection_figure
+from bushfit.report.plots.inspection import inspection_figure, reduction_figure
+from bushfit.report.plots.master_curve import arms_figure
 from bushfit.report.plots.prediction import prediction_figure
-from bushfit.report.plots.reduction import reduction_figure
 from bushfit.report.plots.style import label_axes
 
 

@@ -23,10 +23,9 @@ from bushfit.reading.measurement import Loop, Stepped, Sweep
 from bushfit.reduction.steps import Reduction, Step
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.gap import gap_figure
-from bushfit.report.plots.inspection import inspection_figure
-from bushfit.report.plots.misfit import map_rows
+from bushfit.report.plots.inspection import inspection_figure, reduction_figure
+from bushfit.report.plots.points import map_rows
 from bushfit.report.plots.prediction import fine_grid, prediction_figure
-from bushfit.report.plots.reduction import reduction_figure
 from bushfit.report.plots.style import to_image
 
 #: A picture that is higher does not fit on three pages of A4 [inch].

@@ -15,7 +15,7 @@ from typing_extensions import TypedDict
 
 from bushfit import __version__
 from bushfit.cli.common import Options
-from bushfit.cli.show import new_table
+from bushfit.cli.show import tell_table
 from bushfit.report.folder import check_free, to_json
 from bushfit.validation import plain
 from cards.card import Row, card, confusion
@@ -99,12 +99,12 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
     purpose = "kept for shown cards" if seed >= CARD_SEEDS else "for working"
     for name, rows in cards.items():
         title = f"score card: {len(outcomes[name])} hidden campaigns ({name}), seed {seed}, {purpose}"
-        table = new_table(title, "measure", "figure", "over", "target", "")
+        cells = []
         for row in rows:
             open_ = "too few to say" if row.target and row.over else ""
             met = open_ if row.met is None else ("met" if row.met else "missed")
-            table.add_row(row.measure, row.figure, str(row.over), row.target, met)
-        options.console.print(table)
+            cells.append((row.measure, row.figure, str(row.over), row.target, met))
+        tell_table(options, title, ("measure", "figure", "over", "target", ""), cells)
         _tell(options, confusion(outcomes[name]), outcomes[name])
     whole: Scorecard = {
         "schema": "bushfit/scorecard/2",
