@@ -9,13 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.campaign.quantities import Compound, ReportSettings, embedded
-from bushfit.campaign.schema import (
-    CampaignFile,
-    FitSettings,
-    PredictSettings,
-    RigSettings,
-    SimulateSettings,
-)
+from bushfit.campaign.schema import CampaignFile, FitSettings, PredictSettings, RigSettings, SimulateSettings
 from bushfit.campaign.toml import read_toml
 from bushfit.effects import effect_of, place_of, with_base
 from bushfit.errors import CampaignError, naming, typed

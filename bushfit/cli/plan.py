@@ -57,12 +57,7 @@ _MOST_VALUES = 6
         multiple=True,
     ),
     option("--parameters", "NAME,...", "Whose errors count, with --for parameters [all]."),
-    option(
-        "--rivals",
-        "NAME,...",
-        "Effects to tell apart [what diagnose leaves open].",
-        shell_complete=effect_lists,
-    ),
+    option("--rivals", "NAME,...", "Effects to tell apart [what diagnose leaves open].", shell_complete=effect_lists),
     file_option("--campaign", "With MODEL.json: take [rig] and [predict] of this."),
 )
 @under("Where stiffness will be predicted", grid_options("the campaign's"))

@@ -106,10 +106,7 @@ class RunDocument(TypedDict, total=False):
     dynamic: Annotated[ModelFile, Doc("the paper's two steps; where there are loops and sweeps.")]
     joint: Annotated[ModelFile, Doc("the joint fit; where the model to use is another.")]
     model: Required[
-        Annotated[
-            ModelFile,
-            Doc("the model to use: the joint fit, or the model with what diagnose added."),
-        ]
+        Annotated[ModelFile, Doc("the model to use: the joint fit, or the model with what diagnose added.")]
     ]
     diagnosis: Annotated[DiagnosisFile, Doc("where model and tests disagree; where a parameter is free.")]
     warnings: Annotated[list[str], Doc("what a user must know of the model to use and of what it predicts.")]

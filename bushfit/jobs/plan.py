@@ -104,8 +104,7 @@ class PlanFile(TypedDict):
     tests: Annotated[list[PlannedRun], Doc("runs in their order.")]
     hours_planned: Annotated[float, Doc("that they take.")]
     hours_standard: Annotated[
-        float,
-        Doc("that the standard programme takes, as often as it fits into the hours that the plan needs."),
+        float, Doc("that the standard programme takes, as often as it fits into the hours that the plan needs.")
     ]
     hours_left: Annotated[float, Doc("of those of the rig, that no test takes.")]
     enough: Annotated[str | None, Doc("why hours stay free, in words; null where they are used.")]

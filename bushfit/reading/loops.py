@@ -16,14 +16,7 @@ from bushfit.reading.table import Table
 _FEWEST_LOOP_ROWS = 10
 
 
-def read_loop(
-    file: Path,
-    direction: Place,
-    test: LoopFile,
-    *,
-    name: str | None = None,
-    shared: bool = False,
-) -> Loop:
+def read_loop(file: Path, direction: Place, test: LoopFile, *, name: str | None = None, shared: bool = False) -> Loop:
     """Read a hysteresis loop.
 
     Args:

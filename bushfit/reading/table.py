@@ -178,10 +178,7 @@ class Table(Columns):
         words = Vocabulary({role: of_motion(self.names, other)[role]} if role in OF_MOTION else {}, {})
         for header in headers or filter(words.heading, self.headers):
             raise self.header_error(
-                f"this is a test of {found}",
-                found=f'"{header}" for the {_label(role)}',
-                expected=expected,
-                hint=hint,
+                f"this is a test of {found}", found=f'"{header}" for the {_label(role)}', expected=expected, hint=hint
             )
 
     def _recognise(
