@@ -189,7 +189,7 @@ def test_repeats_and_levels(paper_model: Model) -> None:
     assert column(reduction, "repeat").tolist() == [1, 1, 2, 2, 3, 3]
     assert np.unique(column(reduction, "level")).tolist() == [pytest.approx(column(reduction, "amplitude").mean())]
     named = reduce([first, second], levels=(0.97e-4, 1.03e-4))
-    assert np.unique(named.array("level")).tolist() == [0.97e-4, 1.03e-4]
+    assert np.unique(column(named, "level")).tolist() == [0.97e-4, 1.03e-4]
     with pytest.raises(MeasurementError, match=r"none of the levels[\s\S]*0.097 mm at 10 Hz[\s\S]*30 % of 0.2 mm"):
         reduce([first], levels=(2e-4,))
 
@@ -230,7 +230,7 @@ def test_a_preload_is_told(clean: Loop) -> None:
     print(sentence)
     assert sentence.startswith("recorded about a mean displacement of 1.5 mm and a mean force of 82")
     assert not any("preload" in line for line in plain.warnings)
-    np.testing.assert_allclose(told.array("stiffness"), plain.array("stiffness"), rtol=1e-6)
+    np.testing.assert_allclose(column(told, "stiffness"), column(plain, "stiffness"), rtol=1e-6)
 
 
 def test_the_record_in_data_can_be_made_again(paper_model: Model, root: Path) -> None:
