@@ -185,7 +185,7 @@ class Outcome:
         """The same as a file: of each quantity its column of the table, its scatter and its limits there."""
         quantities: dict[str, Control] = {}
         for quantity, (middle, spread) in self.scatter.items():
-            allowed, tabled = self._allowed(quantity.name), quantity.tabled
+            allowed, tabled = self._allowed.get(quantity.name, ()), quantity.tabled
             ends = [end * tabled.factor if math.isfinite(end) else None for end in allowed]
             scale = tabled.factor / quantity.factor
             told = self.together.process[quantity.name]
@@ -195,9 +195,10 @@ class Outcome:
         counts = self._counts
         return {**counts, "title": self.plan.title, "quantities": quantities, "order": order, "least_told": least}
 
-    def _allowed(self, name: str) -> tuple[float, ...]:
-        """The lowest and the highest allowed value of a quantity; empty where there is no limit."""
-        return self.judge.allowed.get(name, ()) if self.judge else ()
+    @property
+    def _allowed(self) -> Mapping[str, tuple[float, float]]:
+        """The lowest and the highest allowed value of each quantity that has a limit, by its name."""
+        return self.judge.allowed if self.judge else {}
 
     @property
     def contents(self) -> Contents:
@@ -265,16 +266,15 @@ class Outcome:
 
         panels = []
         for name, quantity in self.quantities.items():
-            allowed, figures = self._allowed(name), self.figures.get(name, np.full((len(PARTS), 1), np.nan))
+            allowed, figures = self._allowed.get(name, ()), self.figures.get(name, np.full((len(PARTS), 1), np.nan))
             known = np.isfinite(figures[0])
             if known.sum() >= (1 if allowed else 3):  # fewer show no scatter
                 shown = quantity.for_people(float(np.median(figures[0, known])))
-                missed = [
-                    k for k, judged in enumerate(self.judgements) if judged and name in judged.missed and known[k]
-                ]
+                told = enumerate(self.judgements)
+                missed = {k for k, judged in told if judged and name in judged.missed and known[k]}
                 limits, ends = tuple(limit * shown.factor for limit in allowed), figures[1:3] * shown.factor
                 interval = ends if np.isfinite(ends).all(axis=0).any() else None
-                panels.append(Panel(shown.header, figures[0] * shown.factor, limits, set(missed), interval))
+                panels.append(Panel(shown.header, figures[0] * shown.factor, limits, missed, interval))
         return panels
 
     def junit(self) -> bytes:

@@ -156,10 +156,8 @@ def of_levels(
 
 def stated(level: Iterable[Table]) -> str:
     """The amplitudes of a level in words: "axial at 0.2 mm, torsion at 1 deg"."""
-    displayed = [(table, table.direction.display.displacement) for table in level]
-    return ", ".join(
-        f"{table.direction} at {number(table.amplitude * factor, 6)} {unit}" for table, (unit, factor) in displayed
-    )
+    shown = [(table.direction, table.amplitude, *table.direction.display.displacement) for table in level]
+    return ", ".join(f"{place} at {number(amplitude * factor, 6)} {unit}" for place, amplitude, unit, factor in shown)
 
 
 def real(value: float, digits: int = 5) -> str:

@@ -125,11 +125,6 @@ def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
     return Exported({f"{name}.fmu": _archive(content)}, found.losses, found.arms)
 
 
-def references(found: InTime) -> dict[str, int]:
-    """The reference of each value by its name."""
-    return {value.name: _FIRST + place for place, value in enumerate(found.values)}
-
-
 def model_h(found: InTime, guid: str) -> str:
     """Sizes of the lists, and what an importer knows the FMU by."""
     sizes = {
@@ -145,7 +140,7 @@ def model_h(found: InTime, guid: str) -> str:
 
 def model_c(found: InTime) -> str:
     """The lists themselves."""
-    reference, values = references(found), found.values
+    values, reference = found.values, {value.name: at for at, value in enumerate(found.values, start=_FIRST)}
     lists = {
         "start": [0.0, 1.0, *(value.value for value in values)],
         "least": [0.0, 1.0, *(value.bounds[0] for value in values)],
@@ -159,9 +154,8 @@ def model_c(found: InTime) -> str:
     for own, lever in zip(found.fields, found.levers, strict=True):
         neutrals = {field: int(field in ONE) for field in known if field not in own}
         set_ = {**neutrals, **{field: reference[name] for field, name in own.items()}}
-        lines.append(
-            f"    {{{', '.join(f'.{field} = {place}' for field, place in set_.items())}, .lever = {lever!r}}},"
-        )
+        listed = ", ".join(f".{field} = {place}" for field, place in set_.items())
+        lines.append(f"    {{{listed}, .lever = {lever!r}}},")
     lines += ["};", "const Arm arms[ARMS] = {"]
     arms = found.arm_rows or ((0, 0.0, 1.0),)
     lines += [f"    {{{part}, {share!r}, {time!r}}}," for part, share, time in arms]
@@ -215,7 +209,7 @@ def _variables(found: InTime) -> list[tuple[dict[str, str], dict[str, str]]]:
             shown = displays[unit].name if unit in displays else ""
             real = {"unit": "" if unit == "1" else unit, "displayUnit": shown, **start}
             listed.append(({**variable, "variability": "continuous", **initial}, real))
-    for value, reference in zip(found.values, references(found).values(), strict=True):
+    for reference, value in enumerate(found.values, start=_FIRST):
         kind = {"causality": "parameter", "variability": "tunable"} if value.settable else {
             "causality": "local", "variability": "constant",
         }  # fmt: skip

@@ -119,9 +119,8 @@ def _of_tables(found: ReportData) -> Iterator[Iterator[str]]:
 
 
 def tube(bushing: Bushing) -> str:
-    inner, outer, length = (
-        number(1e3 * size, 4) for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length)
-    )
+    sizes = 2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length
+    inner, outer, length = (number(1e3 * size, 4) for size in sizes)
     formulas = "; radial formulas corrected by finite elements" if bushing.shape == "calibrated" else ""
     return f"rubber tube, inner diameter {inner} mm, outer diameter {outer} mm, length {length} mm{formulas}"
 

@@ -122,12 +122,6 @@ def means(data_sets: Sequence[SweepData]) -> Points:
     return Points(repeats.along, repeats.held, band(np.abs), band(lambda k: k.imag / k.real))
 
 
-def outliers(data_set: LoopData) -> tuple[Array, Array]:
-    """Phase [cycles] and force [N or N m] of a loop's outliers, the rows that are faults of the record, (k,) each."""
-    loop, rows = data_set.test, data_set.drive.outliers["force"].rows
-    return (loop.time[rows] - loop.time[0]) * data_set.drive.frequency, loop.force[rows]
-
-
 def ranges(time: Array, values: Array) -> tuple[Array, Array, Array]:
     """Start of each bin of time that holds rows, and the least and the largest value there, (k,) each, k <= BINS."""
     first = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], BINS + 1)[:-1]))
