@@ -25,6 +25,8 @@ _WIDTH = 80
 _UNPRINTABLE = re.compile(r"[^\x20-\x7e]")
 #: Degrees of freedom that a direction stands for, the bushing's axis along z: 1 to 3 are x, y and z, 6 turns about z.
 DOFS = {Direction.AXIAL: (3,), Direction.RADIAL: (1, 2), Direction.TORSION: (6,)}
+#: What every law over frequency leaves out.
+NO_LOOPS = "no law in time: loops, overtones and transients need another format (fmu)"
 
 
 class Table(NamedTuple):
@@ -168,10 +170,6 @@ def real(value: float, digits: int = 5) -> str:
 def to_bytes(lines: Iterable[str]) -> bytes:
     """The bytes of a deck; a sign beyond ASCII in it is a fault."""
     return ("\n".join(lines) + "\n").encode("ascii")
-
-
-#: What every law over frequency leaves out.
-NO_LOOPS = "no law in time: loops, overtones and transients need another format (fmu)"
 
 
 def of_tables(order: Order, form: Form) -> Iterator[str]:

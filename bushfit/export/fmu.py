@@ -43,6 +43,14 @@ _OPTIONS = (
 _MACHINES = {"x86_64-macos": (0x01000007, 3), "aarch64-macos": (0x0100000C, 0)}
 #: Libraries in it begin at multiples of 2 to this power [bytes].
 _ALIGNED = 14
+#: The sources that all FMUs share.
+_SHARED = ("fmu.c", "bushing.c", "bushing.h", "fmi2.h")
+#: Exponents of SI base units of the units that have whole ones; others are known by name alone.
+_BASE: Mapping[str, Mapping[str, int]] = TABLES["units"]
+#: What XML cannot hold.
+_NO_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+#: Values 0 and 1 stand first on the list of the C sources.
+_FIRST = 2
 
 
 def libraries(sources: Mapping[str, bytes], name: str, systems: Collection[str] = tuple(SYSTEMS)) -> dict[str, bytes]:
@@ -89,16 +97,6 @@ def _joined(parts: Mapping[str, bytes]) -> bytes:
         body += content + bytes(-len(content) % step)
         begin = step + len(body)
     return head + bytes(step - len(head)) + body
-
-
-#: The sources that all FMUs share.
-_SHARED = ("fmu.c", "bushing.c", "bushing.h", "fmi2.h")
-#: Exponents of SI base units of the units that have whole ones; others are known by name alone.
-_BASE: Mapping[str, Mapping[str, int]] = TABLES["units"]
-#: What XML cannot hold.
-_NO_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-#: Values 0 and 1 stand first on the list of the C sources.
-_FIRST = 2
 
 
 def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:

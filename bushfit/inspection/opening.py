@@ -37,6 +37,8 @@ from bushfit.validation import check_tables
 BLOCK_KEYS = ("area", "thickness", "elements")
 #: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
 _TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)
+#: [Hz] Frequency above which a motion in steps is a stepped sine; chosen: quasi-static loops are slower.
+_QUASI_STATIC = 1.0
 
 
 def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
@@ -161,10 +163,6 @@ def open_table(
     written = FileFormat(**{field.name: stated.get(field.name) for field in fields(FileFormat)})
     rows = Rows(stated.get("direction"), stated.get("specimen_number"), stated.get("rows", {}))
     return Table.open(file, names, own["columns"], own["units"], written, motion, rows if any(rows) else None)
-
-
-#: [Hz] Frequency above which a motion in steps is a stepped sine; chosen: quasi-static loops are slower.
-_QUASI_STATIC = 1.0
 
 
 def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) -> Inspected:

@@ -34,6 +34,18 @@ from bushfit.errors import CONTROL, OutputError
 _AT_FDCWD = -100
 #: Linux' flag of renameat2 that swaps two paths (linux/fs.h).
 _RENAME_EXCHANGE = 2
+#: Start of the name of a stage, the hidden folder in which a set of files is written.
+_STAGE = ".bushfit-"
+#: Name of a set of files that is complete and waits to be moved into the folder around it.
+_DECIDED = ".bushfit-decided"
+#: Name of the record, in a folder of results, of the files that each command wrote there: as JSON their SHA-256 by
+#: command and name, and the names that the last one took away.
+_RECORD = ".bushfit.json"
+#: Characters of a document that steer a terminal; the ends of its lines do not.
+_STEERING = re.compile(rf"(?!\n){CONTROL.pattern}")
+#: Most files of a folder that is exchanged [files]; one that holds more is no folder of results, and linking its files
+#: would take longer than moving the new ones in.
+_MOST_LINKED = 2000
 
 
 def exchange(one: Path, other: Path) -> None:
@@ -126,20 +138,6 @@ class Claim:
 def _libc() -> Any:
     """Linux' C library; None on other systems."""
     return ctypes.CDLL(None, use_errno=True) if sys.platform.startswith("linux") else None
-
-
-#: Start of the name of a stage, the hidden folder in which a set of files is written.
-_STAGE = ".bushfit-"
-#: Name of a set of files that is complete and waits to be moved into the folder around it.
-_DECIDED = ".bushfit-decided"
-#: Name of the record, in a folder of results, of the files that each command wrote there: as JSON their SHA-256 by
-#: command and name, and the names that the last one took away.
-_RECORD = ".bushfit.json"
-#: Characters of a document that steer a terminal; the ends of its lines do not.
-_STEERING = re.compile(rf"(?!\n){CONTROL.pattern}")
-#: Most files of a folder that is exchanged [files]; one that holds more is no folder of results, and linking its files
-#: would take longer than moving the new ones in.
-_MOST_LINKED = 2000
 
 
 @dataclass(frozen=True)

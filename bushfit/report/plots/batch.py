@@ -34,6 +34,12 @@ _FURTHEST = 12.0
 _COLUMNS = 2
 #: Most panels of a picture: it is then a metre high.
 _MOST_PANELS = 40
+#: Width of a line [point].
+_STROKE = 1.3
+#: Dashes of the smallest and of the largest value that is held.
+_DASHES = ("-", (0, (4, 1.5)))
+#: Markers on a line, or fewer: they tell lines apart in grey print.
+_MARKS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,14 +191,6 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
             parse_math=False,
             zorder=5,
         )
-
-
-#: Width of a line [point].
-_STROKE = 1.3
-#: Dashes of the smallest and of the largest value that is held.
-_DASHES = ("-", (0, (4, 1.5)))
-#: Markers on a line, or fewer: they tell lines apart in grey print.
-_MARKS = 5
 
 
 def comparison_figure(found: SideBySide) -> Figure:

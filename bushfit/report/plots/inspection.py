@@ -25,6 +25,10 @@ _COLOR = "#3b528b"
 _MOST_ROWS = 6000
 #: A common scale over the range of a panel at most; chosen: it fills a third, as is said below the picture.
 _ALIKE = 3
+#: Height of a history, and of the panels of noise and distortion [cm].
+_STRIP, _NOISE_ROW = 2.7, 4.2
+#: Most histories that are drawn: with more the figure leaves the page.
+_MOST_HISTORIES = 4
 
 
 def inspection_figure(every: Sequence[Inspected], first: int = 0, count: int = 5) -> Figure:
@@ -127,12 +131,6 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
     if sweep.stepped:
         style.name_levels(pair[-1], labels, held, [True] * levels.size)
     return pair[0]
-
-
-#: Height of a history, and of the panels of noise and distortion [cm].
-_STRIP, _NOISE_ROW = 2.7, 4.2
-#: Most histories that are drawn: with more the figure leaves the page.
-_MOST_HISTORIES = 4
 
 
 def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str) -> Figure:

@@ -19,6 +19,8 @@ from bushfit.units import CELSIUS, for_people, number
 _FINE = 200
 #: Ratio of amplitudes that count as one level.
 _NEAR = 1.3
+#: Factor by which the picture goes beyond the band, to show how arms end.
+_BEYOND = 4.0
 
 
 def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> Figure:
@@ -82,10 +84,6 @@ def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -
 def _degree(found: Shifted) -> float:
     """The temperature of a sweep to a degree [degC]."""
     return float(np.round(found.temperature - CELSIUS))
-
-
-#: Factor by which the picture goes beyond the band, to show how arms end.
-_BEYOND = 4.0
 
 
 def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:

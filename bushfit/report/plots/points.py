@@ -24,6 +24,8 @@ SECTORS = 36
 BINS = 1500
 #: What is drawn along the x axis: what a test steps through while it holds the other.
 Axis = Literal["frequency", "amplitude"]
+#: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
+_MOST_ROWS = 24
 
 
 def by_direction(data_sets: Sequence[_T]) -> dict[Place, list[_T]]:
@@ -139,10 +141,6 @@ def over_sectors(data_set: LoopData) -> tuple[Array, Array]:
     sector = (phase_after_turn(data_set) * (SECTORS / 360.0)).astype(int) % SECTORS
     filled, count = np.unique(sector, return_counts=True)
     return (filled + 0.5) * (360.0 / SECTORS), (sector == filled[:, None]) / count[:, None]
-
-
-#: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
-_MOST_ROWS = 24
 
 
 class Map(NamedTuple):
