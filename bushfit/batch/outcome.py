@@ -83,9 +83,11 @@ class Outcome:
         """On each row; None on all without limits, and on a row that failed."""
         found = list[Judgement | None]()
         for number, record in enumerate(self.records):
-            row = {name: figures[:, number].tolist() for name, figures in self.figures.items()}
-            known = {name: four for name, four in row.items() if math.isfinite(four[0])}
-            found.append(self.judge(known, record) if self.judge and record["status"] == "done" else None)
+            judged = None
+            if self.judge and record["status"] == "done":
+                row = {name: figures[:, number].tolist() for name, figures in self.figures.items()}
+                judged = self.judge({name: four for name, four in row.items() if math.isfinite(four[0])}, record)
+            found.append(judged)
         return found
 
     @cached_property
@@ -288,8 +290,9 @@ class Outcome:
             if failed or missed:
                 text = _printable(record["error"] if failed else "\n".join(missed.values()))
                 line = text.partition("\n")[0] if failed else "; ".join(text.splitlines())
-                case.result = [Error(line, "failed") if failed else Failure(line, "limits")]
-                case.result[0].text = text
+                result = Error(line, "failed") if failed else Failure(line, "limits")
+                result.text = text
+                case.result = [result]
             suite.add_testcase(case)
         report = JUnitXml("bushfit batch")
         report.add_testsuite(suite)

@@ -134,7 +134,7 @@ def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
         limits += [(force, rig.max_force), (size, rig.max_displacement), (speed, rig.max_velocity)]
     elif place.motion is ROTATION:
         limits += [(force, rig.max_moment), (size, rig.max_rotation)]
-    bearable = size * known.model.unit_strain(place) <= max(0.5, known.strain or 0.0)  # or what it has borne
+    bearable = size * known.model.unit_strain(place) <= max(0.5, known.strain or 0.0)  # what it has borne
     for reached, limit in limits:
         bearable &= reached <= (limit or np.inf) * (1.0 + 1e-9)  # rounding
     if isinstance(test, SimulatedLoop):
