@@ -211,8 +211,7 @@ def _holding_tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
             pass
         tests.append(part)
     if tests and tests[0].sheet and without:
-        of_book = labels_above(
-            line for part in parts_of(tests[0].file) if part.sheet in without for line in part.head()
-        )
+        others = [part for part in parts_of(tests[0].file) if part.sheet in without]
+        of_book = labels_above(line for part in others for line in part.head())
         tests = [replace(test, of_book=of_book) for test in tests]
     return tests, left_out

@@ -31,6 +31,10 @@ from bushfit.units import number, split_header, told
 _MOST_ROWS, _FEWEST = 2400, 24
 #: Width of a point of a loop [pixels].
 _DOT = 2.6
+#: Most columns and rows of a map of cells: each is then some pixels wide and high.
+_MOST_COLUMNS, _MOST_LEVELS = 24, 12
+#: Letters of the name of a row at most.
+_LONGEST = 24
 
 
 def loop_panels(found: ReportData) -> list[Panel]:
@@ -82,12 +86,6 @@ def _charts(place: Place, loops: dict[str, Array]) -> list[Markup]:
         chart(f"{place}: hysteresis", labels, whole, loops_in_words, dot=_DOT),
         chart(f"{place}: measured less model", labels, left, left_in_words, dot=_DOT, rules=[Rule(0.0, "")]),
     ]
-
-
-#: Most columns and rows of a map of cells: each is then some pixels wide and high.
-_MOST_COLUMNS, _MOST_LEVELS = 24, 12
-#: Letters of the name of a row at most.
-_LONGEST = 24
 
 
 def gap_panels(found: ReportData) -> list[Panel]:

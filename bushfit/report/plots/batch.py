@@ -34,6 +34,12 @@ _FURTHEST = 12.0
 _COLUMNS = 2
 #: Most panels of a picture: it is then a metre high.
 _MOST_PANELS = 40
+#: Width of a line [point].
+_STROKE = 1.3
+#: Dashes of the smallest and of the largest value that is held.
+_DASHES = ("-", (0, (4, 1.5)))
+#: Markers on a line, or fewer: they tell lines apart in grey print.
+_MARKS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +90,9 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
     beyond = "Triangles: further out than the panel reaches, the furthest by name and value."
     few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in drawn)
     more = f"The first {len(drawn)} of {len(panels)} quantities." * (len(panels) > len(drawn))
-    style.explain(figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more)
-    return figure
+    return style.explained(
+        figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more
+    )
 
 
 def _short(name: str, letters: int) -> str:
@@ -105,15 +112,11 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     good_style = {**style.DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, 1500 / values.size))} if cloud else style.POINT
     if ends is not None and not cloud:
         axes.vlines(place + 1, *ends, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
-    for chosen, color, look, order in (
-        (~bad, _GOOD, good_style, 2),
-        (bad, _OUT, style.POINT if not cloud else style.DOT, 4),
-    ):
+    kinds = (~bad, _GOOD, good_style, 2), (bad, _OUT, style.DOT if cloud else style.POINT, 4)
+    for chosen, color, look, order in kinds:
         for marker, which in (("o", shown == values), ("^", shown < values), ("v", shown > values)):
-            x, y = place[chosen & which] + 1, shown[chosen & which]
-            axes.plot(
-                x, y, marker, color=color, zorder=order, rasterized=cloud, **(look if marker == "o" else style.POINT)
-            )
+            at, drawn = chosen & which, look if marker == "o" else style.POINT
+            axes.plot(place[at] + 1, shown[at], marker, color=color, zorder=order, rasterized=cloud, **drawn)
     axes.axhline(float(np.median(values)), color=style.GREY, lw=0.9, zorder=1)
     for limit in filter(math.isfinite, panel.allowed):
         axes.axhline(limit, color=_OUT, lw=0.9, ls=(0, (5, 2)), zorder=3)
@@ -190,14 +193,6 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
         )
 
 
-#: Width of a line [point].
-_STROKE = 1.3
-#: Dashes of the smallest and of the largest value that is held.
-_DASHES = ("-", (0, (4, 1.5)))
-#: Markers on a line, or fewer: they tell lines apart in grey print.
-_MARKS = 5
-
-
 def comparison_figure(found: SideBySide) -> Figure:
     """All results at every place they are compared at: two rows of panels a place, the differences below the values.
 
@@ -216,22 +211,18 @@ def comparison_figure(found: SideBySide) -> Figure:
                 axes.plot(line.x, line.value, color=look.color, **markers, **along)
                 # bands of several results lie on each other
                 axes.fill_between(line.x, line.low, line.high, color=look.color, alpha=0.18, lw=0)
-            style.label_axes(axes, sides.along, panel.header if panel.least else f"{sides.place} {panel.header}")
-            style.log_if_wide(axes, panel.lines[0].x)
+            shown_as = panel.header if panel.least else f"{sides.place} {panel.header}"
+            style.label_axes(axes, sides.along, shown_as, panel.lines[0].x)
             if panel.least:
                 axes.axhline(0.0, color=looks[first].color, lw=_STROKE)
                 style.least_span(axes, panel.least)
-        lines = [
-            Line2D([], [], color=look.color, lw=_STROKE, marker=look.marker, **style.POINT) for look in looks.values()
-        ]
-        dashes = [
-            Line2D([], [], color=style.INK, lw=_STROKE, ls=_DASHES[level]) for level, _ in enumerate(sides.levels)
-        ]
+        marked = {"lw": _STROKE, **style.POINT}
+        lines = [Line2D([], [], color=look.color, marker=look.marker, **marked) for look in looks.values()]
+        dashes = [Line2D([], [], color=style.INK, lw=_STROKE, ls=dash) for dash in _DASHES[: len(sides.levels)]]
         called = [f"{label}: {style.file_name(name)}" for label, name in found.names.items()]
         style.legend(grid[2 * i, 1], lines, called, "", besides=dict(zip(sides.levels, dashes, strict=True)))
-    style.explain(
+    return style.explained(
         figure,
         "Shaded: 95 % bands. Lower panels: the band of each point by itself; "
         "compare.json and the terminal say what holds at all points at once.",
     )
-    return figure

@@ -23,7 +23,6 @@ from bushfit.report.plots.points import (
     by_kind,
     held_with,
     means,
-    outliers,
     over_sectors,
     phase_after_turn,
 )
@@ -58,8 +57,7 @@ def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> F
             draw(pair, kind.place, lines, points, kind.axis, levels)
         _draw_residuals(pair, strips, model, mine, kind)
     outlying = any((data_set.weights == 0.0).any() for data_set in data_sets)
-    style.explain(figure, "Lines: model.", points_note(data_sets), _RESIDUALS, _OUTLIERS * outlying)
-    return figure
+    return style.explained(figure, "Lines: model.", points_note(data_sets), _RESIDUALS, _OUTLIERS * outlying)
 
 
 def _draw_residuals(
@@ -74,12 +72,10 @@ def _draw_residuals(
             marker = style.DOT | {"color": look.color, "alpha": 0.8}
             strip.plot(x[place][at], residuals[place][at], look.marker, **marker)
         strip.sharex(panel)
-        style.label_axes(strip, panel.get_xlabel(), f"{name} residual\n/ noise")
         reach = np.concatenate(x)
+        style.label_axes(strip, panel.get_xlabel(), f"{name} residual\n/ noise", reach)
         if kind.axis == "amplitude" and reach.max() > 3.0 * reach.min():  # half a decade
             style.logarithmic(strip, reach)
-        else:
-            style.log_if_wide(strip, reach)
         panel.tick_params(labelbottom=False)
         panel.set_xlabel("")
         style.noise_band(strip)
@@ -124,14 +120,13 @@ def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Fig
         phase_panel.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
         loops_legend(phase_panel, mine, besides={"model": Line2D([], [], color=style.INK, lw=0.8)})
     note = _OUTLIERS if any(data_set.drive.outliers["force"].rows.size for data_set in data_sets) else ""
-    style.explain(
+    return style.explained(
         figure,
         "Left: measured force over the motion cleared of noise; black: model.",
         _RESIDUALS,
         f"Lines there: means over {360 // SECTORS} deg.",
         note,
     )
-    return figure
 
 
 def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[LoopData]) -> None:
@@ -148,8 +143,9 @@ def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[
         axes.plot(motion, factor * drive.force[rows], "o", color=look.color, alpha=0.5, **style.DOT)
         axes.plot(motion, modelled, color=style.INK, lw=0.8)
     for data_set in data_sets:
-        phase, force = outliers(data_set)
-        style.mark_outliers(axes, length * data_set.drive.displacement(phase), factor * force)
+        loop, rows = data_set.test, data_set.drive.outliers["force"].rows
+        phase = (loop.time[rows] - loop.time[0]) * data_set.drive.frequency
+        style.mark_outliers(axes, length * data_set.drive.displacement(phase), factor * loop.force[rows])
 
 
 def loops_legend(axes: Axes, data_sets: Sequence[LoopData], **words: Any) -> None:
@@ -161,14 +157,10 @@ def loops_legend(axes: Axes, data_sets: Sequence[LoopData], **words: Any) -> Non
 def loop_labels(data_sets: Sequence[LoopData]) -> list[str]:
     """Each loop of a direction by amplitude and frequency, and by file on a second line where that leaves twins."""
     unit, length = data_sets[0].direction.display.displacement
-    labels = [
-        f"{told(unit, length * data_set.amplitude[0])}, {told('Hz', data_set.frequency[0])}" for data_set in data_sets
-    ]
+    labels = [f"{told(unit, length * each.amplitude[0])}, {told('Hz', each.frequency[0])}" for each in data_sets]
     if len(set(labels)) == len(labels):
         return labels
-    return [
-        f"{label}\n{style.file_name(data_set.test.name)}" for label, data_set in zip(labels, data_sets, strict=True)
-    ]
+    return [f"{label}\n{style.file_name(each.test.name)}" for label, each in zip(labels, data_sets, strict=True)]
 
 
 def _model_lines(model: Model, direction: Place, points: Points, axis: Axis) -> Points:

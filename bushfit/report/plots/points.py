@@ -24,6 +24,8 @@ SECTORS = 36
 BINS = 1500
 #: What is drawn along the x axis: what a test steps through while it holds the other.
 Axis = Literal["frequency", "amplitude"]
+#: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
+_MOST_ROWS = 24
 
 
 def by_direction(data_sets: Sequence[_T]) -> dict[Place, list[_T]]:
@@ -122,12 +124,6 @@ def means(data_sets: Sequence[SweepData]) -> Points:
     return Points(repeats.along, repeats.held, band(np.abs), band(lambda k: k.imag / k.real))
 
 
-def outliers(data_set: LoopData) -> tuple[Array, Array]:
-    """Phase [cycles] and force [N or N m] of a loop's outliers, the rows that are faults of the record, (k,) each."""
-    loop, rows = data_set.test, data_set.drive.outliers["force"].rows
-    return (loop.time[rows] - loop.time[0]) * data_set.drive.frequency, loop.force[rows]
-
-
 def ranges(time: Array, values: Array) -> tuple[Array, Array, Array]:
     """Start of each bin of time that holds rows, and the least and the largest value there, (k,) each, k <= BINS."""
     first = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], BINS + 1)[:-1]))
@@ -145,10 +141,6 @@ def over_sectors(data_set: LoopData) -> tuple[Array, Array]:
     sector = (phase_after_turn(data_set) * (SECTORS / 360.0)).astype(int) % SECTORS
     filled, count = np.unique(sector, return_counts=True)
     return (filled + 0.5) * (360.0 / SECTORS), (sector == filled[:, None]) / count[:, None]
-
-
-#: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
-_MOST_ROWS = 24
 
 
 class Map(NamedTuple):

@@ -100,8 +100,7 @@ def prediction_figure(
         through += f" Double lines: the same {IF_RIGS}, and not the bushing's; the band spans both."
     if amplitudes.size > _MOST_AMPLITUDES:
         through += f" Over frequency some of the {amplitudes.size} amplitudes are drawn."
-    style.explain(figure, f"Lines: model{shade}.{through}", points_note(every) if laid or free else "", note)
-    return figure
+    return style.explained(figure, f"Lines: model{shade}.{through}", points_note(every) if laid or free else "", note)
 
 
 def _lines(levels: Array, held: Array, most: int) -> Array:
@@ -154,8 +153,7 @@ def draw(
                     axes.plot(x[at], factor * getattr(rig, kind).value[at], color=look.color, lw=_THIN)
                 axes.vlines(where[spots], point.low[spots], point.high[spots], color=look.color, lw=0.7, alpha=0.7)
                 axes.plot(where[spots], point.value[spots], look.marker, color=look.color, **style.POINT)
-        style.label_axes(axes, axis_label(direction, axis), name)
-        style.log_if_wide(axes, x)
+        style.label_axes(axes, axis_label(direction, axis), name, x)
         style.least_span(axes, 0.04 * line.high.max() if kind == "stiffness" else 0.01)  # flat curves shall look flat
     unit, scale = scales[held]
     names_of_levels = [told(unit, scale * level) for level in levels]
