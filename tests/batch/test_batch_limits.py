@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from bushfit.batch.limits import Judge, Limits, Verdict, judge, read_limits
 from bushfit.batch.quantities import at_point, parameter_quantities
-from bushfit.errors import BushfitError
 from bushfit.reduction.scatter import scatter
 
 NAN = math.nan
@@ -143,28 +142,3 @@ def test_a_value_at_rest_on_a_bound_of_its_fit_is_no_plain_pass(tmp_path: Path) 
     assert set(guarded(known, record).missed) == {"mu", "eps_half"}
     out = Judge(limits(tmp_path, "[parameters.mu]\nmax = '1 MPa'\n"), {}, QUANTITIES)(known, record)
     assert out.missed["mu"] == "mu = 1.1 MPa, max 1, at the max of its fit: fail"
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("[parameters.mi]\nmax = '1 MPa'", ["parameters", "mi", "unknown key"]),
-        ("[parameters.mu]\nmax = 1e6", ["parameters.mu.max", "without a unit"]),
-        ("[parameters.mu]\nnominal = '1 MPa'", ["make no limit", "tolerance"]),
-        ("[parameters.mu]\nmin = '2 MPa'\nmax = '1 MPa'", ["hold no value"]),
-        ("[[stiffness]]\nat = 'axial 25 Hz 0.1 mm'\nmax = '1 N'", ["stiffness #1.max", "a stiffness"]),
-        ("[[stiffness]]\nat = 'axial 25'\nmax = '1 N/mm'", ["stiffness #1.at", "no operating point"]),
-        (
-            "[[stiffness]]\nat = 'axial 25 Hz 0.1 mm'\nmax = '9 N/mm'\n"
-            "[[stiffness]]\nat = 'axial 0.025 kHz 100 um'\nsigma = 3",
-            ["2 tables for one point", "stiffness axial 25 Hz 0.1 mm", "put them in one table"],
-        ),
-        ("verdict = ['named']", ["unknown key", 'mean "verdicts"']),
-        ("verdicts = ['good']", ["verdicts #1"]),
-        ("guard = true", ["there is no limit"]),
-    ],
-)
-def test_bad_limits_have_one_clear_error(tmp_path: Path, text: str, words: list[str]) -> None:
-    with pytest.raises(BushfitError) as caught:
-        limits(tmp_path, text)
-    assert all(word in str(caught.value) for word in ("limits.toml", *words)), str(caught.value)

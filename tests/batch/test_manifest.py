@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from bushfit.batch.manifest import Manifest, Settings, read_manifest
 from bushfit.batch.quantities import parse_point
-from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 
 
@@ -81,43 +80,6 @@ def test_folders_are_of_their_own_and_lead_nowhere_else(
 
 
 ROW = '[[bushings]]\ncampaign = "a.toml"\n'
-BAD = [
-    ("m.toml", ROW + 'nme = "x"', ["bushings #1.nme", "unknown key", 'mean "name"']),
-    ("m.toml", ROW + 'commands = ["fitt"]', ["bushings #1.commands #1", "'fit'"]),
-    ("m.toml", ROW + "commands = []", ["bushings #1.commands", "at least one"]),
-    ("m.toml", ROW + 'commands = ["predict"]', ["predict has no model", '"fit", "predict"']),
-    ("m.toml", ROW + 'tolerance = "2 %"', ["tolerance", "does nothing here", "commands fit", "goes with diagnose"]),
-    ("m.toml", ROW + 'commands = ["diagnose"]\neffects = ["inertia"]', ["effects", "does nothing", "--command fit"]),
-    ("m.toml", ROW + 'commands = ["fit", "predict"]\nmodel = "m.json"', ["model", "does nothing", "fit, predict"]),
-    ("m.toml", "max_effects = 1\n" + ROW, ["max_effects", "does nothing", "commands fit"]),
-    (
-        "m.csv",
-        "campaign,directions,commands\na.toml,axial,fit\nb.toml,axial,diagnose",
-        ["b.toml", "directions", "commands diag"],
-    ),
-    ("m.toml", ROW + 'commands = ["run", "fit"]', ["commands", "run is the whole chain", "found: run, fit"]),
-    (
-        "m.toml",
-        ROW + 'commands = ["run"]\neffects = ["inertia"]',
-        ["effects", "nothing", "try: leave effects out"],
-    ),
-    ("m.toml", ROW + 'effects = ["inertai"]', ["bushings #1.effects #1", "did you mean inertia?"]),
-    ("m.toml", 'at = ["axial 25 Hz"]\n' + ROW, ["at", "no operating point", "axial 25 Hz"]),
-    ("m.toml", '[[bushings]]\ncampaign = "no/*.toml"', ["the pattern matches no file", "no/*.toml"]),
-    ("m.csv", "campaing\na.toml", ["header", "unknown key", 'mean "campaign"']),
-    ("m.csv", "campaign,commands\na.toml,fit\nb.toml,fitt", ["line 3", "commands #1"]),
-    ("m.csv", "\n\n \ncampaign\na.toml,b.toml", ["line 5", "more cells"]),
-    ("m.csv", "name\nx", ["line 2", "a key is missing", "campaign"]),
-    ("m.csv", "campaign,name\n", ["no rows"]),
-]
-
-
-@pytest.mark.parametrize(("name", "text", "words"), BAD, ids=lambda value: None if isinstance(value, list) else value)
-def test_bad_manifests_have_one_clear_error(tmp_path: Path, name: str, text: str, words: list[str]) -> None:
-    with pytest.raises(BushfitError) as caught:
-        read(tmp_path, text, name)
-    message = str(caught.value)
-    assert all(word in message for word in (name, *words)), message
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ import numpy as np
 from spoiled_campaigns import IN_CAMPAIGN, IN_MORE, WHOLE_CAMPAIGNS
 from spoiled_models import IN_MODEL, IN_PREDICTED, WHOLE_MODELS
 from spoiled_tables import IN_LOOP, IN_RESONANCE, IN_SWEEP
-from spoiled_usage import LIMITS, USAGE
+from spoiled_usage import LIMITS, MANIFESTS, USAGE
 
 CAMPAIGN = """\
 [bushing]
@@ -216,12 +216,14 @@ def tables() -> Iterator[Spoiled]:
 
 
 def typed() -> Iterator[Spoiled]:
-    """Command lines, and limits of a batch."""
+    """Command lines, and limits and manifests of a batch."""
     for command, *says in USAGE:
         yield Spoiled(command, tuple(command.split("|")), tuple(says))
     for text, *says in LIMITS:
         command = ("batch", "campaign*.toml", "--limits", "judge.toml")
         yield Spoiled(f"limits: {text}", command, tuple(says), {"judge.toml": text + "\n"})
+    for name, text, *says in MANIFESTS:
+        yield Spoiled(f"{name}: {text}", ("batch", name), (name, *says), {name: text})
 
 
 ROWS = [*campaigns(), *models(), *typed(), *tables()]

@@ -1,4 +1,4 @@
-"""Command lines that are wrong, and what the one error has to say: what was typed, and where there is one, a hint."""
+"""Command lines, limits and manifests that are wrong, and what the one error has to say."""
 
 # fmt: off
 from __future__ import annotations
@@ -22,6 +22,11 @@ USAGE = [
     ("plan|model.json|--rivals|delay,inertia", "model.json: there are no rivals to be told apart", "expected: tests of a campaign"),
     ("plan|campaign.toml|--campaign|more.toml", "'--campaign' goes with MODEL.json"),
     ("plan|model.json|--parameters|mue", "this parameter is not among those that tests are to tell", "found: mue", 'did you mean "mu"?'),
+    ("plan|model.json|--target|mu", 'such as "mu=2 %"'),
+    ("plan|model.json|--target|mu=2 mm", "the unit does not fit"),
+    ("plan|model.json|--target|nu=2 %", "there is no such target"),
+    ("plan|model.json|--target|stiffness.torsion=2 %", "stiffness.axial, stiffness.radial"),
+    ("plan|model.json|--target|mu=2 %|--for|parameters", "an aim of its own"),
     ("plan|model.json|--hours|0", "Invalid value for '--hours'"),
     ("plan|model.json|--hours|0.1", "no test fits into the hours", "found: 0.1 h"),
     ("plan|campaign.toml|--rivals|delai", "campaign.toml, --rivals: this is no rival in these tests", 'did you mean "delay"?'),
@@ -30,6 +35,8 @@ USAGE = [
     ("compare|campaign.toml|--families|friction", "the model has this effect already", "kraus"),
     ("compare|campaign.toml|--families|sliders+kraus", "what this effect stands in place of is not in the model", "found: kraus"),
     ("predict|model.json|--bushing|loop.csv", "loop.csv"),
+    ("predict|model.json|--temperature|40 degC", "the model knows no temperature"),
+    ("predict|model.json|--temperature|warm", "--temperature: "),
     ("predict|model.json|--arms|1e-9 %", "no error for arms", "0.0001 % up to 100 %"),
     ("fit|campaign.toml|--direction|torsion", "campaign.toml: no test in the directions asked for", "torsion"),
     ("fit|campaign.toml|--effect|stiffness_factor.mount", "no such direction or specimen", "one of axial, radial, torsion"),
@@ -116,6 +123,8 @@ USAGE = [
     ("export|model.json", "Missing option '--format'"),
     ("export|model.json|--format|catia", "'catia' is not one of 'fmu', 'nastran', 'abaqus', 'adams', 'csv', 'xlsx'"),
     ("export|model.json|--format|nastran|--units|mm kg s N", "--units: kg times mm/s^2 is 0.001 N, and not one N", 'try: such as "mm t s N"'),
+    ("export|model.json|--format|nastran|--units|mm m s N", '"mm" and "m" measure the same'),
+    ("export|model.json|--format|nastran|--units|mm t s __import__('os')", "is none of the four units"),
     ("export|model.json|--format|nastran|--units|mm", "--units: a unit is missing", 'found: "mm"'),
     ("export|model.json|--format|xlsx|--units|mm t s bar", '--units: "bar" is none of the four units'),
     ("export|model.json|--format|csv|--dialect|optistruct", "'--dialect' is of '--format nastran'."),
@@ -125,6 +134,39 @@ USAGE = [
 #: (a limit for a batch, what the error says ...)
 LIMITS = [
     *((f"{key} = {value}", f"judge.toml, {key}: this value is not understood", "found: ") for key in ("nrmse", "reduced_chi_square") for value in ("nan", "-0.1", "inf")),
+    ("[parameters.mi]\nmax = '1 MPa'", "judge.toml", "parameters", "mi", "unknown key"),
+    ("[parameters.mu]\nmax = 1e6", "judge.toml, parameters.mu.max", "without a unit"),
+    ("[parameters.mu]\nnominal = '1 MPa'", "make no limit", "tolerance"),
+    ("[parameters.mu]\nmin = '2 MPa'\nmax = '1 MPa'", "hold no value"),
+    ("[[stiffness]]\nat = 'axial 25 Hz 0.1 mm'\nmax = '1 N'", "stiffness #1.max", "a stiffness"),
+    ("[[stiffness]]\nat = 'axial 25'\nmax = '1 N/mm'", "stiffness #1.at", "no operating point"),
+    ("".join(f"[[stiffness]]\nat = 'axial {at}'\nsigma = 3\n" for at in ("25 Hz 0.1 mm", "0.025 kHz 100 um")), "2 tables for one point", "stiffness axial 25 Hz 0.1 mm", "put them in one table"),
+    ("verdict = ['named']", "unknown key", 'did you mean "verdicts"?'),
+    ("verdicts = ['good']", "verdicts #1"),
+    ("guard = true", "there is no limit"),
     ('[[stiffness]]\nat = "axial 15 Hz 0.1 mm"\nmin = "-5 N/mm"', "judge.toml, stiffness #1.min: this value is not understood"),
     ('[parameters.mu]\nsigma = inf', "judge.toml, parameters.mu.sigma: this value is not understood"),
+]
+ROW = '[[bushings]]\ncampaign = "campaign.toml"\n'
+#: (name of a manifest, its text, what the error says ...)
+MANIFESTS = [
+    ("manifest.toml", ROW + 'nme = "x"', "bushings #1.nme", "unknown key", 'did you mean "name"'),
+    ("manifest.toml", ROW + 'commands = ["fitt"]', "bushings #1.commands #1", "'fit'"),
+    ("manifest.toml", ROW + "commands = []", "bushings #1.commands", "at least one"),
+    ("manifest.toml", ROW + 'commands = ["predict"]', "predict has no model", '"fit", "predict"'),
+    ("manifest.toml", ROW + 'tolerance = "2 %"', "tolerance", "does nothing here", "commands fit", "goes with diagnose"),
+    ("manifest.toml", ROW + 'commands = ["diagnose"]\neffects = ["inertia"]', "effects", "does nothing", "--command fit"),
+    ("manifest.toml", ROW + 'commands = ["fit", "predict"]\nmodel = "m.json"', "model", "does nothing", "fit, predict"),
+    ("manifest.toml", "max_effects = 1\n" + ROW, "max_effects", "does nothing", "commands fit"),
+    ("manifest.csv", "campaign,directions,commands\na.toml,axial,fit\nb.toml,axial,diagnose", "b.toml", "directions", "commands diag"),
+    ("manifest.toml", ROW + 'commands = ["run", "fit"]', "commands", "run is the whole chain", "found: run, fit"),
+    ("manifest.toml", ROW + 'commands = ["run"]\neffects = ["inertia"]', "effects", "nothing", "try: leave effects out"),
+    ("manifest.toml", ROW + 'effects = ["inertai"]', "bushings #1.effects #1", "did you mean inertia?"),
+    ("manifest.toml", 'at = ["axial 25 Hz"]\n' + ROW, "at", "no operating point", "axial 25 Hz"),
+    ("manifest.toml", '[[bushings]]\ncampaign = "no/*.toml"', "the pattern matches no file", "no/*.toml"),
+    ("manifest.csv", "campaing\na.toml", "header", "unknown key", 'did you mean "campaign"'),
+    ("manifest.csv", "campaign,commands\na.toml,fit\nb.toml,fitt", "line 3", "commands #1"),
+    ("manifest.csv", "\n\n \ncampaign\na.toml,b.toml", "line 5", "more cells"),
+    ("manifest.csv", "name\nx", "line 2", "a key is missing", "campaign"),
+    ("manifest.csv", "campaign,name\n", "no rows"),
 ]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from shell import CAMPAIGN, Run, document, names, refused, typing, values
+from shell import CAMPAIGN, Run, document, names, typing, values
 
 
 @pytest.fixture(scope="module")
@@ -174,18 +174,3 @@ def test_no_test_is_planned_for_what_is_known(bushfit: Run, tmp_path: Path) -> N
     assert "no test is needed" in done.stderr
     assert names(tmp_path) == {"plan.json", "plan.csv", "plan.png"}
     assert pd.read_csv(tmp_path / "plan.csv").empty
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (("mu",), 'such as "mu=2 %"'),
-        (("mu=2 mm",), "the unit does not fit"),
-        (("nu=2 %",), "there is no such target"),
-        (("stiffness.torsion=2 %",), "stiffness.axial, stiffness.radial"),
-        (("mu=2 %", "--for", "parameters"), "an aim of its own"),
-    ],
-)
-def test_a_target_that_is_none_is_refused(root: Path, tmp_path: Path, options: tuple[str, ...], said: str) -> None:
-    done = typing(root)("plan", TARGETS[0], "--target", *options, "-o", tmp_path / "x", status=2)
-    refused(done, tmp_path / "x", said)

@@ -47,16 +47,6 @@ def test_predict_shows_at_most_eight_amplitudes_a_direction(bushfit: Run, tmp_pa
     assert len(pd.read_csv(tmp_path / "x/axial.csv")["amplitude [mm]"].unique()) == 30
 
 
-@pytest.mark.parametrize(
-    ("temperature", "said"), [("40 degC", "the model knows no temperature"), ("warm", "--temperature")]
-)
-def test_predict_at_a_temperature_needs_a_model_that_knows_one(
-    bushfit: Run, tmp_path: Path, temperature: str, said: str
-) -> None:
-    at = ("--no-plots", "-o", tmp_path / "x", "--temperature", temperature)
-    assert said in bushfit("predict", "model/model.json", *at, status=2).stderr
-
-
 def test_predict_writes_maxwell_arms_where_asked(bushfit: Run, root: Path, tmp_path: Path) -> None:
     folder = tmp_path / "x"
     done = bushfit("predict", root / ARM, "--arms", "0.5 %", "-o", folder, "--json")

@@ -1,15 +1,13 @@
 """The guess of a compound: Gent's table, and whether what is known of real and simulated rubbers lies inside."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.campaign.compound import Compound, Polymer, filler, hardness
-from bushfit.errors import BushfitError, CampaignError, UnitError
+from bushfit.campaign.compound import Compound, Polymer
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing
@@ -85,29 +83,3 @@ def test_width_follows_from_the_laws(rubber: Polymer, errors: tuple[float, ...])
     if rubber == "natural":  # of other densities the volume of the filler differs from the paper's, by a power unsure
         np.testing.assert_allclose(known.covariance, slopes @ np.diag(np.square(wide)) @ slopes.T, atol=1e-6)
     assert np.sqrt(np.diag(known.covariance))[:3] == pytest.approx(np.linalg.norm(slopes * wide, axis=1)[:3])
-
-
-@pytest.mark.parametrize(
-    ("read", "text", "error", "said"),
-    [
-        *((hardness, text, UnitError, "61 Shore A") for text in ("61", "61 Shore D", "shore a", "-61 Shore A", 61)),
-        *((filler, text, UnitError, "27 phr") for text in ("27", "27 %", "27 phr silica", True)),
-        (hardness, "95 Shore A", CampaignError, "95 Shore A"),
-        (filler, "500 phr", CampaignError, "500 phr"),
-    ],
-)
-def test_what_no_bushing_is_made_of(
-    read: Callable[[object], object], text: object, error: type[BushfitError], said: str
-) -> None:
-    with pytest.raises(error, match=said):
-        read(text)
-
-
-def test_a_campaign_states_its_compound(tmp_path: Path) -> None:
-    table = '[bushing]\nname = "new"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n[compound]\n'
-    file = tmp_path / "new.toml"
-    file.write_text(table + 'hardness = "61 Shore A"\nfiller = "27 phr carbon black"\n', encoding="utf-8")
-    assert load_campaign(file).compound == Compound(61.0, 27.0)
-    file.write_text(table + 'hardness = "61"\nfiller = "27 phr"\n', encoding="utf-8")
-    with pytest.raises(BushfitError, match=r"compound\.hardness"):
-        load_campaign(file)

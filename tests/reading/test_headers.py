@@ -1,9 +1,10 @@
-"""Headers of columns: the role they name, their unit, and how they count amplitudes."""
+"""Headers of columns: where they stand, the role they name, their unit, and how they count amplitudes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ from dialects import DIALECTS, expected
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
-from bushfit.reading.headers import Heading, Vocabulary, plain, split_convention
+from bushfit.reading.headers import Heading, Vocabulary
+from bushfit.reading.layout import FileFormat
 from bushfit.reading.sweeps import read_sweep
+from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 
 LOOPS, SWEEPS = Vocabulary(LOOP_COLUMNS, {}), Vocabulary(SWEEP_COLUMNS, {})
@@ -37,11 +40,6 @@ LOOPS, SWEEPS = Vocabulary(LOOP_COLUMNS, {}), Vocabulary(SWEEP_COLUMNS, {})
 )
 def test_what_a_header_says_of_its_column(vocabulary: Vocabulary, header: str, heading: Heading | None) -> None:
     assert vocabulary.heading(header) == heading
-
-
-def test_spellings_that_count_for_nothing() -> None:
-    assert len({plain(name) for name in ("Prüf-Weg", "PRUEFWEG", "pruf weg", "prüf_weg")}) == 1
-    assert plain("K'") != plain("K''") == plain("K\u2033")
 
 
 PEAK_TO_PEAK = [
@@ -89,6 +87,37 @@ def test_a_header_that_is_named_says_it_too(header: str, named: str, counted: fl
     assert set(amplitudes(tmp_path, header, {"amplitude": named})) == {counted}
 
 
-def test_what_a_header_says_of_counting_is_taken_out_of_it() -> None:
-    assert split_convention("amplitude [mm p-p]") == ("amplitude [mm  ]", "peak-to-peak")
-    assert split_convention("stress") == ("stress", None)
+@pytest.mark.parametrize(
+    ("header", "index"),
+    [
+        ("f [Hz],A [mm],K [N/mm],tan d", 2),
+        ("f [Hz],A [mm],Stiffness K [N/mm],tan d", 2),
+        ("f,A,K,tan d\nHz,mm,N/mm,-", 2),
+        ("f [Hz],K [N/mm],A [mm],K* [N/mm],tan d", 3),
+        ("f [Hz],A [mm],K,tan d", None),
+        ("f [Hz],A [mm],K [degC],tan d", None),
+    ],
+)
+def test_the_symbol_of_a_stiffness_is_one_by_its_unit(header: str, index: int | None, tmp_path: Path) -> None:
+    file = tmp_path / "sweep.csv"
+    row = ",".join(["1.5"] * (header.partition("\n")[0].count(",") + 1))
+    file.write_text("\n".join([header, *[row] * 3]))
+    column = Table.open(file, SWEEP_COLUMNS).roles.get("stiffness")
+    assert (column and column.index) == index
+
+
+@pytest.mark.parametrize(
+    ("text", "stated", "line", "headers"),
+    [
+        ("time,force\ntime,displacement,force\n1,2,3\n", {}, 2, ("time", "displacement", "force")),
+        ("time,force\nZeit,Kraft\n1,2\n", {"header_line": 1}, 1, ("time", "force")),
+        ("time;force,x\n1;2,3\n", {"delimiter": "comma"}, 1, ("time;force", "x")),
+        ("x,y\n1,2\n2,3\n3,4\n", {}, 1, ("x", "y")),
+    ],
+)
+def test_the_header_names_most_columns_unless_it_is_stated(
+    text: str, stated: dict[str, Any], line: int, headers: tuple[str, ...], tmp_path: Path
+) -> None:
+    (tmp_path / "loop.csv").write_text(text)
+    found = Table.open(tmp_path / "loop.csv", LOOP_COLUMNS, stated=FileFormat(**stated)).layout
+    assert (found.header_line, found.headers) == (line, headers)

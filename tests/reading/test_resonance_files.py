@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 from bushfit.reading.resonance import ResonanceTest, is_resonance, read_resonance
 from bushfit.reading.table import Table
@@ -80,32 +79,3 @@ def test_rows_are_sorted_by_frequency(tmp_path: Path) -> None:
     assert np.allclose(test.frequency, FREQUENCY)
     assert np.allclose(test.transmissibility, RATIO, rtol=1e-6)
     assert set(test.base_acceleration) == {1.5}
-
-
-@pytest.mark.parametrize(
-    ("header", "base", "said"),
-    [
-        ("f [Hz],|T|,phase [rad]", None, "how strongly the base was shaken"),
-        ("f [Hz],|T|,phase", 1.0, "the phase has no unit"),
-        ("f [Hz],base acceleration,phase [rad]", None, "no complex transmissibility"),
-        ("f [Hz],base acceleration [N],mass acceleration [g]", None, "no complex transmissibility"),
-        ("f [Hz],Re T,Im T,base acceleration", None, r"the base acceleration has no unit[\s\S]*such as m/s\^2"),
-    ],
-)
-def test_what_a_file_does_not_say_is_asked_for(tmp_path: Path, header: str, base: float | None, said: str) -> None:
-    columns = [MASS, ANGLE, BASE][: header.count(",")]
-    with pytest.raises(BushfitError, match=said):
-        read(written(tmp_path, header, *columns), base)
-
-
-@pytest.mark.parametrize("value", [0.0, -1.0])
-def test_values_that_cannot_be_are_refused(tmp_path: Path, value: float) -> None:
-    mass = np.where(np.arange(60) == 7, value, MASS)
-    header = "f [Hz],mass acceleration [g],phase [rad],base acceleration [g]"
-    with pytest.raises(BushfitError, match=r"line 9.*: the mass acceleration is not positive"):
-        read(written(tmp_path, header, mass, ANGLE, BASE))
-
-
-def test_other_tests_are_no_resonance_tests(root: Path) -> None:
-    for name in ("sweep_axial.csv", "loop_axial_1.csv"):
-        assert not is_resonance(Table.open(root / "data/cmp_15961" / name, RESONANCE_COLUMNS))
