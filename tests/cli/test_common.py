@@ -8,19 +8,13 @@ import shlex
 import shutil
 import subprocess
 import sys
-from io import StringIO
 from pathlib import Path
 
 import click
 import pytest
-from rich.console import Console
 from shell import CAMPAIGN, GEOMETRY, Run, names
 
 from bushfit.cli import cli
-from bushfit.cli.common import Options
-from bushfit.cli.show import new_table, tell_tests
-from bushfit.model.result import Misfit
-from bushfit.report.contents import Formats
 
 COMMANDS = cli.list_commands(click.Context(cli))
 #: Lines of the longest help on a terminal of 80 columns.
@@ -146,20 +140,3 @@ def test_examples_of_the_help_work(typed: Run, root: Path, tmp_path: Path, comma
         program, *arguments = shlex.split(line)
         assert (program, arguments[0]) == ("bushfit", command)
         assert typed(*arguments).stderr, "something is told"
-
-
-def test_long_names_in_a_table_wrap_and_lose_no_letter() -> None:
-    table = new_table("t", "test", "place", "points", "NRMSE", names=2)
-    table.add_row("tf_015p 18.4 degC", "DMA, second specimen", "14", "7.7")
-    told = StringIO()
-    Console(file=told, width=40).print(table)
-    assert "…" not in told.getvalue()
-    for word in ("tf_015p", "degC", "second", "specimen", "points", "NRMSE", "7.7"):
-        assert word in told.getvalue()
-
-
-@pytest.mark.parametrize(("count", "said"), [(9, "and 1 more test, which is"), (10, "and 2 more tests, which are")])
-def test_tests_left_out_are_counted(count: int, said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    tests = [Misfit(f"t{n}", "axial", True, None, None, None, 5, 0.01, 1.0, 0.0) for n in range(count)]
-    tell_tests(Options(None, False, False, False, Formats(), False), tests, [])
-    assert said in capsys.readouterr().err

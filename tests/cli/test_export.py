@@ -10,9 +10,7 @@ import pandas as pd
 import pytest
 from shell import BUSHING, CAMPAIGN, Run, document, names, refused, typing
 
-from bushfit.cli.export import command
 from bushfit.effects.contract import Circumstances
-from bushfit.jobs.export import FORMATS
 from bushfit.model.file import load_result
 from bushfit.units import CELSIUS
 
@@ -72,11 +70,6 @@ def test_directions_share_frequencies_and_the_dialect_has_its_own_file(bushfit: 
     assert "KMAG" in (tmp_path / "x/bushing.fem").read_text()
     for place in ("axial", "radial"):
         assert pd.read_csv(tmp_path / f"x/{place}.csv")["frequency [Hz]"].tolist() == [5, 20, 50, 70]
-
-
-def test_the_formats_of_the_option_are_those_of_the_job() -> None:
-    (formats,) = (each.type for each in command.params if each.name == "formats")
-    assert list(FORMATS) == list(formats.choices)
 
 
 def test_an_unresolved_effect_is_a_loss_of_every_deck(bushfit: Run, root: Path, tmp_path: Path) -> None:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import shlex
 import shutil
-from collections.abc import Collection
 from functools import partial
+from itertools import cycle
 from pathlib import Path
-from typing import Any
 
 import click
 import pandas as pd
 import pytest
 from shell import typing
+from tries import some
 
 from bushfit.cli import cli
 
@@ -38,14 +38,8 @@ ARGUMENTS = {
 }
 
 
-#: Commands that take a second or less: of the others a commit sees their files in their own tests.
-QUICK = {"predict", "reduce", "export"}
-
-
-def having(option: str, quick: Collection[str] = QUICK) -> list[Any]:
-    commands = {name: cli.get_command(CONTEXT, name) for name in cli.list_commands(CONTEXT)}
-    names = [name for name, found in commands.items() if found and option in {each.name for each in found.params}]
-    return [name if name in quick else pytest.param(name, marks=pytest.mark.slow) for name in names]
+#: Commands that draw, each with a form of tables; a commit tries one, and sees the files of the others in their tests.
+COMMANDS = some([*zip(ARGUMENTS, cycle(("xlsx", "decimal-comma")), strict=False)], [("reduce", "xlsx")])
 
 
 @pytest.fixture(scope="module")
@@ -63,30 +57,30 @@ def written(place: Path, name: str, *options: str) -> set[Path]:
     return {file.relative_to(folder) for file in folder.rglob("[!.]*") if file.is_file()}
 
 
-@pytest.mark.parametrize("name", having("table_format"))
-def test_tables_hold_the_same_in_every_form(place: Path, name: str) -> None:
-    files = {form: written(place, name, "-o", f"{name}-{form}", "--no-plots", "--table-format", form) for form in READ}
-    tables = [file for file in files["csv"] if file.suffix == ".csv"]
-    assert tables
-    assert files["decimal-comma"] == files["csv"]
-    only_csv = name == "export"  # where --format says it
-    end = ".csv" if only_csv else ".xlsx"
-    assert files["xlsx"] == {file.with_suffix(end) if file in tables else file for file in files["csv"]}
-    for table in tables:
-        plain = pd.read_csv(place / f"{name}-csv" / table)
-        for form in ("decimal-comma", "xlsx"):
-            file = place / f"{name}-{form}" / table.with_suffix(end if form == "xlsx" else ".csv")
-            found = READ["csv" if only_csv and form == "xlsx" else form](file)
-            pd.testing.assert_frame_equal(found, plain, check_dtype=False, rtol=1e-6, atol=1e-300)
+def test_every_command_that_writes_tables_or_draws_is_among_them() -> None:
+    options = {"table_format", "plot_format"}
+    found = [cli.get_command(CONTEXT, name) for name in cli.list_commands(CONTEXT)]
+    assert {each.name for each in found if each and options & {one.name for one in each.params}} == set(ARGUMENTS)
 
 
-@pytest.mark.parametrize("name", having("plot_format", {"reduce"}))
-def test_pictures_are_of_every_form_asked_for(place: Path, name: str) -> None:
-    draws = ["--format", "fmu"] if name == "export" else []  # of its formats, the one that draws
-    files = written(place, name, "-o", f"{name}-drawn", *draws, "--plot-format", "svg", "--plot-format", "pdf")
-    drawn = {form: {file.with_suffix("") for file in files if file.suffix == form} for form in (".svg", ".pdf", ".png")}
+@pytest.mark.parametrize(("name", "form"), COMMANDS)
+def test_tables_hold_the_same_in_every_form_and_pictures_are_of_every_form_asked_for(
+    place: Path, name: str, form: str
+) -> None:
+    plain = written(place, name, "-o", f"{name}-csv", "--no-plots")
+    draws = ("--format", "fmu") if name == "export" else ()  # of its formats, the one that draws
+    options = ("--table-format", form, "--plot-format", "svg", "--plot-format", "pdf")
+    files = written(place, name, "-o", f"{name}-other", *options, *draws)
+    drawn = {end: {file.with_suffix("") for file in files if file.suffix == end} for end in (".svg", ".pdf", ".png")}
     assert drawn[".svg"] == drawn[".pdf"] != set()
     assert drawn[".png"] == set()
+    form = "csv" if name == "export" else form  # where --format says it
+    tables = {file: file.with_suffix(".xlsx" if form == "xlsx" else ".csv") for file in plain if file.suffix == ".csv"}
+    assert tables
+    assert {tables.get(file, file) for file in plain} <= files
+    for table, other in tables.items():
+        found, known = READ[form](place / f"{name}-other" / other), pd.read_csv(place / f"{name}-csv" / table)
+        pd.testing.assert_frame_equal(found, known, check_dtype=False, rtol=1e-6, atol=1e-300)
 
 
 def test_a_variable_of_the_environment_holds_for_all_commands(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:

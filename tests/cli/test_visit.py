@@ -99,7 +99,7 @@ def visited(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 def test_a_visit_makes_a_campaign_that_fits(
-    typed: Run, visited: Path, tmp_path: Path, table_1: dict[str, float]
+    typed: Run, visited: Path, tmp_path: Path, table_1: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A workbook with an info sheet, four CSVs named by amplitude, a wide table, an MTS export, a German loop."""
     done = typed("init", visited, *GEOMETRY, "-o", "x")
@@ -122,8 +122,11 @@ def test_a_visit_makes_a_campaign_that_fits(
     for sweep in radial:
         assert np.unique(sweep.amplitude) == pytest.approx(AMPLITUDES)
         assert np.unique(sweep.frequency) == pytest.approx(FREQUENCIES)
-    fitted = values(typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json"))
-    assert fitted == pytest.approx(table_1, rel=0.04)
+    monkeypatch.setenv("COLUMNS", "50")
+    done = typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json")
+    assert values(done) == pytest.approx(table_1, rel=0.04)
+    assert "and 1 more test, which is met better" in " ".join(done.stderr.split())
+    assert "…" not in done.stderr, "long names wrap"
 
 
 def test_what_no_name_says_is_one_question(typed: Run, visited: Path, tmp_path: Path) -> None:
