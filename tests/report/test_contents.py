@@ -1,20 +1,26 @@
-"""Tables and pictures as files: named before they are made, in the form asked for, with the right numbers."""
+"""Tables and pictures as files: named before they are made, in the form asked for, with the right numbers and texts."""
 
 from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 from xml.etree import ElementTree
 
 import numpy as np
+import openpyxl
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from bushfit.campaign.campaign import load_campaign
+from bushfit.errors import CONTROL
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction
+from bushfit.jobs.compare import Compare
+from bushfit.jobs.fits import Fit
+from bushfit.jobs.predict import Predict
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import predict
@@ -105,3 +111,54 @@ def test_sweeps_sorted_by_amplitude_repeat_and_frequency(data: Data, paper_model
     stiffness = paper_model.stiffness("axial", frequency, amplitude / 1e3)
     np.testing.assert_allclose(axial["model stiffness [N/mm]"], np.abs(stiffness) / 1e3, rtol=1e-12)
     np.testing.assert_allclose(axial["model loss factor [-]"], stiffness.imag / stiffness.real, rtol=1e-9)
+
+
+#: A formula, mathematics that is none, and in names of files what clears the screen and turns a line around.
+NAME = r"=cmd|' /C calc'!A0 $\foo{x}$ _a_ <b>"
+FILE = "=1+1 $\\foo$ \x1b[2J\u202ecsv.exe"
+
+
+@pytest.fixture(scope="module")
+def found(root: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Contents]:
+    """All that commands make of a campaign of such names."""
+    folder = tmp_path_factory.mktemp("foreign")
+    text = (root / "configs/cmp_15961.toml").read_text().replace('"CMP 15 961"', f"'''{NAME}'''", 1)
+    for number, file in enumerate(sorted((root / "data/cmp_15961").glob("*.csv"))):
+        name = f"{FILE}{number}.csv"
+        (folder / name).write_bytes(file.read_bytes())
+        quoted = name.replace("\\", "\\\\").replace("\x1b", "\\u001b")
+        text = text.replace(f'"../data/cmp_15961/{file.name}"', f'"{quoted}"')
+    assert "../data" not in text
+    (folder / "campaign.toml").write_text(text, encoding="utf-8")
+    campaign = load_campaign(folder / "campaign.toml")
+    fitted = Fit().run(Data.of(campaign))
+    job = Compare()
+    compared = job.run([job.entry(fitted.result, FILE), job.entry(fitted.result, NAME)])
+    return {
+        "fit": fitted.contents,
+        "predict": Predict().run(fitted.result, campaign).contents_beside,
+        "compare": compared.contents,
+    }
+
+
+@pytest.mark.parametrize("command", ["fit", "predict", "compare"])
+def test_pictures_and_sheets(command: str, found: dict[str, Contents]) -> None:
+    contents, texts, cells = found[command], list[str](), list[Any]()
+    for make in contents.pictures.values():
+        figure = make()
+        to_image(figure)
+        drawn = figure.findobj(Text)
+        assert not [text.get_text() for text in drawn if text._preprocess_math(text.get_text())[1]], "mathematics"
+        texts += [text.get_text() for text in drawn]
+    for name, content in Formats(pictures=False, table_form="xlsx").files(contents).items():
+        if name.endswith("xlsx"):
+            book = openpyxl.load_workbook(io.BytesIO(content))
+            cells += [cell for sheet in book for row in sheet.iter_rows() for cell in row]
+        else:
+            texts += content.decode().split("\n")
+    assert not [cell.value for cell in cells if cell.data_type == "f" or cell.hyperlink]
+    texts += [str(cell.value) for cell in cells]
+    assert not [text for text in texts if CONTROL.search(text.replace("\n", ""))]
+    seen = [text for text in texts if "foo" in text]
+    print(f"{len(texts)} texts, {len(seen)} with a foreign name")
+    assert seen
