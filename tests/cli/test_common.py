@@ -27,18 +27,12 @@ EXAMPLES = re.compile(r"^  Examples?:\n((?:    .*\n)+)\Z", re.MULTILINE)
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("fit-static", CAMPAIGN),
-        ("fit-dynamic", CAMPAIGN),
-        ("fit", CAMPAIGN),
-        ("run", CAMPAIGN),
-        ("predict", "model/model.json"),
-        ("compare", "model", "model/model.json"),
-        ("simulate", "model/model.json"),
-        ("plan", "model/model.json", "--hours", "1.5"),
-        ("export", "model/model.json", "--format", "abaqus"),
+        ("fit-static", CAMPAIGN), ("fit-dynamic", CAMPAIGN), ("fit", CAMPAIGN), ("run", CAMPAIGN),
+        ("predict", "model/model.json"), ("compare", "model", "model/model.json"), ("simulate", "model/model.json"),
+        ("plan", "model/model.json", "--hours", "1.5"), ("export", "model/model.json", "--format", "abaqus"),
     ],
     ids=lambda arguments: arguments[0],
-)
+)  # fmt: skip
 def test_json_alone_on_standard_output_and_quiet_is_quiet(
     bushfit: Run, tmp_path: Path, arguments: tuple[str, ...]
 ) -> None:

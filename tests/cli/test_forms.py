@@ -63,10 +63,11 @@ def test_every_command_that_writes_tables_or_draws_is_among_them() -> None:
     assert {each.name for each in found if each and options & {one.name for one in each.params}} == set(ARGUMENTS)
 
 
-@pytest.mark.parametrize(("name", "form"), COMMANDS)
+@pytest.mark.parametrize("case", COMMANDS, ids=" ".join)
 def test_tables_hold_the_same_in_every_form_and_pictures_are_of_every_form_asked_for(
-    place: Path, name: str, form: str
+    place: Path, case: tuple[str, str]
 ) -> None:
+    name, form = case
     plain = written(place, name, "-o", f"{name}-csv", "--no-plots")
     draws = ("--format", "fmu") if name == "export" else ()  # of its formats, the one that draws
     options = ("--table-format", form, "--plot-format", "svg", "--plot-format", "pdf")

@@ -158,35 +158,6 @@ def test_loops_of_one_file(typed: Run, tmp_path: Path, label: str, values: tuple
     assert [loop.time.size for loop in loops] == [900, 900]
 
 
-@pytest.mark.parametrize(
-    ("mark", "units", "before"),
-    [
-        ("\t", "Sec,mm,N,", []),
-        (",", "Sec,mm,N", []),
-        (";", "Sec,mm,N", ["Data Header: time axial disp 12.3 force sec 3/4/2024 10:11:12 AM", ""]),
-        ("|", "Sec,mm,N,", ["Data Header: time axial disp 12.3 force sec 3/4/2024 10:11:12 AM", ""]),
-    ],
-)
-def test_blanks_in_headers_and_empty_cells_below(
-    typed: Run, tmp_path: Path, mark: str, units: str, before: list[str]
-) -> None:
-    phase = np.linspace(0.0, 4.0 * np.pi, 300)
-    rows = [
-        mark.join(
-            f"{cell:.4f}".replace(".", "," if mark == ";" else ".")
-            for cell in (p, np.sin(p), 600 * np.sin(p + 0.1), 23)
-        )
-        for p in phase
-    ]
-    head = "Time,Axial Disp,Axial Force,Temp".replace(",", mark)
-    (tmp_path / "axial.txt").write_text("\n".join([*before, head, units.replace(",", mark), *rows]), encoding="utf-8")
-    done = typed("inspect", "axial.txt", "-o", "x", "--json", "--no-plots")
-    (seen,) = json.loads(done.stdout)["files"]
-    assert [(column["role"], column["unit"]) for column in seen["columns"]][:3] == [
-        ("time", "Sec"), ("displacement", "mm"), ("force", "N")
-    ]  # fmt: skip
-
-
 def test_a_column_that_is_given_twice(typed: Run, points: dict[str, Rows], tmp_path: Path) -> None:
     head = ("Freq [Hz]", "Dyn. Disp. [mm]", "Dyn. Disp. [mm]", "K* [N/mm]", "Tan Delta")
     export(tmp_path / "axial.csv", head, [(row[0], row[1], row[1], *row[2:]) for row in points["axial"]])

@@ -9,31 +9,14 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
-from bushfit.fitting.data import Data
 from bushfit.geometry import Bushing, Direction
-from bushfit.jobs import fits
 from bushfit.jobs.compare import Compare, Entry
-from bushfit.jobs.fits import Fit
 from bushfit.jobs.grid import common_grid, default_grid
 from bushfit.jobs.predict import Predict
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
 from bushfit.report.contents import Kinds
-
-
-def test_warnings_of_a_resonance_are_those_of_the_prediction(campaign: Campaign) -> None:
-    result = Fit().run(Data.of(campaign)).result
-    warnings = Predict(mass=0.2, base_acceleration=0.1).run(result, campaign).document["warnings"]
-    assert any(line.startswith("axial, resonance of 0.2 kg: predicted at strains") for line in warnings)
-    assert len(set(warnings)) == len(warnings)
-
-
-def test_a_campaign_has_the_kinds_of_test_that_it_lists(campaign: Campaign) -> None:
-    assert fits.kinds_of_test(campaign, ()) == ("loops", "sweeps")
-    assert fits.kinds_of_test(replace(campaign, loops=()), ("temperature",)) == ("sweeps",)
-    warm = replace(campaign, sweeps=tuple(replace(sweep, temperature=300.0) for sweep in campaign.sweeps))
-    assert fits.kinds_of_test(warm, ("temperature",)) == ("loops", "sweeps", "master_curve", "shift_factors")
 
 
 def test_a_prediction_is_over_what_was_asked_for_before_what_the_campaign_says(

@@ -75,16 +75,12 @@ def test_a_header_says_how_amplitudes_count(header: str, tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("header", "named", "counted"),
     [
-        ("Amplitude SS [mm]", "Amplitude SS", 0.5),
-        ("Pegel p-p [mm]", "Pegel p-p [mm]", 0.5),
-        ("Pegel [mm pp]", "Pegel", 0.5),
-        ("Schwingbreite [mm]", "Schwingbreite", 0.5),
-        ("Doppelamplitude [mm] ", "Doppelamplitude [mm]", 0.5),
-        ("Pegel 0-p [mm]", "Pegel 0-p", 1.0),
-        ("range [mm]", "range", 1.0),
-        ("Stress level [mm]", "Stress level", 1.0),
+        ("Amplitude SS [mm]", "Amplitude SS", 0.5), ("Pegel p-p [mm]", "Pegel p-p [mm]", 0.5),
+        ("Pegel [mm pp]", "Pegel", 0.5), ("Schwingbreite [mm]", "Schwingbreite", 0.5),
+        ("Doppelamplitude [mm] ", "Doppelamplitude [mm]", 0.5), ("Pegel 0-p [mm]", "Pegel 0-p", 1.0),
+        ("range [mm]", "range", 1.0), ("Stress level [mm]", "Stress level", 1.0),
     ],
-)
+)  # fmt: skip
 def test_a_header_that_is_named_says_it_too(header: str, named: str, counted: float, tmp_path: Path) -> None:
     assert set(amplitudes(tmp_path, header, {"amplitude": named})) == {counted}
 
@@ -92,14 +88,11 @@ def test_a_header_that_is_named_says_it_too(header: str, named: str, counted: fl
 @pytest.mark.parametrize(
     ("header", "index"),
     [
-        ("f [Hz],A [mm],K [N/mm],tan d", 2),
-        ("f [Hz],A [mm],Stiffness K [N/mm],tan d", 2),
-        ("f,A,K,tan d\nHz,mm,N/mm,-", 2),
-        ("f [Hz],K [N/mm],A [mm],K* [N/mm],tan d", 3),
-        ("f [Hz],A [mm],K,tan d", None),
-        ("f [Hz],A [mm],K [degC],tan d", None),
+        ("f [Hz],A [mm],K [N/mm],tan d", 2), ("f [Hz],A [mm],Stiffness K [N/mm],tan d", 2),
+        ("f,A,K,tan d\nHz,mm,N/mm,-", 2), ("f [Hz],K [N/mm],A [mm],K* [N/mm],tan d", 3),
+        ("f [Hz],A [mm],K,tan d", None), ("f [Hz],A [mm],K [degC],tan d", None),
     ],
-)
+)  # fmt: skip
 def test_the_symbol_of_a_stiffness_is_one_by_its_unit(header: str, index: int | None, tmp_path: Path) -> None:
     file = tmp_path / "sweep.csv"
     row = ",".join(["1.5"] * (header.partition("\n")[0].count(",") + 1))
@@ -128,21 +121,13 @@ def test_the_header_names_most_columns_unless_it_is_stated(
 @pytest.mark.parametrize(
     ("decimal", "thousands", "text", "number"),
     [
-        (".", None, "-1.5e3", -1500.0),
-        (".", None, "\u22122.5", -2.5),
-        (".", None, "1,5", None),
-        (".", None, "1.", 1.0),
-        (",", None, ",5", 0.5),
-        (",", ".", "1.234.567,8", 1234567.8),
-        (",", ".", "1.23,4", None),
-        (".", "'", "1\u2019234", 1234.0),
-        (",", " ", "1\u202f234,5", 1234.5),
-        (".", ",", "0,123", None),
-        (".", None, "\u0661", None),
-        (".", None, "nan", None),
+        (".", None, "-1.5e3", -1500.0), (".", None, "\u22122.5", -2.5), (".", None, "1,5", None),
+        (".", None, "1.", 1.0), (",", None, ",5", 0.5), (",", ".", "1.234.567,8", 1234567.8),
+        (",", ".", "1.23,4", None), (".", "'", "1\u2019234", 1234.0), (",", " ", "1\u202f234,5", 1234.5),
+        (".", ",", "0,123", None), (".", None, "\u0661", None), (".", None, "nan", None),
         (".", None, "1" * 401, None),
     ],
-)
+)  # fmt: skip
 def test_a_cell_is_a_number_in_its_way_or_none(
     decimal: str, thousands: str | None, text: str, number: float | None
 ) -> None:

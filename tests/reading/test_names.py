@@ -21,26 +21,16 @@ def amplitudes(said: Labels, expected: str = "m") -> list[tuple[str, str | None]
 @pytest.mark.parametrize(
     ("name", "text", "convention"),
     [
-        ("Dyn_axial_A0,05mm", "0.05 mm", None),
-        ("axial 0p1mm", "0.1 mm", None),
-        ("+-2mm", "2 mm", "zero-to-peak"),
-        ("radial ±0,5 mm 10Hz", "0.5 mm", "zero-to-peak"),
-        ("2mm_pp", "2 mm", "peak-to-peak"),
-        ("2mmpp_radial", "2 mm", "peak-to-peak"),
-        ("ax_2mm p-p_10Hz", "2 mm", "peak-to-peak"),
-        ("A0.05mm_SS", "0.05 mm", "peak-to-peak"),
-        ("1mm 0-p", "1 mm", "zero-to-peak"),
-        ("100 um", "100 µm", None),
-        ("Amplitude_0.2mm_bushing_18mm", "0.2 mm", None),
-        ("CMP15961_2024-05-03_0.1mm", "0.1 mm", None),
-        ("03.05.2024 radial 0.1mm", "0.1 mm", None),
-        ("d20mm_L34mm_0.3mm", "0.3 mm", None),
-        ("abc18mm_1mm", "1 mm", None),
-        ("preload_1.5mm_0.2mm", "0.2 mm", None),
-        ("loop 1,0 mm 10mm_min", "1 mm", None),
-        ("5-155Hz_0.1mm", "0.1 mm", None),
+        ("Dyn_axial_A0,05mm", "0.05 mm", None), ("axial 0p1mm", "0.1 mm", None), ("+-2mm", "2 mm", "zero-to-peak"),
+        ("radial ±0,5 mm 10Hz", "0.5 mm", "zero-to-peak"), ("2mm_pp", "2 mm", "peak-to-peak"),
+        ("2mmpp_radial", "2 mm", "peak-to-peak"), ("ax_2mm p-p_10Hz", "2 mm", "peak-to-peak"),
+        ("A0.05mm_SS", "0.05 mm", "peak-to-peak"), ("1mm 0-p", "1 mm", "zero-to-peak"), ("100 um", "100 µm", None),
+        ("Amplitude_0.2mm_bushing_18mm", "0.2 mm", None), ("CMP15961_2024-05-03_0.1mm", "0.1 mm", None),
+        ("03.05.2024 radial 0.1mm", "0.1 mm", None), ("d20mm_L34mm_0.3mm", "0.3 mm", None),
+        ("abc18mm_1mm", "1 mm", None), ("preload_1.5mm_0.2mm", "0.2 mm", None),
+        ("loop 1,0 mm 10mm_min", "1 mm", None), ("5-155Hz_0.1mm", "0.1 mm", None),
     ],
-)
+)  # fmt: skip
 def test_the_amplitude_in_a_name(name: str, text: str, convention: str | None) -> None:
     assert amplitudes(labels_in_names(name)) == [(text, convention)]
 
@@ -83,16 +73,11 @@ def test_frequencies_and_strains_and_a_sheet_before_its_file() -> None:
 @pytest.mark.parametrize(
     ("name", "direction"),
     [
-        ("sweep_axial_2", Direction.AXIAL),
-        ("bague_axiale", Direction.AXIAL),
-        ("Essais radiaux", Direction.RADIAL),
-        ("Verdrehung-3", Direction.TORSION),
-        ("TORSIÓN", Direction.TORSION),
-        ("axial_and_radial", None),
-        ("coaxial", None),
-        ("loop", None),
+        ("sweep_axial_2", Direction.AXIAL), ("bague_axiale", Direction.AXIAL), ("Essais radiaux", Direction.RADIAL),
+        ("Verdrehung-3", Direction.TORSION), ("TORSIÓN", Direction.TORSION), ("axial_and_radial", None),
+        ("coaxial", None), ("loop", None),
     ],
-)
+)  # fmt: skip
 def test_one_word_of_four_languages_settles_the_direction(name: str, direction: Direction | None) -> None:
     assert named_direction([name]) is direction
 

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from texts import LOOP, LOOP_ROWS, TIME, loop_from, refused, with_line
+from texts import LOOP, LOOP_HEADER, LOOP_ROWS, TIME, loop_from, refused, with_line
 
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.geometry import Direction, Specimen
@@ -32,6 +32,7 @@ from bushfit.reading.parallel import by_chunks
         LOOP.replace("force [N]", "Force_N").replace("displacement [mm]", "DISPLACEMENT_mm"),
         LOOP.replace("time [s],displacement [mm],force [N]", "t [s],displacement,load\n,mm,N"),
         LOOP.replace("\n", ",ok\n").replace("force [N],ok", "force [N],remark"),
+        LOOP.replace("\n", ",23\n").replace(LOOP_HEADER + ",23", "Time,Axial Disp,Axial Force,Temp\nSec,mm,N"),
         LOOP.replace("\n", ",Prüf\x81\n").replace("force [N],Prüf\x81", "force [N],remark").encode("latin-1"),
     ],
 )
