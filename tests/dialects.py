@@ -70,7 +70,10 @@ HEADERS: dict[str, dict[Kind, str]] = {
     "spanish ascii": {
         "loop": "tiempo, desplazamiento, carga", "sweep": "frecuencia, amplitud, rigidez, factor de perdidas",
     },
-    "chinese": {"loop": "时间, 位移, 力", "sweep": "频率, 振幅, 刚度, 损耗因子", "coupon": "频率, 剪切应变, 储能模量, 损耗模量"},
+    "chinese": {
+        "loop": "时间, 位移, 力", "sweep": "频率, 振幅, 刚度, 损耗因子",
+        "coupon": "频率, 剪切应变, 储能模量, 损耗模量",
+    },
     "bluehill": {"loop": "Time, Extension, Load"},
     "test suite": {"loop": "Running Time, Axial Displacement, Axial Force"},
     "daq": {"loop": "Time , Crosshead , Load "},

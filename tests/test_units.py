@@ -43,11 +43,6 @@ def test_quantity_in_si(text: str, expected: str, value: float) -> None:
     assert units.quantity(text, expected) == pytest.approx(value, rel=1e-14)
 
 
-def test_quantity_takes_the_unit_that_fits() -> None:
-    assert units.quantity("1 mm", "m", "rad") == 0.001
-    assert units.quantity("180 deg", "m", "rad") == pytest.approx(math.pi)
-
-
 @pytest.mark.parametrize(
     ("value", "expected", "words"),
     [
@@ -73,28 +68,6 @@ def test_any_text_is_a_unit_or_a_unit_error(text: str) -> None:
     except UnitError:
         return
     assert math.isfinite(scale)
-
-
-@given(
-    st.floats(-1e5, 1e5).filter(lambda number: number == 0.0 or abs(number) > 1e-6),
-    st.sampled_from([("mm", "m", 1e-3), ("kN", "N", 1e3), ("MPa", "Pa", 1e6)]),
-)
-def test_quantity_is_number_times_unit(number: float, unit: tuple[str, str, float]) -> None:
-    text, si, scale = unit
-    assert units.quantity(f"{number!r} {text}", si) == pytest.approx(number * scale, rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("header", "parts"),
-    [
-        ("force [N]", ("force", "N")),
-        (" force (kN) ", ("force", "kN")),
-        ("force_N", ("force_N", None)),
-        ("force (cell 2) [N]", ("force (cell 2)", "N")),
-    ],
-)
-def test_split_header(header: str, parts: tuple[str, str | None]) -> None:
-    assert units.split_header(header) == parts
 
 
 FIELD = """m mm cm um µm in inch inches ft thou rad mrad deg ° gon grade arcmin s ms sec min h Hz kHz rpm 1/s

@@ -152,9 +152,7 @@ def held(own: Path, mu: str) -> None:
             campaign.write(f"\n[fit.{key}]\nvalue = {json.dumps(value)}\nvary = false\n")
 
 
-@pytest.mark.parametrize(
-    ("command", "loss"), [("fit-static", "linear"), ("fit-dynamic", "soft_l1"), ("fit", "soft_l1"), ("run", "linear")]
-)
+@pytest.mark.parametrize(("command", "loss"), [("fit-static", "linear"), ("fit-dynamic", "soft_l1"), ("run", "linear")])
 def test_five_held_parameters_are_checked_against_the_tests(own: Path, command: str, loss: str) -> None:
     held(own, "1.09 MPa")
     done = typing(own)(command, CAMPAIGN, "-o", "x", "--no-plots", "--loss", loss)

@@ -122,6 +122,15 @@ def test_the_gain_of_a_loop_is_no_surer_than_the_class_of_the_rig(known: Knowled
     np.testing.assert_allclose(told, slopes @ slopes.T, rtol=0.02, atol=1e-3 * np.max(np.abs(told)))
 
 
+def test_one_run_more_is_counted_as_when_it_is_made(known: Knowledge) -> None:
+    view, counts = view_of(known, TESTS), np.array([1, 0, 2, 0, 1, 1, 0])
+    more = view.one_more(counts)
+    for test in range(counts.size):
+        alone = view.together(counts + (np.arange(counts.size) == test))
+        for one, other in zip((more.own, more.cross, more.size), (alone.own, alone.cross, alone.size), strict=True):
+            np.testing.assert_allclose(one[test], other[0], rtol=1e-9, atol=1e-6)
+
+
 def test_an_effect_shows_as_a_fit_without_it_misses_it(known: Knowledge) -> None:
     """Noncentrality against chi-square of the best fit of the model to noise-free tests with a little of the effect."""
     counts = np.array([2, 1, 1, 1, 2, 0, 0])
@@ -198,6 +207,19 @@ def test_no_order_shows_a_drift_much_better(known: Knowledge) -> None:
     assert runs[0] == runs[-1]
     assert np.bincount(runs).tolist() == counts.tolist()
     assert worth(tuple(runs)) >= 0.9 * max(map(worth, every))
+
+
+def test_a_drift_counts_as_its_noncentrality_says(known: Knowledge) -> None:
+    """The sums of an exchange against the noncentrality of the order with two runs exchanged."""
+    random = np.random.default_rng(2)
+    drifting = Drifting(random.uniform(1.0, 2.0, 3), random.uniform(0.0, 0.1, 3), np.zeros((3, 2)))
+    runs = np.array([0, 1, 2, 1, 0])
+    gains = drifting.exchanged(runs)
+    for i, j in permutations(range(5), 2):
+        other = runs.copy()
+        other[[i, j]] = other[[j, i]]
+        grown = drifting.noncentrality(other.tolist()) - drifting.noncentrality(runs.tolist())
+        assert gains[i, j] == pytest.approx(grown, abs=1e-12)
 
 
 def test_a_plan_is_better_than_the_standard_programme_and_no_blinder(planned: Plan) -> None:

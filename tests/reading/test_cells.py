@@ -14,7 +14,6 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.reading.headers import Heading, Vocabulary
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.loops import read_loop
 from bushfit.reading.numerals import Numerals
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
@@ -163,10 +162,3 @@ def test_what_can_be_read_in_two_ways_is_refused(case: str, tmp_path: Path) -> N
             table.read(wanted, fewest_rows=1)
     else:
         assert table.read(wanted, fewest_rows=1)["force"][0] == force
-
-
-def test_numbers_in_two_ways_are_refused(tmp_path: Path) -> None:
-    text = DIALECTS["German"].text().replace("62,598", "62.598")
-    (tmp_path / "loop.csv").write_text(text)
-    with pytest.raises(MeasurementError, match=r"line 4[\s\S]*another way[\s\S]*decimal comma"):
-        read_loop(tmp_path / "loop.csv", Direction.AXIAL)

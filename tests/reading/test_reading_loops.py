@@ -63,18 +63,6 @@ def test_names_and_units_from_the_campaign(tmp_path: Path) -> None:
     assert loop.force.max() == pytest.approx(99.96e3, rel=1e-3)
 
 
-def test_force_sign_turns_the_force(tmp_path: Path) -> None:
-    rows = (row.split(",") for row in LOOP_ROWS)
-    turned = "\n".join([LOOP.splitlines()[0], *(f"{t},{x},{-float(f):.3f}" for t, x, f in rows)])
-    assert np.array_equal(loop_from(turned, tmp_path, force_sign=-1).force, loop_from(LOOP, tmp_path).force)
-
-
-def test_torsion_counts_in_rad(tmp_path: Path) -> None:
-    text = LOOP.replace("displacement [mm]", "angle [deg]").replace("force [N]", "torque [Nm]")
-    loop = loop_from(text, tmp_path, direction=Direction.TORSION)
-    assert loop.displacement.max() == pytest.approx(np.radians(1.0), rel=1e-2)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("lead", ["# rig 3\n\n", '\ufeffOperator "A"\nPrüfstand 3\n'])
 def test_a_large_file_reads_like_a_small_one(lead: str, tmp_path: Path) -> None:
@@ -116,6 +104,7 @@ BAD_LOOPS: list[tuple[str | bytes, list[str]]] = [
     (",".join(["time [s]"] * 100_000) + "\n1,2\n", ["line 1", "more than one column"]),
     ('"' * 1_000_000, ["only one column"]),
     (with_line("\n# x\n\n" + LOOP, 8, "0.3,abc,3"), ["line 8", '"abc"']),
+    (LOOP.replace(",", ";").replace(".", ",").replace("1,0;", "1.0;"), ["another way", "decimal comma"]),
     (with_line(LOOP, 5, "0.1,1,2"), ["line 5", '"time [s]"', "does not increase", '"0.1"']),
 ]
 
@@ -133,12 +122,15 @@ def test_any_bytes_are_a_loop_or_a_clear_error(tmp_path_factory: pytest.TempPath
             loop_from(content, tmp_path_factory.getbasetemp())
 
 
-def test_a_loop_of_a_coupon_has_strain_and_stress(tmp_path: Path) -> None:
+def test_a_loop_of_a_coupon_has_strain_and_stress_and_one_in_torsion_radians(tmp_path: Path) -> None:
     text = LOOP.replace("displacement [mm]", "shear strain [%]").replace("force [N]", "Schubspannung [kPa]")
     loop = loop_from(text, tmp_path, direction=Specimen("DMA", "modulus"))
     plain = loop_from(LOOP, tmp_path)
     np.testing.assert_allclose(loop.displacement, 10.0 * plain.displacement)
     np.testing.assert_allclose(loop.force, 1e3 * plain.force)
+    turned = LOOP.replace("displacement [mm]", "angle [deg]").replace("force [N]", "torque [Nm]")
+    turned = loop_from(turned, tmp_path, direction=Direction.TORSION)
+    np.testing.assert_allclose(turned.displacement, np.radians(1e3 * plain.displacement))
     doubled = loop_from(text, tmp_path, direction=Specimen("DMA", "modulus", strain="tensor"))
     np.testing.assert_allclose(doubled.displacement, 2.0 * loop.displacement)
     with pytest.raises(BushfitError, match=r"test of strain and modulus[\s\S]*specimen = "):

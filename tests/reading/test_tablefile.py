@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
-import openpyxl
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from bushfit.errors import OutputError
 from bushfit.geometry import Direction
@@ -63,32 +58,6 @@ def test_a_text_that_a_spreadsheet_would_run_is_quoted_and_every_text_is_one_lin
     assert [defused(text) for text in RUN] == [f"'{text}" for text in RUN]
     assert [defused(text) for text in STAY] == STAY
     assert (defused("a\r\nb"), defused("a\r\n=1")) == ("a b", "a =1")
-
-
-@given(st.lists(st.text(), min_size=1))
-def test_no_cell_runs(texts: list[str]) -> None:
-    written = to_csv(pd.DataFrame({"text": texts, "n": range(len(texts))})).decode()
-    rows = list(csv.reader(io.StringIO(written, newline="")))[1:]
-    assert len(rows) == len(texts)
-    for row in rows:
-        assert not row[0].lstrip().startswith(("=", "+", "-", "@"))
-
-
-def test_a_workbook_has_numbers_in_full_and_texts_that_nothing_runs() -> None:
-    book = openpyxl.load_workbook(io.BytesIO(to_bytes("my table", TABLE, "xlsx")))
-    (sheet,) = book
-    header, *rows = sheet.iter_rows()
-    assert (sheet.title, sheet.freeze_panes) == ("my table", "A2")
-    assert [cell.value for cell in header] == list(TABLE.columns)
-    assert [[cell.value for cell in row] for row in rows] == [
-        [1.0 / 3.0, 1, "=1+1"], [None, 2, "a; b, c"], [-1e-12, 3, "Prüfling"],
-    ]  # fmt: skip
-    assert rows[0][2].data_type == "s", "a text, no formula"
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_the_same_table_is_the_same_bytes(form: Form) -> None:
-    assert len({to_bytes("t", TABLE, form) for _ in range(2)}) == 1
 
 
 def test_what_a_sheet_does_not_hold_is_refused_and_not_cut(tmp_path: Path) -> None:

@@ -25,7 +25,6 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
-from bushfit.reading.sweeps import read_sweep
 
 Sheets = dict[str, list[list[object]]]
 
@@ -109,12 +108,6 @@ def test_workbooks_of_other_formats_read_to_the_same_numbers(
 ) -> None:
     write(table("loop"), tmp_path / f"test.{write.__name__}")
     assert np.array_equal(forces(tmp_path / f"test.{write.__name__}"), FORCE)
-
-
-def test_a_sweep_and_a_loop_in_one_workbook(tmp_path: Path) -> None:
-    file = workbook({"Loop": table("loop", "french"), "Sweep": table("sweep", "spanish")}, tmp_path)
-    assert np.array_equal(read_sweep(file, Direction.AXIAL).frequency, [float(row[0]) for row in NUMBERS["sweep"]])
-    assert np.array_equal(forces(file, sheet="Loop"), FORCE)
 
 
 LOOP = table("loop")

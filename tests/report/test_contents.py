@@ -17,15 +17,11 @@ from matplotlib.text import Text
 from bushfit.campaign.campaign import load_campaign
 from bushfit.errors import CONTROL
 from bushfit.fitting.data import Data
-from bushfit.geometry import Direction
 from bushfit.jobs.compare import Compare
 from bushfit.jobs.fits import Fit
 from bushfit.jobs.predict import Predict
 from bushfit.model.model import Model
-from bushfit.model.result import Result
-from bushfit.prediction.stiffness import predict
 from bushfit.reading.tablefile import Form
-from bushfit.report.artifacts import fit_contents, prediction_contents
 from bushfit.report.contents import Contents, Formats, Picture
 from bushfit.report.plots.style import to_image
 from bushfit.report.tables import loops_table, sweeps_table
@@ -76,19 +72,6 @@ def test_a_picture_is_the_same_bytes_each_time_without_date_or_version(form: Pic
         names = {element.tag.partition("}")[2] for element in ElementTree.fromstring(first).iter()}
         assert {"path", "use"} <= names
         assert not {"script", "text", "image"} & names
-
-
-def test_a_fit_and_a_prediction_have_a_table_and_a_picture_of_each(data: Data, paper_model: Model) -> None:
-    result = Result(paper_model)
-    assert Formats().files(fit_contents(result, "", [], [])) == {}
-    assert list(Formats(tables=False).files(fit_contents(result, "", data.loops, data.sweeps))) == [
-        "loops.png",
-        "sweeps.png",
-    ]
-    predictions = [predict(result, direction, [5.0, 15.0], [1e-4]) for direction in (Direction.AXIAL, Direction.RADIAL)]
-    files = Formats().files(prediction_contents(result, predictions, data.sweeps))
-    assert list(files) == ["axial.csv", "axial.png", "radial.csv", "radial.png"]
-    assert len(pd.read_csv(io.BytesIO(files["radial.csv"]))) == 2
 
 
 def test_loops_row_by_row(data: Data, paper_model: Model) -> None:

@@ -191,21 +191,6 @@ def test_a_new_folder_is_made_with_its_parents(tmp_path: Path) -> None:
     assert stat.S_IMODE(folder.stat().st_mode) == 0o777 & ~umask
 
 
-def test_standing_results_are_kept_until_force_replaces_them_alone(tmp_path: Path) -> None:
-    folder = tmp_path / "x"
-    folder.mkdir()
-    (folder / "mine.txt").write_bytes(b"kept")
-    write_files(folder, FILES, force=False)
-    with pytest.raises(OutputError) as caught:
-        write_files(folder, {"b.json": b"new", "c.csv": b"new"}, force=False)
-    assert "b.json" in str(caught.value)
-    assert "--force" in str(caught.value)
-    assert contents(folder) == FILES | {"mine.txt": b"kept"}
-    write_files(folder, {"b.json": b"new"}, force=True)
-    assert contents(folder) == {"a.csv": b"1\n", "b.json": b"new", "mine.txt": b"kept"}
-    assert [child.name for child in tmp_path.iterdir()] == ["x"]
-
-
 def test_a_file_or_a_folder_in_the_way(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("a file")
     (tmp_path / "x" / "a.csv").mkdir(parents=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -48,18 +48,6 @@ def test_triangles_have_a_name_and_the_value_that_the_panel_does_not_show() -> N
     assert {text.get_text() for text in axes.texts} == {"b5: 4010", "b7: 30", "b9: 20"}
     boxes = [text.get_window_extent() for text in axes.texts]
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2)), "names must not cover each other"
-
-
-def test_an_odd_panel_leaves_no_gap_between_the_rows() -> None:
-    names = [f"a bushing of a long name {n}" for n in range(10)]
-    figure = batch_figure([panel(10)] * 5, "x", names)
-    to_image(figure)
-    places = [axes.get_position() for axes in figure.axes[:5:2]]
-    gaps = [above.y0 - below.y1 for above, below in pairwise(places)]
-    assert gaps[1] == pytest.approx(gaps[0], abs=0.003)
-    right, last = figure.axes[3], figure.axes[4]
-    lowest = min(label.get_window_extent().y0 for label in right.get_xticklabels())
-    assert lowest > min(label.get_window_extent().y0 for label in last.get_xticklabels())
 
 
 def test_a_panel_shows_no_less_than_what_is_known() -> None:

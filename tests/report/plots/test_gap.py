@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from figures import Looped, Swept, legend, whole
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from tries import some
 
 from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Direction
@@ -127,35 +125,6 @@ def test_loops_are_means_in_units_of_their_noise(paper_model: Model, looped: Loo
     assert 0.6 < np.std(curve.get_ydata()) < 1.5
     assert axes.get_yscale() == "linear"
     assert legend(axes) == ["1 mm, 0.1 Hz"]
-
-
-def test_huge_gaps_of_loops_keep_what_is_small_readable(paper_model: Model, heavier: Heavier, looped: Looped) -> None:
-    wrong = paper_model.with_values({"mu": 2.0 * paper_model.values["mu"]})
-    figure = gap_figure(wrong, paper_model, [looped(paper_model, 1e-3)], "loop", "")
-    first, second = figure.axes
-    assert first.get_yscale() == second.get_yscale() == "symlog"
-    assert first.get_ylim() == second.get_ylim()
-
-
-def test_a_hole_stays_white(paper_model: Model, swept: Swept) -> None:
-    frequencies = np.delete(np.arange(5.0, 156.0, 10.0), 7)
-    (storage, *_) = maps(gap_figure(paper_model, paper_model, [swept(paper_model, frequencies=frequencies)], "", ""))
-    (found,) = cells(storage)
-    edges = np.array([path.get_extents().intervalx for path in found.get_paths()])
-    assert not np.any((edges[:, 0] < 75.0) & (edges[:, 1] > 75.0))
-    np.testing.assert_allclose(np.ptp(edges, axis=1), 10.0)
-
-
-@pytest.mark.parametrize("stiffer", some([1.05, 1.3, 3.0, 20.0], {1.3, 20.0}))
-def test_numbers_of_the_scale_stay_apart(paper_model: Model, swept: Swept, stiffer: float) -> None:
-    off = paper_model.with_values({"mu": paper_model.values["mu"] * stiffer})
-    figure = gap_figure(off, paper_model, [swept(paper_model)], "", "")
-    figure.draw_without_rendering()
-    bar = figure.axes[-1]
-    shown = [label for label in bar.get_xticklabels() if label.get_text()]
-    boxes = [label.get_window_extent() for label in shown]
-    assert all(right.x0 - left.x1 > 2.0 for left, right in pairwise(boxes))
-    assert shown[-1].get_text() == f"{bar.get_xticks()[-1]:g}", "where the scale ends"
 
 
 def test_a_mended_test_is_drawn_where_it_was_recorded(paper_model: Model, swept: Swept) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,20 +10,18 @@ from figures import Looped, Swept, inside, legend, points
 from matplotlib.figure import Figure
 from tries import some
 
-from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, SweepData, loop_data, sweep_data
+from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.geometry import Direction
 from bushfit.inspection.record import Inspected
 from bushfit.jobs.grid import default_grid
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import predict
-from bushfit.reading.measurement import Loop, Stepped, Sweep
+from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reduction.steps import Reduction, Step
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.inspection import inspection_figure
-from bushfit.report.plots.misfit import map_rows
 from bushfit.report.plots.prediction import fine_grid, prediction_figure
 from bushfit.report.plots.reduction import reduction_figure
 from bushfit.report.plots.style import to_image
@@ -45,26 +42,7 @@ def checked(figure: Figure) -> Figure:
     return figure
 
 
-def measured(model: Model, frequency: Array, amplitude: Array, stepped: Stepped | None) -> list[SweepData]:
-    """An axial sweep of a model at these operating points, 1 % noise."""
-    stiffness = model.stiffness("axial", frequency, amplitude)
-    stiffness = stiffness * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(frequency.size))
-    return sweep_data([Sweep("sweep.csv", Direction.AXIAL, frequency, amplitude, stiffness, stepped=stepped)])
-
-
-def grid(frequencies: Iterable[float], amplitudes: Iterable[float], scatter: float) -> list[Array]:
-    """Frequency and amplitude of operating points at which each amplitude was missed by a little."""
-    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(list(frequencies), list(amplitudes)))
-    return [frequency, amplitude * (1.0 + scatter * np.random.default_rng(1).standard_normal(amplitude.size))]
-
-
-def check_gaps(model: Model, data_sets: Sequence[DataSet], words: str) -> None:
-    """One column where both models respond alike, and two."""
-    for after in (model, model.with_values({"mu": 1.2 * model.values["mu"]})):
-        checked(gap_figure(model, after, data_sets, words, words))
-
-
-@pytest.mark.parametrize("count", some([2, 8, 40, 300], {40}))
+@pytest.mark.parametrize("count", some([8, 40], {40}))
 def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int) -> None:
     """A line an amplitude, named by a legend as long as that can, else by a colour bar."""
     data_sets = [swept(paper_model, amplitudes=np.geomspace(2e-5, 1e-3, count), repeats=1)]
@@ -87,13 +65,14 @@ def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int)
     assert bar or len(legend(right)) == count
 
 
-@pytest.mark.parametrize(
-    "frequencies", some([(40.0,), tuple(np.geomspace(5.0, 150.0, 30)), (10.0, 40.0, 100.0)], {(40.0,)})
-)
+@pytest.mark.parametrize("frequencies", some([(40.0,), tuple(np.geomspace(5.0, 150.0, 30))], {(40.0,)}))
 def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, ...]) -> None:
     """Amplitudes across, logarithmic; a line and a row of the map for each frequency that was held."""
-    points_at = grid(frequencies, np.geomspace(2e-5, 1e-3, 15), 0.01)
-    data_sets = measured(paper_model, *points_at, "amplitude")
+    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(frequencies, np.geomspace(2e-5, 1e-3, 15)))
+    stiffness = paper_model.stiffness("axial", frequency, amplitude)
+    stiffness = stiffness * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(frequency.size))
+    sweep = Sweep("sweep.csv", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")
+    data_sets, result = sweep_data([sweep]), Result(paper_model)
     figure = checked(sweeps_figure(paper_model, data_sets, "strain"))
     assert figure.axes[2].get_xlabel() == "amplitude [mm]"
     assert figure.axes[2].get_xscale() == "log"
@@ -101,22 +80,11 @@ def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, .
     gap = checked(gap_figure(paper_model, paper_model, data_sets, "strain", ""))
     assert gap.axes[1].get_xlabel() == "amplitude [mm]"
     assert len(gap.axes[0].get_yticklabels()) == min(len(frequencies), 8), "each, or every third of 24 rows"
-    result = Result(paper_model)
-    prediction = predict(
-        result, Direction.AXIAL, *default_grid(result, Direction.AXIAL, [data_set.sweep for data_set in data_sets])
-    )
+    prediction = predict(result, Direction.AXIAL, *default_grid(result, Direction.AXIAL, [sweep]))
     checked(prediction_figure(prediction, data_sets, "strain", model=paper_model))
 
 
-def test_rows_of_a_map_are_the_amplitudes_as_long_as_they_fit() -> None:
-    few = np.repeat(np.geomspace(1e-5, 1e-3, 24), 3)
-    assert map_rows(few) is few
-    many = map_rows(np.geomspace(1e-5, 1e-3, 300))
-    assert np.unique(many).size == 24
-    assert np.all(np.diff(many) >= 0.0)
-
-
-@pytest.mark.parametrize("count", some([2, 8, 40, 300], {40}))
+@pytest.mark.parametrize("count", some([2, 40], {40}))
 def test_many_loops(paper_model: Model, looped: Looped, count: int) -> None:
     one = looped(paper_model, 1e-3, cycles=2).test
     data_sets = loop_data(
@@ -129,10 +97,11 @@ def test_many_loops(paper_model: Model, looped: Looped, count: int) -> None:
     assert names[-1] == "model"
     assert len(names) == min(count, 8) + (count > 8) + 1
     assert (f"and {count - 8} more" in names) is (count > 8)
-    check_gaps(paper_model, data_sets, "mount")
+    for after in (paper_model, paper_model.with_values({"mu": 1.2 * paper_model.values["mu"]})):
+        checked(gap_figure(paper_model, after, data_sets, "mount", "mount"))
 
 
-@pytest.mark.parametrize(("levels", "histories"), [(8, 40), pytest.param(300, 2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("levels", "histories"), [(8, 40), pytest.param(60, 2, marks=pytest.mark.slow)])
 def test_reduction_of_many_levels(levels: int, histories: int) -> None:
     time = np.linspace(0.0, 2.0 * levels, 4000)
     motion = 1e-3 * np.sin(20.0 * time)
