@@ -207,6 +207,7 @@ def test_a_campaign_that_kills_its_worker_is_told_once_and_the_others_go_on(
     done = typed("batch", PATTERN, "-o", "all", "--no-plots", "--no-report", "--jobs", "2")
     assert done.returncode == 1
     assert "4 done, 1 failed" in done.stderr
+    assert not (shop / "all/index.html").exists()
     assert not {"Traceback", "\x1b"} & set(done.stderr.split()), "plain lines where there is no terminal"
     assert not (shop / f"all/{ledger.STAGE}").exists()
     assert [row["status"] for row in rows(shop / "all")] == ["done", "done", "failed", "done", "done"]
@@ -218,14 +219,11 @@ def test_a_campaign_that_kills_its_worker_is_told_once_and_the_others_go_on(
 @pytest.mark.parametrize(
     ("report", "words"),
     [
-        ("old.xml", "results stand there already"),
-        ("old.xml/r.xml", "not a folder"),
-        ("bushings", "a folder stands where a file goes"),
-        ("all/bushings/b0/r.xml", "among the results"),
-        ("all/bushings/../batch.csv", "in place of the table"),
-        ("all/batch.png", "in place of the table"),
+        ("old.xml", "results stand there already"), ("old.xml/r.xml", "not a folder"),
+        ("bushings", "a folder stands where a file goes"), ("all/bushings/b0/r.xml", "among the results"),
+        ("all/bushings/../batch.csv", "in place of the table"), ("all/batch.png", "in place of the table"),
     ],
-)
+)  # fmt: skip
 def test_a_report_that_cannot_be_written_is_refused_before_the_work(
     typed: Callable[..., Any], shop: Path, report: str, words: str
 ) -> None:

@@ -38,9 +38,6 @@ def test_toml_rows_take_what_they_do_not_say_from_the_top(tmp_path: Path) -> Non
     assert one.campaign == str(tmp_path / "a.toml")
     assert manifest.points == (parse_point("axial 25 Hz 0.1 mm"),)
     assert manifest.stem == "m"
-
-
-def test_a_setting_at_the_top_may_be_for_some_of_the_rows(tmp_path: Path) -> None:
     rows = '[[bushings]]\ncampaign = "b.toml"\ncommands = ["predict"]\n' + ROW + 'commands = ["diagnose"]\n'
     manifest = read(tmp_path, 'model = "m.json"\ntolerance = "2 %"\neffects = ["inertia"]\n' + rows + ROW)
     assert [row.settings.commands for row in manifest.rows] == [("predict",), ("diagnose",), ("fit",)]

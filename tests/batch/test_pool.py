@@ -60,19 +60,16 @@ def test_workers_that_die_before_they_are_given_more_are_replaced(tmp_path: Path
     assert dict(done) == {n: str(2 * (100 + n)) for n in range(40)}
 
 
-def test_a_worker_of_another_version_ends_the_batch(tmp_path: Path) -> None:
+def test_a_worker_of_another_version_or_none_that_lives_ends_the_batch(tmp_path: Path) -> None:
     row = Row("a", "a", "a.toml", "a.toml", Settings())
     orders = Orders(tmp_path, (), Formats(False, False), resume=False, version="0.0.0")
     with pytest.raises(BatchError, match=r"another bushfit[\s\S]*0\.0\.0"):
         list(run([row], partial(work, orders=orders), failed, LocalPool(1)))
+    with pytest.raises(BatchError, match="no worker process starts"):
+        list(run(list(range(100)), die, lambda why: why, LocalPool(2)))
 
 
 def die(rows: Sequence[int]) -> list[str]:
     """Die, also over nothing."""
     os.kill(os.getpid(), signal.SIGKILL)
     return []
-
-
-def test_where_no_worker_lives_the_batch_ends_at_once() -> None:
-    with pytest.raises(BatchError, match="no worker process starts"):
-        list(run(list(range(100)), die, lambda why: why, LocalPool(2)))

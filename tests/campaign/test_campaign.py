@@ -87,11 +87,14 @@ noise = "1 %"
     assert campaign.sweeps[0].amplitude[0] == pytest.approx(0.05e-3)
 
 
-def test_names_of_tests_differ(folder: Path) -> None:
+def test_names_of_tests_differ_and_limits_are_moved_to_what_can_be(folder: Path) -> None:
     (folder / "more").mkdir()
     (folder / "more/loop.csv").write_text(LOOP)
     campaign = campaign_from(BUSHING + TESTS + '[[loops]]\nfile = "more/loop.csv"\ndirection = "axial"\n', folder)
     assert [loop.name for loop in campaign.loops] == ["loop.csv", "more/loop.csv"]
+    # A least modulus of 0 says that it is not negative; a logarithm has no 0.
+    limits = campaign_from(SIMULATE + '[fit.mu]\nmin = "0 MPa"\nmax = "1e6 MPa"', folder).fit.parameters["mu"]
+    assert (limits.min, limits.max) == (1e3, 1e9)
 
 
 def test_settings_arrive_in_si(folder: Path) -> None:
@@ -134,12 +137,6 @@ sweeps = [{ direction = "torsion", amplitudes = ["1 deg"], frequencies = ["5 Hz"
     assert simulate.effects == {"inertia": {"mass": 0.1}, "delay": {"tau": 5e-5}}
     assert (simulate.noise, simulate.gain_error, simulate.loops[0].cycles) == (0.005, 0.0, 3)
     assert simulate.sweeps[0].amplitudes == pytest.approx((math.radians(1),))
-
-
-def test_a_limit_beyond_what_a_parameter_can_have_is_moved_there(folder: Path) -> None:
-    """A least modulus of 0 says that it is not negative; a logarithm has no 0."""
-    limits = campaign_from(SIMULATE + '[fit.mu]\nmin = "0 MPa"\nmax = "1e6 MPa"', folder).fit.parameters["mu"]
-    assert (limits.min, limits.max) == (1e3, 1e9)
 
 
 @pytest.mark.parametrize(
@@ -202,7 +199,7 @@ RUBBER = Bushing("CMP 15 961", 0.010, 0.018, 0.034)
 COUPON = Specimen("DMA", "modulus")
 
 
-def test_turns_go_from_first_to_last_and_strains_remember_the_largest_before() -> None:
+def test_turns_strains_and_rests_of_a_session() -> None:
     loop = Visit(Direction.AXIAL, np.array([1e-3]), 300.0)
     sweep = Visit(Direction.AXIAL, np.array([1e-4, 5e-4, 2e-4]))
     first, second = session(RUBBER, [loop, sweep])
@@ -212,17 +209,11 @@ def test_turns_go_from_first_to_last_and_strains_remember_the_largest_before() -
     np.testing.assert_allclose(second.turn, [1 / 3, 2 / 3, 1.0])
     np.testing.assert_allclose(first.strained, [0.0])
     np.testing.assert_allclose(second.strained, 3 * [1e-3 * unit_strain(RUBBER, Direction.AXIAL)])
-
-
-def test_the_last_larger_strain_counts_from_when_it_was_left() -> None:
     up_and_down = np.array([1.0, 2.0, 4.0, 4.1, 2.0, 2.1, 1.0, 2.0]) * 1e-4
     (found,) = session(RUBBER, [Visit(Direction.AXIAL, up_and_down)])
     strain = up_and_down * unit_strain(RUBBER, Direction.AXIAL)
     np.testing.assert_allclose(found.left, [0.0, 0.0, 0.0, 0.0, strain[3], strain[3], strain[5], strain[3]])
     np.testing.assert_allclose(7.0 * found.rested[4:], [1.0, 2.0, 1.0, 4.0])
-
-
-def test_every_body_has_a_session_of_its_own() -> None:
     coupon, mount = Visit(COUPON, np.array([0.5, 0.1])), Visit(Direction.RADIAL, np.array([1e-4, 1e-4, 1e-4]))
     of_coupon, of_mount = session(RUBBER, [coupon, mount])
     np.testing.assert_allclose(of_coupon.turn, [0.0, 1.0])

@@ -133,23 +133,17 @@ def shaker() -> list[str]:
 
 
 FILES = {
-    "campaign.toml": CAMPAIGN,
-    "more.toml": CAMPAIGN + MORE,
-    "model.json": json.dumps(MODEL, indent=1),
-    "loop.csv": "\n".join(loop()) + "\n",
-    "sweep.csv": "\n".join(sweep()) + "\n",
+    "campaign.toml": CAMPAIGN, "more.toml": CAMPAIGN + MORE, "model.json": json.dumps(MODEL, indent=1),
+    "loop.csv": "\n".join(loop()) + "\n", "sweep.csv": "\n".join(sweep()) + "\n",
     "shaker.csv": "\n".join(shaker()) + "\n",
-}
+}  # fmt: skip
 READING = ("fit-static", "fit-dynamic", "fit", "diagnose", "run", "plan")
 TAKING_MODELS = (
-    ("predict", "model.json"),
-    ("compare", "model.json", "campaign.toml"),
-    ("simulate", "model.json"),
-    ("plan", "model.json"),
-    ("diagnose", "campaign.toml", "--model", "model.json"),
+    ("predict", "model.json"), ("compare", "model.json", "campaign.toml"), ("simulate", "model.json"),
+    ("plan", "model.json"), ("diagnose", "campaign.toml", "--model", "model.json"),
     ("fit-static", "campaign.toml", "--dynamic", "model.json"),
     ("fit-dynamic", "campaign.toml", "--static", "model.json"),
-)
+)  # fmt: skip
 #: The formats that are written without a compiler.
 EXPORT = ("export", "model.json", *(f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx")))
 

@@ -74,14 +74,11 @@ def test_repeats_that_disagree_do_not_excuse_themselves(own: Path, off: float, t
 @pytest.mark.parametrize(
     "words",
     [
-        ("predict", "{work}/model/model.json", "--campaign", CAMPAIGN),
-        ("plan", CAMPAIGN),
-        ("compare", CAMPAIGN, CAMPAIGN),
-        ("compare", CAMPAIGN, "--families", "intrinsic_time"),
-        ("inspect", SWEEP),
+        ("predict", "{work}/model/model.json", "--campaign", CAMPAIGN), ("plan", CAMPAIGN),
+        ("compare", CAMPAIGN, CAMPAIGN), ("compare", CAMPAIGN, "--families", "intrinsic_time"), ("inspect", SWEEP),
     ],
     ids=["predict", "plan", "compare", "families", "inspect"],
-)
+)  # fmt: skip
 def test_rows_that_lie_far_apart_are_told_wherever_tests_are_read(
     own: Path, work: Path, words: tuple[str, ...]
 ) -> None:

@@ -71,15 +71,9 @@ SHAPES: dict[str, tuple[str, ...]] = {
 }
 #: Commands that write a model, and its name in their folder.
 WRITERS = {
-    "fit-static": "static",
-    "fit-dynamic": "dynamic",
-    "fit": "model",
-    "fit --profile": "model",
-    "fit --effect inertia": "model",
-    "diagnose": "model",
-    "run": "model",
-    "batch": "model",
-}
+    "fit-static": "static", "fit-dynamic": "dynamic", "fit": "model", "fit --profile": "model",
+    "fit --effect inertia": "model", "diagnose": "model", "run": "model", "batch": "model",
+}  # fmt: skip
 #: Formats of export for a bushing, and for specimens alone.
 FORMATS = ("nastran", "nastran --dialect optistruct", "abaqus", "adams", "csv", "xlsx", "fmu")
 TABLES = ("csv", "xlsx")

@@ -42,13 +42,10 @@ def assert_one_line(status: int, err: bytes) -> None:
 @pytest.mark.parametrize(
     "arguments",
     [
-        PREDICT,
-        pytest.param(BATCH, marks=pytest.mark.slow),
-        ("--help",),
-        ("schema", "model", "-q"),
+        PREDICT, pytest.param(BATCH, marks=pytest.mark.slow), ("--help",), ("schema", "model", "-q"),
     ],
     ids=lambda it: it[0],
-)
+)  # fmt: skip
 def test_a_full_device(arguments: tuple[str, ...], folder: Path) -> None:
     with Path("/dev/full").open("wb") as full:
         done = subprocess.run([*BUSHFIT, *arguments], stdout=full, stderr=subprocess.PIPE, check=False)

@@ -25,12 +25,9 @@ GEOMETRY = ("--inner-diameter", "20 mm", "--outer-diameter", "36 mm", "--length"
 FREQUENCIES = tuple(float(f) for f in range(5, 156, 15))
 AMPLITUDES = (5e-5, 1e-4, 2e-4, 5e-4)
 INFO = [
-    ["Prüfbericht", ""],
-    ["Kunde", "Muster AG"],
-    ["Prüftemperatur", "23 °C"],
-    ["Datum", "2024-05-03"],
+    ["Prüfbericht", ""], ["Kunde", "Muster AG"], ["Prüftemperatur", "23 °C"], ["Datum", "2024-05-03"],
     ["Hinweis", "Werte nach 3 Vorzyklen"],
-]
+]  # fmt: skip
 
 
 def write_visit(folder: Path, truth: Model) -> None:

@@ -67,7 +67,7 @@ def test_long_and_wide_tables_hold_the_whole_grid(kind: str, order: Order, known
     assert worst < MODEL
 
 
-def test_parameters_and_provenance(order: Order, table_1: dict[str, float]) -> None:
+def test_parameters_provenance_and_units_asked_for(order: Order, table_1: dict[str, float]) -> None:
     tables = sheets(spreadsheets.xlsx(order).files["bushing.xlsx"])
     parameters = tables["parameters"]
     assert dict(zip(parameters["parameter"], parameters["value"], strict=True)) == table_1
@@ -76,9 +76,6 @@ def test_parameters_and_provenance(order: Order, table_1: dict[str, float]) -> N
     assert provenance["model, sha256"] == order.source.sha256
     assert provenance["bushing"] == "CMP 15 961"
     assert provenance["length [m]"] == "0.034"
-
-
-def test_units_asked_for_are_in_header_and_value(order: Order) -> None:
     table = sheets(spreadsheets.xlsx(replace(order, units=UnitSystem.parse("m kg s N"))).files["bushing.xlsx"])
     exact = np.abs(order.result.model.stiffness("torsion", 5.0, order.predictions[2].amplitude[0]))
     assert table["torsion"]["stiffness [N*m/rad]"][0] == pytest.approx(exact, rel=1e-12)

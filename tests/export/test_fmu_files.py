@@ -122,7 +122,7 @@ def test_names_with_quotes_and_markup_come_through(paper_model: Model, opened: P
     assert (running.inputs, running.outputs) == (["strain.DMA"], ["stress.DMA"])
 
 
-def test_instances_do_not_see_each_other_and_reset_forgets(paper: Running) -> None:
+def test_instances_do_not_see_each_other_and_a_state_is_taken_up_again(paper: Running) -> None:
     motion = 2e-4 * wandering(300, 1e-3, seed=3)[:, None] * np.array([1.0, 1.0, 50.0])
     expected = paper.run(motion, 1e-3)
     first, second = (paper.begun(paper.instance()) for _ in range(2))
@@ -134,9 +134,6 @@ def test_instances_do_not_see_each_other_and_reset_forgets(paper: Running) -> No
     for each in (first, second):
         each.terminate()
         each.freeInstance()
-
-
-def test_a_state_is_taken_up_again_through_bytes_too(paper: Running) -> None:
     motion = 2e-4 * wandering(300, 1e-3, seed=4)[:, None] * np.array([1.0, 1.0, 50.0])
     made = paper.begun(paper.instance())
     paper.follow(made, motion[:150], 1e-3)
@@ -190,16 +187,13 @@ def test_effects_without_a_law_in_time_are_refused(paper_model: Model, name: str
     assert refused.value.place == name
 
 
-def test_effects_of_the_rig_are_left_out(paper_model: Model) -> None:
+def test_effects_of_the_rig_are_left_out_and_what_is_held_is_said_with_its_error(paper_model: Model) -> None:
     plain, *others = (
         [value.name for value in in_time(order_of(model, (Direction.AXIAL,))).values]
         for model in (paper_model, *(paper_model.with_effect(name) for name in OF_THE_RIG))
     )
     assert dict(zip(OF_THE_RIG, others, strict=True)) == dict.fromkeys(OF_THE_RIG, plain)
-
-
-def test_what_is_held_or_left_out_is_said_with_its_error(paper_model: Model) -> None:
-    """m (e0/0.01)^-q, held at the geometric middle of 0.1 and 0.5 mm: the whole error is that of the springpot."""
+    # m (e0/0.01)^-q, held at the geometric middle of 0.1 and 0.5 mm: the whole error is that of the springpot.
     model = paper_model.with_effect("coupled_breakdown", {"coupled_breakdown.q": 0.3})
     found = in_time(order_of(model, (Direction.AXIAL,)))
     (line,) = (line for line in found.losses if "coupled_breakdown" in line)

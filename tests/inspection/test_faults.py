@@ -105,12 +105,9 @@ def test_each_fault_of_a_loop_is_told(loop: Loop, tmp_path: Path, said: str) -> 
     assert len(odd) <= 2
 
 
-def test_the_sampling_of_an_uneven_clock_is_described(loop: Loop, tmp_path: Path) -> None:
+def test_gaps_and_an_uneven_clock_are_described(loop: Loop, tmp_path: Path) -> None:
     uneven = less(loop, slice(5, None, 10))
     assert look(tmp_path, uneven).facts["sampling"].startswith("uneven, every 0.01 to 0.02 s, mostly 0.01 s")
-
-
-def test_of_a_loop_with_a_whole_cycle_cut_out_the_longer_part_is_described(loop: Loop, tmp_path: Path) -> None:
     seen = look(tmp_path, less(loop, slice(600, 1600)))
     facts, odd = seen.facts, seen.odd
     assert float(facts["amplitude"].split()[0]) == pytest.approx(1.0, rel=0.01)

@@ -113,14 +113,11 @@ def test_gents_relation(shore: float, megapascal: float) -> None:
     assert 3e-6 * gent_modulus(shore) == pytest.approx(megapascal, rel=5e-4)
 
 
-def test_the_papers_bushing_lies_inside() -> None:
+def test_the_guess_holds_the_papers_and_a_measured_rubber(root: Path) -> None:
     found = off(guess(BUSHING, Compound(61, 27)), TABLE_1)
     print("paper, in standard errors", found.round(2))
     assert np.abs(found).max() < Z95
-
-
-def test_a_measured_coupon_lies_inside(root: Path) -> None:
-    """An EPDM of 70 Shore A whose filler nobody states; its strain sweeps alone, which the five parameters can meet."""
+    # An EPDM of 70 Shore A whose filler nobody states; its strain sweeps alone, which the five parameters can meet.
     fitted = fit_joint(Data.of(load_campaign(root / "configs/epdm_70.toml")), directions=["DMA"]).model
     for phr in (40.0, 50.0, 60.0):
         found = off(guess(BUSHING, Compound(70, phr, "EPDM")), dict(fitted.values))

@@ -319,11 +319,6 @@ def test_no_test_is_beyond_the_rig(known: Knowledge, limit: str, most: float) ->
     assert {*found} != {*candidates(known, wanted("predictions", 4.0))}
 
 
-def test_a_rig_that_can_make_no_test_is_told(known: Knowledge) -> None:
-    with pytest.raises(ModelError, match="the rig can make no test"):
-        plan(known, wanted("predictions", 4.0, max_force=1e-3))
-
-
 def test_an_amount_that_is_found_is_found_in_nine_of_ten_cases() -> None:
     """Of normal numbers about FOUND, nine of ten lie beyond what one of twenty about 0 does."""
     drawn = np.random.default_rng(3).standard_normal(200_000)
@@ -331,11 +326,13 @@ def test_an_amount_that_is_found_is_found_in_nine_of_ten_cases() -> None:
     assert np.mean(np.abs(drawn + FOUND) > limit) == pytest.approx(0.9, abs=0.004)
 
 
-def test_values_given_by_hand_are_taken_as_right_within_a_factor(paper_model: Model) -> None:
+def test_what_is_given_by_hand_and_a_rig_that_can_make_no_test(paper_model: Model, known: Knowledge) -> None:
     knowledge = of_result(Result(paper_model))
     assert knowledge.names == tuple(paper_model.parameters)
     np.testing.assert_allclose(knowledge.covariance, 0.25 * np.eye(5))
     assert "a factor of 2.7" in knowledge.source
+    with pytest.raises(ModelError, match="the rig can make no test"):
+        plan(known, wanted("predictions", 4.0, max_force=1e-3))
 
 
 def test_what_tests_leave_open_a_thousand_times_over_stops_no_plan(paper_model: Model) -> None:

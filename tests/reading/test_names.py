@@ -35,10 +35,16 @@ def test_the_amplitude_in_a_name(name: str, text: str, convention: str | None) -
     assert amplitudes(labels_in_names(name)) == [(text, convention)]
 
 
-def test_no_amplitude_where_there_is_no_single_number_with_its_unit() -> None:
+def test_what_no_single_number_says_frequencies_strains_and_sheets() -> None:
     names = ["CMP15961", "2024-05-03", "20240503_12", "test 7", "axial_05mm", "0.1-1mm", "A0.05", "v2mm", "D 20 mm", ""]
     assert {name: amplitudes(labels_in_names(name)) for name in names} == {name: [] for name in names}
     assert amplitudes(labels_in_names("axial_18mm_bushing_1mm")) == [("18 mm", None), ("1 mm", None)]
+    assert amplitudes(labels_in_names("DMA_10Hz_0,05%"), "1") == [("0.05 %", None)]
+    assert amplitudes(labels_in_names("x_50mHz"), "Hz") == [("50 mHz", None)]
+    assert amplitudes(labels_in_names("5-155Hz"), "Hz") == []
+    said = labels_in_names("radial 0.3mm", "axial 0.1mm 20Hz")
+    assert (said.direction, amplitudes(said)) == (Direction.RADIAL, [("0.3 mm", None)])
+    assert amplitudes(said, "Hz") == [("20 Hz", None)]
 
 
 @pytest.mark.parametrize(
@@ -59,15 +65,6 @@ def test_no_amplitude_where_there_is_no_single_number_with_its_unit() -> None:
 def test_what_else_a_name_says(name: str, keys: dict[str, object]) -> None:
     said = labels_in_names(name)
     assert {key: value for key, value in vars(said).items() if value and key != "quantities"} == keys
-
-
-def test_frequencies_and_strains_and_a_sheet_before_its_file() -> None:
-    assert amplitudes(labels_in_names("DMA_10Hz_0,05%"), "1") == [("0.05 %", None)]
-    assert amplitudes(labels_in_names("x_50mHz"), "Hz") == [("50 mHz", None)]
-    assert amplitudes(labels_in_names("5-155Hz"), "Hz") == []
-    said = labels_in_names("radial 0.3mm", "axial 0.1mm 20Hz")
-    assert (said.direction, amplitudes(said)) == (Direction.RADIAL, [("0.3 mm", None)])
-    assert amplitudes(said, "Hz") == [("20 Hz", None)]
 
 
 @pytest.mark.parametrize(

@@ -131,19 +131,13 @@ def test_every_form_reads_from_a_workbook(form: str, tmp_path: Path) -> None:
     check(read_sweep(tmp_path / "book.xlsx", Direction.AXIAL))
 
 
-def test_amplitudes_peak_to_peak_are_halved(tmp_path: Path) -> None:
+def test_amplitudes_peak_to_peak_units_stated_and_repeats(tmp_path: Path) -> None:
     text = halves("f [Hz];" + each("K* {0} mm p-p [N/mm]") + ";" + each("tan delta {0} mm p-p"))
     check(sweep_from("\n".join(text), tmp_path), scale=0.5)
-
-
-def test_a_unit_that_no_header_has_can_be_stated(tmp_path: Path) -> None:
     text = halves("f [Hz];" + each("K* [N/mm] A={0}") + ";" + each("tan delta A={0}"))
     with pytest.raises(BushfitError, match="the amplitude has no unit"):
         sweep_from("\n".join(text), tmp_path)
     check(sweep_from("\n".join(text), tmp_path, units={"amplitude": "mm"}))
-
-
-def test_repeats_are_columns_of_one_amplitude(tmp_path: Path) -> None:
     again = [f"{a} mm" for a in ("0,1", "0,1", "0,5")]
     sweep = sweep_from("\n".join(["K* [N/mm]", *block(stiffness, again), "tan d", *block(loss, again)]), tmp_path)
     assert sorted(sweep.repeat) == [1] * 8 + [2] * 4
@@ -217,13 +211,10 @@ FILES = {
     "f [Hz],|T| [-],phase [rad],base acceleration [m/s²]": (np.abs(RATIO), ANGLE, BASE),
     "f [Hz],Re T,Im T,base acceleration [mm/s^2]": (RATIO.real, RATIO.imag, 1e3 * BASE),
     "f [Hz],base accel real [g],base accel imag [g],mass accel real [g],mass accel imag [g]": (
-        BASE / G,
-        0 * BASE,
-        REAL,
-        IMAGINARY,
+        BASE / G, 0 * BASE, REAL, IMAGINARY,
     ),
     "f [Hz],base acceleration pk-pk [g],mass acceleration pk-pk [g],phase [rad]": (2 * BASE / G, 2 * MASS / G, ANGLE),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("header", FILES)

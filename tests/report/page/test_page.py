@@ -121,17 +121,8 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
     assert call(tmp_path, "report", "x", "-q").returncode == 0
     found = parsed(page_of(tmp_path / "x")).text
     conditions = ("22 °C", "150 N axial", "12 May 2025", "night shift", "A-7", "Fitted, not diagnosed")
-    stated = (
-        "Customer",
-        "Vehicle works",
-        "Part number",
-        "15 961",
-        "Drawing",
-        "D 7, issue C",
-        "Elasto Lab",
-        "20 May 2025",
-    )
-    for words in (*conditions, *stated):
+    stated = ("Customer", "Vehicle works", "Part number", "15 961", "Drawing", "D 7, issue C", "Elasto Lab")
+    for words in (*conditions, *stated, "20 May 2025"):
         assert words in found
     assert "bushfit fit c.toml --direction axial --direction radial --effect inertia" in found
     (shown,) = re.findall(r'<img src="data:image/png;base64,([^"]*)" alt="Logo of Elasto Lab"', page_of(tmp_path / "x"))
@@ -182,17 +173,6 @@ def test_parts_of_one_campaign_are_told_apart_by_name(root: Path, tmp_path: Path
     assert "part B-8, 5 Hz" in drawn(page, "axial: stiffness over amplitude")
     (maps,) = re.findall(r"<svg(?:(?!</svg>).)*?>axial: measured less model, %</text>.*?</svg>", page, re.DOTALL)
     assert {f">part {part}, 0.1 mm<" in maps for part in ("A-7", "B-8")} == {True}
-
-
-def test_loops_in_torsion_are_drawn(root: Path, tmp_path: Path) -> None:
-    """Their tables count rotation in deg, under the header that every direction has."""
-    tests = '[[simulate.loops]]\ndirection = "torsion"\namplitude = "1 deg"\nfrequency = "0.1 Hz"\n'
-    text = (root / "configs/table_1.toml").read_text(encoding="utf-8")
-    (tmp_path / "turned.toml").write_text(text + tests, encoding="utf-8")
-    for command in (("simulate", "turned.toml", "-o", "tests"), ("fit-static", "tests/campaign.toml", "-o", "fit")):
-        done = call(tmp_path, *command, "-q", "--no-plots")
-        assert done.returncode == 0, done.stderr
-    assert "rotation [deg]" in made_of(tmp_path / "fit")
 
 
 @pytest.mark.parametrize(
@@ -291,14 +271,10 @@ def test_loss_angles_are_the_arc_tangents_of_the_loss_factors(results: Results) 
     )
     assert len(angles) == 12
     np.testing.assert_allclose(angles, np.degrees(np.arctan(factors)), atol=0.06)
-    levels = re.search(r"predicted here ([\d.]+) to ([\d.]+) dB", page_of(results("cmp_15961")))
-    assert levels
-    sizes = np.concatenate(
-        [pd.read_csv(results("cmp_15961") / f"{place}.csv")["stiffness [N/mm]"] for place in ("axial", "radial")]
-    )
-    np.testing.assert_allclose(
-        [float(end) for end in levels.groups()], 20 * np.log10([1e3 * sizes.min(), 1e3 * sizes.max()]), atol=0.06
-    )
+    ((low, high),) = re.findall(r"predicted here ([\d.]+) to ([\d.]+) dB", page_of(results("cmp_15961")))
+    tables = [pd.read_csv(results("cmp_15961") / f"{place}.csv") for place in ("axial", "radial")]
+    sizes = np.log10([1e3 * size for table in tables for size in table["stiffness [N/mm]"]])
+    assert (float(low), float(high)) == pytest.approx((20 * sizes.min(), 20 * sizes.max()), abs=0.06)
 
 
 def test_maps_are_measured_less_model(results: Results) -> None:
@@ -387,7 +363,3 @@ def test_the_command(root: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == {"pages": {"page/report.html": (tmp_path / "page/report.html").stat().st_size}}
     assert "wrote report.html to page" in done.stderr
-    assert call(tmp_path, "report", folder, "-o", "page").returncode == 2
-    first = (tmp_path / "page/report.html").read_bytes()
-    assert call(tmp_path, "report", folder, "-o", "page", "--force").returncode == 0
-    assert (tmp_path / "page/report.html").read_bytes() == first
