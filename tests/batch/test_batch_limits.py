@@ -132,23 +132,6 @@ def test_a_bushing_is_as_good_as_its_worst_and_the_words_say_why(tmp_path: Path)
     }
 
 
-def test_a_value_at_rest_on_a_bound_of_its_fit_is_no_plain_pass(tmp_path: Path) -> None:
-    known = {"mu": [1.1e6, NAN, NAN], "eps_half": [0.01, 0.009, 0.011]}
-    record = {"at_bound": {"mu": "max", "eps_half": "min"}}
-    text = "[parameters.mu]\nmin = '1 MPa'\nmax = '1.2 MPa'\n"
-    found = Judge(limits(tmp_path, text), {}, QUANTITIES)(known, record)
-    assert found.verdict is Verdict.CONDITIONAL_PASS
-    assert not found.missed
-    assert dict(found.edge) == {
-        "mu": "mu = 1.1 MPa, min 1 max 1.2, at the max of its fit: conditional pass",
-        "eps_half": "eps_half = 0.01 (0.009 to 0.011), at the min of its fit: conditional pass",
-    }
-    guarded = Judge(limits(tmp_path, "guard = true\n" + text), {}, QUANTITIES)
-    assert set(guarded(known, record).missed) == {"mu", "eps_half"}
-    out = Judge(limits(tmp_path, "[parameters.mu]\nmax = '1 MPa'\n"), {}, QUANTITIES)(known, record)
-    assert out.missed["mu"] == "mu = 1.1 MPa, max 1, at the max of its fit: fail"
-
-
 @pytest.mark.parametrize(
     ("text", "place", "amplitude", "shown"),
     [

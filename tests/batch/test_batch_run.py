@@ -157,6 +157,10 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
     assert "at the max of its fit" in held["on the edge"]
     assert "warning: 1 bushing with a parameter at rest on a bound of its fit" in done.stderr
     assert "conditional pass: b1: mu = 0.2" in done.stderr
+    (shop / "limits.toml").write_text("guard = true\n[parameters.mu]\nmax = '1 GPa'\n")
+    guarded = ("--limits", "limits.toml", "--resume", "-q")
+    assert typed("batch", "bushings/b[013]/bushing.toml", "-o", "all", "--no-plots", *guarded).returncode == 1
+    assert rows(shop / "all")[1]["out of limits"].startswith("mu = 0.2 MPa, max 1000, at the max of its fit")
     none = typed("batch", "bushings/b[013]/bushing.toml", "-o", "none", "--no-plots", "--effect", "inertia", "--json")
     assert json.loads((shop / "none/bushings/b1/model.json").read_text())["parameters"]["mu"]["at_bound"] == "max"
     assert not any("inertia" in row["on a bound"] for row in rows(shop / "none")), "no mass is an answer"

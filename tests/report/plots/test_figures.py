@@ -1,4 +1,4 @@
-"""Figures of predictions, fits, raw files, reductions and Maxwell arms, and what all figures share."""
+"""Figures of predictions, fits, raw files, reductions and Maxwell arms, of few levels and of many."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from figures import (
     AMPLITUDES,
@@ -28,21 +27,29 @@ from figures import (
     titles,
     whole,
 )
+from matplotlib.figure import Figure
 from stepped import stepped
+from tries import some
 
+from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.geometry import Direction
 from bushfit.inspection.opening import inspect
+from bushfit.inspection.record import Inspected
+from bushfit.jobs.grid import default_grid
 from bushfit.model.arms import model_arms
 from bushfit.model.model import Model
-from bushfit.model.result import Range
+from bushfit.model.result import Range, Result
 from bushfit.prediction.stiffness import predict
-from bushfit.reduction.steps import reduce
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reduction.steps import Reduction, Step, reduce
 from bushfit.report.artifacts import prediction_contents
 from bushfit.report.plots.arms import arms_figure
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
+from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.inspection import inspection_figure
-from bushfit.report.plots.prediction import prediction_figure
+from bushfit.report.plots.prediction import fine_grid, prediction_figure
 from bushfit.report.plots.reduction import reduction_figure
+from bushfit.report.plots.style import to_image
 
 
 def test_a_backend_that_is_not_installed_does_not_matter(root: Path, tmp_path: Path) -> None:
@@ -114,18 +121,6 @@ def test_files_of_one_direction_are_drawn_alike_and_pictures_say_which_they_are(
         assert [title.split("/")[0] for title in titles(figure)] == [name.split("/")[-1]] * 2
         for ends in ([axes.get_xlim() for axes in loops], [axes.get_ylim() for axes in loops]):
             assert (ends[0] == ends[1]) is (page == 0)
-
-
-def test_what_is_not_as_it_was_recorded_is_said(root: Path, tmp_path: Path) -> None:
-    table = pd.read_csv(root / "data/cmp_15961/loop_axial_1.csv")
-    turned, timeless = tmp_path / "turned_axial.csv", tmp_path / "timeless_axial.csv"
-    table.assign(**{"force [N]": -table["force [N]"]}).to_csv(turned, index=False)
-    table.drop(columns="time [s]").to_csv(timeless, index=False)
-    sine = {"frequency": "0.1 Hz", "waveform": "sine"}
-    figure = inside(inspection_figure([inspect(turned, {}), inspect(timeless, sine)]))
-    first = "turned_axial.csv: loop, axial, force turned, 1 odd"
-    assert titles(figure) == [first, "timeless_axial.csv: loop, axial"]
-    assert {"time [s]", "time rebuilt [s]"} <= set(labels(figure))
 
 
 def test_reduction(paper_model: Model) -> None:
@@ -224,20 +219,6 @@ def test_what_may_be_the_rigs_has_a_double_line_that_the_legend_names(paper_mode
     assert "Double lines: the same if it is the rig's" in note(figure)
 
 
-def test_one_amplitude_or_one_frequency_leaves_one_row_and_many_leave_six_and_four_lines(paper_model: Model) -> None:
-    for frequencies, amplitudes, along in (
-        (FREQUENCIES, AMPLITUDES[:1], "frequency [Hz]"),
-        (FREQUENCIES[:1], AMPLITUDES, "amplitude [mm]"),
-        (FREQUENCIES[:1], AMPLITUDES[:1], "frequency [Hz]"),
-    ):
-        prediction, curves = predicted(paper_model, Direction.RADIAL, frequencies, amplitudes)
-        figure = prediction_figure(prediction, [], "one", curves=curves)
-        assert [axes.get_xlabel() for axes in whole(figure).axes] == [along, along]
-    prediction, curves = predicted(paper_model, Direction.AXIAL, amplitudes=np.geomspace(1e-5, 1e-3, 20))
-    figure = prediction_figure(prediction, [], "many", curves=curves)
-    assert [len(lines(axes)) for axes in figure.axes] == [6, 6, 4, 4]
-
-
 def test_units_follow_direction_and_size(
     paper_model: Model, other_models: dict[str, Model], swept: Swept, looped: Looped
 ) -> None:
@@ -250,3 +231,94 @@ def test_units_follow_direction_and_size(
     assert "radial stiffness |K| [kN/mm]" in labels(prediction_figure(stiff, [], "stiff"))
     loops = labels(loops_figure(paper_model, [looped(paper_model, 0.1, direction=Direction.TORSION)], "torsion"))
     assert loops[:2] == ["rotation [deg]", "torsion moment [N m]"]
+
+
+#: A picture that is higher does not fit on three pages of A4 [inch].
+HIGHEST = 33.0
+LONG_NAME = "a file whose name tells all that is known of the test " * 3
+
+
+def checked(figure: Figure) -> Figure:
+    """The figure, once nothing leaves it and nothing in it is too small; warnings are errors while it is drawn."""
+    assert to_image(inside(figure))
+    width, height = figure.get_size_inches()
+    assert height < HIGHEST
+    for panel in (axes.get_position() for axes in figure.axes if not hasattr(axes, "_colorbar")):
+        assert panel.height * height > 0.5
+        assert panel.width * width > 1.2
+    return figure
+
+
+@pytest.mark.parametrize("count", some([8, 40], {40}))
+def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int) -> None:
+    """A line an amplitude, named by a legend as long as that can, else by a colour bar."""
+    data_sets = [swept(paper_model, amplitudes=np.geomspace(2e-5, 1e-3, count), repeats=1)]
+    figure = checked(sweeps_figure(paper_model, data_sets, "mount"))
+    assert figure.axes[2].get_xlabel() == "frequency [Hz]"
+    if count > 8:
+        names = [tick.get_text() for tick in figure.axes[-1].get_yticklabels()]
+        assert len(names) == 8
+        assert (names[0], names[-1], figure.axes[-1].get_title()) == ("0.02 mm", "1 mm", "amplitude")
+    else:
+        assert len(legend(figure.axes[1])) == count
+    checked(gap_figure(paper_model, paper_model, data_sets, "mount", ""))
+    prediction = predict(Result(paper_model), Direction.AXIAL, [5.0, 50.0], np.geomspace(2e-5, 1e-3, count))
+    curves = predict(Result(paper_model), Direction.AXIAL, *fine_grid(prediction))
+    checked(prediction_figure(prediction, data_sets, "mount", curves=curves))
+    seen = Inspected(Path(f"{LONG_NAME}.csv"), "sweep", Direction.AXIAL, {}, (), {}, (), {}, data_sets[0].sweep)
+    (left, right, *bar) = checked(inspection_figure([seen])).axes
+    assert len(points(left)) == count
+    assert len(bar) == (count > 8)
+    assert bar or len(legend(right)) == count
+
+
+@pytest.mark.parametrize("frequencies", some([(40.0,), tuple(np.geomspace(5.0, 150.0, 30))], {(40.0,)}))
+def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, ...]) -> None:
+    """Amplitudes across, logarithmic; a line and a row of the map for each frequency that was held."""
+    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(frequencies, np.geomspace(2e-5, 1e-3, 15)))
+    stiffness = paper_model.stiffness("axial", frequency, amplitude)
+    stiffness = stiffness * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(frequency.size))
+    sweep = Sweep("sweep.csv", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")
+    data_sets, result = sweep_data([sweep]), Result(paper_model)
+    figure = checked(sweeps_figure(paper_model, data_sets, "strain"))
+    assert figure.axes[2].get_xlabel() == "amplitude [mm]"
+    assert figure.axes[2].get_xscale() == "log"
+    assert len([line for line in figure.axes[0].lines if line.get_linestyle() != "None"]) == len(frequencies)
+    gap = checked(gap_figure(paper_model, paper_model, data_sets, "strain", ""))
+    assert gap.axes[1].get_xlabel() == "amplitude [mm]"
+    assert len(gap.axes[0].get_yticklabels()) == min(len(frequencies), 8), "each, or every third of 24 rows"
+    prediction = predict(result, Direction.AXIAL, *default_grid(result, Direction.AXIAL, [sweep]))
+    checked(prediction_figure(prediction, data_sets, "strain", model=paper_model))
+
+
+@pytest.mark.parametrize("count", some([2, 40], {40}))
+def test_many_loops(paper_model: Model, looped: Looped, count: int) -> None:
+    one = looped(paper_model, 1e-3, cycles=2).test
+    data_sets = loop_data(
+        [
+            Loop(f"loop {k}.csv", one.direction, one.time, scale * one.displacement, scale * one.force)
+            for k, scale in enumerate(np.linspace(0.5, 2.0, count))
+        ]
+    )
+    names = legend(checked(loops_figure(paper_model, data_sets, "mount")).axes[1])
+    assert names[-1] == "model"
+    assert len(names) == min(count, 8) + (count > 8) + 1
+    assert (f"and {count - 8} more" in names) is (count > 8)
+    for after in (paper_model, paper_model.with_values({"mu": 1.2 * paper_model.values["mu"]})):
+        checked(gap_figure(paper_model, after, data_sets, "mount", "mount"))
+
+
+@pytest.mark.parametrize(("levels", "histories"), [(8, 40), pytest.param(60, 2, marks=pytest.mark.slow)])
+def test_reduction_of_many_levels(levels: int, histories: int) -> None:
+    time = np.linspace(0.0, 2.0 * levels, 4000)
+    motion = 1e-3 * np.sin(20.0 * time)
+    records = [Loop(f"{LONG_NAME}{k}", Direction.AXIAL, time, motion, 1e6 * motion) for k in range(histories)]
+    steps = tuple(
+        Step(record.name, 2.0 * k, 2.0 * k + 1.0, 10, 12, 50.0, f, a, 1e6 + 1e5j, 3e-3, 3e-3, 0.01, 0.02, f, a)
+        for record in records
+        for k, a in enumerate(np.geomspace(1e-5, 1e-3, levels))
+        for f in (5.0, 50.0)
+    )
+    figure = checked(reduction_figure(Reduction(Direction.AXIAL, steps, ()), records, "raw.csv"))
+    (box,) = (axes for axes in figure.axes if axes.get_legend())
+    assert len(legend(box)) == min(levels, 8) + (levels > 8)
