@@ -46,12 +46,9 @@ def blocks(page: Path, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
 
-def test_the_tables_of_effects_are_the_library() -> None:
+def test_effects_and_commands_are_in_the_tables_of_their_pages(root: Path) -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert renewed(page) == page, "run: python tests/effect_tables.py"
-
-
-def test_every_command_is_in_the_table_and_has_an_example(root: Path) -> None:
     readme = (root / "README.md").read_text(encoding="utf-8")
     names = cli.list_commands(click.Context(cli))
     assert [name for name in names if f"| `bushfit {name} " not in readme] == []

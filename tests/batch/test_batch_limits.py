@@ -51,25 +51,15 @@ ALL = """
 nrmse = "2 %"
 reduced_chi_square = 1.5
 verdicts = ["consistent", "named"]
-[parameters.mu]
-min = "1 MPa"
-max = "1.2 MPa"
-[parameters.alpha]
-nominal = 0.24
-tolerance = "5 %"
-[parameters.sigma_fmax]
-sigma = 3
-at_least = 5
-[[stiffness]]
-at = "axial 25 Hz 0.1 mm"
-min = "550 N/mm"
-max = "0.65 kN/mm"
-[[stiffness]]
-at = "torsion 10 Hz 1 deg"
-max = "100 N m/rad"
-[[loss_factor]]
-at = "axial 25 Hz 0.1 mm"
-max = 0.12
+loss_factor = [{ at = "axial 25 Hz 0.1 mm", max = 0.12 }]
+stiffness = [
+  { at = "axial 25 Hz 0.1 mm", min = "550 N/mm", max = "0.65 kN/mm" },
+  { at = "torsion 10 Hz 1 deg", max = "100 N m/rad" },
+]
+[parameters]
+mu = { min = "1 MPa", max = "1.2 MPa" }
+alpha = { nominal = 0.24, tolerance = "5 %" }
+sigma_fmax = { sigma = 3, at_least = 5 }
 """
 
 
@@ -102,12 +92,7 @@ def test_the_batch_s_own_scatter_needs_bushings_that_differ(tmp_path: Path) -> N
 
 FEW = """
 verdicts = ["consistent", "named"]
-[parameters.mu]
-min = "1 MPa"
-max = "1.2 MPa"
-[parameters.alpha]
-nominal = 0.24
-tolerance = "5 %"
+parameters = { mu = { min = "1 MPa", max = "1.2 MPa" }, alpha = { nominal = 0.24, tolerance = "5 %" } }
 """
 QUANTITIES = {q.name: q for q in parameter_quantities(["mu", "alpha", "eps_half"])}
 

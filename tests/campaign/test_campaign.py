@@ -61,10 +61,10 @@ def campaign_from(text: str, folder: Path) -> Campaign:
 
 def test_what_a_campaign_says_of_its_files(folder: Path) -> None:
     (folder / "loop.csv").write_text(LOOP.replace("force [N]", "Kraft").replace("time [s]", "x [s]"))
-    campaign = campaign_from(
-        """
+    said = """
 name = "of files"
 bushing = { name = "b", inner_radius = "1 cm", outer_radius = "18 mm", length = "34 mm" }
+sweeps = [{ file = "sweep.csv", direction = "axial", amplitude = "peak-to-peak", noise = "1 %" }]
 [[loops]]
 file = "loop.csv"
 direction = "axial"
@@ -73,14 +73,8 @@ units = { force = "kN" }
 noise = "0.5 %"
 frequency = "0.1 Hz"
 waveform = "sine"
-[[sweeps]]
-file = "sweep.csv"
-direction = "axial"
-amplitude = "peak-to-peak"
-noise = "1 %"
-""",
-        folder,
-    )
+"""
+    campaign = campaign_from(said, folder)
     assert campaign.name == "of files"
     assert campaign.loops[0].noise == 0.005
     assert campaign.loops[0].force.max() == pytest.approx(1000.0, rel=1e-2)
@@ -102,16 +96,10 @@ def test_settings_arrive_in_si(folder: Path) -> None:
 [fit]
 dynamic_amplitudes = ["0.1 mm", "0.5 deg"]
 residuals = "magnitude_loss_factor"
-[fit.mu]
-value = "1.09 MPa"
-min = "0.1 MPa"
-vary = false
-[fit.m]
-max = "0.2 MPa s^alpha"
-[fit.eps_half]
-value = "1.3 %"
-[fit."inertia.mass"]
-value = "100 g"
+mu = { value = "1.09 MPa", min = "0.1 MPa", vary = false }
+m = { max = "0.2 MPa s^alpha" }
+eps_half = { value = "1.3 %" }
+"inertia.mass" = { value = "100 g" }
 [predict]
 frequencies = { start = "5 Hz", stop = "155 Hz", step = "10 Hz" }
 directions = ["axial", "torsion"]

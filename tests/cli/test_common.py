@@ -67,14 +67,13 @@ def test_results_are_not_replaced_unasked(bushfit: Run, tmp_path: Path, argument
     assert (tmp_path / file).read_bytes() != b"mine"
 
 
-def test_a_missed_limit_is_status_1_with_the_results_written(bushfit: Run, tmp_path: Path) -> None:
+def test_a_missed_limit_is_status_1_and_results_go_to_a_folder_of_the_campaign(
+    bushfit: Run, tmp_path: Path, work: Path, typed: Run
+) -> None:
     missed = bushfit("fit", CAMPAIGN, "-o", tmp_path / "x", "--no-plots", "--max-nrmse", "1e-4", status=1)
     assert "is above --max-nrmse 0.0001" in missed.stderr
     assert "model.json" in names(tmp_path / "x")
     bushfit("fit", CAMPAIGN, "-o", tmp_path / "y", "--no-plots", "--max-nrmse", "0.05")
-
-
-def test_results_go_to_a_folder_of_the_campaign_by_default(work: Path, typed: Run, tmp_path: Path) -> None:
     typed("fit-static", work / CAMPAIGN, "--no-plots")
     assert (tmp_path / "results" / "CMP 15 961" / "static.json").exists()
 

@@ -82,7 +82,7 @@ def test_the_document_names_the_effect_with_its_size_and_the_gap_before_and_afte
     assert usable["held_out"] is True
 
 
-def test_every_residual_is_in_the_table(found: Path) -> None:
+def test_every_residual_and_every_candidate_is_in_a_table(found: Path) -> None:
     """Their mean squares are the gaps that the document states, but for what a loop's rows tell of the next."""
     table = pd.read_csv(found / "gap.csv")
     gap = document(found / "diagnosis.json")["gap"]["calibration"]
@@ -94,9 +94,6 @@ def test_every_residual_is_in_the_table(found: Path) -> None:
         assert values == pytest.approx(gap[when], rel=0.02)  # a loop's rows share its gain
     assert table[table.kind == "sweep"].groupby("test").size().to_dict() == {"sweep_axial": 144, "sweep_radial": 144}
     assert set(table[table.kind == "loop"].test) == {"loop_axial_1", "loop_axial_2"}
-
-
-def test_every_candidate_is_in_the_table(found: Path) -> None:
     table = pd.read_csv(found / "candidates.csv")
     asked = {name for name, effect in at_places(("axial", "radial")).items() if effect.after in (None, *BASE)}
     mistakes = table.effect.str.partition(":")[0].isin(MISTAKES)

@@ -32,13 +32,15 @@ def test_files_are_told_and_the_campaign_s_text_can_be_pasted(typed: Run, root: 
         assert words in done.stderr
 
 
-def test_json_holds_everything(typed: Run, root: Path) -> None:
+def test_json_holds_everything_and_many_files_make_several_pictures(typed: Run, root: Path, tmp_path: Path) -> None:
     written = json.loads(typed("inspect", *(root / file for file in CLEAN), "--json", "--no-plots").stdout)
     loop, sweep = written["files"]
     assert (loop["kind"], sweep["kind"]) == ("loop", "sweep")
     assert [column["role"] for column in loop["columns"]] == ["time", "displacement", "force"]
     assert loop["odd"] == []
     assert "[[loops]]" in written["campaign"]
+    typed("inspect", *[root / CLEAN[1]] * 6, "-o", "x")
+    assert names(tmp_path / "x") == {"inspect.png", "inspect_2.png"}
 
 
 def test_bad_files_are_told_in_the_order_given_the_last_as_the_error(typed: Run, root: Path, tmp_path: Path) -> None:
@@ -50,11 +52,6 @@ def test_bad_files_are_told_in_the_order_given_the_last_as_the_error(typed: Run,
     assert places == sorted(places)
     refused(done, tmp_path / "x", "the columns do not make a test")
     assert "[[loops]]" in done.stdout
-
-
-def test_many_files_make_several_pictures(typed: Run, root: Path, tmp_path: Path) -> None:
-    typed("inspect", *[root / CLEAN[1]] * 6, "-o", "x")
-    assert names(tmp_path / "x") == {"inspect.png", "inspect_2.png"}
 
 
 def test_a_sheet_of_a_workbook(typed: Run, root: Path, tmp_path: Path) -> None:

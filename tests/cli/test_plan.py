@@ -62,25 +62,12 @@ def test_a_plan_after_tests_counts_them(bushfit: Run, tmp_path: Path) -> None:
 
 
 SPECIMENS = """
-[[specimens]]
-name = "two blocks"
-kind = "shear"
-area = "772 mm^2"
-thickness = "6 mm"
-elements = 2
-
-[[specimens]]
-name = "mount"
-kind = "shear"
-area = "400 mm^2"
-thickness = "4 mm"
-
-[simulate.parameters]
-mu = "1.09 MPa"
-m = "0.2 MPa*s^alpha"
-alpha = 0.24
-sigma_fmax = "14.6 kPa"
-eps_half = 0.013
+specimens = [
+  { name = "two blocks", kind = "shear", area = "772 mm^2", thickness = "6 mm", elements = 2 },
+  { name = "mount", kind = "shear", area = "400 mm^2", thickness = "4 mm" },
+]
+[simulate]
+parameters = { mu = "1.09 MPa", m = "0.2 MPa*s^alpha", alpha = 0.24, sigma_fmax = "14.6 kPa", eps_half = 0.013 }
 """
 
 

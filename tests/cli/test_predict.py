@@ -73,7 +73,9 @@ def test_families_of_one_campaign_are_fitted_and_held_out(bushfit: Run, tmp_path
 ARM = "data/arm_bushing/truth.json"
 
 
-def test_predict_lays_measurements_over_and_takes_grids(bushfit: Run, tmp_path: Path) -> None:
+def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_amplitudes(
+    bushfit: Run, tmp_path: Path
+) -> None:
     grid = ("--frequencies", "10:30:10 Hz", "--amplitudes", "0.1, 0.3 mm")
     done = bushfit("predict", "model/model.json", "--campaign", CAMPAIGN, "-o", tmp_path / "x", *grid)
     assert names(tmp_path / "x") == {"axial.csv", "axial.png", "radial.csv", "radial.png", "measured.csv"}
@@ -85,6 +87,13 @@ def test_predict_lays_measurements_over_and_takes_grids(bushfit: Run, tmp_path: 
     table = pd.read_csv(tmp_path / "x" / "axial.csv")
     assert table["frequency [Hz]"].tolist() == [10, 20, 30] * 2
     assert table["amplitude [mm]"].tolist() == [0.1] * 3 + [0.3] * 3
+    amplitudes = ", ".join(f"{0.02 * n:.2f}" for n in range(1, 31)) + " mm"
+    options = ("--direction", "axial", "--amplitudes", amplitudes, "--no-plots", "-o", tmp_path / "x")
+    done = bushfit("predict", "model/model.json", *options)
+    shown = [line.split()[1] for line in done.stderr.splitlines() if line.split()[:1] == ["155"]]
+    assert len(shown) == 8
+    assert (shown[0], shown[-1]) == ("0.02", "0.6")
+    assert len(pd.read_csv(tmp_path / "x/axial.csv")["amplitude [mm]"].unique()) == 30
 
 
 def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: Path, tmp_path: Path) -> None:
@@ -96,16 +105,6 @@ def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: 
         warnings = json.loads(done.stdout)["warnings"]
         assert [f"warning: {line}" for line in warnings] == told
         assert any(line.startswith(said) for line in warnings)
-
-
-def test_predict_shows_at_most_eight_amplitudes_a_direction(bushfit: Run, tmp_path: Path) -> None:
-    amplitudes = ", ".join(f"{0.02 * n:.2f}" for n in range(1, 31)) + " mm"
-    options = ("--direction", "axial", "--amplitudes", amplitudes, "--no-plots", "-o", tmp_path / "x")
-    done = bushfit("predict", "model/model.json", *options)
-    shown = [line.split()[1] for line in done.stderr.splitlines() if line.split()[:1] == ["155"]]
-    assert len(shown) == 8
-    assert (shown[0], shown[-1]) == ("0.02", "0.6")
-    assert len(pd.read_csv(tmp_path / "x/axial.csv")["amplitude [mm]"].unique()) == 30
 
 
 def test_predict_writes_maxwell_arms_where_asked(bushfit: Run, root: Path, tmp_path: Path) -> None:

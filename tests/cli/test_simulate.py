@@ -34,40 +34,23 @@ def test_simulate_writes_a_campaign_that_run_takes(bushfit: Run, tmp_path: Path)
 
 
 SPECIMENS = """
-[[specimens]]
-name = "DMA"
-kind = "modulus"
-
-[[specimens]]
-name = "mount"
-kind = "shear"
-area = "772 mm^2"
-thickness = "6 mm"
-elements = 2
-
+specimens = [
+  { name = "DMA", kind = "modulus" },
+  { name = "mount", kind = "shear", area = "772 mm^2", thickness = "6 mm", elements = 2 },
+]
 [simulate]
 seed = 3
 repeats = 2
 noise = "0.5 %"
 gain_error = "0.2 %"
-
-[simulate.parameters]
-mu = "1.09 MPa"
-m = "0.2 MPa*s^alpha"
-alpha = 0.24
-sigma_fmax = "14.6 kPa"
-eps_half = 0.013
-
-[simulate.effects.stiffness_factor]
-mount = 1.1
-
+parameters = { mu = "1.09 MPa", m = "0.2 MPa*s^alpha", alpha = 0.24, sigma_fmax = "14.6 kPa", eps_half = 0.013 }
+effects.stiffness_factor.mount = 1.1
 [[simulate.sweeps]]
 specimen = "DMA"
 amplitudes = ["0.1 %", "0.2 %", "0.5 %", "1 %", "2 %", "5 %", "10 %"]
 frequencies = ["1 Hz", "10 Hz", "100 Hz"]
 stepped = "amplitude"
 reached = "2 %"
-
 [[simulate.resonances]]
 specimen = "mount"
 mass = "250 g"

@@ -83,7 +83,7 @@ def test_parameters_provenance_and_units_asked_for(order: Order, table_1: dict[s
     assert table["axial"]["stiffness [N/m]"][0] == pytest.approx(order.predictions[0].stiffness.value[0])
 
 
-def test_specimens_have_tables_whatever_they_are_called(order: Order) -> None:
+def test_specimens_have_tables_and_points_that_a_grid_lacks_are_empty(order: Order) -> None:
     bodies = [
         predict(order.result, Specimen(name, "modulus"), [5.0], [0.01]) for name in ("parameters", "axial", "x", "x")
     ]
@@ -94,9 +94,6 @@ def test_specimens_have_tables_whatever_they_are_called(order: Order) -> None:
     assert sum("modulus [MPa]" in table for table in tables.values()) == 4
     assert "parameter" in tables["parameters"]
     assert len(spreadsheets.csv(replace(order, predictions=tuple(bodies))).files) == 2 * 4 + 2
-
-
-def test_points_that_a_grid_lacks_are_empty(order: Order) -> None:
     prediction = order.predictions[0]
     kept = np.arange(prediction.frequency.size) != 3
 

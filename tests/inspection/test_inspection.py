@@ -30,7 +30,7 @@ from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 CHANNELS = ("time", "displacement", "force")
 
 
-def test_a_loop_is_described(loop: Loop, tmp_path: Path) -> None:
+def test_loops_sines_and_triangles_are_described(loop: Loop, tmp_path: Path, paper_model: Model) -> None:
     seen = look(tmp_path, replace(loop, force=loop.force + 20.0), "loop_axial_1mm_0.1Hz.csv")
     assert (seen.kind, seen.direction) == ("loop", Direction.AXIAL)
     assert [(column.role, column.unit) for column in seen.columns] == [
@@ -45,9 +45,6 @@ def test_a_loop_is_described(loop: Loop, tmp_path: Path) -> None:
     assert facts["mean force"].startswith("20")
     assert facts["noise"].startswith("0.3 %")
     assert seen.odd == ()
-
-
-def test_a_triangle_and_torsion_are_recognised(paper_model: Model, tmp_path: Path) -> None:
     test = SimulatedLoop(Direction.TORSION, 0.02, 0.1, cycles=2, waveform="triangle")
     made = measure(undisturbed(paper_model, SimulateSettings(loops=(test,))), SimulateSettings(force_noise=1e-3))
     seen = look(tmp_path, made.loops[0], "x.csv")
@@ -303,11 +300,18 @@ def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str,
     assert raised == []
 
 
-def test_a_gap_in_a_loop_without_time_is_told_by_its_motion(loop: Loop, tmp_path: Path) -> None:
+def test_gaps_in_a_motion_are_told_and_slow_loops_are_no_stepped_sine(
+    loop: Loop, tmp_path: Path, paper_model: Model
+) -> None:
     table = raw_loop_table(loop).iloc[:, 1:].drop(index=range(500, 530))
     table.to_csv(tmp_path / "axial.csv", index=False)
     odd = inspect(tmp_path / "axial.csv", {"frequency": "0.1 Hz", "waveform": "sine"}).odd
     assert any("1 gap in the motion, the first after data row 500: the displacement goes from " in line for line in odd)
+    planned = SimulatedLoop(Direction.AXIAL, 5e-4, cycles=4, frequencies=(0.1, 0.3))
+    (record,) = simulate(paper_model, SimulateSettings(loops=(planned,))).loops
+    seen = look(tmp_path, record)
+    assert seen.kind == "loop"
+    assert seen.facts["programme"].startswith("2 loops in one record: 0.5 mm at 0.1, 0.3 Hz")
 
 
 def test_the_data_of_the_repository_raise_only_what_is_there(root: Path) -> None:
@@ -358,11 +362,3 @@ def test_a_programme_of_loops_is_described(paper_model: Model, tmp_path: Path, *
     assert seen.facts["loop 2"].startswith("0.5 mm at 0.1 Hz, a sine; ")
     assert seen.facts["loop 2"].endswith("before its steady cycles are left out; 4 cycles are used")
     assert tomllib.loads(file_text(seen, tmp_path))["loops"][0]["file"] == "axial.csv"
-
-
-def test_slow_loops_at_several_rates_are_no_stepped_sine(paper_model: Model, tmp_path: Path) -> None:
-    planned = SimulatedLoop(Direction.AXIAL, 5e-4, cycles=4, frequencies=(0.1, 0.3))
-    (record,) = simulate(paper_model, SimulateSettings(loops=(planned,))).loops
-    seen = look(tmp_path, record)
-    assert seen.kind == "loop"
-    assert seen.facts["programme"].startswith("2 loops in one record: 0.5 mm at 0.1, 0.3 Hz")

@@ -74,7 +74,7 @@ def test_a_picture_is_the_same_bytes_each_time_without_date_or_version(form: Pic
         assert not {"script", "text", "image"} & names
 
 
-def test_loops_row_by_row(data: Data, paper_model: Model) -> None:
+def test_loops_row_by_row_and_sweeps_by_amplitude_repeat_and_frequency(data: Data, paper_model: Model) -> None:
     table, loop = loops_table(paper_model, data.loops), data.loops[0].test
     assert len(table) == loop.time.size
     np.testing.assert_allclose(table["force [N]"], loop.force, rtol=1e-12)
@@ -82,9 +82,6 @@ def test_loops_row_by_row(data: Data, paper_model: Model) -> None:
     off = (table["model force [N]"] - table["force [N]"]) / data.loops[0].drive.noise
     np.testing.assert_allclose(table["residual [noise]"], off, rtol=1e-9, atol=1e-9)
     assert np.std(table["residual [noise]"]) == pytest.approx(1.0, abs=0.1)
-
-
-def test_sweeps_sorted_by_amplitude_repeat_and_frequency(data: Data, paper_model: Model) -> None:
     table = sweeps_table(paper_model, data.sweeps)
     assert len(table) == sum(data_set.sweep.frequency.size for data_set in data.sweeps)
     assert list(dict.fromkeys(table["direction"])) == ["axial", "radial"]

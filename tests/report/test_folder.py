@@ -158,7 +158,21 @@ def test_what_a_killed_run_left_is_removed_but_not_what_another_run_is_at(tmp_pa
     assert {path.name for path in tmp_path.iterdir()} == {"x", at_work.name, of_the_user.name}
 
 
-def test_the_folder_keeps_its_rights_its_subfolders_and_its_links(tmp_path: Path) -> None:
+FILES = {"a.csv": b"1\n", "b.json": b"{}\n"}
+
+
+def contents(folder: Path, pattern: str = "*") -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.glob(pattern)}
+
+
+def test_a_new_folder_is_made_and_one_that_stands_keeps_rights_subfolders_and_links(tmp_path: Path) -> None:
+    folder = tmp_path / "results" / "deep" / "x"
+    write_files(folder, FILES, force=False)
+    assert contents(folder) == FILES
+    assert [child.name for child in folder.parent.iterdir()] == ["x"]
+    umask = os.umask(0)
+    os.umask(umask)
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o777 & ~umask
     folder = tmp_path / "x"
     (folder / "sub" / "deep").mkdir(parents=True)
     (folder / "sub" / "deep" / "mine.txt").write_text("mine")
@@ -172,23 +186,6 @@ def test_the_folder_keeps_its_rights_its_subfolders_and_its_links(tmp_path: Path
     assert (folder / "sub" / "deep" / "mine.txt").read_text() == "mine"
     assert (folder / "link").readlink() == Path("nowhere")
     assert folder.stat().st_mode & 0o777 == 0o750
-
-
-FILES = {"a.csv": b"1\n", "b.json": b"{}\n"}
-
-
-def contents(folder: Path, pattern: str = "*") -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.glob(pattern)}
-
-
-def test_a_new_folder_is_made_with_its_parents(tmp_path: Path) -> None:
-    folder = tmp_path / "results" / "deep" / "x"
-    write_files(folder, FILES, force=False)
-    assert contents(folder) == FILES
-    assert [child.name for child in folder.parent.iterdir()] == ["x"]
-    umask = os.umask(0)
-    os.umask(umask)
-    assert stat.S_IMODE(folder.stat().st_mode) == 0o777 & ~umask
 
 
 def test_a_file_or_a_folder_in_the_way(tmp_path: Path) -> None:
