@@ -34,8 +34,8 @@ from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.schema import CampaignFile
 from bushfit.cli import cli
 from bushfit.geometry import Direction
-from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.simulation.files import to_files
 from bushfit.simulation.measured import simulate
@@ -191,7 +191,7 @@ COPIES: dict[str, dict[str, Any]] = {
     },
     "cmp_15961_recordings/loop_axial.mf4": {},
     "cmp_15961_recordings/sweep_radial.parquet": {},
-    "cmp_15961_recordings/sweep_axial.uff": {"written": FileFormat(sheet="0.1 mm"), "at_amplitude": 1e-4},
+    "cmp_15961_recordings/sweep_axial.uff": {"sheet": "0.1 mm"},
 }
 
 
@@ -200,8 +200,11 @@ def test_files_of_other_formats_hold_their_csv(root: Path, copy: str) -> None:
     """Of a loop every fifth row; of a UFF file the first rows, which are those of an amplitude."""
     kind, direction = Path(copy).stem.split("_")
     read: Any = read_loop if kind == "loop" else read_sweep
-    kept = read(root / f"data/cmp_15961/{kind}_{direction}{'_1' * (kind == 'loop')}.csv", Direction(direction))
-    own = read(root / "data" / copy, Direction(direction), **COPIES[copy])
+    stated = LoopFile if kind == "loop" else SweepFile
+    csv_file = root / f"data/cmp_15961/{kind}_{direction}{'_1' * (kind == 'loop')}.csv"
+    kept = read(csv_file, Direction(direction), stated(file=""))
+    held = {"at_amplitude": 1e-4} if copy.endswith("uff") else {}
+    own = read(root / "data" / copy, Direction(direction), stated(file="", **COPIES[copy]), **held)
     columns = ("time", "displacement", "force") if kind == "loop" else ("frequency", "amplitude", "stiffness", "repeat")
     for column in columns:
         csv = getattr(kept, column)[:: 5 if kind == "loop" else 1][: getattr(own, column).size]

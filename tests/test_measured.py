@@ -18,10 +18,10 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint, fit_two_step
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import predict, predict_resonance
+from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import loss_factor
 from bushfit.reading.resonance import read_resonance
 from bushfit.reading.table import Table
-from bushfit.reading.words import RESONANCE_COLUMNS
 from bushfit.reduction.resonance import reduce_resonance
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed

@@ -23,8 +23,8 @@ from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import Point
 from bushfit.errors import OutputError
-from bushfit.report import disk
 from bushfit.report.contents import Formats
+from bushfit.report.folder import claim
 from bushfit.version import __version__
 
 #: Layout of a record; records of another are done again.
@@ -119,7 +119,7 @@ def held(output: Path) -> Iterator[None]:
     """
     os.makedirs(output / ROWS, exist_ok=True)  # noqa: PTH103
     try:
-        claim = disk.claim(output / ROWS, wait=False)
+        claimed = claim(output / ROWS, wait=False)
     except BlockingIOError:
         raise OutputError(
             "another batch is at work there", file=output, hint="wait for its end, or name another folder with -o"
@@ -130,4 +130,4 @@ def held(output: Path) -> Iterator[None]:
         yield
     finally:
         shutil.rmtree(output / STAGE, ignore_errors=True)
-        claim.close()
+        claimed.close()

@@ -21,13 +21,12 @@ from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, PARTS, STIFFNESS, Quan
 from bushfit.batch.together import Together
 from bushfit.batch.work import Orders
 from bushfit.effects.contract import Array
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
 from bushfit.report.contents import Contents, Formats
 from bushfit.report.tables import BETWEEN
 
 if TYPE_CHECKING:
     import pandas as pd
-    from junitparser import TestCase
     from matplotlib.figure import Figure
 
     from bushfit.report.plots.batch import Panel
@@ -82,18 +81,12 @@ class Outcome:
     @cached_property
     def judgements(self) -> list[Judgement | None]:
         """On each row; None on all without limits, and on a row that failed."""
-        return [
-            self.judge(self._known(number), record) if self.judge and record["status"] == "done" else None
-            for number, record in enumerate(self.records)
-        ]
-
-    def _known(self, number: int) -> dict[str, list[float]]:
-        """The four figures of each quantity that is known of a row."""
-        return {
-            name: figures[:, number].tolist()
-            for name, figures in self.figures.items()
-            if math.isfinite(figures[0, number])
-        }
+        found = list[Judgement | None]()
+        for number, record in enumerate(self.records):
+            row = {name: figures[:, number].tolist() for name, figures in self.figures.items()}
+            known = {name: four for name, four in row.items() if math.isfinite(four[0])}
+            found.append(self.judge(known, record) if self.judge and record["status"] == "done" else None)
+        return found
 
     @cached_property
     def status(self) -> Counter[str]:
@@ -119,16 +112,18 @@ class Outcome:
     @property
     def missed(self) -> list[tuple[str, str]]:
         """The name of each bushing that misses a limit, and what it misses, in words."""
-        pairs = zip(self.plan.rows, self.judgements, strict=True)
-        return [(row.name, "; ".join(judged.missed.values())) for row, judged in pairs if judged and judged.missed]
+        return [(name, "; ".join(judged.missed.values())) for name, judged in self._judged if judged.missed]
 
     @property
     def edge(self) -> list[tuple[str, str]]:
         """The name of each bushing that passes on condition, and why."""
-        pairs = [(row, judged) for row, judged in zip(self.plan.rows, self.judgements, strict=True) if judged]
-        return [
-            (row.name, "; ".join(judged.edge.values())) for row, judged in pairs if judged.edge and not judged.missed
-        ]
+        just = [(name, judged.edge) for name, judged in self._judged if judged.edge and not judged.missed]
+        return [(name, "; ".join(edge.values())) for name, edge in just]
+
+    @property
+    def _judged(self) -> list[tuple[str, Judgement]]:
+        pairs = zip(self.plan.rows, self.judgements, strict=True)
+        return [(row.name, judged) for row, judged in pairs if judged]
 
     @cached_property
     def together(self) -> Together:
@@ -284,29 +279,22 @@ class Outcome:
 
     def junit(self) -> bytes:
         """A report for continuous integration: an error where a bushing failed, a failure where it misses limits."""
-        from junitparser import JUnitXml, TestSuite
+        from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
         suite = TestSuite(self.plan.title)
         for row, record, judged in zip(self.plan.rows, self.records, self.judgements, strict=True):
-            suite.add_testcase(_case(suite.name, row, record, judged))
+            case = TestCase(_printable(row.name), suite.name, record["seconds"])
+            failed, missed = record["status"] != "done", judged.missed if judged else {}
+            if failed or missed:
+                text = _printable(record["error"] if failed else "\n".join(missed.values()))
+                line = text.partition("\n")[0] if failed else "; ".join(text.splitlines())
+                case.result = [Error(line, "failed") if failed else Failure(line, "limits")]
+                case.result[0].text = text
+            suite.add_testcase(case)
         report = JUnitXml("bushfit batch")
         report.add_testsuite(suite)
         report.update_statistics()  # type: ignore[no-untyped-call]
         return b'<?xml version="1.0" encoding="utf-8"?>\n' + report.tostring()  # type: ignore[no-untyped-call]
-
-
-def _case(suite: str, row: Row, record: Record, judged: Judgement | None) -> TestCase:
-    from junitparser import Error, Failure, TestCase
-
-    case = TestCase(_printable(row.name), suite, record["seconds"])
-    failed, missed = record["status"] != "done", judged.missed if judged else {}
-    if failed or missed:
-        text = _printable(record["error"] if failed else "\n".join(missed.values()))
-        line = text.partition("\n")[0] if failed else "; ".join(text.splitlines())
-        result = Error(line, "failed") if failed else Failure(line, "limits")
-        result.text = text
-        case.result = [result]
-    return case
 
 
 def _printable(text: str) -> str:

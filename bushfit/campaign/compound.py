@@ -4,9 +4,8 @@ import re
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from bushfit.campaign.quantities import text
 from bushfit.errors import CampaignError, UnitError
-from bushfit.validation import converted
+from bushfit.validation import converted, text
 
 #: Polymers whose density is known, by the names that rubber engineers use; NR is natural rubber.
 Polymer = Literal["natural", "SBR", "EPDM", "NBR", "CR", "IIR"]

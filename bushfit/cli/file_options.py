@@ -64,7 +64,7 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
     told = ("direction", "force_sign", *keys, *_AS_WRITTEN)
 
     def known() -> tuple[str, ...]:
-        from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
+        from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 
         return tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
 

@@ -10,7 +10,7 @@ import click
 from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.grids import asked_for, kelvin, positive, where_predicted
 from bushfit.cli.options import FILE, command_called, file_option, flag, option, under
-from bushfit.cli.show import new_table, tell_tests
+from bushfit.cli.show import tell_table, tell_tests
 
 if TYPE_CHECKING:
     from bushfit.jobs.predict import Predicted
@@ -96,9 +96,8 @@ def tell_predictions(options: Options, outcome: Predicted) -> None:
         chosen = amplitudes[spread(amplitudes.size, _MOST_AMPLITUDES)]
         place = str(prediction.direction)
         whose = "" if prediction.direction in outcome.result.specimens else f"{outcome.result.name}: "
-        shown = new_table(f"{whose}{place}, corners", *table.columns[:4])
         low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
-        for row in table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].itertuples(index=False):
-            shown.add_row(*(number(value, 6) for value in row[:2]), *(alike([value], 4)[0] for value in row[2:4]))
-        options.console.print(shown)
+        corners = table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].itertuples(index=False)
+        rows = ([*(number(x, 6) for x in row[:2]), *(alike([x], 4)[0] for x in row[2:4])] for row in corners)
+        tell_table(options, f"{whose}{place}, corners", list(table.columns[:4]), rows)
     options.warn(outcome.warnings)

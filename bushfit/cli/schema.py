@@ -8,7 +8,7 @@ import click
 from bushfit.cli import completion
 from bushfit.cli.common import Options, with_options
 from bushfit.cli.options import command_called
-from bushfit.cli.show import new_table
+from bushfit.cli.show import tell_table
 
 
 @command_called("schema", "", "model")
@@ -37,9 +37,7 @@ def command(name: str | None, options: Options) -> None:
     elif name:
         options.say(f"{name} describes: {DESCRIBED[name].files}")
     else:
-        table = new_table("schemas", "name", "describes", names=2)
-        for each, described in DESCRIBED.items():
-            table.add_row(each, described.files)
-        options.console.print(table)
+        rows = ((each, described.files) for each, described in DESCRIBED.items())
+        tell_table(options, "schemas", ("name", "describes"), rows, names=2)
     if not options.output:
         replace(options, as_json=options.as_json or name is not None).print_json(document)

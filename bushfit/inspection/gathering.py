@@ -13,15 +13,14 @@ from bushfit.errors import BushfitError, NoColumnError, NoTestError
 from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.geometry import Direction
 from bushfit.inspection.labels import temperatures_of
-from bushfit.inspection.opening import inspect
-from bushfit.inspection.recognition import open_table, recognised
+from bushfit.inspection.opening import inspect, open_table, recognised
 from bushfit.inspection.record import Inspected
 from bushfit.reading.columns import same_text
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above
 from bushfit.reading.parts import parts_of
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 
 
 @dataclass(frozen=True)

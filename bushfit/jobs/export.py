@@ -12,8 +12,7 @@ from typing_extensions import Doc, TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.errors import ModelError
-from bushfit.export.contract import Dialect, Exported, Order
-from bushfit.export.systems import UnitSystem
+from bushfit.export.contract import Dialect, Exported, Order, UnitSystem
 from bushfit.jobs.predict import Predict, Predicted
 from bushfit.model.result import Result
 from bushfit.progress import counting

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
-from bushfit.units import CELSIUS
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -42,19 +41,6 @@ class Source:
     sha256: str
     conditions: Mapping[str, str | float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-
-
-def source_of(
-    file: Path,
-    listed_as: Path | None,
-    sha256: str,
-    temperature: float | None,
-    conditions: Mapping[str, str | float] | None,
-    notes: Iterable[str] = (),
-) -> Source:
-    """The provenance of a test: its file as the campaign names it, and its conditions, a temperature [K] in degC."""
-    degrees = {} if temperature is None else {"temperature_degC": round(temperature - CELSIUS, 6)}
-    return Source(listed_as or Path(file.name), sha256, {**(conditions or {}), **degrees}, tuple(notes))
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,22 @@ from bushfit import units
 from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.columns import Columns, Rows
-from bushfit.reading.encoding import to_utf8
-from bushfit.reading.files import sha256, view_bytes
-from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, plain, split_convention
+from bushfit.reading.files import sha256, to_utf8, view_bytes
+from bushfit.reading.headers import (
+    OF_MOTION,
+    Column,
+    Heading,
+    Vocabulary,
+    is_angular,
+    of_motion,
+    plain,
+    split_convention,
+)
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.parts import open_part
 from bushfit.reading.source import RowSource, Sheet, Text
 from bushfit.reading.wide import as_long
-from bushfit.reading.words import OF_MOTION, of_motion
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 #: Likeness, from 0 to 1, from which a header is suggested for one that is not there; chosen: one word of two suffices.
@@ -217,9 +224,15 @@ class Table(Columns):
                     else f'choose it in the campaign: columns = {{ {role} = "{header}" }}',
                 )
             roles[role] = column
-        for role in columns:
-            if role not in roles:
-                raise self._no_column(role, columns[role])
+        for role in (role for role in columns if role not in roles):
+            near = next(iter(get_close_matches(columns[role], self.headers, n=1, cutoff=_ALIKE)), "")
+            raise self.header_error(
+                f'there is no column "{columns[role]}"',
+                kind=NoColumnError,
+                expected=f"the header that was named for the {_label(role)}",
+                hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
+                + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
+            )
         if "amplitude_reached" in roles and "amplitude" not in roles:
             roles["amplitude"] = replace(roles.pop("amplitude_reached"), role="amplitude")
         return roles
@@ -240,17 +253,6 @@ class Table(Columns):
                 expected="one unit, from the header, the units row or the campaign",
             )
         return column
-
-    def _no_column(self, role: str, named: str) -> MeasurementError:
-        """The error for a role whose column was named by a header that is not there."""
-        near = next(iter(get_close_matches(named, self.headers, n=1, cutoff=_ALIKE)), "")
-        return self.header_error(
-            f'there is no column "{named}"',
-            kind=NoColumnError,
-            expected=f"the header that was named for the {_label(role)}",
-            hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
-            + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
-        )
 
 
 def _is_k(header: str) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from bushfit.export.contract import Exported, Order
-from bushfit.export.losses import NO_LOOPS
+from bushfit.export.deck import NO_LOOPS
 from bushfit.model.result import Result
 from bushfit.reading.tablefile import to_csv, to_xlsx
 from bushfit.report.artifacts import place_names

@@ -192,32 +192,28 @@ def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
     return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
 
 
-def gap_table(
-    before: Model,
-    after: Model,
-    data_sets: Sequence[DataSet],
-    mended: Sequence[DataSet] | None = None,
-    result: Model | None = None,
-) -> pd.DataFrame:
+def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """Every residual of a diagnosis, before and after, in units of noise and in %: a row per sweep point or loop row.
 
-    `mended` are the tests that belong to the model after, where they are others: a row says where it was recorded.
-    `result` is the model to use, `after` unless given, whose response stands beside what was measured.
+    Where the test that belongs to the model after is another, a row says where it was recorded. The response of the
+    model to use stands beside what was measured.
     """
+    before, after = diagnosis.before, diagnosis.after
 
     def rows(data_set: DataSet, later: DataSet) -> pd.DataFrame:
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
         columns |= data_set.columns()
-        for name, model, test in (("before", before, data_set), ("after", after, later)):
+        for name, model, test in (("before", before.model, data_set), ("after", after.model, later)):
             parts = zip(test.components, np.split(test.misfit(model), test.parts), strict=True)
             columns |= {f"{part} {name} [noise]": values for part, values in parts}
             off = zip(test.components, test.off(model), strict=True)
             columns |= {f"{part} {name} [%]": 100.0 * values for part, values in off}
         table: Any = loops_table if data_set.kind == "loop" else sweeps_table
-        shown = table(result or after, [data_set])
+        shown = table(diagnosis.result.model, [data_set])
         return pd.DataFrame(columns | {name: shown[name] for name in shown if _MEASURED.match(name)})
 
-    return pd.concat([rows(*pair) for pair in zip(data_sets, mended or data_sets, strict=True)], ignore_index=True)
+    both = zip(before.data_sets, after.data_sets, strict=True)
+    return pd.concat([rows(*pair) for pair in both], ignore_index=True)
 
 
 def master_curve_table(found: Sequence[Shifted]) -> pd.DataFrame:

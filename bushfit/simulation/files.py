@@ -8,7 +8,7 @@ from typing import Annotated
 
 from typing_extensions import Doc, TypedDict
 
-from bushfit.campaign.written import body_lines, table_lines
+from bushfit.campaign.toml import body_lines, table_lines
 from bushfit.errors import typed
 from bushfit.geometry import Specimen
 from bushfit.model.document import ModelFile

@@ -17,7 +17,7 @@ from bushfit.errors import BatchError, ModelError, UnitError
 from bushfit.geometry import STRAINING, TRANSLATION, Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
 
 NAN = math.nan
 finite = st.floats(-1e3, 1e3)

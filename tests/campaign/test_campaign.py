@@ -17,11 +17,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.campaign.naming import folder_name
 from bushfit.campaign.session import Visit, session
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, UnitError
 from bushfit.fitting.data import Data
 from bushfit.geometry import Bushing, Direction, Specimen, unit_strain
+from bushfit.reading.tablefile import folder_name
 
 BUSHING = """
 [bushing]

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from shell import GEOMETRY, Run, document, refused, values
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.campaign.written import toml_value
+from bushfit.campaign.toml import toml_value
 
 FILES = ("loop_axial_1.csv", "sweep_axial.csv", "sweep_radial.csv")
 

@@ -16,6 +16,7 @@ from bushfit.campaign.campaign import load_campaign
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document
 from bushfit.model.model import Model
+from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
 
 
@@ -100,7 +101,7 @@ def test_a_raw_record_becomes_a_sweep_that_fits(
     assert list(table)[:3] == ["frequency [Hz]", "amplitude [mm]", "amplitude reached [mm]"]
     assert (table["force distortion [-]"] > 0.005).all()
     assert (table["cycles used"] >= 4).all()
-    sweep = read_sweep(tmp_path / "x/sweep.csv", Direction.AXIAL)
+    sweep = read_sweep(tmp_path / "x/sweep.csv", Direction.AXIAL, SweepFile(file="sweep.csv"))
     off = sweep.stiffness / paper_model.stiffness(Direction.AXIAL, sweep.frequency, sweep.amplitude_reached) - 1.0
     print(f"raw record with noise: |K| and phase of 15 points within {abs(off).max():.1e}")
     assert abs(off).max() < 3e-3

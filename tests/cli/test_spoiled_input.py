@@ -18,7 +18,7 @@ from shell import refused
 from spoiled import CAMPAIGN, FILES, ROWS, Spoiled
 
 from bushfit.cli import cli
-from bushfit.report import disk
+from bushfit.report import folder as results
 
 ERROR = re.compile(r"^(bushfit: error: |Error: )", re.MULTILINE)
 
@@ -60,7 +60,7 @@ def test_a_disk_that_fills_up_after_the_work(command: str, folder: Path, monkeyp
     def full(files: list[int]) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(disk, "flush", full)
+    monkeypatch.setattr(results, "flush", full)
     row = Spoiled(
         command, (command, "model.json", "--json", "-q"), ("x: the results cannot be written", "free some space")
     )

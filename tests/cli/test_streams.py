@@ -17,7 +17,7 @@ import pytest
 from shell import CAMPAIGN
 from spoiled import FILES, MODEL
 
-from bushfit.cli import main, progress
+from bushfit.cli import common, main
 
 PREDICT = ("predict", "model.json", "-o", "x", "--no-plots", "--json", "-q")
 BATCH = ("batch", "campaign.toml", "more.toml", "-o", "x", "--jobs", "1", "--no-plots", "--json", "-q")
@@ -130,7 +130,7 @@ def said(work: Path, monkeypatch: pytest.MonkeyPatch, heard: io.StringIO, *words
 
 
 def test_a_terminal_is_shown_how_far_it_is(work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(progress, "_PATIENCE", 0.0)
+    monkeypatch.setattr(common, "_PATIENCE", 0.0)
     told = said(work, monkeypatch, Terminal(), *SIMULATE, "-o", tmp_path / "x")
     assert "sweeps simulated" in told
     assert "0 of 2" in told
@@ -147,7 +147,7 @@ def test_a_terminal_is_shown_how_far_it_is(work: Path, tmp_path: Path, monkeypat
 def test_nobody_else_is(
     work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, heard: type, patience: float, more: tuple[str, ...]
 ) -> None:
-    monkeypatch.setattr(progress, "_PATIENCE", patience)
+    monkeypatch.setattr(common, "_PATIENCE", patience)
     told = said(work, monkeypatch, heard(), *SIMULATE, *more, "-o", tmp_path / "x")
     assert "simulated " not in told
     assert "\x1b[?25" not in told, "the cursor is left alone"

@@ -14,9 +14,8 @@ from readers import HASH, Curves, abaqus_options, by_abaqus, by_optistruct, by_p
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.export import abaqus, adams, nastran
-from bushfit.export.contract import Exported, Order
+from bushfit.export.contract import MM_T_S_N, Exported, Order, UnitSystem
 from bushfit.export.deck import DOFS, levels
-from bushfit.export.systems import MM_T_S_N, UnitSystem
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result

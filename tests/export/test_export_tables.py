@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 from readers import abaqus_options, bulk_cards, by_abaqus, by_pynastran, teimorbit
 
 from bushfit.export import abaqus, adams, nastran
-from bushfit.export.contract import Order
-from bushfit.export.systems import UnitSystem
+from bushfit.export.contract import Order, UnitSystem
 from bushfit.geometry import Direction, Specimen
 from bushfit.prediction.stiffness import Band, predict
 from bushfit.reading.tablefile import to_xlsx

@@ -15,15 +15,16 @@ from looking import NOISE, SEEDS, look, plan, without
 from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
 from bushfit.errors import BushfitError, FitError
 from bushfit.geometry import Direction, Specimen
-from bushfit.inspection.draft import file_text
 from bushfit.inspection.gathering import gather
 from bushfit.inspection.loops import look_at_loop
 from bushfit.inspection.opening import inspect
+from bushfit.inspection.record import file_text
 from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import Labels
 from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
+from bushfit.reading.stated import LoopFile
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
@@ -128,8 +129,9 @@ def test_rows_of_a_sine_do_not_pass_for_a_triangle(root: Path, tmp_path: Path) -
     lines = (root / "data/arm_bushing/loop_axial_1.csv").read_text(encoding="utf-8").splitlines()
     file = tmp_path / "loop.csv"
     file.write_text("\n".join(line.partition(",")[2] for line in lines), encoding="utf-8")
-    _, wrong = look_at_loop(read_loop(file, Direction.AXIAL, rate=1.2e-4), Labels())
-    _, right = look_at_loop(read_loop(file, Direction.AXIAL, frequency=0.1, waveform="sine"), Labels())
+    triangle, sine = LoopFile(file="", rate=1.2e-4), LoopFile(file="", frequency=0.1, waveform="sine")
+    _, wrong = look_at_loop(read_loop(file, Direction.AXIAL, triangle), Labels())
+    _, right = look_at_loop(read_loop(file, Direction.AXIAL, sine), Labels())
     assert any("as those of a sine" in line for line in wrong)
     assert not any("as those of" in line for line in right)
 

@@ -18,15 +18,13 @@ from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.model.model import FIVE, Model
-from bushfit.planning.campaign import campaign_toml, settings_of
-from bushfit.planning.check import Check, check
+from bushfit.planning.campaign import Check, campaign_toml, check, settings_of
 from bushfit.planning.contract import Knowledge, Noise, Plan, Points, Test, Wanted
 from bushfit.planning.criterion import View
-from bushfit.planning.guess import gent_modulus, guess
-from bushfit.planning.knowledge import noise_of, of_campaign, rig_of
+from bushfit.planning.knowledge import gent_modulus, guess, noise_of, of_campaign, rig_of
 from bushfit.planning.plan import plan
 from bushfit.planning.sensitivity import Information, relative_slopes
-from bushfit.report.planned import plan_sheet
+from bushfit.report.artifacts import plan_sheet
 from bushfit.simulation.measured import simulate
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL

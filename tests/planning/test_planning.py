@@ -22,13 +22,19 @@ from bushfit.jobs.plan import PlanTests
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.planning.candidates import candidates, minutes
 from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, Points, Programme, Test, Wanted, motions
-from bushfit.planning.criterion import Budget, Criterion, View, best_runs, distances, noncentrality_of
-from bushfit.planning.guess import guess
-from bushfit.planning.knowledge import noise_of, of_campaign, of_result
-from bushfit.planning.offer import FOUND, RIVALS_APART
-from bushfit.planning.order import Drifting, ordered
+from bushfit.planning.criterion import (
+    Budget,
+    Criterion,
+    Drifting,
+    View,
+    best_runs,
+    distances,
+    noncentrality_of,
+    ordered,
+)
+from bushfit.planning.knowledge import guess, noise_of, of_campaign, of_result
+from bushfit.planning.offer import FOUND, RIVALS_APART, candidates, minutes
 from bushfit.planning.plan import plan
 from bushfit.planning.sensitivity import Grid, relative_slopes
 from bushfit.simulation.measured import simulate

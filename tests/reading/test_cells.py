@@ -12,12 +12,12 @@ from dialects import DIALECTS, expected
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
-from bushfit.reading.headers import Heading, Vocabulary
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Heading, Vocabulary
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.numerals import Numerals
+from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 
 LOOPS, SWEEPS = Vocabulary(LOOP_COLUMNS, {}), Vocabulary(SWEEP_COLUMNS, {})
 
@@ -59,7 +59,7 @@ def amplitudes(folder: Path, header: str, columns: Mapping[str, str] | None = No
     """Those that a sweep has under a header, over those of the file: 1, or 0.5 where they count peak-to-peak."""
     file = folder / "sweep.csv"
     file.write_text(DIALECTS["plain sweep"].text().replace("amplitude [mm]", header), encoding="utf-8")
-    found = read_sweep(file, Direction.AXIAL, columns=columns, **stated)  # type: ignore[arg-type]
+    found = read_sweep(file, Direction.AXIAL, SweepFile(file=file.name, columns=columns, **stated))  # type: ignore[arg-type]
     return found.amplitude / (expected("sweep")[1] * 1e-3)
 
 

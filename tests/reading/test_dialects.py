@@ -14,6 +14,7 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction, Specimen
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Floats, Loop, Sweep
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 
 
@@ -25,8 +26,9 @@ def written(dialect: Dialect, folder: Path) -> Path:
 
 def by_bushfit(file: Path) -> Loop | Sweep:
     if file.stem == "loop":
-        return read_loop(file, Direction.AXIAL)
-    return read_sweep(file, Direction.AXIAL if file.stem == "sweep" else Specimen("DMA", "modulus"))
+        return read_loop(file, Direction.AXIAL, LoopFile(file=file.name))
+    place = Direction.AXIAL if file.stem == "sweep" else Specimen("DMA", "modulus")
+    return read_sweep(file, place, SweepFile(file=file.name))
 
 
 ALL = {**DIALECTS, **MACHINES}

@@ -17,10 +17,9 @@ from texts import LOOP, LOOP_HEADER, LOOP_ROWS, TIME, loop_from, refused, with_l
 
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.geometry import Direction, Specimen
-from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, rebuild_time
-from bushfit.reading.parallel import by_chunks
+from bushfit.reading.stated import LoopFile
 
 
 @pytest.mark.parametrize(
@@ -58,7 +57,7 @@ def test_a_quote_left_open_in_a_remark_takes_no_rows(first: str, last: str, tmp_
 def test_names_and_units_from_the_campaign(tmp_path: Path) -> None:
     text = LOOP.replace("force [N]", "Kräft").replace("displacement [mm]", "Weg [mm]")
     columns = {"force": "KrÃ¤ft", "displacement": "weg"}
-    stated = {"columns": columns, "units": {"force": "kN"}, "written": FileFormat(encoding="latin-1")}
+    stated = {"columns": columns, "units": {"force": "kN"}, "encoding": "latin-1"}
     loop = loop_from(text, tmp_path, force_sign=1, **stated)
     assert loop.force.max() == pytest.approx(99.96e3, rel=1e-3)
 
@@ -153,7 +152,7 @@ def test_a_file_that_changes_while_it_is_read(then: int, found: str, tmp_path: P
 
     (tmp_path / "loop.csv").write_text("time_s,displacement_mm,force_N\n" + "\n" * 9_599_969)
     with refused("file changes while it is read", f"found: {found} bytes\n  try: wait"):
-        read_loop(Changing(tmp_path / "loop.csv"), Direction.AXIAL)
+        read_loop(Changing(tmp_path / "loop.csv"), Direction.AXIAL, LoopFile(file="loop.csv"))
 
 
 @pytest.mark.parametrize("waveform", ["sine", "triangle"])
@@ -181,11 +180,3 @@ def test_time_rebuilt_from_rate_and_columns_of_one_length(tmp_path: Path) -> Non
 def test_rebuilt_time_always_increases(displacement: Any) -> None:
     for waveform in ("sine", "triangle"):
         assert np.all(np.diff(rebuild_time(displacement, frequency=1.0, waveform=waveform)) > 0)
-
-
-@pytest.mark.parametrize("cores", [1, 5])
-def test_the_number_of_cores_changes_no_digit(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    values = np.random.default_rng(0).standard_normal(10_001)
-    monkeypatch.setattr(os, "cpu_count", lambda: cores)
-    found = by_chunks(lambda part: values[part].sum(), values.size, 100)
-    assert found == [values[start : start + 100].sum() for start in range(0, values.size, 100)]

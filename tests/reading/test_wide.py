@@ -14,11 +14,12 @@ from texts import refused, sweep_from
 
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
+from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import Sweep
 from bushfit.reading.resonance import ResonanceTest, is_resonance, read_resonance
+from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
-from bushfit.reading.words import RESONANCE_COLUMNS
 from bushfit.reduction.resonance import transmissibility
 
 FREQUENCIES = ("5", "15", "25", "35")
@@ -128,7 +129,7 @@ def test_every_form_reads_from_a_workbook(form: str, tmp_path: Path) -> None:
     for row in csv.reader(FORMS[form], delimiter=";"):
         sheet.append([number(cell) if cell and cell.replace(",", "").isdecimal() else cell or None for cell in row])
     book.save(tmp_path / "book.xlsx")
-    check(read_sweep(tmp_path / "book.xlsx", Direction.AXIAL))
+    check(read_sweep(tmp_path / "book.xlsx", Direction.AXIAL, SweepFile(file="book.xlsx")))
 
 
 def test_amplitudes_peak_to_peak_units_stated_and_repeats(tmp_path: Path) -> None:

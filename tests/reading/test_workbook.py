@@ -24,10 +24,10 @@ from texts import refused
 
 from bushfit.errors import MeasurementError, OutputError
 from bushfit.geometry import Direction
-from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.tablefile import Form, defused, ending, to_bytes, to_csv
 
@@ -56,7 +56,7 @@ def workbook(sheets: Sheets, folder: Path) -> Path:
 
 
 def forces(file: Path, **stated: Any) -> Any:
-    return read_loop(file, Direction.AXIAL, written=FileFormat(**stated)).force
+    return read_loop(file, Direction.AXIAL, LoopFile(file=file.name, **stated)).force
 
 
 FORCE = np.array([float(row[2]) for row in NUMBERS["loop"]])
@@ -166,7 +166,7 @@ def test_cells_of_all_sheets_count_together_but_for_those_not_asked_for(
 ) -> None:
     """Which are asked for one after the other, too."""
     file = workbook({"A": table("loop"), "B": table("loop")}, tmp_path)
-    monkeypatch.setattr("bushfit.reading.workbook._MOST_CELLS", 300)
+    monkeypatch.setattr("bushfit.reading.parts._MOST_CELLS", 300)
     with pytest.raises(MeasurementError, match='more, with sheet "B"'):
         forces(file)
     assert np.array_equal(forces(file, sheet="A"), FORCE)
@@ -187,7 +187,7 @@ def test_cells_of_all_sheets_count_together_but_for_those_not_asked_for(
 @pytest.mark.slow
 def test_a_workbook_takes_so_much_time_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "test.xlsx").write_bytes(bombs.workbook([bombs.EMPTY * 5]))
-    monkeypatch.setattr("bushfit.reading.workbook._MOST_SECONDS", 1)
+    monkeypatch.setattr("bushfit.reading.parts._MOST_SECONDS", 1)
     with pytest.raises(MeasurementError, match="more than 1 s of work"):
         forces(tmp_path / "test.xlsx")
 
@@ -217,7 +217,8 @@ def test_tests_are_read_back(form: Form, direction: Direction, tmp_path: Path) -
     files = [tmp_path / f"{name}.{ending(form)}" for name in ("loop", "sweep")]
     for file, table in zip(files, (raw_loop_table(loop), raw_sweep_table(sweep)), strict=True):
         file.write_bytes(to_bytes(file.stem, table, form))
-    found, swept = read_loop(files[0], direction), read_sweep(files[1], direction)
+    found = read_loop(files[0], direction, LoopFile(file=""))
+    swept = read_sweep(files[1], direction, SweepFile(file=""))
     for column in ("time", "displacement", "force"):
         written = getattr(loop, column)
         np.testing.assert_allclose(getattr(found, column), written, rtol=1e-6, atol=1e-9 * np.abs(written).max())

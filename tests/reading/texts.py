@@ -14,6 +14,7 @@ from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 
 TIME = np.arange(40) * 0.1
@@ -28,13 +29,14 @@ SWEEP = "\n".join([SWEEP_HEADER, *SWEEP_ROWS]) + "\n"
 def loop_from(text: str | bytes, folder: Path, **options: Any) -> Loop:
     file = folder / "loop.csv"
     file.write_bytes(text.encode() if isinstance(text, str) else text)
-    return read_loop(file, options.pop("direction", Direction.AXIAL), **options)
+    return read_loop(file, options.pop("direction", Direction.AXIAL), LoopFile(file=file.name, **options))
 
 
 def sweep_from(text: str, folder: Path, **options: Any) -> Sweep:
     file = folder / "sweep.csv"
     file.write_text(text)
-    return read_sweep(file, options.pop("direction", Direction.AXIAL), **options)
+    direction, held = options.pop("direction", Direction.AXIAL), options.pop("at_amplitude", None)
+    return read_sweep(file, direction, SweepFile(file=file.name, **options), at_amplitude=held)
 
 
 @contextmanager

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bushfit.reduction.arrays import scatter
 from bushfit.reduction.cycles import Cycles, least_prominence, lone_outliers, mean_from_steady, turning_points
-from bushfit.reduction.scatter import scatter
 
 TIME = np.arange(4000) / 1000.0
 

@@ -23,6 +23,7 @@ from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
+from bushfit.reading.stated import LoopFile
 from bushfit.reduction.programme import programme
 from bushfit.simulation.measured import simulate
 
@@ -120,7 +121,7 @@ def test_the_true_model_leaves_little_but_noise_of_each_part(paper_model: Model,
 @pytest.mark.parametrize("case", ["pauses", "one speed"])
 def test_without_time_parts_are_the_same(paper_model: Model, case: str) -> None:
     motions, expected = PROGRAMMES[case]
-    loops = programme(replace(recorded(paper_model, *motions), timed=False), rate=1e-4)
+    loops = programme(replace(recorded(paper_model, *motions), timed=False), LoopFile(file="", rate=1e-4))
     sizes = [drive_of(loop).amplitude for loop in loops]
     assert [1e3 * size for size in sizes] == pytest.approx([x for x, _ in expected], rel=1e-2)
     for loop, size in zip(loops, sizes, strict=True):

@@ -17,6 +17,7 @@ from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop
+from bushfit.reading.stated import LoopFile
 from bushfit.reduction.result import Reduction
 from bushfit.reduction.steps import reduce
 from bushfit.report.tables import reduced_table
@@ -237,7 +238,7 @@ def test_the_record_in_data_can_be_made_again(paper_model: Model, root: Path) ->
     ]
     clean = stepped(paper_model, points, step=4e-6, every=100, pause=0.15, cycles=12)
     made = measured(clean, random, noise=5e-4, drift=0.005)
-    kept = read_loop(root / "data/cmp_15961_raw/stepped_sine_axial.csv", Direction.AXIAL)
+    kept = read_loop(root / "data/cmp_15961_raw/stepped_sine_axial.csv", Direction.AXIAL, LoopFile(file=""))
     assert kept.time.size == made.time.size
     np.testing.assert_allclose(kept.displacement, made.displacement, atol=1.1e-8)
     np.testing.assert_allclose(kept.force, made.force, atol=0.02)

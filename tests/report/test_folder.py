@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from bushfit.errors import OutputError
-from bushfit.report import disk
+from bushfit.report import folder as results
 from bushfit.report.folder import write_files
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are forked and killed")
@@ -39,7 +39,7 @@ def exchange_works(folder: Path) -> bool:
     one.mkdir()
     other.mkdir()
     try:
-        disk.exchange(one, other)
+        results.exchange(one, other)
     except OSError:
         return False
     return True
@@ -116,7 +116,7 @@ def test_files_are_flushed_one_by_one_where_the_system_knows_no_other_way(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     flushed: list[int] = []
-    monkeypatch.setattr(disk, "_libc", lambda: None)
+    monkeypatch.setattr(results, "_libc", lambda: None)
     monkeypatch.setattr(os, "fsync", flushed.append)
     write_files(tmp_path / "x", OLD, force=False)
     write_files(tmp_path / "x", NEW, force=True)  # nor can folders be exchanged there
@@ -152,7 +152,7 @@ def test_what_a_killed_run_left_is_removed_but_not_what_another_run_is_at(tmp_pa
     left, at_work, of_the_user = (tmp_path / name for name in (".bushfit-abcdefgh", ".bushfit-ijklmnop", ".bushfit-x"))
     for folder in (left, at_work, of_the_user):
         (folder / "new").mkdir(parents=True)
-    claim = disk.claim(at_work)
+    claim = results.claim(at_work)
     write_files(tmp_path / "x", NEW, force=False)
     claim.close()
     assert {path.name for path in tmp_path.iterdir()} == {"x", at_work.name, of_the_user.name}

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
+import tomllib
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Where the templates are, with the style sheet and the script that go into every page.
 _TEMPLATES = Path(__file__).parent / "templates"
+#: What a warning means for who uses the numbers, by how it is told.
+_USES: Mapping[str, str] = tomllib.loads(Path(__file__).with_name("uses.toml").read_text(encoding="utf-8"))
 
 
 def report_page(documents: Documents, tables: Tables) -> str:
@@ -61,6 +66,11 @@ def filled(template: str, context: dict[str, Any]) -> str:
     return _environment().get_template(template).render(context)
 
 
+def use_of(warning: str) -> str:
+    """What a warning means for the use of the numbers, in one sentence."""
+    return next(use for pattern, use in _USES.items() if re.search(pattern, warning))
+
+
 def _hash(text: str) -> str:
     """A text as a content policy names it."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
@@ -69,8 +79,6 @@ def _hash(text: str) -> str:
 @cache
 def _environment() -> jinja2.Environment:
     import jinja2
-
-    from bushfit.report.page.uses import use_of
 
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_TEMPLATES),

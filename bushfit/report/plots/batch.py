@@ -1,4 +1,4 @@
-"""The picture of a batch: the scatter of each quantity over its bushings, limits drawn, the ones out of them named."""
+"""Pictures of many bushings: the scatter of a batch, its limits and who is out of them; and results side by side."""
 
 import math
 from collections.abc import Collection, Sequence
@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from bushfit.effects.contract import Array
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
+from bushfit.report.compared import SideBySide
 from bushfit.report.plots import style
 from bushfit.units import number
 
@@ -123,8 +125,11 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     count = f": {len(panel.missed)} out" if panel.missed else ""
     axes.set_title(panel.title + count, fontsize=style.SMALL, loc="left", color=_OUT if count else style.INK, pad=3)
     _name(axes, panel, (low, high), names)
-    if cloud:
-        _histogram(axes, shown)
+    if cloud:  # how many bushings lie where, at the right edge
+        counts, edges = np.histogram(shown, bins=60, range=axes.get_ylim())
+        side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
+        side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)
+        side.set_axis_off()
 
 
 def _reach(values: Array, allowed: Sequence[float], ends: Array | None) -> tuple[float, float]:
@@ -185,9 +190,48 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
         )
 
 
-def _histogram(axes: Axes, values: Array) -> None:
-    """Draw how many bushings lie where, at the right edge."""
-    counts, edges = np.histogram(values, bins=60, range=axes.get_ylim())
-    side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
-    side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)
-    side.set_axis_off()
+#: Width of a line [point].
+_STROKE = 1.3
+#: Dashes of the smallest and of the largest value that is held.
+_DASHES = ("-", (0, (4, 1.5)))
+#: Markers on a line, or fewer: they tell lines apart in grey print.
+_MARKS = 5
+
+
+def comparison_figure(found: SideBySide) -> Figure:
+    """All results at every place they are compared at: two rows of panels a place, the differences below the values.
+
+    Drawn over frequency at the smallest and the largest amplitude, or over amplitude where there is one frequency.
+    """
+    first, *others = found.names
+    shown = [found.sides(place) for place in found.places]
+    figure = style.new_figure(f"{', '.join(others)} against {first}", 2 * len(shown) * style.ROW)
+    grid = figure.subplots(2 * len(shown), 2, squeeze=False)
+    looks = dict(zip(found.names, style.styles(len(found.names), "loop"), strict=True))
+    for i, sides in enumerate(shown):
+        for axes, panel in zip(grid[2 * i : 2 * i + 2].flat, sides.panels, strict=True):
+            for line in panel.lines:
+                look, along = looks[line.label], {"ls": _DASHES[line.level], "lw": _STROKE, **style.POINT}
+                markers = {"marker": look.marker, "markevery": max(line.x.size // _MARKS, 1)}
+                axes.plot(line.x, line.value, color=look.color, **markers, **along)
+                # bands of several results lie on each other
+                axes.fill_between(line.x, line.low, line.high, color=look.color, alpha=0.18, lw=0)
+            style.label_axes(axes, sides.along, panel.header if panel.least else f"{sides.place} {panel.header}")
+            style.log_if_wide(axes, panel.lines[0].x)
+            if panel.least:
+                axes.axhline(0.0, color=looks[first].color, lw=_STROKE)
+                style.least_span(axes, panel.least)
+        lines = [
+            Line2D([], [], color=look.color, lw=_STROKE, marker=look.marker, **style.POINT) for look in looks.values()
+        ]
+        dashes = [
+            Line2D([], [], color=style.INK, lw=_STROKE, ls=_DASHES[level]) for level, _ in enumerate(sides.levels)
+        ]
+        called = [f"{label}: {style.file_name(name)}" for label, name in found.names.items()]
+        style.legend(grid[2 * i, 1], lines, called, "", besides=dict(zip(sides.levels, dashes, strict=True)))
+    style.explain(
+        figure,
+        "Shaded: 95 % bands. Lower panels: the band of each point by itself; "
+        "compare.json and the terminal say what holds at all points at once.",
+    )
+    return figure

@@ -113,7 +113,15 @@ def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Fig
     grid = figure.subplots(len(directions), 2, squeeze=False, width_ratios=[1.15, 1.0])
     for (direction, mine), (loop_panel, phase_panel) in zip(directions.items(), grid, strict=True):
         _draw_loops(loop_panel, model, direction, mine)
-        _draw_over_phase(phase_panel, model, mine)
+        style.label_axes(phase_panel, "phase after the upper turn [deg]", "residual / noise")
+        for data_set, look in zip(mine, style.styles(len(mine), "loop"), strict=True):
+            rows, residual = _drawn_rows(data_set), data_set.misfit(model)
+            dots: dict[str, Any] = {"color": look.color, "alpha": 0.4, **style.DOT}
+            phase_panel.plot(phase_after_turn(data_set)[rows], residual[rows], ".", **dots)
+            middle, shares = over_sectors(data_set)
+            phase_panel.plot(middle, shares @ residual, color=look.color, ls=look.dashes, lw=1.4)
+        style.noise_band(phase_panel)
+        phase_panel.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
         loops_legend(phase_panel, mine, besides={"model": Line2D([], [], color=style.INK, lw=0.8)})
     note = _OUTLIERS if any(data_set.drive.outliers["force"].rows.size for data_set in data_sets) else ""
     style.explain(
@@ -142,17 +150,6 @@ def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[
     for data_set in data_sets:
         phase, force = outliers(data_set)
         style.mark_outliers(axes, length * data_set.drive.displacement(phase), factor * force)
-
-
-def _draw_over_phase(axes: Axes, model: Model, data_sets: Sequence[LoopData]) -> None:
-    style.label_axes(axes, "phase after the upper turn [deg]", "residual / noise")
-    for data_set, look in zip(data_sets, style.styles(len(data_sets), "loop"), strict=True):
-        rows, residual = _drawn_rows(data_set), data_set.misfit(model)
-        axes.plot(phase_after_turn(data_set)[rows], residual[rows], ".", color=look.color, alpha=0.4, **style.DOT)
-        middle, shares = over_sectors(data_set)
-        axes.plot(middle, shares @ residual, color=look.color, ls=look.dashes, lw=1.4)
-    style.noise_band(axes)
-    axes.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
 
 
 def loops_legend(axes: Axes, data_sets: Sequence[LoopData], **words: Any) -> None:

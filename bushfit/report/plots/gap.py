@@ -20,8 +20,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import loop_labels, loops_legend
-from bushfit.report.plots.misfit import Map, Side, columns, side_of
-from bushfit.report.plots.points import SECTORS, Kind, by_direction, by_kind
+from bushfit.report.plots.points import SECTORS, Kind, Map, Side, by_direction, by_kind, columns, side_of
 from bushfit.report.plots.prediction import axis_label
 from bushfit.units import told
 
@@ -70,7 +69,10 @@ def gap_figure(
     rows = [(kind, part) for kind in sweeps for part in ("storage", "loss")]
     levels = [np.unique(sides[0].maps[kind].points.held).size for kind, _ in rows]
     heights = [min(max(_LEVEL * count, _LEAST_MAP), _LARGEST_MAP) for count in levels]
-    heights += [_loops_height(mine, len(sides)) for mine in loops.values()]
+    for labels in map(loop_labels, loops.values()):
+        entries = min(len(labels), style.MOST_NAMED + 1)  # one more says how many are not named
+        lines_of_legend = math.ceil(entries / _legend_columns(labels, len(sides))) * len(labels[0].splitlines())
+        heights.append(_LOOPS + style.LINE * max(0, lines_of_legend - _LEGEND_LINES))
     lines = textwrap.wrap(summary, 92)  # as many letters as the width of a figure holds
     figure = style.new_figure(title, sum(heights) + _SCALE * bool(rows) + style.LINE * (len(lines) + 2))
     body: SubFigure = figure.subfigures(1, 1, squeeze=False)[0, 0]
@@ -88,14 +90,6 @@ def gap_figure(
     _head(grid[0], sides)
     style.explain(figure, *_words(sides[0]))
     return figure
-
-
-def _loops_height(data_sets: Sequence[LoopData], sides: int) -> float:
-    """Height of the panels of one direction's loops with their legend [inch]."""
-    labels = loop_labels(data_sets)
-    entries = min(len(labels), style.MOST_NAMED + 1)  # one more says how many are not named
-    lines = math.ceil(entries / _legend_columns(labels, sides)) * len(labels[0].splitlines())
-    return _LOOPS + style.LINE * max(0, lines - _LEGEND_LINES)
 
 
 def _legend_columns(labels: Sequence[str], sides: int) -> int:

@@ -35,9 +35,8 @@ from bushfit.campaign.campaign import load_campaign
 from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
 from bushfit.report.contents import Formats
-from bushfit.report.page import report_page
+from bushfit.report.page import report_page, use_of
 from bushfit.report.page.readback import read_results
-from bushfit.report.page.uses import _ELSE
 
 Results = Callable[[str], Path]
 
@@ -250,7 +249,7 @@ def test_ellipses_are_those_of_the_covariance(results: Results, measured: Path) 
 def test_every_warning_says_what_it_means_for_use(results: Results, measured: Path) -> None:
     told = [row for folder in (results("cmp_15961"), results("mystery_mount"), measured) for row in uses(folder)]
     assert len(told) > 10
-    assert _ELSE not in [use for _, use in told], "each is of a known kind"
+    assert use_of("of no known kind") not in [use for _, use in told], "each is of a known kind"
     means = dict(told)
     (open_,) = (use for warning, use in means.items() if warning.startswith("the tests leave sigma_fmax open"))
     assert "quote no more of this value" in open_

@@ -43,12 +43,11 @@ from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reduction.steps import Reduction, Step, reduce
 from bushfit.report.artifacts import prediction_contents
-from bushfit.report.plots.arms import arms_figure
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.gap import gap_figure
-from bushfit.report.plots.inspection import inspection_figure
+from bushfit.report.plots.inspection import inspection_figure, reduction_figure
+from bushfit.report.plots.master_curve import arms_figure
 from bushfit.report.plots.prediction import fine_grid, prediction_figure
-from bushfit.report.plots.reduction import reduction_figure
 from bushfit.report.plots.style import to_image
 
 

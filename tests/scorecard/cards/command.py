@@ -16,7 +16,6 @@ from typing_extensions import TypedDict
 from bushfit import __version__
 from bushfit.cli.common import Options
 from bushfit.cli.show import new_table
-from bushfit.report.contents import Formats
 from bushfit.report.folder import check_free, to_json
 from bushfit.validation import plain
 from cards.card import Row, card, confusion
@@ -84,7 +83,7 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
     the share right holds them. -o takes scorecard.json. Seeds from 77000 on are kept for cards that are shown; try and
     tune with others.
     """
-    options = Options(formats=Formats(pictures=False), **given)
+    options = Options(no_plots=True, **given)
     folder = options.output
     if keep and folder is None:
         raise click.UsageError("--keep needs a folder: -o/--output")
