@@ -5,11 +5,9 @@ Most of what can be wrong with a campaign stands in cli/spoiled_campaigns.py, wi
 
 from __future__ import annotations
 
-import contextlib
 import math
 import pickle
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -146,28 +144,6 @@ def test_what_is_wrong_has_one_clear_error_which_travels_between_processes(
     assert str(folder) in message
     assert all(word in message for word in words), message
     assert str(pickle.loads(pickle.dumps(caught.value))) == message
-
-
-VALUES = st.recursive(
-    st.sampled_from(['"1 mm"', '"5 Hz"', "1", "-1.5", "nan", "true", '"axial"', '"loop.csv"', "1979-05-27", '"1 MPa"']),
-    lambda inner: (
-        st.lists(inner, max_size=3).map(lambda parts: f"[{', '.join(parts)}]")
-        | st.dictionaries(
-            st.sampled_from(["mu", "value", "direction", "file", "start", "stop", "step"]), inner, max_size=3
-        ).map(lambda table: "{" + ", ".join(f"{key} = {value}" for key, value in table.items()) + "}")
-    ),
-    max_leaves=6,
-)
-KEYS = ["mu", "frequencies", "directions", "parameters", "effects", "loops", "sweeps", "file", "residuals"]
-
-
-@given(st.sampled_from(["fit", "predict", "simulate", "loops", "sweeps"]), st.sampled_from(KEYS), VALUES)
-def test_any_value_is_understood_or_a_clear_error(
-    tmp_path_factory: pytest.TempPathFactory, table: str, key: str, value: Any
-) -> None:
-    header = f"[[{table}]]" if table in ("loops", "sweeps") else f"[{table}]"
-    with contextlib.suppress(BushfitError):
-        campaign_from(f"{BUSHING}\n{header}\n{key} = {value}\n", tmp_path_factory.getbasetemp())
 
 
 @given(st.text(max_size=300))

@@ -22,15 +22,10 @@ from bushfit.model.file import load_result, to_document
 from bushfit.schemas import schema
 
 SPECIMENS = """
-[[specimens]]
-name = "Dumbbell"
-kind = "modulus"
-[[specimens]]
-name = "Quad"
-kind = "shear"
-area = "500 mm^2"
-thickness = "6 mm"
-elements = 4
+specimens = [
+  { name = "Dumbbell", kind = "modulus" },
+  { name = "Quad", kind = "shear", area = "500 mm^2", thickness = "6 mm", elements = 4 },
+]
 """
 RIG = rig("0.4 %", 'displacement_noise = "0.05 %"')
 COLOURED = rig("0.4 %", 'displacement_noise = "0.05 %"', 'force_correlation = "90 %"')
@@ -62,7 +57,7 @@ SHAPES: dict[str, tuple[str, ...]] = {
     "one loop in torsion": (MOUNT + RIG + LOOP.format("torsion", "2 deg", "0.1 Hz"),),
     "amplitudes at one frequency": (MOUNT + RIG + ONE_FREQUENCY,),
     "coupons alone": ('name = "Sheet"\n' + SPECIMENS + RIG + COUPONS,),
-    "coupons beside a bushing": (MOUNT + SPECIMENS + RIG + LOOPS + SWEEPS["axial"] + COUPONS,),
+    "coupons beside a bushing": (SPECIMENS + MOUNT + RIG + LOOPS + SWEEPS["axial"] + COUPONS,),
     "all directions": (MOUNT + RIG + LOOPS + "".join(SWEEPS.values()),),
     "radial alone": (MOUNT + RIG + LOOP.format("radial", "0.3 mm", "0.1 Hz") + SWEEPS["radial"],),
     "a resonance": (MOUNT + RIG + LOOPS + SHAKEN.format(RISING),),

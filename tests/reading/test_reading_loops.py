@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 from pathlib import Path
@@ -112,13 +111,6 @@ BAD_LOOPS: list[tuple[str | bytes, list[str]]] = [
 def test_spoiled_loops_have_one_clear_error(text: str | bytes, words: list[str], tmp_path: Path) -> None:
     with refused("loop.csv", *words):
         loop_from(text, tmp_path)
-
-
-@given(st.binary(max_size=300) | st.text(alphabet='timeforcdsplan[]mN,;"\t\n\r#._0123-e', max_size=300).map(str.encode))
-def test_any_bytes_are_a_loop_or_a_clear_error(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
-    for content in (data, LOOP.encode() + data):
-        with contextlib.suppress(BushfitError):
-            loop_from(content, tmp_path_factory.getbasetemp())
 
 
 def test_a_loop_of_a_coupon_has_strain_and_stress_and_one_in_torsion_radians(tmp_path: Path) -> None:
