@@ -148,20 +148,6 @@ def test_a_force_that_counts_the_other_way_is_turned_and_said(typed: Run, tests:
     assert loop.force[loop.displacement.argmax()] > 0.0
 
 
-def test_coupons_alone_make_a_campaign_without_a_bushing(typed: Run, tmp_path: Path) -> None:
-    for symbol in ("E", "G"):
-        rows = "\n".join(f"{f},{a},{1 + f / 1e3},0.1" for a in (0.1, 1) for f in range(5, 60, 5))
-        text = f"Frequency [Hz],Strain [%],Storage Modulus {symbol}' [MPa],tan delta [-]\n{rows}\n"
-        (tmp_path / f"{symbol}.csv").write_text(text, encoding="utf-8")
-    for options, names in (((), ("bar", "coupon")), (("--specimen", "DMA"), ("DMA", "DMA_2"))):
-        typed("init", tmp_path / "E.csv", tmp_path / "G.csv", *options, "-o", f"{names[0]}.toml")
-        campaign = load_campaign(tmp_path / f"{names[0]}.toml")
-        assert [(one.name, one.strain) for one in campaign.specimens] == list(
-            zip(names, ("tension", "engineering"), strict=True)
-        )
-        assert [sweep.direction for sweep in campaign.sweeps] == list(campaign.specimens)
-
-
 @pytest.mark.parametrize(
     ("files", "said"),
     [

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import sys
-import zipfile
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -135,30 +133,6 @@ def test_spoiled_workbooks_have_one_clear_error(
 ) -> None:
     with refused("test.xlsx", *words):
         forces(workbook(sheets, tmp_path), sheet=sheet)
-
-
-def archive(parts: dict[str, bytes]) -> bytes:
-    file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed:
-        for name, content in parts.items():
-            packed.writestr(name, content)
-    return file.getvalue()
-
-
-HOSTILE: dict[str, Callable[[], bytes]] = {
-    "another archive": lambda: archive({"a.txt": b"x"}),
-    "cut off": lambda: bombs.workbook(["<row/>" * 9000])[:-300],
-    "old Office": lambda: b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600),
-    "bomb": lambda: archive({"xl/workbook.xml": b"", "xl/worksheets/sheet1.xml": bytes((1 << 30) + 1)}),
-    "no content": lambda: archive({"xl/workbook.xml": b"<a>"}),
-}
-
-
-@pytest.mark.parametrize("case", HOSTILE)
-def test_hostile_workbooks_are_refused(case: str, tmp_path: Path) -> None:
-    (tmp_path / "test.xlsx").write_bytes(HOSTILE[case]())
-    with pytest.raises(MeasurementError, match="workbook"):
-        forces(tmp_path / "test.xlsx")
 
 
 def test_cells_of_all_sheets_count_together_but_for_those_not_asked_for(

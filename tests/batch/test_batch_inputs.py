@@ -1,8 +1,11 @@
-"""Operating points in words, limits of every kind, and the four verdicts."""
+"""Manifests of every kind and the names they give, operating points in words, limits and the four verdicts."""
 
 from __future__ import annotations
 
+import csv
+import io
 import math
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +14,91 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.batch.limits import Judge, Limits, Verdict, judge, read_limits
+from bushfit.batch.manifest import Manifest, Settings, read_manifest
 from bushfit.batch.quantities import at_point, parameter_quantities, parse_point
 from bushfit.batch.work import numbers_of
 from bushfit.errors import BatchError, ModelError, UnitError
-from bushfit.geometry import STRAINING, TRANSLATION, Specimen
+from bushfit.geometry import STRAINING, TRANSLATION, Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.reduction.arrays import scatter
+
+
+def written(folder: Path, text: str, name: str = "m.toml") -> str:
+    (folder / name).write_text(text, encoding="utf-8")
+    return str(folder / name)
+
+
+def read(folder: Path, text: str, name: str = "m.toml", given_: Settings | None = None) -> Manifest:
+    return read_manifest(written(folder, text, name), given_ or Settings())
+
+
+def test_toml_rows_take_what_they_do_not_say_from_the_top(tmp_path: Path) -> None:
+    manifest = read(
+        tmp_path,
+        'commands = ["fit", "predict"]\neffects = ["inertia"]\nat = ["axial 25 Hz 0.1 mm"]\n'
+        '[[bushings]]\ncampaign = "a.toml"\n'
+        '[[bushings]]\ncampaign = "sub/b.toml"\nname = "B"\ncommands = ["diagnose"]\ntolerance = "2 %"\n',
+    )
+    one, other = manifest.rows
+    assert (one.name, one.settings.commands, one.settings.effects) == ("a", ("fit", "predict"), ("inertia",))
+    assert (other.name, other.settings.commands, other.settings.tolerance) == ("B", ("diagnose",), 0.02)
+    assert one.campaign == str(tmp_path / "a.toml")
+    assert manifest.points == (parse_point("axial 25 Hz 0.1 mm"),)
+    assert manifest.stem == "m"
+    rows = '[[bushings]]\ncampaign = "b.toml"\ncommands = ["predict"]\n' + ROW + 'commands = ["diagnose"]\n'
+    manifest = read(tmp_path, 'model = "m.json"\ntolerance = "2 %"\neffects = ["inertia"]\n' + rows + ROW)
+    assert [row.settings.commands for row in manifest.rows] == [("predict",), ("diagnose",), ("fit",)]
+    assert {row.settings.model for row in manifest.rows} == {str(tmp_path / "m.json")}
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_csv_of_any_delimiter_with_a_byte_order_mark(tmp_path: Path, delimiter: str) -> None:
+    lines = [["campaign", "name", "commands"], ["a.toml", "A", "fit predict"], [], ["b.toml", "", ""]]
+    text = "\ufeff" + "\r\n".join(delimiter.join(line) for line in lines)
+    manifest = read(tmp_path, text, "m.csv", Settings(directions=(Direction.RADIAL,)))
+    assert [(row.name, row.settings.commands) for row in manifest.rows] == [("A", ("fit", "predict")), ("b", ("fit",))]
+    assert {row.settings.directions for row in manifest.rows} == {("radial",)}
+
+
+def test_a_pattern_takes_every_match_and_names_by_folder_where_files_share_a_name(shop: Path) -> None:
+    manifest = read_manifest(str(shop / "bushings/*/bushing.toml"), Settings())
+    assert [row.name for row in manifest.rows] == ["b0", "b1", "b2", "b3", "b4"]
+    inside = read(shop, '[[bushings]]\ncampaign = "bushings/b[0-2]/*.toml"\n[[bushings]]\ncampaign = "x.toml"\n')
+    assert [row.name for row in inside.rows] == ["b0", "b1", "b2", "x"]
+    assert inside.stem == "m"
+
+
+@given(st.lists(st.text(min_size=1), min_size=1, max_size=8))
+def test_folders_are_of_their_own_and_lead_nowhere_else(
+    tmp_path_factory: pytest.TempPathFactory, names: list[str]
+) -> None:
+    names = [name for name in names if name.strip() and "\0" not in name and name.isprintable()]
+    if not names:
+        return
+    text = io.StringIO()
+    csv.writer(text).writerows([["campaign", "name"], *(["x.toml", name] for name in names)])
+    rows = read(tmp_path_factory.getbasetemp(), text.getvalue(), "names.csv").rows
+    folders = [row.folder for row in rows]
+    assert len({folder.casefold() for folder in folders}) == len(names)
+    assert all(Path(folder).name == folder and folder not in (".", "..") for folder in folders)
+
+
+ROW = '[[bushings]]\ncampaign = "a.toml"\n'
+
+
+def test_a_manifest_of_many_rows_is_read_once_and_small(tmp_path: Path) -> None:
+    count = 1000
+    text = "campaign,name\n" + "".join(f"bushings/{n:05}/campaign.toml,bushing {n}\n" for n in range(count))
+    source = written(tmp_path, text, "many.csv")
+    tracemalloc.start()
+    rows = read_manifest(source, Settings()).rows
+    held, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    print(f"{held / count:.0f} bytes a row")
+    assert len({id(row.settings) for row in rows}) == 1
+    assert held / count < 1000
+
 
 NAN = math.nan
 finite = st.floats(-1e3, 1e3)
