@@ -231,7 +231,9 @@ def wheel(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Path(next(builder.build(directory=str(tmp_path_factory.mktemp("wheel")), versions=["standard"])))
 
 
-def test_measured_rubber_has_a_licence_of_its_own_and_is_left_out_of_what_is_built(root: Path) -> None:
+def test_measured_rubber_has_a_licence_of_its_own_and_nothing_built_holds_it(
+    root: Path, wheel: Path, tmp_path: Path
+) -> None:
     folders = [folder for folder in (root / "data/measured").iterdir() if folder.is_dir()]
     assert folders
     for folder in folders:
@@ -240,9 +242,6 @@ def test_measured_rubber_has_a_licence_of_its_own_and_is_left_out_of_what_is_bui
     targets = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["hatch"]["build"]["targets"]
     assert targets["wheel"]["packages"] == ["bushfit"]
     assert "/data/measured" in targets["sdist"]["exclude"]
-
-
-def test_wheel_and_source_archive_hold_no_measured_rubber(root: Path, wheel: Path, tmp_path: Path) -> None:
     sdist = pytest.importorskip("hatchling.builders.sdist").SdistBuilder(str(root))
     archive = next(sdist.build(directory=str(tmp_path), versions=["standard"]))
     with tarfile.open(archive) as opened:

@@ -144,7 +144,7 @@ sigma_fmax = { sigma = 3, at_least = 5 }
 """
 
 
-def test_limits_of_every_kind(tmp_path: Path) -> None:
+def test_limits_of_every_kind_and_of_the_batch_s_own_scatter(tmp_path: Path) -> None:
     read = limits(tmp_path, ALL)
     values = np.array([1.0, 1.01, 0.99, 1.02, 0.98, 7.0]) * 1e4
     columns = {"sigma_fmax": values}
@@ -160,9 +160,6 @@ def test_limits_of_every_kind(tmp_path: Path) -> None:
     assert judged.allowed["sigma_fmax"] == pytest.approx((middle - 3 * spread, middle + 3 * spread))
     assert judged.allowed["sigma_fmax"][1] < 1.2e4, "one far out must not widen the limits"
     assert judged.notes == []
-
-
-def test_the_batch_s_own_scatter_needs_bushings_that_differ(tmp_path: Path) -> None:
     read = limits(tmp_path, "[parameters.mu]\nsigma = 3\n")
     few = Judge(read, {"mu": np.array([1.0, 2.0, np.nan])}, {})
     assert "2 bushings, and at_least = 10" in few.notes[0]

@@ -92,7 +92,7 @@ def test_capability_is_that_of_fixed_limits_and_of_a_process_that_is_not_steady(
     assert "capability: mu: Pp = " in (made / "said").read_text(encoding="utf-8")
 
 
-def test_few_bushings_tell_little_and_say_so(made: Path) -> None:
+def test_few_bushings_tell_little_and_subgroups_make_charts(made: Path) -> None:
     done = fitted(made, "part_0[0-4]/bushing.toml", "-o", "few")
     assert "5 bushings cannot tell whether it is above 1.33; about" in done.stderr
     found = json.loads((made / "few/batch.json").read_text(encoding="utf-8"))
@@ -100,9 +100,6 @@ def test_few_bushings_tell_little_and_say_so(made: Path) -> None:
     assert found["least_told"] > 20
     page = (made / "few/index.html").read_text(encoding="utf-8")
     assert "limits of 5 bushings are provisional" in page
-
-
-def test_subgroups_make_charts_of_mean_and_range(made: Path) -> None:
     rows = [f"part_{number:02}/bushing.toml,shift {number // 3}\n" for number in range(COUNT)]
     (made / "shifts.csv").write_text("campaign,subgroup\n" + "".join(rows))
     fitted(made, "shifts.csv", "-o", "shifts")

@@ -57,7 +57,7 @@ def campaign_from(text: str, folder: Path) -> Campaign:
     return load_campaign(folder / "campaign.toml")
 
 
-def test_what_a_campaign_says_of_its_files(folder: Path) -> None:
+def test_what_a_campaign_says_of_its_files_their_names_and_limits(folder: Path) -> None:
     (folder / "loop.csv").write_text(LOOP.replace("force [N]", "Kraft").replace("time [s]", "x [s]"))
     said = """
 name = "of files"
@@ -77,9 +77,7 @@ waveform = "sine"
     assert campaign.loops[0].noise == 0.005
     assert campaign.loops[0].force.max() == pytest.approx(1000.0, rel=1e-2)
     assert campaign.sweeps[0].amplitude[0] == pytest.approx(0.05e-3)
-
-
-def test_names_of_tests_differ_and_limits_are_moved_to_what_can_be(folder: Path) -> None:
+    (folder / "loop.csv").write_text(LOOP)
     (folder / "more").mkdir()
     (folder / "more/loop.csv").write_text(LOOP)
     campaign = campaign_from(BUSHING + TESTS + '[[loops]]\nfile = "more/loop.csv"\ndirection = "axial"\n', folder)

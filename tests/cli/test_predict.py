@@ -1,4 +1,4 @@
-"""plan, predict and compare as typed: what is planned, grids, measurements laid over, results side by side, families."""
+"""plan, predict and compare as typed: what is planned, grids, measurements laid over, results side by side."""
 
 from __future__ import annotations
 

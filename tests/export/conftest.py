@@ -65,9 +65,3 @@ def paper(exported: Exported, tmp_path_factory: pytest.TempPathFactory) -> Runni
     ((name, content),) = exported.files.items()
     (folder / name).write_bytes(content)
     return Running(folder / name, folder / "open")
-
-
-@pytest.fixture(scope="session")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder for other FMUs."""
-    return tmp_path_factory.mktemp("others")

@@ -102,28 +102,25 @@ def test_each_effect_follows_the_rig(every: tuple[Model, Running], name: str) ->
     assert counted.mean() > 0.98
 
 
-def test_what_fades_with_memory_follows_the_rig(paper_model: Model, opened: Path) -> None:
+def test_what_fades_with_memory_or_a_preload_follows_the_rig(paper_model: Model, tmp_path: Path) -> None:
     names = tuple(dict.fromkeys(name.partition(".")[0] for name in FADING))
     model = Model.started(paper_model.bushing, (*paper_model.effects, *names), {**paper_model.values, **FADING})
-    running = Running(written(order_of(model, accuracy=2e-3), opened), opened / "fading")
+    running = Running(written(order_of(model, accuracy=2e-3), tmp_path), tmp_path / "fading")
     assert worst(running, model, "random") < LARGEST
     doubled = {"maxwell.mu1": 2.0 * FADING["maxwell.mu1"]}
     assert worst(running, model.with_values(doubled), "random", values=doubled) < LARGEST
-
-
-def test_preload_of_one_direction_has_values_of_its_own(paper_model: Model, opened: Path) -> None:
     model = paper_model.with_effect("elastic_preload.radial", {"elastic_preload.radial": 1.2})
-    running = Running(written(order_of(model), opened), opened / "preload")
+    running = Running(written(order_of(model), tmp_path), tmp_path / "preload")
     assert {"mu.axial", "mu.radial", "mu.torsion"} <= set(running.reference)
     assert worst(running, model, "random") < LARGEST
 
 
-def test_an_fmu_is_of_the_temperature_asked_for(paper_model: Model, opened: Path) -> None:
+def test_an_fmu_is_of_the_temperature_asked_for(paper_model: Model, tmp_path: Path) -> None:
     """Springs that soften, and a springpot that shifts as well."""
     values = {"temperature.softening": 4e-3, "temperature.shift": 0.08}
     model = paper_model.with_effect("temperature", values)
     plain, at, frequency = order_of(model), 60.0 + CELSIUS, 55.0
-    running = Running(written(replace(plain, temperature=at), opened), opened / "warm")
+    running = Running(written(replace(plain, temperature=at), tmp_path), tmp_path / "warm")
     amplitude, phase = LEVELS[Direction.AXIAL][1], np.arange(30 * 64 + 1) / 64
     motion = np.zeros((phase.size, 3))
     motion[:, 0] = amplitude * np.sin(2.0 * np.pi * phase)

@@ -102,23 +102,23 @@ def test_the_same_model_gives_the_same_bytes_and_another_its_own_guid(paper_mode
     assert ET.fromstring(stiffer["modelDescription.xml"]).get("guid") != own
 
 
-def test_names_with_quotes_and_markup_come_through(paper_model: Model, opened: Path) -> None:
+def test_names_with_quotes_and_markup_come_through(paper_model: Model, tmp_path: Path) -> None:
     assert paper_model.bushing
     bushing = replace(paper_model.bushing, name='"A" & <b>\'\x07é</b> ]]>')
     mount = Specimen('<mount> "&1"', "shear", area=1e-3, thickness=5e-3)
     model = Model(bushing, paper_model.effects, paper_model.values)
     wanted = order_of(model, (Direction.AXIAL, mount), specimens=(mount,))
-    file = written(wanted, opened)
+    file = written(wanted, tmp_path)
     assert file.name == "bushfit_a_b_b.fmu"
     assert validate_fmu(str(file)) == []
-    running = Running(file, opened / "named")
+    running = Running(file, tmp_path / "named")
     assert running.description.modelName == '"A" & <b>\'_é</b> ]]>'
     assert running.inputs == ["displacement.axial", 'displacement.<mount> "&1"']
     force = running.run(1e-4 * np.linspace(0.0, 1.0, 11)[:, None] * np.ones(2), 1e-3)
     assert np.all(np.diff(force, axis=0) > 0.0)
     coupon = Specimen("DMA", "modulus")
     alone = order_of(Model(None, paper_model.effects, paper_model.values), (coupon,), specimens=(coupon,))
-    running = Running(written(alone, opened), opened / "coupon")
+    running = Running(written(alone, tmp_path), tmp_path / "coupon")
     assert (running.inputs, running.outputs) == (["strain.DMA"], ["stress.DMA"])
 
 
@@ -152,7 +152,9 @@ def test_instances_do_not_see_each_other_and_a_state_is_taken_up_again(paper: Ru
     other.freeInstance()
 
 
-def test_wrong_calls_are_refused(paper: Running, capfd: pytest.CaptureFixture[str]) -> None:
+def test_wrong_calls_are_refused_and_output_before_the_first_step_is_that_of_the_input(
+    paper: Running, capfd: pytest.CaptureFixture[str], paper_model: Model
+) -> None:
     with pytest.raises(Exception, match="instantiate"):
         paper.instance(guid="{00000000-0000-0000-0000-000000000000}")
     made = paper.begun(paper.instance())
@@ -165,9 +167,6 @@ def test_wrong_calls_are_refused(paper: Running, capfd: pytest.CaptureFixture[st
         made.getReal([10_000])
     assert made.getReal([paper.reference["mu"]]) == [1.09e6]
     made.freeInstance()
-
-
-def test_output_before_the_first_step_is_that_of_the_input(paper: Running, paper_model: Model) -> None:
     made = paper.instance()
     made.enterInitializationMode()
     made.setReal([paper.reference["displacement.axial"]], [1e-4])

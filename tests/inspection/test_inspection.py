@@ -28,6 +28,22 @@ from bushfit.reading.stated import LoopFile
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
+
+@pytest.fixture(scope="module")
+def clean(paper_model: Model) -> Undisturbed:
+    return undisturbed(paper_model, plan(), steps_per_cycle=256)
+
+
+@pytest.fixture
+def loop(clean: Undisturbed) -> Loop:
+    return measure(clean, plan(seed=1, force_noise=3e-3, displacement_noise=2e-4)).loops[0]
+
+
+@pytest.fixture
+def sweep(clean: Undisturbed) -> Sweep:
+    return measure(clean, plan(seed=1, noise=5e-3, gain_error=2e-3, phase_error=2e-3)).sweeps[0]
+
+
 CHANNELS = ("time", "displacement", "force")
 
 

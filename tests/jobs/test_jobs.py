@@ -53,7 +53,9 @@ def test_the_grid_lies_within_what_all_were_fitted_at(paper_model: Model, other_
     assert (frequency.min(), frequency.max(), amplitude.min(), amplitude.max()) == pytest.approx((6, 9, 1.2e-4, 1.8e-4))
 
 
-def test_a_place_beyond_what_one_was_fitted_at_is_warned_of_by_its_label(paper_model: Model) -> None:
+def test_what_lies_beyond_one_is_warned_of_and_another_shape_is_compared_at_the_same_displacement(
+    paper_model: Model,
+) -> None:
     entries = [
         Entry("one", "one.json", fitted(paper_model, (5.0, 155.0), (1e-4, 1e-3))),
         Entry("two", "two.json", fitted(paper_model, (200.0, 300.0), (1e-4, 1e-3))),
@@ -61,9 +63,6 @@ def test_a_place_beyond_what_one_was_fitted_at_is_warned_of_by_its_label(paper_m
     found = Compare().run(entries)
     assert any(line.startswith("B: axial: predicted at frequencies of 5 to 155 Hz") for line in found.warnings)
     assert not any(line.startswith("A: axial: predicted") for line in found.warnings)
-
-
-def test_a_bushing_of_another_shape_is_compared_at_the_same_displacement(paper_model: Model) -> None:
     longer = replace(paper_model, bushing=Bushing("longer", 0.010, 0.018, 0.068))
     entries = [Entry(m.name, m.name, fitted(m, (1.0, 155.0), (1e-4, 1e-3))) for m in (paper_model, longer)]
     (pair,) = Compare().run(entries).comparisons

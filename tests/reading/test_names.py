@@ -79,15 +79,7 @@ def test_one_word_of_four_languages_settles_the_direction(name: str, direction: 
     assert named_direction([name]) is direction
 
 
-def test_the_name_goes_before_the_headers_and_angles_before_both() -> None:
-    headers = ["Radialweg [mm]", "Kraft [N]"]
-    assert direction_of_file(Path("radial/axial_1.csv"), headers, turns=False) is Direction.AXIAL
-    assert direction_of_file(Path("axial/loop_1.csv"), headers, turns=False) is Direction.RADIAL
-    assert direction_of_file(Path("axial_1.csv"), headers, turns=True) is Direction.TORSION
-    assert direction_of_file(Path("loop_1.csv"), ["Weg [mm]"], turns=False) is None
-
-
-def test_lines_above_a_table() -> None:
+def test_lines_above_a_table_and_the_name_before_the_headers() -> None:
     lines = [
         "# Prüftemperatur: 23,5 °C",
         "Datum;2024-05-03",
@@ -105,6 +97,11 @@ def test_lines_above_a_table() -> None:
     assert (said.date, said.operator, said.preload, said.specimen_number) == ("2024-05-03", "3", "2 kN", "17")
     assert amplitudes(said) == [("0.2 mm", "peak-to-peak")]
     assert [each.text for each in said.of("Hz")] == ["10 Hz"]
+    headers = ["Radialweg [mm]", "Kraft [N]"]
+    assert direction_of_file(Path("radial/axial_1.csv"), headers, turns=False) is Direction.AXIAL
+    assert direction_of_file(Path("axial/loop_1.csv"), headers, turns=False) is Direction.RADIAL
+    assert direction_of_file(Path("axial_1.csv"), headers, turns=True) is Direction.TORSION
+    assert direction_of_file(Path("loop_1.csv"), ["Weg [mm]"], turns=False) is None
 
 
 @given(st.text())

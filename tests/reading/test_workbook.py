@@ -135,28 +135,6 @@ def test_spoiled_workbooks_have_one_clear_error(
         forces(workbook(sheets, tmp_path), sheet=sheet)
 
 
-def test_cells_of_all_sheets_count_together_but_for_those_not_asked_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Which are asked for one after the other, too."""
-    file = workbook({"A": table("loop"), "B": table("loop")}, tmp_path)
-    monkeypatch.setattr("bushfit.reading.parts._MOST_CELLS", 300)
-    with pytest.raises(MeasurementError, match='more, with sheet "B"'):
-        forces(file)
-    assert np.array_equal(forces(file, sheet="A"), FORCE)
-    with pytest.raises(MeasurementError, match="at most 300 cells"):
-        forces(file, sheet="B")
-    # Beside one that would fill the memory stands one that is used.
-    rows = "".join(
-        "<row>" + "".join(f'<c t="str"><v>{cell}</v></c>' for cell in row) + "</row>"
-        for row in [["t [s]", "Weg [mm]", "Kraft [N]"], *NUMBERS["loop"]]
-    )
-    (tmp_path / "test.xlsx").write_bytes(bombs.workbook([bombs.far_apart(), rows]))
-    assert np.array_equal(forces(tmp_path / "test.xlsx", sheet="S2"), FORCE)
-    with pytest.raises(MeasurementError, match="the workbook is too large"):
-        forces(tmp_path / "test.xlsx")
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows bounds no process")
 @pytest.mark.slow
 def test_a_workbook_takes_so_much_time_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -216,9 +194,28 @@ RUN = ["=1+1", "+cmd", "-2+3", "@SUM(A1)", "\t=1", "  =1", '=HYPERLINK("http://x
 STAY = ["loop_axial_1", "0.1 mm", "a=b", "A-4", "", "'quoted'", "Prüfling 3"]
 
 
-def test_what_a_sheet_does_not_hold_is_refused_and_not_cut(tmp_path: Path) -> None:
+def test_what_a_sheet_does_not_hold_is_refused_and_cells_of_all_sheets_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     wide = pd.DataFrame(np.ones((1, 16_385)), columns=[f"c{n}" for n in range(16_385)])
     assert to_bytes("t", wide, "csv")
     with pytest.raises(OutputError, match="too large for a sheet"):
         to_bytes("t", wide, "xlsx")
     assert to_bytes("t", wide, "csv")
+    # Which are asked for one after the other, too.
+    file = workbook({"A": table("loop"), "B": table("loop")}, tmp_path)
+    monkeypatch.setattr("bushfit.reading.parts._MOST_CELLS", 300)
+    with pytest.raises(MeasurementError, match='more, with sheet "B"'):
+        forces(file)
+    assert np.array_equal(forces(file, sheet="A"), FORCE)
+    with pytest.raises(MeasurementError, match="at most 300 cells"):
+        forces(file, sheet="B")
+    # Beside one that would fill the memory stands one that is used.
+    rows = "".join(
+        "<row>" + "".join(f'<c t="str"><v>{cell}</v></c>' for cell in row) + "</row>"
+        for row in [["t [s]", "Weg [mm]", "Kraft [N]"], *NUMBERS["loop"]]
+    )
+    (tmp_path / "test.xlsx").write_bytes(bombs.workbook([bombs.far_apart(), rows]))
+    assert np.array_equal(forces(tmp_path / "test.xlsx", sheet="S2"), FORCE)
+    with pytest.raises(MeasurementError, match="the workbook is too large"):
+        forces(tmp_path / "test.xlsx")

@@ -206,22 +206,7 @@ def test_a_new_folder_is_made_and_one_that_stands_keeps_rights_subfolders_and_li
     assert folder.stat().st_mode & 0o777 == 0o750
 
 
-def test_a_file_or_a_folder_in_the_way(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("a file")
-    (tmp_path / "x" / "a.csv").mkdir(parents=True)
-    for folder, says in (
-        ("file", "not a folder"),
-        ("file/below", "cannot be written"),
-        ("x", "a folder stands where a file goes"),
-    ):
-        for force in (True, False):
-            with pytest.raises(OutputError, match=says):
-                write_files(tmp_path / folder, FILES, force=force)
-    assert (tmp_path / "file").read_text() == "a file"
-    assert list((tmp_path / "x").iterdir()) == [tmp_path / "x" / "a.csv"]
-
-
-def test_force_takes_away_what_the_same_command_wrote_before(tmp_path: Path) -> None:
+def test_a_file_in_the_way_stops_and_force_takes_away_what_the_same_command_wrote(tmp_path: Path) -> None:
     """Not what another wrote, what somebody has changed since, or what stands there besides."""
     folder = tmp_path / "x"
     for names, by in (("abc", "one"), ("de", "other"), ("fg", "one")):
@@ -234,6 +219,18 @@ def test_force_takes_away_what_the_same_command_wrote_before(tmp_path: Path) -> 
     assert contents(folder, "[!.]*") == {"b.csv": b"mine", "notes.txt": b"mine", **new}
     write_files(folder, {"h.csv": b"1"}, force=True, by="one")
     assert set(contents(folder, "[!.]*")) == {"b.csv", "e.csv", "h.csv", "notes.txt"}
+    (tmp_path / "file").write_text("a file")
+    (tmp_path / "y" / "a.csv").mkdir(parents=True)
+    for folder, says in (
+        ("file", "not a folder"),
+        ("file/below", "cannot be written"),
+        ("y", "a folder stands where a file goes"),
+    ):
+        for force in (True, False):
+            with pytest.raises(OutputError, match=says):
+                write_files(tmp_path / folder, FILES, force=force)
+    assert (tmp_path / "file").read_text() == "a file"
+    assert list((tmp_path / "y").iterdir()) == [tmp_path / "y" / "a.csv"]
 
 
 @pytest.mark.parametrize(

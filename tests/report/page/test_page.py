@@ -259,7 +259,7 @@ def uses(folder: Path) -> list[tuple[str, str]]:
     return [(unescape(warning), unescape(use)) for warning, use in found]
 
 
-def test_loss_angles_are_the_arc_tangents_of_the_loss_factors(results: Results) -> None:
+def test_loss_angles_and_maps_are_those_of_the_tables(results: Results) -> None:
     rows = re.findall(r'<td align="right" data-head="([^"]*)">([^<]*)</td>', page_of(results("cmp_15961")))
     angles, factors = (
         [float(cell) for head, cell in rows if head == key] for key in ("Loss angle [deg]", "Loss factor")
@@ -270,10 +270,7 @@ def test_loss_angles_are_the_arc_tangents_of_the_loss_factors(results: Results) 
     tables = [pd.read_csv(results("cmp_15961") / f"{place}.csv") for place in ("axial", "radial")]
     sizes = np.log10([1e3 * size for table in tables for size in table["stiffness [N/mm]"]])
     assert (float(low), float(high)) == pytest.approx((20 * sizes.min(), 20 * sizes.max()), abs=0.06)
-
-
-def test_maps_are_measured_less_model(results: Results) -> None:
-    """The mean of what is left of a direction, of the plain model and with the effect, as in words."""
+    # The mean of what is left of a direction, of the plain model and with the effect, as in words.
     folder = results("mystery_mount")
     gap = pd.read_csv(folder / "gap.csv")
     radial = gap[(gap["direction"] == "radial") & (gap["kind"] == "sweep")]

@@ -109,19 +109,6 @@ def test_files_are_drawn_as_they_are_together_and_alone(root: Path) -> None:
         whole(inspection_figure([one]))
 
 
-def test_files_of_one_direction_are_drawn_alike_and_pictures_say_which_they_are(root: Path) -> None:
-    """Loops to 1 and 2 mm in the same scales, with their folders where names repeat; others each in their own."""
-    names = ("practice/case_000", "arm_bushing")
-    every = [inspect(root / f"data/{name}/loop_axial_{number}.csv", {}) for name in names for number in (1, 2)]
-    for page, name in enumerate(names):
-        figure = inside(inspection_figure(every, 2 * page, 2))
-        loops = [axes for axes in figure.axes if axes.get_xlabel() == "displacement [mm]"]
-        assert figure.get_suptitle() == f"Test files as they are, {page + 1} of 2"
-        assert [title.split("/")[0] for title in titles(figure)] == [name.split("/")[-1]] * 2
-        for ends in ([axes.get_xlim() for axes in loops], [axes.get_ylim() for axes in loops]):
-            assert (ends[0] == ends[1]) is (page == 0)
-
-
 def test_reduction(paper_model: Model) -> None:
     operating = [(f, 30.0 * a) for a in (1e-4, 4e-4) for f in (10.0, 30.0)]
     history = stepped(paper_model, operating, direction=Direction.TORSION)
@@ -151,7 +138,7 @@ def test_arms_are_drawn_over_what_they_stand_for(paper_model: Model) -> None:
     assert "in place of the springpot" in note(figure)
 
 
-def test_prediction_over_frequency_and_amplitude(paper_model: Model, swept: Swept) -> None:
+def test_prediction_over_frequency_and_amplitude_and_means_of_repeats(paper_model: Model, swept: Swept) -> None:
     prediction, curves = predicted(paper_model, Direction.AXIAL)
     figure = prediction_figure(prediction, [swept(paper_model)], "CMP 15 961", curves=curves, note="A word more.")
     shown = ("axial stiffness |K| [N/mm]", "axial loss factor [-]")
@@ -164,9 +151,6 @@ def test_prediction_over_frequency_and_amplitude(paper_model: Model, swept: Swep
     line = lines(figure.axes[0])[0]
     spot = np.flatnonzero(np.isclose(line.get_xdata(), 5.0))[0]
     assert line.get_ydata()[spot] == pytest.approx(591.0, rel=1e-3)
-
-
-def test_points_are_means_of_repeats_of_the_same_level_and_direction(paper_model: Model, swept: Swept) -> None:
     prediction, _ = predicted(paper_model, Direction.AXIAL, amplitudes=np.array([2e-4, 3e-4]))
     sweeps = [swept(paper_model), swept(paper_model, Direction.RADIAL)]
     axes = prediction_figure(prediction, sweeps, "").axes[0]

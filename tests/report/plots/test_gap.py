@@ -85,7 +85,9 @@ def test_rows_are_directions_and_parts_columns_before_and_after(
     assert {text.get_text() for text in bar.texts} == {"measured\nbelow model", "measured\nabove model"}
 
 
-def test_one_symmetric_scale_for_all_maps(paper_model: Model, heavier: Heavier, campaign: list[DataSet]) -> None:
+def test_one_symmetric_scale_and_cells_that_are_measured_less_model_over_noise(
+    paper_model: Model, heavier: Heavier, campaign: list[DataSet], swept: Swept
+) -> None:
     figure = gap_figure(paper_model, heavier(0.1), campaign, "mount", "")
     coloured = [found for axes in maps(figure) for found in cells(axes)]
     assert len(coloured) == 8
@@ -98,9 +100,6 @@ def test_one_symmetric_scale_for_all_maps(paper_model: Model, heavier: Heavier, 
     assert above[0] > above[2], "red above"
     share = np.mean(np.abs(np.concatenate([values(axes) for axes in maps(figure)])) > norm.vmax)
     assert share <= 0.02
-
-
-def test_a_cell_is_measured_less_model_over_the_noise_of_the_mean(paper_model: Model, swept: Swept) -> None:
     data_set = swept(paper_model)
     harder = paper_model.with_values({name: 1.2 * paper_model.values[name] for name in ("mu", "m", "sigma_fmax")})
     axes = maps(gap_figure(harder, paper_model, [data_set], "", ""))
