@@ -146,24 +146,17 @@ def test_examples_of_the_help_work(typed: Run, root: Path, tmp_path: Path, comma
 MISTAKES = {"plain,peak_to_peak:sweep_axial", "plain,peak_to_peak:sweep_radial"}
 PLACES = {"plain,axial", "plain,radial", "plain,torsion"}
 ASKED = [
-    ("fit-", {"plain,fit-static", "plain,fit-dynamic"}),
-    ("fit|x.toml|--prof", {"plain,--profile"}),
-    ("fit|x.toml|--loss|", {"plain,linear", "plain,soft_l1"}),
-    ("export|m.json|--format|na", {"plain,nastran"}),
-    ("run|conf", {"file,conf"}),
-    ("run|x.toml|-o|res", {"dir,res"}),
-    ("init|x.csv|--direction|ra", {"plain,radial"}),
+    ("fit-", {"plain,fit-static", "plain,fit-dynamic"}), ("fit|x.toml|--prof", {"plain,--profile"}),
+    ("fit|x.toml|--loss|", {"plain,linear", "plain,soft_l1"}), ("export|m.json|--format|na", {"plain,nastran"}),
+    ("run|conf", {"file,conf"}), ("run|x.toml|-o|res", {"dir,res"}), ("init|x.csv|--direction|ra", {"plain,radial"}),
     ("fit|configs/epdm_70.toml|--direction|", {*PLACES, "plain,DMA", "plain,DMA 2", "plain,mount"}),
-    ("fit|configs/lost.toml|--direction|", PLACES),
-    ("fit|half.toml|--direction|", PLACES),
+    ("fit|configs/lost.toml|--direction|", PLACES), ("fit|half.toml|--direction|", PLACES),
     ("fit|README.md|--effect|interf", {"plain,interface_slip"}),
-    ("diagnose|configs/cmp_15961.toml|--adopt|peak_to", MISTAKES),
-    ("diagnose|--without|inerti", {"plain,inertia"}),
+    ("diagnose|configs/cmp_15961.toml|--adopt|peak_to", MISTAKES), ("diagnose|--without|inerti", {"plain,inertia"}),
     ("plan|x.toml|--rivals|delay,iner", {"plain,delay,inertia"}),
-    ("compare|x.toml|--families|sliders+kra", {"plain,sliders+kraus"}),
-    ("schema|mod", {"plain,model"}),
+    ("compare|x.toml|--families|sliders+kra", {"plain,sliders+kraus"}), ("schema|mod", {"plain,model"}),
     ("inspect|configs/cmp_15961.toml|--thou", {"plain,--thousands"}),
-]
+]  # fmt: skip
 
 
 def asking(*words: str) -> dict[str, str]:

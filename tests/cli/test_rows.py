@@ -18,13 +18,10 @@ from bushfit.campaign.campaign import load_campaign
 HEADERS = ("Frequency [Hz]", "Amplitude [mm]", "Stiffness [N/mm]", "Loss factor [-]")
 #: Header of the column, its words for axial and radial, and the delimiter; beside semicolons decimals have a comma.
 DIRECTIONS = {
-    "English": ("Direction", "Axial", "Radial", ","),
-    "short": ("Dir.", "ax", "rad", "\t"),
-    "German": ("Prüfrichtung", "axial", "radial", ";"),
-    "French": ("Direction", "axiale", "radiale", ";"),
-    "Italian": ("Direzione", "assiale", "radiale", ";"),
-    "Spanish": ("Dirección", "axial", "radial", ";"),
-}
+    "English": ("Direction", "Axial", "Radial", ","), "short": ("Dir.", "ax", "rad", "\t"),
+    "German": ("Prüfrichtung", "axial", "radial", ";"), "French": ("Direction", "axiale", "radiale", ";"),
+    "Italian": ("Direzione", "assiale", "radiale", ";"), "Spanish": ("Dirección", "axial", "radial", ";"),
+}  # fmt: skip
 Rows = list[tuple[float, ...]]
 
 

@@ -29,20 +29,14 @@ LOOPS, SWEEPS = Vocabulary(LOOP_COLUMNS, {}), Vocabulary(SWEEP_COLUMNS, {})
 @pytest.mark.parametrize(
     ("vocabulary", "header", "heading"),
     [
-        (LOOPS, "Prüfkraft [kN]", Heading("force", "kN")),
-        (LOOPS, "PRUEFKRAFT in N", Heading("force", "N")),
-        (LOOPS, "F / kN", Heading("force", "kN")),
-        (LOOPS, "Axial displacement_mm", Heading("displacement", "mm")),
-        (LOOPS, "力\uff08N\uff09", Heading("force", "N")),
-        (LOOPS, "f [Hz]", None),
-        (LOOPS, "force of habit", None),
-        (LOOPS, "x" * 201, None),
-        (SWEEPS, "f [Hz]", Heading("frequency", "Hz")),
-        (SWEEPS, "F [N]", None),
+        (LOOPS, "Prüfkraft [kN]", Heading("force", "kN")), (LOOPS, "PRUEFKRAFT in N", Heading("force", "N")),
+        (LOOPS, "F / kN", Heading("force", "kN")), (LOOPS, "Axial displacement_mm", Heading("displacement", "mm")),
+        (LOOPS, "力\uff08N\uff09", Heading("force", "N")), (LOOPS, "f [Hz]", None), (LOOPS, "force of habit", None),
+        (LOOPS, "x" * 201, None), (SWEEPS, "f [Hz]", Heading("frequency", "Hz")), (SWEEPS, "F [N]", None),
         (Vocabulary(LOOP_COLUMNS, {"force": "Kanal 3"}), "kanal_3 [N]", Heading("force", "N")),
         (Vocabulary(LOOP_COLUMNS, {"force": "Kanal 3"}), "force [N]", None),
     ],
-)
+)  # fmt: skip
 def test_what_a_header_says_of_its_column(vocabulary: Vocabulary, header: str, heading: Heading | None) -> None:
     assert vocabulary.heading(header) == heading
 
