@@ -101,8 +101,13 @@ def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_ampl
 
 def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: Path, tmp_path: Path) -> None:
     truth = root / "data/mystery_mount/open_last/truth.json"
-    for model, said in ((truth, "left out of the prediction"), ("model/model.json", "radial: not fitted")):
-        done = bushfit("predict", model, "-o", tmp_path / "x", "--no-plots", "--force", "--json")
+    shaken = ("--mass", "0.2 kg", "--base-acceleration", "0.1 m/s^2", "--direction", "axial")
+    for said, model, *more in (
+        ("left out of the prediction", truth),
+        ("radial: not fitted", "model/model.json"),
+        ("axial, resonance of 0.2 kg: predicted at strains", "model/model.json", *shaken),
+    ):
+        done = bushfit("predict", model, *more, "-o", tmp_path / "x", "--no-plots", "--force", "--json")
         told = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
         assert len(set(told)) == len(told) > 0
         warnings = json.loads(done.stdout)["warnings"]

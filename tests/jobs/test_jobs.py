@@ -11,12 +11,19 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.geometry import Bushing, Direction
 from bushfit.jobs.compare import Compare, Entry
+from bushfit.jobs.fits import kinds_of_test
 from bushfit.jobs.grid import common_grid, default_grid
 from bushfit.jobs.predict import Predict
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
 from bushfit.report.contents import Kinds
+
+
+def test_a_campaign_has_the_kinds_of_test_that_it_lists(campaign: Campaign) -> None:
+    assert kinds_of_test(replace(campaign, loops=()), ("temperature",)) == ("sweeps",)
+    warm = replace(campaign, sweeps=tuple(replace(sweep, temperature=300.0) for sweep in campaign.sweeps))
+    assert kinds_of_test(warm, ("temperature",)) == ("loops", "sweeps", "master_curve", "shift_factors")
 
 
 def test_a_prediction_is_over_what_was_asked_for_before_what_the_campaign_says(
