@@ -88,6 +88,11 @@ def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep: SweepData) 
         np.testing.assert_allclose(found, influence @ whitening @ whole @ whitening.T, atol=1e-9, err_msg=kind)
 
 
+def test_the_right_model_of_a_sweep_leaves_no_residual(sweep: SweepData, paper_model: Model) -> None:
+    assert np.max(np.abs(sweep.residual(paper_model))) < 1e-10
+    assert np.max(sweep.relative(paper_model)) < 1e-12
+
+
 @pytest.mark.parametrize("kind", ["complex", "magnitude_loss_factor", "loop", "loop of correlated rows"])
 def test_the_jacobian_is_that_of_the_residual(rig: Rig, sweep: SweepData, paper_model: Model, kind: str) -> None:
     data_set: DataSet

@@ -1,4 +1,4 @@
-"""What counts as right and as wrong on a card, and what its rows and its table of confusions count."""
+"""What counts as right and as wrong on a card, and what its rows count."""
 
 from __future__ import annotations
 
