@@ -16,7 +16,7 @@ from cards.card import card
 from cards.command import SCORECARD, command
 from cards.families import DISTURBANCES, RECIPES, campaign_of, tasks
 from cards.faults import FAULTS
-from cards.hidden import FIRST, hidden_campaign, hideable
+from cards.hidden import FIRST, hideable
 from cards.outcome import Outcome, Task
 from cards.outside import OUTSIDE_LAWS
 from cards.recipe import Recipe, cooked
@@ -26,7 +26,6 @@ from pydantic import TypeAdapter
 
 from bushfit.effects import BASE, LIBRARY
 from bushfit.effects.mistakes import MISTAKES
-from bushfit.model.model import FIVE
 from bushfit.simulation.measured import Simulated
 
 COUNT, SEED = 12, 5
@@ -184,15 +183,6 @@ def test_the_same_seed_makes_the_same_campaign(task: Task) -> None:
     assert one.campaign().simulate is None
     if task.kind == "clean":
         assert (sealed.hidden, sealed.visible, one.truth.effects) == ((), 0.0, BASE)
-
-
-@pytest.mark.parametrize("hidden", [("inertia",), ("viscous", "force_offset")])
-def test_what_is_hidden_is_in_the_truth_and_visible(hidden: tuple[str, ...]) -> None:
-    simulated, sealed = hidden_campaign(1, hidden)
-    assert {*simulated.truth.effects} == {*BASE, *hidden}
-    assert {name.partition(".")[0] for name in sealed.values} - set(FIVE) == set(hidden)
-    assert sealed.visible > 0.01
-    assert dict(simulated.truth.values) == sealed.values
 
 
 @pytest.mark.slow
