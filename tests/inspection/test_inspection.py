@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from looking import NOISE, SEEDS, look, plan, without
 
 from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
@@ -23,7 +24,6 @@ from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import Labels
-from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.reading.stated import LoopFile
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed

@@ -14,6 +14,7 @@ import openpyxl
 import pandas as pd
 import pytest
 import xlwt
+from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from dialects import HEADERS, NUMBERS, UNITS
 from odf.opendocument import OpenDocumentSpreadsheet
 from odf.table import Table, TableCell, TableRow
@@ -24,7 +25,6 @@ from bushfit.errors import MeasurementError, OutputError
 from bushfit.geometry import Direction
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.tablefile import Form, defused, ending, to_bytes, to_csv
