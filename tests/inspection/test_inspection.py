@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from looking import NOISE, SEEDS, look, plan, without
 
 from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
@@ -25,6 +24,7 @@ from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import Labels
 from bushfit.reading.stated import LoopFile
+from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 

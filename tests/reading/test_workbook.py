@@ -14,7 +14,6 @@ import openpyxl
 import pandas as pd
 import pytest
 import xlwt
-from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from dialects import HEADERS, NUMBERS, UNITS
 from odf.opendocument import OpenDocumentSpreadsheet
 from odf.table import Table, TableCell, TableRow
@@ -28,6 +27,7 @@ from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.tablefile import Form, defused, ending, to_bytes, to_csv
+from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 
 Sheets = dict[str, list[list[object]]]
 
