@@ -40,7 +40,7 @@ class Format(NamedTuple):
 #: What may be done about files without channels.
 _HINT = "export it again, with its channels"
 _MATLAB_HINT = 'save vectors, or structs of them, with -v7; a table by way of table2struct(T, "ToScalar", true)'
-_UFF_HINT = "export records or frequency responses as dataset 58"
+_UFF_HINT = "export records or frequency responses as dataset 58; of data at nodes (55) only the latter are read"
 #: The formats of recordings.
 _FORMATS = (
     Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", recordings.matlab, _MATLAB_HINT),
