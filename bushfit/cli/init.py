@@ -173,11 +173,11 @@ def _usable(
 
 
 def _look(source: Source, stated: Mapping[str, Any], *, is_sized: bool, is_asked: bool) -> Inspected:
-    """A test of which this is stated; where somebody `is_asked`, how amplitudes count is not taken for granted."""
+    """A test of which this is stated; where somebody `is_asked`, what it needs not say is asked for as well."""
     from bushfit.geometry import Specimen
     from bushfit.inspection.recognition import BLOCK_KEYS
 
-    source = replace(source, stated=stated)
+    source = replace(source, stated={key: value for key, value in stated.items() if value != ""})
     with options_named():
         one = source.inspect()
         if is_sized and isinstance(one.direction, Specimen) and one.direction.kind == "shear":
@@ -192,6 +192,8 @@ def _look(source: Source, stated: Mapping[str, Any], *, is_sized: bool, is_asked
         raise direction_error(source.file, source.sheet)
     if is_asked and one.is_counting_open:
         raise MeasurementError("no header says how amplitudes are counted", file=source.file, hint="--amplitude")
+    if is_asked and one.kind != "history" and "preload" not in {*one.entry, *stated}:
+        raise MeasurementError("nothing says under which preload this was tested", file=source.file, hint="--preload")
     return one
 
 

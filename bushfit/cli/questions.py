@@ -27,13 +27,15 @@ _WORDS = {
     "at_amplitude": 'its amplitude, such as "0.1 mm"',
     "at_frequency": 'its frequency, such as "10 Hz"',
     "temperature": 'its temperature, such as "23 degC"',
+    "preload": 'preload of these tests, such as "500 N axial" or "none"; Enter leaves it open',
     "inner_diameter": 'inner diameter of the rubber, where it meets the inner sleeve, such as "20 mm"',
     "outer_diameter": 'its outer diameter, such as "36 mm"',
     "length": 'its length, the mean of inside and outside, such as "34 mm"',
 }
-#: The key that an answer is of, and of columns and units the role; the one that is asked for once for all files.
+#: The key that an answer is of, and of columns and units the role.
 _Key = tuple[str, str]
-_COUNTING: _Key = ("amplitude", "")
+#: What is asked for once for all files, with what is offered.
+_ONCE: dict[_Key, str] = {("amplitude", ""): "zero-to-peak", ("preload", ""): ""}
 _Seen = TypeVar("_Seen")
 
 
@@ -43,7 +45,7 @@ class Questions:
 
     options: Options
     asked: bool
-    _answers: dict[_Key, Any] = field(default_factory=lambda: {_COUNTING: None})
+    _answers: dict[_Key, Any] = field(default_factory=lambda: dict.fromkeys(_ONCE))
 
     @classmethod
     def of(cls, options: Options, *, no_input: bool) -> Questions:
@@ -73,11 +75,11 @@ class Questions:
     def _answer(self, key: _Key, told: BushfitError) -> dict[_Key, Any]:
         name, role = key
         known = self._answers.get(key)
-        if key != _COUNTING or known is None:
+        if key not in _ONCE or known is None:
             self.options.say(f"\n{told}")
             words = _WORDS.get(name, name.replace("_", " ")).format(role=role.replace("_", " "))
-            usual = "zero-to-peak" if key == _COUNTING else known
-            known = click.prompt(words, default=usual, type=TYPES.get(name), err=True)
+            usual = _ONCE.get(key, known)
+            known = click.prompt(words, default=usual, type=TYPES.get(name), show_default=usual != "", err=True)
             key = ("frequency", "") if name == "rate" and "Hz" in known else key
         self._answers[key] = known
         return {key: known}
