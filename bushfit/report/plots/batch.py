@@ -181,7 +181,7 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
             color=_OUT if k in panel.missed else style.GREY,
             family=style.fonts(),
             parse_math=False,
-            zorder=5,
+            zorder=1.5,
         )
 
 
