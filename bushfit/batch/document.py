@@ -29,16 +29,13 @@ class Found(TypedDict, total=False):
         ),
     ]
     at_bound: Annotated[
-        dict[str, End],
-        Doc("parameters that came to rest on the least or largest value that they may have."),
+        dict[str, End], Doc("parameters that came to rest on the least or largest value that they may have.")
     ]
     nrmse: Annotated[
-        float | None,
-        Doc("root mean square difference of model and tests, relative; null where nothing was fitted."),
+        float | None, Doc("root mean square difference of model and tests, relative; null where nothing was fitted.")
     ]
     reduced_chi_square: Annotated[
-        float | None,
-        Doc("mean square residual in units of noise; null where nothing was fitted."),
+        float | None, Doc("mean square residual in units of noise; null where nothing was fitted.")
     ]
     points: Annotated[
         dict[str, dict[str, list[float | None]]],
@@ -87,8 +84,7 @@ class Control(TypedDict):
     median: Annotated[float, Doc("in the unit of the column.")]
     sigma: Annotated[float, Doc("robust standard deviation, in the unit of the column.")]
     allowed: Annotated[
-        list[float | None],
-        Doc("least and largest, in the unit of the column; null where there is no limit."),
+        list[float | None], Doc("least and largest, in the unit of the column; null where there is no limit.")
     ]
     process: Annotated[Process, Doc("what the order of test tells of it.")]
 

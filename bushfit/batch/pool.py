@@ -35,11 +35,7 @@ _CHUNK_SECONDS, _LARGEST_CHUNK = 0.5, 64
 _CHUNKS_PER_WORKER = 2
 #: Environment of the workers. Python puts the current folder before its own on the path of what it starts, unless told
 #: not to. Below so many bytes glibc keeps freed memory for the next row: handing it back takes a tenth of the time.
-_ENVIRONMENT = {
-    "PYTHONSAFEPATH": "1",
-    "MALLOC_TRIM_THRESHOLD_": "134217728",
-    "MALLOC_MMAP_THRESHOLD_": "33554432",
-}
+_ENVIRONMENT = {"PYTHONSAFEPATH": "1", "MALLOC_TRIM_THRESHOLD_": "134217728", "MALLOC_MMAP_THRESHOLD_": "33554432"}
 
 
 class LocalPool:

@@ -27,10 +27,7 @@ from bushfit.report.folder import unwritable, write_files
 #: All that is written of the whole batch: what is said of it, its table, picture and page.
 KINDS = Kinds(("batch",), ("batch",), ("batch",), ("index",))
 #: The files of these in whatever form, in the batch's folder.
-FILES = [
-    "index.html",
-    *(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture))),
-]
+FILES = ["index.html", *(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture)))]
 #: Keys of a record that are not held in memory: the figures have its numbers, and a later run asks for the files.
 _NOT_HELD = {"parameters", "points", "inputs", "files"}
 

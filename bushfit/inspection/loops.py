@@ -121,7 +121,7 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Fi
     facts = {
         "programme": f"{len(loops)} loops in one record: {_listed([factor * size for size in amplitudes])} {unit} "
         f"at {_listed(frequencies)} Hz, {_listed([min(cycles), max(cycles)], ' to ')} cycles used of each; "
-        f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out",
+        f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out"
     }
     odd = [*wrong_labels(labels, record.direction, amplitudes, frequencies), *odd_channels(record)]
     for place, (loop, drive) in enumerate(zip(loops, drives, strict=True), start=1):

@@ -49,14 +49,12 @@ class InspectedFile(TypedDict):
     kind: Annotated[Kind, Doc("a hysteresis loop, a sweep, or the raw history of a stepped sine.")]
     direction: Annotated[str | None, Doc("of the test, or specimen; null where neither file nor options say it.")]
     written: Annotated[
-        dict[str, str],
-        Doc("how the file is written, by label: encoding, delimiter, decimal mark and so on."),
+        dict[str, str], Doc("how the file is written, by label: encoding, delimiter, decimal mark and so on.")
     ]
     columns: Annotated[tuple[ColumnSeen, ...], Doc("all of them, in order.")]
     facts: Annotated[dict[str, str], Doc("in words, by label.")]
     assumed: Annotated[
-        str | None,
-        Doc("what was assumed, with the option or key that says otherwise; null where nothing was."),
+        str | None, Doc("what was assumed, with the option or key that says otherwise; null where nothing was.")
     ]
     odd: Annotated[list[str], Doc("a sentence for each thing that is odd.")]
 

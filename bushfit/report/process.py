@@ -44,12 +44,10 @@ class Capability(TypedDict):
         Doc('"Cpk" where the chart of 25 bushings or more is steady, else "Ppk"; null without a fixed limit.'),
     ]
     spread: Annotated[
-        tuple[float, float, float] | None,
-        Doc("Cp or Pp, low and high of its 95 % interval; null with one limit."),
+        tuple[float, float, float] | None, Doc("Cp or Pp, low and high of its 95 % interval; null with one limit.")
     ]
     nearest: Annotated[
-        tuple[float, float, float] | None,
-        Doc("Cpk or Ppk likewise (Bissell, Applied Statistics 39 (1990) 331)."),
+        tuple[float, float, float] | None, Doc("Cpk or Ppk likewise (Bissell, Applied Statistics 39 (1990) 331).")
     ]
     capability: Annotated[str, Doc("the same in words, and what it does not tell.")]
 

@@ -63,9 +63,7 @@ def comparison_context(found: SideBySide) -> dict[str, Any]:
         "sizes": [row for place in places for row in _sizes(found, place)],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*found.family_cells()],
-        "judged": len(others) + document["words"][0].startswith("use ")
-        if families
-        else 0,  # older files give no advice
+        "judged": families * (len(others) + document["words"][0].startswith("use ")),  # older files give no advice
         "most": MOST,
         "cells": parameter_cells,
         "chance": chance,
@@ -157,13 +155,7 @@ def _corners(
             sides = alike([row[f"{who} {what}"] for who in ("reference", "other")], 4)
             sure = row[f"{difference}, sure"] == "yes"
             cells.append((*(side + of for side in sides), shown + percent, " to ".join(ends), sure))
-        yield (
-            place,
-            label,
-            f"{number(row['frequency [Hz]'], 4)} Hz",
-            told(length or "", row[heads.amplitude]),
-            *cells,
-        )
+        yield (place, label, f"{number(row['frequency [Hz]'], 4)} Hz", told(length or "", row[heads.amplitude]), *cells)
 
 
 def _files(compared: Sequence[ComparedEntry]) -> list[tuple[str, str]]:

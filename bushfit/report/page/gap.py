@@ -11,7 +11,7 @@ from bushfit.geometry import Place
 from bushfit.report.page.chart import MOST_PLACES, Cells, Panel, maps
 from bushfit.report.page.readback import ReportData
 from bushfit.report.page.sweeps import Level, by_stepped, levels_of
-from bushfit.report.tables import complete, moved_of, numbers
+from bushfit.report.tables import complete, moved_of, numbers, shortened
 from bushfit.units import number, split_header, told
 
 #: Most columns and rows of a map of cells: each is then some pixels wide and high.
@@ -80,10 +80,7 @@ def _map(part: str, levels: Sequence[Level], along: Array, ends: tuple[str, str,
         sums = np.bincount(cell, -np.nan_to_num(off), minlength=size)
         sides.append(np.where(count > 0, sums / np.maximum(count, 1), np.nan).reshape(len(first), -1))
     same = np.array_equal(sides[0], sides[1], equal_nan=True)
-    names = [levels[n].name for n in first]
-    short = [
-        name if len(name) <= _LONGEST else f"{name[: _LONGEST // 2]}…{name[1 - _LONGEST // 2 :]}" for name in names
-    ]
+    short = [shortened(levels[n].name, _LONGEST) for n in first]
     return Cells(part, short, ends, sides[:1] if same else sides)
 
 

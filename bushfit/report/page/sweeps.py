@@ -105,14 +105,9 @@ class Sweeps:
         labels = _four(self.place)[2], _four(self.place)[3]
         series = [
             Series(
-                curve.name,
-                color,
-                dashes,
-                (curve.model[3], curve.model[4]),
-                None,
-                (curve.measured[3], curve.measured[4]),
+                each.name, color, dashes, (each.model[3], each.model[4]), points=(each.measured[3], each.measured[4])
             )
-            for curve, color, dashes in self._looks()
+            for each, color, dashes in self._looks()
         ]
         words = self._in_words(4, labels[1], split_header(labels[0])[0])
         return chart(f"{self.place}: Cole-Cole", labels, series, words)

@@ -64,10 +64,7 @@ _USES = (
     (r"predicted at 23 degC", "May be used at 23 °C; ask for the temperature of use."),
     (r"as if no larger strain went before", "May be used for a part that was not strained further before."),
     (r"as fully recovered", "May be used for a part that rested; soon after a large strain it is softer."),
-    (
-        r"rig's class",
-        "May be used; intervals are as good as this class: repeat a test, or state the class of the rig.",
-    ),
+    (r"rig's class", "May be used; intervals are as good as this class: repeat a test, or state the class of the rig."),
     (
         r"rests on the m.. given in",
         "May be used as far as this bound is known; the value is the bound, not a test result.",

@@ -37,9 +37,7 @@ def comparison_figure(found: SideBySide) -> Figure:
             if panel.least:
                 axes.axhline(0.0, color=looks[first].color, lw=_LINE)
                 style.least_span(axes, panel.least)
-        lines = [
-            Line2D([], [], color=look.color, lw=_LINE, marker=look.marker, **style.POINT) for look in looks.values()
-        ]
+        lines = [look._replace(dashes="-").handle(True) for look in looks.values()]
         dashes = [Line2D([], [], color=style.INK, lw=_LINE, ls=_DASHES[level]) for level, _ in enumerate(sides.levels)]
         called = [f"{label}: {style.file_name(name)}" for label, name in found.names.items()]
         style.legend(grid[2 * i, 1], lines, called, "", besides=dict(zip(sides.levels, dashes, strict=True)))

@@ -13,6 +13,7 @@ from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.plots import style
 from bushfit.report.plots.points import BINS, Kind, Repeats, held_with, ranges
 from bushfit.report.plots.prediction import axis_label
+from bushfit.report.tables import words
 from bushfit.units import for_people, told
 
 #: Colour of a history.
@@ -110,7 +111,7 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
     levels = np.unique(at_level)
     drawn = style.styles(levels.size, held)
     kinds = (
-        (factor * np.abs(sweep.stiffness), f"|K| [{stiffness}]"),
+        (factor * np.abs(sweep.stiffness), f"{words(sweep.direction)[2].replace('stiffness', '|K|')} [{stiffness}]"),
         (sweep.stiffness.imag / sweep.stiffness.real, "loss factor [-]"),
     )
     for axes, (values, label) in zip(pair, kinds, strict=True):

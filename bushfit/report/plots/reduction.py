@@ -85,7 +85,7 @@ def _draw_points(
         axes.tick_params(labelbottom=False)
         style.log_if_wide(axes, steps["frequency"].to_numpy())
     handles = [look.handle(True) for look in looks.values()]
-    style.legend(pair[-1], handles, [told(unit, length * level, digits=4) for level in looks], "amplitude")
+    style.legend(pair[-1], handles, [told(unit, length * level) for level in looks], "amplitude")
 
 
 def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, style.Style]) -> None:

@@ -162,7 +162,7 @@ def test_reduction(paper_model: Model, direction: Direction) -> None:
     figure = whole(reduction_figure(reduction, [history], "$ raw $.csv"))
     unit, length = ("deg", 180.0 / np.pi) if turns else ("mm", 1e3)
     levels = sorted({step.level for step in reduction.steps})
-    assert legend(figure.axes[2]) == [f"{length * level:.4g} {unit}" for level in levels]
+    assert legend(figure.axes[2]) == [f"{length * level:.3g} {unit}" for level in levels]
     assert titles(figure) == [], "the title names one history"
     stiffness = f"{direction} stiffness |K| [{'N m/rad' if turns else 'N/mm'}]"
     moved = "rotation [deg]" if turns else "displacement [mm]"
