@@ -30,9 +30,9 @@ def temperatures_of(table: Table) -> int:
     return 1 if np.ptp(found) <= ONE_TEST else 2
 
 
-def labels_of_file(file: Path, stated: Mapping[str, Any]) -> Labels:
+def labels_of_file(file: Path, sheet: str, stated: Mapping[str, Any]) -> Labels:
     """What the name of a sheet and of its file say of a test; they count amplitudes as is stated, if it is."""
-    said = labels_in_names(stated.get("sheet", ""), file.stem)
+    said = labels_in_names(sheet, file.stem)
     counting = stated.get("amplitude")
     if counting is None:
         return said

@@ -180,7 +180,7 @@ def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) 
     # which of two translations it is makes no difference to reading
     read_as = direction or Direction.AXIAL
     entry = _entry(SweepFile if is_sweep else LoopFile, stated, table, direction)
-    by_name = labels_of_file(file, stated)
+    by_name = labels_of_file(file, table.source.sheet or "", stated)
     said, told, counted = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
     if "at_amplitude" in said:
         entry.pop("amplitude", None)  # counted already

@@ -350,6 +350,11 @@ def resonance_table(found: Resonance) -> pd.DataFrame:
     )
 
 
+def shortened(name: str, letters: int) -> str:
+    """A name of at most so many letters: what is too long loses its middle."""
+    return name if len(name) <= letters else f"{name[: (letters - 1) // 2]}…{name[-(letters // 2) :]}"
+
+
 def spread(count: int, most: int) -> Array:
     """Places of at most so many of `count` things, evenly from the first to the last, (min(count, most),)."""
     return np.linspace(0, count - 1, min(most, count)).round().astype(int)

@@ -290,7 +290,7 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
     together = np.asarray(order), named if all(named) else []
     columns = [Column(name, each, table[name].to_numpy(), *together) for name, each in known.items()]
     by = {each.row - 1: each.by for each in batch.differ if 0 < each.row <= len(table)}
-    shown = [name for name in _WORDS if name in table and (name == "status" or len(set(table[name])) > 1)]
+    shown = [name for name in _WORDS if name in table and len(set(table[name])) > 1]
     remarks = [name for name in _REMARKS if name in table]
     curves = Curves.of(table) if _OFF in table else None
     listed, important = _ordered(table, by)
@@ -348,7 +348,7 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
             }
             for at in chosen
         ],
-        "left": (important - len(first), len(others) - len(sample)),
+        "left_rows": (important - len(first), len(others) - len(sample)),
         "important": important,
         "tones": _TONES,
         "enough": ENOUGH,

@@ -14,6 +14,7 @@ from bushfit.effects.contract import Array
 from bushfit.reduction.arrays import scatter
 from bushfit.report.compared import SideBySide
 from bushfit.report.plots import style
+from bushfit.report.tables import shortened
 from bushfit.units import number
 
 #: Colour of limits and of what is out of them.
@@ -67,7 +68,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
     The names of the bushings, (n,), stand along x too where they are few.
     """
     drawn = panels[:_MOST_PANELS]
-    along = [_short(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
+    along = [shortened(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
     lines = math.ceil(len(drawn) / _COLUMNS)
     height = style.ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * style.FRAME
     height += 0.12 * max(0, max(map(len, along), default=0) - 16)  # there is room for 16 letters as it is
@@ -93,11 +94,6 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
     return style.explained(
         figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more
     )
-
-
-def _short(name: str, letters: int) -> str:
-    """A name of at most so many letters."""
-    return name if len(name) <= letters else name[: letters - 1] + "…"
 
 
 def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
@@ -167,7 +163,7 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
     taken: list[tuple[float, float, int, bool]] = []
     for k in sorted(beyond.union(panel.missed), key=order)[:_MOST_NAMED]:
         value = float(np.clip(panel.values[k], *reach))
-        text = _short(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in beyond else "")
+        text = shortened(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in beyond else "")
         place, above = (k + 0.5) / panel.values.size, value < (reach[0] + reach[1]) / 2.0
         half, line = 0.5 * _LETTER * len(text), 1
         center = min(max(place, half), 1.0 - half)
@@ -189,7 +185,7 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
             color=_OUT if k in panel.missed else style.GREY,
             family=style.fonts(),
             parse_math=False,
-            zorder=5,
+            zorder=1.5,
         )
 
 

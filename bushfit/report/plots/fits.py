@@ -21,12 +21,13 @@ from bushfit.report.plots.points import (
     Points,
     by_direction,
     by_kind,
+    curves_of,
     held_with,
     means,
     over_sectors,
     phase_after_turn,
 )
-from bushfit.report.plots.prediction import FINE, draw, draw_unheld, points_note
+from bushfit.report.plots.prediction import FINE, draw, draw_curves, points_note
 from bushfit.units import for_people, told
 
 #: Height of a panel of residuals [cm].
@@ -47,8 +48,8 @@ def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> F
     figure = style.new_figure(title, (style.ROW + _STRIP) * len(kinds))
     grid = figure.subplots(2 * len(kinds), 2, squeeze=False, height_ratios=[style.ROW, _STRIP] * len(kinds))
     for (kind, mine), pair, strips in zip(kinds.items(), grid[::2], grid[1::2], strict=True):
-        if kind.stepped is None:
-            draw_unheld(pair, kind.place, model, mine)
+        if curves_of(mine, kind):
+            draw_curves(pair, kind, model, mine)
         else:
             points, held = means(mine), held_with(kind.axis)
             levels = np.unique(getattr(points, held))
@@ -85,11 +86,10 @@ def _draw_residuals(
 
 
 def _looks(data_sets: Sequence[SweepData], kind: Kind) -> Iterator[tuple[style.Style, int, Array]]:
-    """How the points of each level are drawn, or of each test where nothing was held: style, number of the test, which
-    of its points."""
-    if kind.stepped is None:
-        for place, look in enumerate(style.styles(len(data_sets), "loop")):
-            yield look._replace(marker="o"), place, data_sets[place].weights > 0.0
+    """How the points of each level are drawn, or of each curve: style, number of the test, which of its points."""
+    if curves := curves_of(data_sets, kind):
+        for curve, look in zip(curves, style.styles(len(curves), kind.palette), strict=True):
+            yield look._replace(marker="o"), curve.test, curve.points & (data_sets[curve.test].weights > 0.0)
         return
     held = held_with(kind.axis)
     levels = np.unique(np.concatenate([getattr(data_set.with_weight(), held) for data_set in data_sets]))

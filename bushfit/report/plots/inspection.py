@@ -17,6 +17,7 @@ from bushfit.reduction.result import Reduction
 from bushfit.report.plots import style
 from bushfit.report.plots.points import BINS, Kind, Repeats, held_with, ranges
 from bushfit.report.plots.prediction import axis_label, pair_labels
+from bushfit.report.tables import words
 from bushfit.units import for_people, told
 
 #: Colour of a history.
@@ -116,7 +117,7 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
     levels = np.unique(at_level)
     drawn = style.styles(levels.size, held)
     kinds = (
-        (factor * np.abs(sweep.stiffness), f"|K| [{stiffness}]"),
+        (factor * np.abs(sweep.stiffness), f"{words(sweep.direction)[2].replace('stiffness', '|K|')} [{stiffness}]"),
         (sweep.stiffness.imag / sweep.stiffness.real, "loss factor [-]"),
     )
     for axes, (values, label) in zip(pair, kinds, strict=True):
@@ -196,7 +197,7 @@ def _draw_points(
         style.label_axes(axes, "", name, steps["frequency"].to_numpy())
         axes.tick_params(labelbottom=False)
     handles = [look.handle(True) for look in looks.values()]
-    style.legend(pair[-1], handles, [told(unit, length * level, digits=4) for level in looks], "amplitude")
+    style.legend(pair[-1], handles, [told(unit, length * level) for level in looks], "amplitude")
 
 
 def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, style.Style]) -> None:
@@ -209,8 +210,8 @@ def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, 
             (pair[1], mine["force_distortion"], style.POINT),
             (pair[1], mine["displacement_distortion"], hollow),
         )
-        for axes, share, words in drawn:
-            axes.plot(mine["frequency"], 100 * share, look.marker, color=look.color, **words)
+        for axes, share, look_of in drawn:
+            axes.plot(mine["frequency"], 100 * share, look.marker, color=look.color, **look_of)
     for axes, name in zip(pair, ("noise [%]", "distortion [%]"), strict=True):
         style.label_axes(axes, "frequency [Hz]", name, steps["frequency"].to_numpy())
         axes.set_ylim(bottom=0.0)

@@ -13,7 +13,8 @@ from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.prediction.stiffness import Band
-from bushfit.reading.measurement import Stepped
+from bushfit.reading.measurement import SAME_TEMPERATURE, Stepped
+from bushfit.units import CELSIUS, number, told
 
 _T = TypeVar("_T", SweepData, LoopData)
 
@@ -47,6 +48,11 @@ class Kind(NamedTuple):
         """What lies along x; the frequency, too, where nothing was held."""
         return "amplitude" if self.stepped == "amplitude" else "frequency"
 
+    @property
+    def palette(self) -> str:
+        """The colours of `curves_of` it."""
+        return "temperature" if self.stepped else "loop"
+
 
 def by_kind(data_sets: Sequence[SweepData]) -> dict[Kind, list[SweepData]]:
     """The sweeps of each place that step through the same, in the order of the tests."""
@@ -54,6 +60,31 @@ def by_kind(data_sets: Sequence[SweepData]) -> dict[Kind, list[SweepData]]:
     for data_set in data_sets:
         kinds.setdefault(Kind(data_set.direction, data_set.sweep.stepped), []).append(data_set)
     return kinds
+
+
+class Curve(NamedTuple):
+    """Points that are drawn as one curve: the number of their test, which of its points, (n,) bool, and a name."""
+
+    test: int
+    points: Array
+    name: str
+
+
+def curves_of(data_sets: Sequence[SweepData], kind: Kind) -> list[Curve]:
+    """The curves of sweeps whose levels tests do not share: each test where nothing was held, and of tests that lie
+    apart in temperature each level of each, the coldest first; none of others."""
+    if kind.stepped is None:
+        return [Curve(at, np.ones(one.frequency.size, dtype=bool), one.name) for at, one in enumerate(data_sets)]
+    degrees = [float(np.mean(one.temperature)) - CELSIUS for one in data_sets]
+    if not np.ptp(degrees) > SAME_TEMPERATURE:
+        return []
+    held = [getattr(one, held_with(kind.axis)) for one in data_sets]
+    unit, scale = ("Hz", 1.0) if kind.axis == "amplitude" else kind.place.display.displacement
+    return [
+        Curve(at, held[at] == level, f"{number(degrees[at], 3)} degC, {told(unit, scale * level)}")
+        for at in np.argsort(degrees, kind="stable").tolist()
+        for level in np.unique(held[at])
+    ]
 
 
 def held_with(axis: Axis) -> Axis:

@@ -23,7 +23,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, ScalarFo
 from bushfit.effects.contract import Array
 from bushfit.errors import CONTROL, printable
 from bushfit.model.covariance import Z95
-from bushfit.report.tables import spread
+from bushfit.report.tables import shortened, spread
 
 #: Width of a figure [cm]: the text of a page of A4.
 _WIDTH = 16.0
@@ -218,9 +218,7 @@ def file_name(name: str, letters: int = 20) -> str:
 
     Three columns of a legend with names of twenty letters fill the width of a figure.
     """
-    if len(name) > letters:
-        name = f"{name[: letters // 2 - 1]}…{name[-letters // 2 :]}"
-    return name.replace("$", r"\$")
+    return shortened(name, letters).replace("$", r"\$")
 
 
 def first_sentences(sentences: Sequence[str]) -> str:

@@ -21,7 +21,7 @@ from bushfit.report.page import folder_contents
 #: A page at most [bytes].
 LARGEST = 500_000
 #: Elements that have no end.
-VOID = {"meta", "link", "br", "hr", "img", "input"}
+VOID = {"meta", "link", "br", "wbr", "hr", "img", "input"}
 #: What makes a browser load something.
 LOADING = {"src", "srcset", "data", "poster", "background", "action", "formaction", "xlink:href"}
 
