@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.places import refuse_strain
 from bushfit.campaign.session import measured_session
 from bushfit.effects import BASE, effect_named, effect_of, with_base
 from bushfit.effects.contract import Array
@@ -45,15 +46,20 @@ class Data:
         Raises:
             FitError: a loop is not one whole cycle or more, rows of it are missing, or it gives energy.
             ModelError: [fit] effects has an unknown effect, or one twice.
+            CampaignError: a test strains its rubber by more than any bears.
         """
         with naming(campaign.path, place="[fit] effects"):
             Model.started(None, with_base(campaign.fit.effects), {})
-        return cls(
+        data = cls(
             campaign,
             tuple(loop_data(campaign.loops, campaign.rig, without_outliers=campaign.fit.loss != "linear")),
             tuple(sweep_data(campaign.sweeps, campaign.fit.residuals, campaign.rig)),
             {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
-        ).in_session()
+        )
+        for data_set in data.data_sets:
+            with naming(campaign.path, data_set.name):
+                refuse_strain(campaign.bushing, data_set.direction, data_set.test)
+        return data.in_session()
 
     def in_session(self) -> "Data":
         """The same data, each point with what it was measured under."""
