@@ -90,5 +90,6 @@ def with_plan(found: Diagnosis, path: Path) -> Diagnosis:
     sets = look_alikes(found)
     if found.verdict != "ambiguous" or not sets or path.suffix != ".toml":
         return found
-    command = f"bushfit plan {typed(Path(path.name))} --rivals {','.join(sets[0])}"
+    there = Path(path.name) if path.is_absolute() else path  # results keep no path of a machine
+    command = f"bushfit plan {typed(there)} --rivals {','.join(sets[0])}"
     return replace(found, next_test=f"{found.next_test}; {command} chooses tests that tell them apart")
