@@ -31,6 +31,8 @@ Command = Literal["run", "fit", "diagnose", "predict"]
 
 #: The way on from test files.
 _OF_TESTS = "bushfit init FILE... makes a campaign of test files"
+#: How an error finds the keys of a campaign that no manifest has.
+_OF_CAMPAIGN = ('"bushing"', '"specimens"')
 #: What is done to a campaign where nothing is said.
 _DEFAULT: tuple[Command, ...] = ("fit",)
 #: Which commands look at a setting.
@@ -187,12 +189,13 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
 
 
 def _toml(path: Path) -> ManifestFile:
+    """The content of a TOML manifest; a campaign in its place is a batch of one."""
     try:
         return read_toml(path, ManifestFile, what="a manifest", largest=200_000_000)  # bytes: some million rows
     except CampaignError as error:
-        if error.found == '"bushing"':
-            error.hint = "this is one campaign: bushfit run takes it, and a pattern in quotes takes many"
-        raise
+        if error.found not in _OF_CAMPAIGN:
+            raise
+        return ManifestFile(bushings=(Entry(campaign=path.name),))
 
 
 def _keys(table: type) -> list[str]:

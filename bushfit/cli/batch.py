@@ -125,7 +125,8 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
         table = new_table(f"{plan.title}: {status['done']} bushings", "quantity", "median", "robust std dev", "unit")
         for quantity, (middle, spread) in outcome.scatter.items():
             unit, factor = for_people(quantity.unit, 1.0, middle)
-            table.add_row(quantity.name, alike([middle * factor], 4)[0], alike([spread * factor], 2)[0], unit)
+            scatter = alike([spread * factor], 2)[0] if spread else ""  # one value tells of none
+            table.add_row(quantity.name, alike([middle * factor], 4)[0], scatter, unit)
         console.print(table)
     rate = status.total() / max(outcome.seconds, 1e-9)
     kept = f", {outcome.kept} of them from before" if outcome.kept else ""
@@ -137,7 +138,7 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
         if each["capability"]:
             options.say(f"capability: {name}: {each['capability']}")
     for word, names in (
-        ("failed", [f"{name}: {' '.join(error.split())}" for name, error in outcome.errors]),
+        ("failed", [f"{name}: {'; '.join(map(str.strip, error.splitlines()))}" for name, error in outcome.errors]),
         ("out of limits", [f"{name}: {words}" for name, words in outcome.missed]),
         ("conditional pass", [f"{name}: {words}" for name, words in outcome.edge]),
         ("differs", [f"{each['name']}: {each['words']}" for each in outcome.together.differ]),

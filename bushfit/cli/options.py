@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -98,6 +99,20 @@ class Size(click.FloatRange):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         size = super().convert(value, param, ctx)
         return size if math.isfinite(size) else self.fail(f"{value} is no {self.name}", param, ctx)
+
+
+class Share(click.ParamType[float]):
+    """A share of a whole, between 0 and 1, as a number or in per cent."""
+
+    name = "share"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        text = str(value).strip()
+        with suppress(ValueError):
+            share = float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+            if 0.0 < share < 1.0:
+                return share
+        return self.fail(f"{text} is no share between 0 and 1, such as 0.02 or 2 %", param, ctx)
 
 
 def command_called(name: str, *examples: str) -> Callable[[Function], click.Command]:

@@ -81,7 +81,7 @@ def test_a_missed_limit_is_status_1_with_the_results_written(bushfit: Run, tmp_p
     missed = bushfit("fit", CAMPAIGN, "-o", tmp_path / "x", "--no-plots", "--max-nrmse", "1e-4", status=1)
     assert "is above --max-nrmse 0.0001" in missed.stderr
     assert "model.json" in names(tmp_path / "x")
-    bushfit("fit", CAMPAIGN, "-o", tmp_path / "y", "--no-plots", "--max-nrmse", "0.05")
+    bushfit("fit", CAMPAIGN, "-o", tmp_path / "y", "--no-plots", "--max-nrmse", "5 %")
 
 
 def test_results_go_to_a_folder_of_the_campaign_by_default(work: Path, typed: Run, tmp_path: Path) -> None:
