@@ -255,12 +255,13 @@ def open_model(file: Path) -> Result:
     if file.is_dir() or (file.is_file() and ending in (".toml", *TEST_FILES)):
         found = "a folder" if file.is_dir() else "a campaign" if ending == ".toml" else "a test file"
         way = f"bushfit run {typed(file)}" if ending == ".toml" else f"bushfit init {typed(file)} ..., then bushfit run"
+        inside = file / "model.json"
         raise ModelError(
             "a fitted model is needed",
             file=file,
             found=found,
             expected="a .json file, as bushfit run, the fits and diagnose write it",
-            hint=f"{way} makes one",
+            hint=f"name the file: {typed(inside)}" if inside.is_file() else f"{way} makes one",
         )
     return load_result(file)
 

@@ -11,6 +11,7 @@ from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import FitError, typed
 from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import NEXT
 from bushfit.jobs.fits import Fit, Fitted
 from bushfit.jobs.provenance import campaign_document, document_of, options_typed
 from bushfit.model.model import Model
@@ -74,7 +75,9 @@ class Diagnose:
             )
         found = with_plan(diagnose(data, self.model, self.settings), data.campaign.path)
         if not (found.changed or self.model or self.settings.adopt):  # then the model to use is that of `fit`
-            found = replace(found, result=found.odds.averaged((self.joint or Fit().run(data)).result))
+            joint = (self.joint or Fit().run(data)).result
+            asked = replace(joint, warnings=tuple(words.removesuffix(NEXT) for words in joint.warnings))
+            found = replace(found, result=found.odds.averaged(asked))
         return Diagnosed(campaign_document(data, "diagnose", self._options()), found)
 
     def _options(self) -> tuple[str, ...]:

@@ -73,7 +73,7 @@ def _missing(file: Path, kind: type[BushfitError]) -> BushfitError:
     return kind(
         "there is no such file",
         file=file,
-        expected="an existing file; a relative path counts from the folder of the file that names it",
+        expected="an existing file; a relative path counts from here, or from the folder of the file that names it",
         hint=did_you_mean(file.name, siblings) or "check the path for a typing error",
     )
 
