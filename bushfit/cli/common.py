@@ -15,7 +15,7 @@ from rich.markup import escape
 from rich.segment import Segment
 
 from bushfit.campaign.naming import folder_name
-from bushfit.cli.options import FILE, FORMS, Folder, Function, Parameter, Share, Written, flag, in_order, option, under
+from bushfit.cli.options import FILE, FORMS, Folder, Function, Parameter, Size, Written, flag, in_order, option, under
 from bushfit.cli.progress import shown_on
 from bushfit.errors import ModelError, printable, typed
 from bushfit.report.contents import Formats, Kinds
@@ -219,7 +219,7 @@ def with_task(*written: Written, soft_l1: str = "points far off pull less, outli
                     "--max-nrmse",
                     "SHARE",
                     "Exit status 1 above this misfit (NRMSE), such as 2 %.",
-                    type=Share(),
+                    type=Size("share up to 1, such as 0.02 or 2 %", 1.0),
                 ),
             ),
         )

@@ -1,6 +1,5 @@
 """What options are made of: their types, those that several commands have, and commands with examples."""
 
-import math
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -89,30 +88,19 @@ class Folder(click.Path):
         )
 
 
-class Size(click.FloatRange):
-    """A number above zero, called by what it is of; nan, which click takes, is none."""
+class Size(click.ParamType[float]):
+    """A number above zero and below or at `most`, called by what it is of; of 1, a share, also in per cent."""
 
-    def __init__(self, name: str, most: float | None = None) -> None:
-        super().__init__(min=0.0, max=most, min_open=True)
-        self.name = name
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        size = super().convert(value, param, ctx)
-        return size if math.isfinite(size) else self.fail(f"{value} is no {self.name}", param, ctx)
-
-
-class Share(click.ParamType[float]):
-    """A share of a whole, between 0 and 1, as a number or in per cent."""
-
-    name = "share"
+    def __init__(self, name: str, most: float) -> None:
+        self.name, self._most = name, most
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         text = str(value).strip()
+        percent = self._most == 1.0 and text.endswith("%")
         with suppress(ValueError):
-            share = float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
-            if 0.0 < share < 1.0:
-                return share
-        return self.fail(f"{text} is no share between 0 and 1, such as 0.02 or 2 %", param, ctx)
+            if 0.0 < (size := float(text.removesuffix("%" * percent)) * (0.01 if percent else 1.0)) <= self._most:
+                return size
+        return self.fail(f"{text} is no {self.name}", param, ctx)
 
 
 def command_called(name: str, *examples: str) -> Callable[[Function], click.Command]:

@@ -19,7 +19,7 @@ IN_LOOP = [
     ("no units", every("time [s],displacement [mm],force [N]", "time,displacement,force"), 'loop.csv, line 1, column "displacement": the displacement has no unit', 'write "displacement [mm]" in the header, or units = { displacement = "mm" } in the'),
     ("unknown unit", every("force [N]", "force [Nn]"), 'loop.csv, line 1, column "force [Nn]": unknown unit', "a unit such as mm, N, kN/mm, deg, Hz or %"),
     ("unit of another kind", every("force [N]", "force [mm]"), 'loop.csv, line 1, column "force [mm]": the unit does not fit', "a force, such as N"),
-    ("unknown columns", every("force [N]", "gadget [N]"), "loop.csv, line 1: there is no column for the force", 'name the column in the campaign: columns = { force = "..." }'),
+    ("unknown columns", every("force [N]", "gadget [N]"), "loop.csv, line 1: there is no column for the force", 'name the column in the campaign: columns = { force = "gadget [N]" }'),
     ("two force columns", lambda lines: text([line + "," + (line.split(",")[2] if at == 0 else "1") for at, line in enumerate(lines)]), "loop.csv, line 1: more than one column could be the force", "give each a header of its own"),
     ("a cell of text", row(7, "0.", "abc"), 'loop.csv, line 7, column "time [s]": this is no finite number', "a number such as 12.5"),
     ("a cell that is empty", lambda lines: text([*lines[:5], ",".join([*lines[5].split(",")[:2], ""]), *lines[6:]]), 'loop.csv, line 6, column "force [N]": the cell is empty', "a number such as 12.5"),
