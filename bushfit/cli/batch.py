@@ -75,7 +75,7 @@ def command(
 ) -> None:
     """Fit (diagnose, predict, run) many campaigns, with a row each in one table.
 
-    MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or campaigns:
+    MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or campaigns, be it one:
 
     \b
         [[bushings]]

@@ -20,7 +20,7 @@ from bushfit.reading.numerals import is_like_number
 from bushfit.reading.parts import open_part
 from bushfit.reading.source import RowSource, Sheet, Text
 from bushfit.reading.wide import as_long
-from bushfit.reading.words import OF_MOTION, of_motion
+from bushfit.reading.words import LOOP_COLUMNS, OF_MOTION, SWEEP_COLUMNS, of_motion
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 #: Likeness, from 0 to 1, from which a header is suggested for one that is not there; chosen: one word of two suffices.
@@ -152,9 +152,9 @@ class Table(Columns):
         )
 
     def columns_key(self, role: str, unit: str) -> str:
-        """The key that names the column of a role, with the one free header that has a unit of this dimension."""
-        taken = {column.index for column in self.roles.values()}
-        free = (header for index, header in enumerate(self.headers) if index not in taken)
+        """The key that names the column of a role, with the one header that names none and has a unit that fits."""
+        usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
+        free = (header for header in self.headers if usual.heading(header) is None)
         found = [header for header in free if units.agrees(units.split_header(header)[1] or "", unit)]
         return f'columns = {{ {role} = "{found[0] if len(found) == 1 else "..."}" }}'
 

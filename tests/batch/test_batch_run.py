@@ -112,11 +112,12 @@ def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed: C
 
 
 def test_one_campaign_is_a_batch_of_one_which_has_no_scatter(typed: Callable[..., Any], shop: Path) -> None:
-    (shop / "limits.toml").write_text('[[stiffness]]\nat = "axial 25 Hz 0.1 mm"\nmax = "1 N/mm"\n')
+    (shop / "limits.toml").write_text('[[stiffness]]\nat = "axial 999 Hz 0.1 mm"\nmax = "1 N/mm"\n')
     done = typed("batch", "bushings/b0/bushing.toml", "--limits", "limits.toml", "-o", "one", "--no-plots")
     assert done.returncode == 1, done.stderr
     (row,) = rows(shop / "one")
-    assert row["out of limits"].startswith("stiffness axial 25 Hz 0.1 mm = ")
+    assert row["out of limits"].startswith("stiffness axial 999 Hz 0.1 mm = ")
+    assert "1 bushing with a point beyond the tests" in done.stderr
     assert ["mu", "MPa"] in [line.split()[::2] for line in done.stderr.splitlines()], done.stderr
 
 
