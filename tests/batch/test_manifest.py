@@ -101,7 +101,7 @@ BAD = [
         ROW + 'commands = ["run"]\neffects = ["inertia"]',
         ["effects", "nothing", "try: leave effects out"],
     ),
-    ("m.toml", ROW + 'effects = ["inertai"]', ["bushings #1.effects #1", "did you mean inertia?"]),
+    ("m.toml", ROW + 'effects = ["inertai"]', ["bushings #1.effects #1", 'did you mean "inertia"?']),
     ("m.toml", 'at = ["axial 25 Hz"]\n' + ROW, ["at", "no operating point", "axial 25 Hz"]),
     ("m.toml", '[[bushings]]\ncampaign = "no/*.toml"', ["the pattern matches no file", "no/*.toml"]),
     ("m.csv", "campaing\na.toml", ["header", "unknown key", 'mean "campaign"']),
