@@ -163,15 +163,12 @@ class Limits:
     )
     stiffness: tuple[StiffnessBounds, ...] = ()
     loss_factor: tuple[LossFactorBounds, ...] = ()
-    nrmse: Ratio | None = None
+    nrmse: Annotated[Ratio, Field(lt=1.0)] | None = None
     reduced_chi_square: Ratio | None = None
     verdicts: tuple[document.Verdict, ...] = ()
     guard: Annotated[bool, Field(strict=True)] = False
 
     def __post_init__(self) -> None:
-        if self.nrmse is not None and self.nrmse >= 1.0:
-            found, expected = f"{100.0 * self.nrmse:g} %", 'a share such as "2 %", or 0.02'
-            raise ValueError(CampaignError("this NRMSE limits nothing", place="nrmse", found=found, expected=expected))
         for name, count in Counter(name for name, _ in self._at_points).items():
             if count > 1:
                 problem = CampaignError(f"{count} tables for one point", found=name, hint="put them in one table")

@@ -272,12 +272,4 @@ def open_source(source: Path) -> Campaign | Result:
 
     if source.suffix.lower() == ".toml" and not source.is_dir():
         return load_campaign(source)
-    file = source / "model.json" if source.is_dir() else source
-    if source.is_dir() and not file.is_file():
-        raise ModelError(
-            "there is no model in this folder",
-            file=source,
-            expected="model.json, as bushfit run, fit and diagnose write it",
-            hint="name a model file itself, or a campaign",
-        )
-    return open_model(file)
+    return open_model(inside if (inside := source / "model.json").is_file() else source)

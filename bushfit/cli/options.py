@@ -89,16 +89,15 @@ class Folder(click.Path):
 
 
 class Size(click.ParamType[float]):
-    """A number above zero and below or at `most`, called by what it is of; of 1, a share, also in per cent."""
+    """A number above zero and below or at `most`, called by what it is of; a share also in per cent."""
 
     def __init__(self, name: str, most: float) -> None:
         self.name, self._most = name, most
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         text = str(value).strip()
-        percent = self._most == 1.0 and text.endswith("%")
         with suppress(ValueError):
-            if 0.0 < (size := float(text.removesuffix("%" * percent)) * (0.01 if percent else 1.0)) <= self._most:
+            if 0.0 < (size := float(text.removesuffix("%")) * (0.01 if "%" in text else 1.0)) <= self._most:
                 return size
         return self.fail(f"{text} is no {self.name}", param, ctx)
 

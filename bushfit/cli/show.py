@@ -68,12 +68,9 @@ def tell_tests(options: Options, tested: Sequence[Misfit], usable: Sequence[Usab
         for test in tests:
             if test in worst:
                 name = test.test if test.held is None else f"  {_held(test)}"
-                figures = (
-                    number(100 * test.nrmse, 2),
-                    number(test.reduced_chi_square, 2),
-                    f"{round(100 * test.gain, 2) + 0.0:+.2f}",
-                )
-                table.add_row(name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted")
+                figures = (number(100 * test.nrmse, 2), number(test.reduced_chi_square, 2))
+                gain = f"{round(100 * test.gain, 2) + 0.0:+.2f}"  # no -0
+                table.add_row(name, test.place, str(test.points), *figures, gain, "" if test.fitted else "not fitted")
         options.console.print(table)
     if left := len(tests) - len(worst):
         options.say(

@@ -14,7 +14,7 @@ USAGE = [
     ("fit|campaign.toml|--direction|", "Invalid value for '--direction': this is no direction: an empty text"),
     ("compare|model.json", "2 to 8 results are compared; one campaign alone with '--families' after it"),
     ("compare|model.json|loop.csv", "loop.csv: a fitted model is needed", "found: a test file"),
-    ("compare|model.json|..", "..: there is no model in this folder", "model.json, as bushfit run, fit and diagnose write it"),
+    ("compare|model.json|..", "..: a fitted model is needed", "found: a folder", "try: bushfit init .. ..., then bushfit run makes one"),
     ("compare|campaign.toml|campaign.toml|--families", "'--families' is of one campaign"),
     ("plan", "Missing argument 'CAMPAIGN|MODEL.json'."),
     ("plan|model.json|--for|parameters|--rivals|delay", "'--rivals' goes with '--for rivals'"),
