@@ -96,9 +96,14 @@ def tell_predictions(options: Options, outcome: Predicted) -> None:
         chosen = amplitudes[spread(amplitudes.size, _MOST_AMPLITUDES)]
         place = str(prediction.direction)
         whose = "" if prediction.direction in outcome.result.specimens else f"{outcome.result.name}: "
-        shown = new_table(f"{whose}{place}, corners", *table.columns[:4])
+        shown = new_table(f"{whose}{place}, corners, with 95 % bands", *table.columns[:4], names=2)
         low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
-        for row in table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].itertuples(index=False):
-            shown.add_row(*(number(value, 6) for value in row[:2]), *(alike([value], 4)[0] for value in row[2:4]))
+        for _, row in table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].iterrows():
+            cells = [number(value, 6) for value in row.iloc[:2]]
+            for name, digits in zip(table.columns[2:4], (4, 3), strict=True):
+                band = row[f"{name}, low"], row[f"{name}, high"]
+                value, *ends = alike([row[name], *band], digits)
+                cells.append(f"{value} ({' to '.join(ends)})" if band[0] < band[1] else value)
+            shown.add_row(*cells)
         options.console.print(shown)
     options.warn(outcome.warnings)
