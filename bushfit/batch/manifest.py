@@ -31,8 +31,6 @@ Command = Literal["run", "fit", "diagnose", "predict"]
 
 #: The way on from test files.
 _OF_TESTS = "bushfit init FILE... makes a campaign of test files"
-#: How an error finds the keys of a campaign that no manifest has.
-_OF_CAMPAIGN = ('"bushing"', '"specimens"')
 #: What is done to a campaign where nothing is said.
 _DEFAULT: tuple[Command, ...] = ("fit",)
 #: Which commands look at a setting.
@@ -193,7 +191,7 @@ def _toml(path: Path) -> ManifestFile:
     try:
         return read_toml(path, ManifestFile, what="a manifest", largest=200_000_000)  # bytes: some million rows
     except CampaignError as error:
-        if error.found not in _OF_CAMPAIGN:
+        if error.found not in ('"bushing"', '"specimens"'):
             raise
         return ManifestFile(bushings=(Entry(campaign=path.name),))
 

@@ -3,20 +3,13 @@
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from bushfit.errors import CampaignError, naming
-from bushfit.geometry import Bushing, Direction, Place, Specimen, unit_strain
-from bushfit.reading.measurement import Loop, Sweep
-from bushfit.units import number, told
+from bushfit.geometry import Direction, Place, Specimen
 
 #: Keys of a table that tell it.
 PLACE_KEYS = ("direction", "specimen")
 #: Lists of tests in [simulate].
 _LISTS = ("loops", "sweeps", "resonances")
-#: Strain amplitude that no filled rubber bears over the cycles of a test; chosen: a bushing sees less than a third of
-#: it, and a wrong prefix of a unit is a factor of 1000.
-_MOST_STRAIN = 3.0
 
 
 def place_tested(specimen: object, direction: object, specimens: Sequence[Specimen]) -> Place:
@@ -43,19 +36,6 @@ def place_tested(specimen: object, direction: object, specimens: Sequence[Specim
         expected = 'direction = "shear", or none: a specimen is tested in one way only'
         raise CampaignError("a specimen has no such direction", found=str(direction), expected=expected)
     return known[specimen]
-
-
-def refuse_strain(bushing: Bushing | None, place: Place, test: Loop | Sweep) -> None:
-    """Raise a CampaignError where a test strains its rubber by more than any bears: a unit, or a size, is wrong."""
-    moved = test.amplitude if isinstance(test, Sweep) else 0.5 * np.ptp(test.displacement, keepdims=True)
-    largest = float(np.max(moved))
-    if (strain := largest * unit_strain(bushing, place)) > _MOST_STRAIN:
-        raise CampaignError(
-            "no rubber bears the amplitude of this test",
-            found=f"{told(place.motion.displacement_unit, largest)}, {place}: a strain of {number(100 * strain, 2)} %",
-            expected=f"a strain below {100 * _MOST_STRAIN:g} %",
-            hint="check the unit of the amplitude or displacement, and the sizes of what was tested",
-        )
 
 
 def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:

@@ -15,9 +15,10 @@ T = TypeVar("T")
 _DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
 
 #: What to do about an error of TOML, by how it begins.
-_BACKSLASH = "write / for each \\ of a path, or the text in single quotes"
-_TWICE = "name each table and key once; several tests stand under [[loops]] or [[sweeps]], in two brackets"
-_WAYS = {"Unescaped": _BACKSLASH, "Invalid hex": _BACKSLASH, "Cannot": _TWICE}
+_WAYS = {
+    ("Unescaped", "Invalid hex"): "write / for each \\ of a path, or the text in single quotes",
+    ("Cannot",): "name each table and key once; several tests stand under [[loops]] or [[sweeps]], in two brackets",
+}
 
 
 def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", largest: int = 1_000_000) -> T:

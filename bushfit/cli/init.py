@@ -58,7 +58,6 @@ def command(
     In a terminal it asks for what neither files nor options say. FILE may be a folder, or a workbook with several
     tests; an option holds for all files of its kind. Writes campaign.toml, or -o my_bushing.toml.
     """
-    from bushfit.campaign.places import refuse_strain
     from bushfit.geometry import Specimen
     from bushfit.inspection.draft import campaign_text, campaigns_of_parts, with_specimens_named
 
@@ -77,10 +76,6 @@ def command(
     seen = with_specimens_named(seen)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
         bushing = questions.settled(sizes, size)
-    for one in seen:
-        if one.measured and one.direction:
-            with naming(one.file):
-                refuse_strain(bushing and bushing[0], one.direction, one.measured)
     table = bushing and bushing[1]
     if len({one.part for one in seen if one.part}) > 1:
         target = target if options.output and options.output.suffix == ".toml" else "batch.toml"

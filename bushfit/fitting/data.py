@@ -9,11 +9,11 @@ from typing import TypeVar
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.places import refuse_strain
 from bushfit.campaign.session import measured_session
 from bushfit.effects import BASE, effect_named, effect_of, with_base
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError, naming
+from bushfit.fitting.assess import refuse_strain
 from bushfit.fitting.coordinates import Bounds, residual
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data, with_level_errors
 from bushfit.fitting.design import designed
@@ -44,9 +44,8 @@ class Data:
         """The data sets of a campaign as its [fit] asks for them.
 
         Raises:
-            FitError: a loop is not one whole cycle or more, rows of it are missing, or it gives energy.
+            FitError: a loop is not one whole cycle or more, lacks rows, or gives energy; a strain that no rubber bears.
             ModelError: [fit] effects has an unknown effect, or one twice.
-            CampaignError: a test strains its rubber by more than any bears.
         """
         with naming(campaign.path, place="[fit] effects"):
             Model.started(None, with_base(campaign.fit.effects), {})
@@ -56,9 +55,8 @@ class Data:
             tuple(sweep_data(campaign.sweeps, campaign.fit.residuals, campaign.rig)),
             {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
         )
-        for data_set in data.data_sets:
-            with naming(campaign.path, data_set.name):
-                refuse_strain(campaign.bushing, data_set.direction, data_set.test)
+        with naming(campaign.path):
+            refuse_strain(campaign.bushing, data.data_sets)
         return data.in_session()
 
     def in_session(self) -> "Data":
