@@ -122,7 +122,8 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
 
     console, status, plan = options.console, outcome.status, outcome.plan
     if outcome.scatter:
-        table = new_table(f"{plan.title}: {status['done']} bushings", "quantity", "median", "robust std dev", "unit")
+        title = f"{plan.title}: {status['done']} bushing{'s' * (status['done'] > 1)}"
+        table = new_table(title, "quantity", "median", "robust std dev", "unit")
         for quantity, (middle, spread) in outcome.scatter.items():
             unit, factor = for_people(quantity.unit, 1.0, middle)
             scatter = alike([spread * factor], 2)[0] if spread else ""  # one value tells of none
@@ -132,7 +133,9 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
     kept = f", {outcome.kept} of them from before" if outcome.kept else ""
     options.say(f"{status['done']} done{kept}, {status['failed']} failed; {outcome.seconds:.1f} s, {rate:.1f} a second")
     if plan.limits:
-        options.say("limits: " + ", ".join(f"{count} {word}" for word, count in outcome.limits.items()))
+        options.say(
+            "limits: " + (", ".join(f"{count} {word}" for word, count in outcome.limits.items()) or "none judged")
+        )
     options.warn(outcome.notes)
     for name, each in outcome.together.process.items():
         if each["capability"]:

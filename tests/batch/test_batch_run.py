@@ -117,6 +117,7 @@ def test_one_campaign_is_a_batch_of_one_which_has_no_scatter(typed: Callable[...
     assert done.returncode == 1, done.stderr
     (row,) = rows(shop / "one")
     assert row["out of limits"].startswith("stiffness axial 999 Hz 0.1 mm = ")
+    assert "bushing: 1 bushing\n" in done.stderr
     assert "1 bushing with a point beyond the tests" in done.stderr
     assert ["mu", "MPa"] in [line.split()[::2] for line in done.stderr.splitlines()], done.stderr
 
