@@ -21,6 +21,7 @@ from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, PARTS, STIFFNESS, Quan
 from bushfit.batch.together import Together
 from bushfit.batch.work import Orders
 from bushfit.effects.contract import Array
+from bushfit.prediction.caveats import BEYOND
 from bushfit.reduction.arrays import scatter
 from bushfit.report.contents import Contents, Formats
 from bushfit.report.tables import BETWEEN
@@ -153,7 +154,10 @@ class Outcome:
         said = {
             "a parameter at rest on a bound of its fit, which the tests do not settle: "
             f"{names}; see the column on a bound": sum(map(bool, on_bound)),
-            "warnings of their own: see the column warnings": sum(bool(each.get("warnings")) for each in self.records),
+            "a point beyond the tests, which no test has checked: see the column warnings": sum(
+                any(words.endswith(BEYOND) for words in each.get("warnings", ())) for each in self.records
+            ),
+            "warnings: see the column warnings": sum(bool(each.get("warnings")) for each in self.records),
         }
         counted = [f"{n} bushing{'s' * (n > 1)} with {words} of {table}" for words, n in said.items() if n]
         return [*(self.judge.notes if self.judge else ()), *self.together.notes, *counted, *self.earlier]

@@ -93,7 +93,7 @@ def _held(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -
         f"nothing says at which {role} this was tested",
         found=f"{label}: {' and '.join(each.text for each in found)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
-        hint=f'state {key} = "{example}" in the campaign, or name the column: columns = {{ {role} = "..." }}',
+        hint=f'state {key} = "{example}" in the campaign, or name the column: {table.columns_key(role, expected)}',
     )
 
 

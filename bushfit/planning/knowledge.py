@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -185,9 +186,16 @@ def _each_added(plain: Evidence, names: Sequence[str], held: Sequence[str], boun
 
 
 def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:
-    """The sets of effects that a diagnosis cannot tell apart; without mistakes and faults, which no plan tells."""
-    sets = ((named.name, *named.alternatives) for named in found.effects if named.alternatives and not named.test)
-    return [names for names in sets if not names[1].startswith("fault:")]
+    """The sets of effects that a diagnosis cannot tell apart; without mistakes and faults, which no plan tells, and of
+    effects that make one explanation together without those that every explanation has."""
+    sets, every = [], [each.name for each in found.effects]
+    for named in found.effects:
+        if named.alternatives and not named.test and not named.alternatives[0].startswith("fault:"):
+            others = [label.split(" + ") for label in named.alternatives]
+            own = every if max(map(len, others)) > 1 else [named.name]
+            names = [name for name in dict.fromkeys(chain(own, *others)) if name in LIBRARY]
+            sets.append(tuple(name for name in names if not all(name in each for each in (own, *others))))
+    return [names for names in sets if len(names) > 1]
 
 
 def noise_of(data: Data) -> Noise:
