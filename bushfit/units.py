@@ -132,7 +132,9 @@ def quantity(value: object, *expected: str) -> float:
         hint = None if expected[0] == "1" else f'write "{text} {unit}"'
         raise refused("a number without a unit", found=text, hint=hint)
     if own[0] in ",.":
-        raise refused("this is no quantity", found=f'"{text}"', hint="write numbers with a decimal point")
+        parts = re.fullmatch(r"([+-]?\d+),(\d\d?|\d{4,})(\D*)", text)  # three digits may be thousands
+        way = f'write "{parts[1]}.{parts[2]}{parts[3]}", with' if parts else "write numbers with"
+        raise refused("this is no quantity", found=f'"{text}"', hint=f"{way} a decimal point")
     if not math.isfinite(float(number[0])):
         raise refused("the number is too large", found=f'"{text}"')
     fitting = next((choice for choice in expected if agrees(own, choice)), expected[0])

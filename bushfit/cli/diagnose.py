@@ -135,8 +135,8 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
     for parameter, entry in effect["parameters"].items():
         unit, factor = for_people(entry["unit"], 1.0, entry["value"])
         value, *ends = alike([factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, least=2)
-        size = f"{value} {unit}".removesuffix(" -")
-        console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
+        sure = f"95 % {' to '.join(ends)}" if ends else "without an interval"
+        console.print(f"    {parameter} = {f'{value} {unit}'.removesuffix(' -')}, {sure}")
     if effect["twins"]:
         names = " or ".join((effect["name"], *effect["twins"]))
         if effect["alternatives"]:

@@ -1,7 +1,6 @@
 """What options are made of: types, those of several commands, what Tab offers for them, and commands with examples."""
 
 import json
-import math
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
@@ -156,16 +155,18 @@ class Folder(click.Path):
         )
 
 
-class Size(click.FloatRange):
-    """A number above zero, called by what it is of; nan, which click takes, is none."""
+class Size(click.ParamType[float]):
+    """A number above zero and below or at `most`, called by what it is of; a share also in per cent."""
 
-    def __init__(self, name: str, most: float | None = None) -> None:
-        super().__init__(min=0.0, max=most, min_open=True)
-        self.name = name
+    def __init__(self, name: str, most: float) -> None:
+        self.name, self._most = name, most
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        size = super().convert(value, param, ctx)
-        return size if math.isfinite(size) else self.fail(f"{value} is no {self.name}", param, ctx)
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        text = str(value).strip()
+        with suppress(ValueError):
+            if 0.0 < (size := float(text.removesuffix("%")) * (0.01 if "%" in text else 1.0)) <= self._most:
+                return size
+        return self.fail(f"{text} is no {self.name}", param, ctx)
 
 
 def command_called(name: str, *examples: str) -> Callable[[Function], click.Command]:

@@ -14,7 +14,7 @@ from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import FitError, typed
 from bushfit.fitting.data import Data
-from bushfit.fitting.procedures import TwoStep, fit_two_step
+from bushfit.fitting.procedures import NEXT, TwoStep, fit_two_step
 from bushfit.jobs.fits import (
     Fit,
     FitStatic,
@@ -87,10 +87,13 @@ class Diagnose:
             )
         found, path = diagnose(data, self.model, self.settings), data.campaign.path
         if found.verdict == "ambiguous" and (sets := look_alikes(found)) and path.suffix == ".toml":
-            command = f"bushfit plan {typed(Path(path.name))} --rivals {','.join(sets[0])}"
+            there = Path(path.name) if path.is_absolute() else path  # results keep no path of a machine
+            command = f"bushfit plan {typed(there)} --rivals {','.join(sets[0])}"
             found = replace(found, next_test=f"{found.next_test}; {command} chooses tests that tell them apart")
         if not (found.changed or self.model or self.settings.adopt):  # then the model to use is that of `fit`
-            found = replace(found, result=found.odds.averaged((self.joint or Fit().run(data)).result))
+            joint = (self.joint or Fit().run(data)).result
+            asked = replace(joint, warnings=tuple(words.removesuffix(NEXT) for words in joint.warnings))
+            found = replace(found, result=found.odds.averaged(asked))
         mine, usual = self.settings, Settings()
         sizes = ((key, getattr(mine, key), getattr(usual, key)) for key in ("max_effects", "tolerance"))
         changed = {key: f"{size:g}" for key, size, default in sizes if size != default}

@@ -55,7 +55,7 @@ _UNITS_OF = {"a": ("m", "rad"), "k": ("N/m", "N*m/rad")}
 #: Names of an amplitude that count it peak-to-peak by themselves.
 _PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
 #: The word "peak".
-_PEAK = r"(?:peak|pk|spitze|crete|cresta|pico|pic)"
+_PEAK = r"(?:peak|pk|spitze|sp\.?|crete|cresta|pico|pic)"
 #: Where a word begins; an underscore parts words.
 _WORD_START = r"(?<![^\W_])"
 #: Where a word ends.

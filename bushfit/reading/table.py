@@ -14,7 +14,9 @@ from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.columns import Columns, Rows
 from bushfit.reading.files import sha256, to_utf8, view_bytes
 from bushfit.reading.headers import (
+    LOOP_COLUMNS,
     OF_MOTION,
+    SWEEP_COLUMNS,
     Column,
     Heading,
     Vocabulary,
@@ -160,8 +162,15 @@ class Table(Columns):
         return self.header_error(
             f"there is no column for the {_label(role)}",
             expected=f'a header such as "{_label(role)} [{units.example(expected)}]"',
-            hint=f'name the column in the campaign: columns = {{ {role} = "..." }}' + (f", {hint}" if hint else ""),
+            hint=f"name the column in the campaign: {self.columns_key(role, expected)}" + (f", {hint}" if hint else ""),
         )
+
+    def columns_key(self, role: str, unit: str) -> str:
+        """The key that names the column of a role, with the one header that names none and has a unit that fits."""
+        usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
+        free = (header for header in self.headers if usual.heading(header) is None)
+        found = [header for header in free if units.agrees(units.split_header(header)[1] or "", unit)]
+        return f'columns = {{ {role} = "{found[0] if len(found) == 1 else "..."}" }}'
 
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
         """Refuse headers that would name a role in a test of the other kind of motion: strain, or displacement.

@@ -25,7 +25,7 @@ from bushfit.prediction.stiffness import predict
 MODEL = 2e-4
 #: What the five digits of a deck leave of a value, and ten of what a table goes over.
 DIGITS, ALONG = 5e-5, 2e-9
-SYSTEMS = ["mm t s N", "m kg s N", "mm kg ms kN", "in lbf*s^2/in s lbf"]
+SYSTEMS = ["N, s, t, mm", "m kg s N", "mm kg ms kN", "in lbf*s^2/in s lbf"]
 
 
 def read(name: str, order: Order, folder: Path) -> tuple[Exported, Curves]:
@@ -47,7 +47,7 @@ def test_every_value_of_the_grid_is_read_back(
 ) -> None:
     """In whatever units, turned back into SI by factors that are typed here."""
     newton, metre, second = {
-        "mm t s N": (1.0, 1e3, 1.0),
+        "N, s, t, mm": (1.0, 1e3, 1.0),
         "m kg s N": (1.0, 1.0, 1.0),
         "mm kg ms kN": (1e-3, 1e3, 1e3),
         "in lbf*s^2/in s lbf": (1.0 / 4.4482216152605, 1.0 / 0.0254, 1.0),

@@ -24,7 +24,7 @@ NOISE = {
     },
 }
 #: Clean campaigns: of a commit, and of all.
-SEEDS = [4, pytest.param(25, marks=pytest.mark.slow)]
+SEEDS = [4, pytest.param(12, marks=pytest.mark.slow)]
 
 
 def plan(**settings: float) -> SimulateSettings:

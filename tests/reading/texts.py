@@ -19,7 +19,8 @@ from bushfit.reading.sweeps import read_sweep
 
 TIME = np.arange(40) * 0.1
 LOOP_ROWS = [f"{t:.1f},{np.sin(3 * t):.4f},{100 * np.sin(3 * t + 0.1):.3f}" for t in TIME]
-LOOP = "\n".join(["time [s],displacement [mm],force [N]", *LOOP_ROWS]) + "\n"
+LOOP_HEADER = "time [s],displacement [mm],force [N]"
+LOOP = "\n".join([LOOP_HEADER, *LOOP_ROWS]) + "\n"
 SWEEP_HEADER = "frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]"
 SWEEP_ROWS = [f"{f},{a},{500 + f},0.1" for a in (0.1, 0.2) for f in (5, 15, 25, 35)]
 SWEEP = "\n".join([SWEEP_HEADER, *SWEEP_ROWS]) + "\n"

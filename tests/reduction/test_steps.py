@@ -18,6 +18,7 @@ from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop
 from bushfit.reading.stated import LoopFile
+from bushfit.reduction.harmonics import spread_rows
 from bushfit.reduction.result import Reduction
 from bushfit.reduction.steps import reduce
 from bushfit.report.tables import reduced_table
@@ -271,3 +272,9 @@ def test_any_sine_gives_its_stiffness(
     assert step.frequency == pytest.approx(frequency, rel=1e-6)
     assert step.amplitude == pytest.approx(amplitude, rel=1e-6)
     assert step.stiffness == pytest.approx(3e5 * np.exp(1j * lead), rel=1e-6)
+
+
+def test_rows_that_stand_for_all_keep_no_time_with_cycles() -> None:
+    chosen = spread_rows(1_000_000, 1000)
+    assert (chosen.size, bool(np.all(np.diff(chosen) > 0)), bool(chosen[-1] < 1_000_000)) == (1000, True, True)
+    assert np.abs(np.exp(2j * np.pi * chosen / 1000.0).mean()) < 0.1
