@@ -67,6 +67,7 @@ Name = Annotated[str, Field(strict=True, min_length=1, max_length=200, pattern=r
 def unknown_key(key: str, known: Collection[str]) -> CampaignError:
     """The error for a key that is none of the known ones."""
     hint = did_you_mean(key, known, likeness=0.5)
+    hint = f"{hint} It is half of a diameter" if hint and "diameter" in key and "radius" in hint else hint
     expected = "one of " + ", ".join([*known][:_MOST_LISTED]) + (", ..." if len(known) > _MOST_LISTED else "")
     return CampaignError("unknown key", found=f'"{key}"', expected=expected, hint=hint)
 
@@ -150,7 +151,9 @@ def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> 
         found = _WORDS.get(str(detail["input"]), str(detail["input"]))
         said = re.sub("^(Input|String) should (be|have) ", "", detail["msg"])
         expected = _SHAPES.get(detail["type"], _ZEROS.sub(lambda digits: f"{float(digits[0]):g}", said))
-        error = kind("this value is not understood", found=found, expected=expected)
+        single = detail["type"] == "tuple_type" and isinstance(detail["input"], dict)
+        hint = f"write [[{place}]], in two brackets: there may be several" if single else None
+        error = kind("this value is not understood", found=found, expected=expected, hint=hint)
     error.place = place
     return error
 

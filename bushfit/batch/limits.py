@@ -163,7 +163,7 @@ class Limits:
     )
     stiffness: tuple[StiffnessBounds, ...] = ()
     loss_factor: tuple[LossFactorBounds, ...] = ()
-    nrmse: Ratio | None = None
+    nrmse: Annotated[Ratio, Field(lt=1.0)] | None = None
     reduced_chi_square: Ratio | None = None
     verdicts: tuple[document.Verdict, ...] = ()
     guard: Annotated[bool, Field(strict=True)] = False

@@ -186,12 +186,13 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
 
 
 def _toml(path: Path) -> ManifestFile:
+    """The content of a TOML manifest; a campaign in its place is a batch of one."""
     try:
         return read_toml(path, ManifestFile, what="a manifest", largest=200_000_000)  # bytes: some million rows
     except CampaignError as error:
-        if error.found == '"bushing"':
-            error.hint = "this is one campaign: bushfit run takes it, and a pattern in quotes takes many"
-        raise
+        if error.found not in ('"bushing"', '"specimens"'):
+            raise
+        return ManifestFile(bushings=(Entry(campaign=path.name),))
 
 
 def _csv_entries(path: Path) -> Iterator[Entry]:

@@ -21,6 +21,7 @@ from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, PARTS, STIFFNESS, Quan
 from bushfit.batch.together import Together
 from bushfit.batch.work import Orders
 from bushfit.effects.contract import Array
+from bushfit.prediction.caveats import BEYOND
 from bushfit.reduction.arrays import scatter
 from bushfit.report.contents import Contents, Formats
 from bushfit.report.tables import BETWEEN
@@ -83,9 +84,11 @@ class Outcome:
         """On each row; None on all without limits, and on a row that failed."""
         found = list[Judgement | None]()
         for number, record in enumerate(self.records):
-            row = {name: figures[:, number].tolist() for name, figures in self.figures.items()}
-            known = {name: four for name, four in row.items() if math.isfinite(four[0])}
-            found.append(self.judge(known, record) if self.judge and record["status"] == "done" else None)
+            judged = None
+            if self.judge and record["status"] == "done":
+                row = {name: figures[:, number].tolist() for name, figures in self.figures.items()}
+                judged = self.judge({name: four for name, four in row.items() if math.isfinite(four[0])}, record)
+            found.append(judged)
         return found
 
     @cached_property
@@ -151,7 +154,10 @@ class Outcome:
         said = {
             "a parameter at rest on a bound of its fit, which the tests do not settle: "
             f"{names}; see the column on a bound": sum(map(bool, on_bound)),
-            "warnings of their own: see the column warnings": sum(bool(each.get("warnings")) for each in self.records),
+            "a point beyond the tests, which no test has checked: see the column warnings": sum(
+                any(words.endswith(BEYOND) for words in each.get("warnings", ())) for each in self.records
+            ),
+            "warnings: see the column warnings": sum(bool(each.get("warnings")) for each in self.records),
         }
         counted = [f"{n} bushing{'s' * (n > 1)} with {words} of {table}" for words, n in said.items() if n]
         return [*(self.judge.notes if self.judge else ()), *self.together.notes, *counted, *self.earlier]
@@ -185,7 +191,7 @@ class Outcome:
         """The same as a file: of each quantity its column of the table, its scatter and its limits there."""
         quantities: dict[str, Control] = {}
         for quantity, (middle, spread) in self.scatter.items():
-            allowed, tabled = self._allowed(quantity.name), quantity.tabled
+            allowed, tabled = self._allowed.get(quantity.name, ()), quantity.tabled
             ends = [end * tabled.factor if math.isfinite(end) else None for end in allowed]
             scale = tabled.factor / quantity.factor
             told = self.together.process[quantity.name]
@@ -195,9 +201,10 @@ class Outcome:
         counts = self._counts
         return {**counts, "title": self.plan.title, "quantities": quantities, "order": order, "least_told": least}
 
-    def _allowed(self, name: str) -> tuple[float, ...]:
-        """The lowest and the highest allowed value of a quantity; empty where there is no limit."""
-        return self.judge.allowed.get(name, ()) if self.judge else ()
+    @property
+    def _allowed(self) -> Mapping[str, tuple[float, float]]:
+        """The lowest and the highest allowed value of each quantity that has a limit, by its name."""
+        return self.judge.allowed if self.judge else {}
 
     @property
     def contents(self) -> Contents:
@@ -265,16 +272,15 @@ class Outcome:
 
         panels = []
         for name, quantity in self.quantities.items():
-            allowed, figures = self._allowed(name), self.figures.get(name, np.full((len(PARTS), 1), np.nan))
+            allowed, figures = self._allowed.get(name, ()), self.figures.get(name, np.full((len(PARTS), 1), np.nan))
             known = np.isfinite(figures[0])
             if known.sum() >= (1 if allowed else 3):  # fewer show no scatter
                 shown = quantity.for_people(float(np.median(figures[0, known])))
-                missed = [
-                    k for k, judged in enumerate(self.judgements) if judged and name in judged.missed and known[k]
-                ]
+                told = enumerate(self.judgements)
+                missed = {k for k, judged in told if judged and name in judged.missed and known[k]}
                 limits, ends = tuple(limit * shown.factor for limit in allowed), figures[1:3] * shown.factor
                 interval = ends if np.isfinite(ends).all(axis=0).any() else None
-                panels.append(Panel(shown.header, figures[0] * shown.factor, limits, set(missed), interval))
+                panels.append(Panel(shown.header, figures[0] * shown.factor, limits, missed, interval))
         return panels
 
     def junit(self) -> bytes:
@@ -288,8 +294,9 @@ class Outcome:
             if failed or missed:
                 text = _printable(record["error"] if failed else "\n".join(missed.values()))
                 line = text.partition("\n")[0] if failed else "; ".join(text.splitlines())
-                case.result = [Error(line, "failed") if failed else Failure(line, "limits")]
-                case.result[0].text = text
+                result = Error(line, "failed") if failed else Failure(line, "limits")
+                result.text = text
+                case.result = [result]
             suite.add_testcase(case)
         report = JUnitXml("bushfit batch")
         report.add_testsuite(suite)

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bushfit.campaign.compound import Compound
-from bushfit.campaign.head import ReportSettings, embedded
+from bushfit.campaign.quantities import Compound, ReportSettings, embedded
 from bushfit.campaign.schema import (
     CampaignFile,
     FitSettings,
@@ -91,10 +90,6 @@ def load_campaign(path: str | Path) -> Campaign:
     with naming(path):
         bushing = Bushing(**vars(content.bushing)) if content.bushing else None
         specimens = tuple(Specimen(**vars(table)) for table in content.specimens)
-        _check_bodies(bushing, specimens)
-        with naming(place="predict.directions"):
-            for name in content.predict.directions or ():
-                place_named(name, specimens)
         _check_places(content, specimens)
     with naming(place="[report] logo"):
         logo = embedded(path.parent / content.report.logo) if content.report.logo else None
@@ -127,18 +122,17 @@ def load_bushing(path: Path) -> Bushing:
         return Bushing(**vars(table))
 
 
-def _check_bodies(bushing: Bushing | None, specimens: Sequence[Specimen]) -> None:
-    """Raise a CampaignError where there is no body, or two have one name."""
+def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
+    """Raise a CampaignError where there is no body or two have one name, a ModelError where a place is none of them."""
     names = [specimen.name for specimen in specimens]
-    if bushing is None and not names:
+    if not (content.bushing or names):
         expected = "[bushing] with its name, radii and length, or [[specimens]]"
         raise CampaignError("nothing is said of what was tested", expected=expected)
     if doubles := {name for name in names if names.count(name) > 1}:
         raise CampaignError("two specimens have one name", place="[[specimens]]", found=", ".join(sorted(doubles)))
-
-
-def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
-    """Raise a ModelError where an effect belongs to a place that the campaign does not have."""
+    with naming(place="predict.directions"):
+        for name in content.predict.directions or ():
+            place_named(name, specimens)
     simulated = content.simulate.effects if content.simulate else {}
     own = [f"{effect}.{name}" for effect, table in simulated.items() for name in table]
     for name in (*content.fit.effects, *content.fit.parameters, *own):

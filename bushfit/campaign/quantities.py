@@ -1,18 +1,32 @@
-"""Model parameters of a campaign file by name: texts such as "1.1 MPa" become SI."""
+"""What only a campaign file states: model parameters by name; [compound], of an untested rubber; [report], its head."""
 
+import base64
 import re
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from bushfit.effects import is_parameter, parameter_named, parameter_names
-from bushfit.errors import CampaignError, naming
+from bushfit.errors import CampaignError, UnitError, naming
+from bushfit.reading.files import view_bytes
 from bushfit.units import quantity, sized
-from bushfit.validation import LARGEST_NUMBER, unknown_key
+from bushfit.validation import LARGEST_NUMBER, Name, converted, text, unknown_key
 
 #: The second to the power of alpha, at the end of the unit of m.
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
+#: Polymers whose density is known, by the names that rubber engineers use; NR is natural rubber.
+Polymer = Literal["natural", "SBR", "EPDM", "NBR", "CR", "IIR"]
+#: Hardness between which Gent's relation is used [Shore A]: outside of it a durometer hardly tells rubbers apart.
+_HARDNESS = (20.0, 90.0)
+#: Carbon black at most [phr]: more is not mixed into rubber that is to move.
+_MOST_FILLER = 120.0
+#: A logo at most [bytes]: it stands in every model file of its campaign.
+LARGEST_LOGO = 64_000
+#: How a PNG file begins, and what the head of an SVG file holds; such a head at most [bytes].
+_PNG, _SVG, _HEAD = b"\x89PNG\r\n\x1a\n", b"<svg", 4096
 
 
 def parameter_value(place: str, name: str, raw: Any) -> float:
@@ -77,3 +91,98 @@ def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
                 raise CampaignError("these limits hold no value", place=name, found=str(raw[name]), expected=expected)
             table |= {key: float(end) for key, end in zip(("min", "max"), ends, strict=True) if key in table}
     return settings
+
+
+def hardness(raw: object) -> float:
+    """The number of a text such as "61 Shore A".
+
+    Raises:
+        UnitError: no such text.
+        CampaignError: a hardness for which Gent's relation does not hold.
+    """
+    found = _number(raw, r"sh(?:ore)?\.?\s*a", "a hardness", '"61 Shore A"')
+    if not _HARDNESS[0] <= found <= _HARDNESS[1]:
+        expected = f"{_HARDNESS[0]:g} to {_HARDNESS[1]:g} Shore A"
+        raise CampaignError("no modulus follows from this hardness", found=str(raw), expected=expected)
+    return found
+
+
+def filler(raw: object) -> float:
+    """The carbon black per hundred parts of rubber of a text such as "27 phr", or "27 phr carbon black".
+
+    Raises:
+        UnitError: no such text.
+        CampaignError: more filler than there is in bushings.
+    """
+    found = _number(raw, r"phr(?:\s+(?:of\s+)?carbon[\s-]black)?", "a filler", '"27 phr", of carbon black')
+    if found > _MOST_FILLER:
+        raise CampaignError("impossible filler", found=str(raw), expected=f"0 to {_MOST_FILLER:g} phr of carbon black")
+    return found
+
+
+def _number(raw: object, unit: str, what: str, expected: str) -> float:
+    """The number before a unit that pint does not know."""
+    match = re.fullmatch(rf"\s*(\d{{1,4}}(?:\.\d{{1,6}})?)\s*(?:{unit})\s*", str(raw), re.ASCII | re.IGNORECASE)
+    if not (isinstance(raw, str) and match):
+        raise UnitError(f"this is not {what}", found=str(raw), expected=expected)
+    return float(match[1])
+
+
+@dataclass(frozen=True)
+class Compound:
+    """[compound]: a rubber that was not tested yet, for `bushfit plan`.
+
+    Args:
+        hardness: [Shore A].
+        filler: carbon black, parts by weight per hundred of rubber [phr].
+        rubber: the polymer.
+    """
+
+    hardness: Annotated[float, converted(lambda raw, _: hardness(raw), text('such as "61 Shore A"'))]
+    filler: Annotated[float, converted(lambda raw, _: filler(raw), text('such as "27 phr"'))]
+    rubber: Polymer = "natural"
+
+
+@dataclass(frozen=True)
+class ReportSettings:
+    """[report]: what stands at the head of the report, as it is to be read there.
+
+    Args:
+        customer: whose part it is.
+        part_number: of the bushing.
+        drawing: its number, with the issue.
+        compound: the rubber, by its name.
+        laboratory: that tested it.
+        date: of the report.
+        logo: a PNG or SVG file, relative to the campaign file.
+    """
+
+    customer: Name | None = None
+    part_number: Name | None = None
+    drawing: Name | None = None
+    compound: Name | None = None
+    laboratory: Name | None = None
+    date: Name | None = None
+    logo: Name | None = None
+
+    @property
+    def lines(self) -> dict[str, str]:
+        """What is stated in words, in the order in which it is read."""
+        return {key: value for key, value in vars(self).items() if value is not None and key != "logo"}
+
+
+def embedded(file: Path) -> str:
+    """A logo as a data URI: the picture itself, for a page that stands alone.
+
+    Raises:
+        CampaignError: the file is missing, too large, or neither PNG nor SVG.
+    """
+    data = view_bytes(file, CampaignError, largest=LARGEST_LOGO, hint="save the logo with fewer pixels, or as SVG")
+    if data.startswith(_PNG):
+        kind = "png"
+    elif _SVG in data[:_HEAD]:
+        kind = "svg+xml"
+    else:
+        begins = f"a file that begins with {data[:12]!r}"
+        raise CampaignError("this is no picture that a page can show", file=file, found=begins, expected="PNG or SVG")
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"

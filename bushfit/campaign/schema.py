@@ -7,9 +7,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
-from bushfit.campaign.compound import Compound
-from bushfit.campaign.head import ReportSettings
-from bushfit.campaign.quantities import effect_values, parameter_settings, parameter_values
+from bushfit.campaign.quantities import Compound, ReportSettings, effect_values, parameter_settings, parameter_values
 from bushfit.effects import is_parameter, parameter_names
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError

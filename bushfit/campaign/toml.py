@@ -17,6 +17,12 @@ T = TypeVar("T")
 #: A key of more than 16 parts, such as a.b.c; parsing one takes time in proportion to the square of their number.
 _DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
 
+#: What to do about an error of TOML, by how it begins.
+_WAYS = {
+    ("Unescaped", "Invalid hex"): "write / for each \\ of a path, or the text in single quotes",
+    ("Cannot",): "name each table and key once; several tests stand under [[loops]] or [[sweeps]], in two brackets",
+}
+
 
 def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", largest: int = 1_000_000) -> T:
     """The content of a TOML file as the dataclass `schema`, all quantities in SI.
@@ -49,7 +55,9 @@ def _parsed(path: Path, what: str, largest: int) -> dict[str, Any]:
             place=reason["place"] if reason else None,
             found=reason["problem"] if reason else "a whole number of thousands of digits",
             expected='lines such as length = "34 mm"',
-            hint="put texts and quantities in quotes",
+            hint=next(
+                (_WAYS[start] for start in _WAYS if str(error).startswith(start)), "put texts and quantities in quotes"
+            ),
         ) from error
     except RecursionError:
         pass

@@ -75,7 +75,7 @@ def command(
 ) -> None:
     """Fit (diagnose, predict, run) many campaigns, with a row each in one table.
 
-    MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or campaigns:
+    MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or campaigns, be it one:
 
     \b
         [[bushings]]
@@ -125,20 +125,23 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
         rows = []
         for quantity, (middle, spread) in outcome.scatter.items():
             unit, factor = for_people(quantity.unit, 1.0, middle)
-            rows.append((quantity.name, alike([middle * factor], 4)[0], alike([spread * factor], 2)[0], unit))
+            scatter = alike([spread * factor], 2)[0] if spread else ""  # one value tells of none
+            rows.append((quantity.name, alike([middle * factor], 4)[0], scatter, unit))
         columns = ("quantity", "median", "robust std dev", "unit")
-        tell_table(options, f"{plan.title}: {status['done']} bushings", columns, rows)
+        tell_table(options, f"{plan.title}: {status['done']} bushing{'s' * (status['done'] > 1)}", columns, rows)
     rate = status.total() / max(outcome.seconds, 1e-9)
     kept = f", {outcome.kept} of them from before" if outcome.kept else ""
     options.say(f"{status['done']} done{kept}, {status['failed']} failed; {outcome.seconds:.1f} s, {rate:.1f} a second")
     if plan.limits:
-        options.say("limits: " + ", ".join(f"{count} {word}" for word, count in outcome.limits.items()))
+        options.say(
+            "limits: " + (", ".join(f"{count} {word}" for word, count in outcome.limits.items()) or "none judged")
+        )
     options.warn(outcome.notes)
     for name, each in outcome.together.process.items():
         if each["capability"]:
             options.say(f"capability: {name}: {each['capability']}")
     for word, names in (
-        ("failed", [f"{name}: {' '.join(error.split())}" for name, error in outcome.errors]),
+        ("failed", [f"{name}: {'; '.join(map(str.strip, error.splitlines()))}" for name, error in outcome.errors]),
         ("out of limits", [f"{name}: {words}" for name, words in outcome.missed]),
         ("conditional pass", [f"{name}: {words}" for name, words in outcome.edge]),
         ("differs", [f"{each['name']}: {each['words']}" for each in outcome.together.differ]),

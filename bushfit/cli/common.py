@@ -274,8 +274,8 @@ def with_task(*written: Written, soft_l1: str = "points far off pull less, outli
                 option(
                     "--max-nrmse",
                     "SHARE",
-                    "Exit status 1 above this misfit, such as 0.02 (NRMSE).",
-                    type=Size("share such as 0.02"),
+                    "Exit status 1 above this misfit (NRMSE), such as 2 %.",
+                    type=Size("share up to 1, such as 0.02 or 2 %", 1.0),
                 ),
             ),
         )
@@ -311,12 +311,13 @@ def open_model(file: Path) -> Result:
     if file.is_dir() or (file.is_file() and ending in (".toml", *TEST_FILES)):
         found = "a folder" if file.is_dir() else "a campaign" if ending == ".toml" else "a test file"
         way = f"bushfit run {typed(file)}" if ending == ".toml" else f"bushfit init {typed(file)} ..., then bushfit run"
+        inside = file / "model.json"
         raise ModelError(
             "a fitted model is needed",
             file=file,
             found=found,
             expected="a .json file, as bushfit run, the fits and diagnose write it",
-            hint=f"{way} makes one",
+            hint=f"name the file: {typed(inside)}" if inside.is_file() else f"{way} makes one",
         )
     return load_result(file)
 
@@ -327,12 +328,4 @@ def open_source(source: Path) -> Campaign | Result:
 
     if source.suffix.lower() == ".toml" and not source.is_dir():
         return load_campaign(source)
-    file = source / "model.json" if source.is_dir() else source
-    if source.is_dir() and not file.is_file():
-        raise ModelError(
-            "there is no model in this folder",
-            file=source,
-            expected="model.json, as bushfit run, fit and diagnose write it",
-            hint="name a model file itself, or a campaign",
-        )
-    return open_model(file)
+    return open_model(inside if (inside := source / "model.json").is_file() else source)

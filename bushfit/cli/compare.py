@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli import completion
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options
-from bushfit.cli.options import FILE, command_called, option, place_option, under
+from bushfit.cli.options import FILE, command_called, effect_lists, option, place_option, under
 from bushfit.cli.show import tell_table
 from bushfit.errors import naming
 from bushfit.progress import counting
@@ -44,7 +43,7 @@ _ALL = "all"
         ),
         is_flag=False,
         flag_value=_ALL,
-        shell_complete=completion.effect_lists,
+        shell_complete=effect_lists,
     ),
 )
 @with_options("results/<names>", "tables", "pictures", "pages")

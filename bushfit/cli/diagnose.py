@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli import completion
 from bushfit.cli.common import Options, Task, open_model, with_task
-from bushfit.cli.options import command_called, file_option, option, under
+from bushfit.cli.options import command_called, explanations, file_option, option, under
 from bushfit.cli.show import tell_parameters, tell_table
 from bushfit.errors import BushfitError, naming
 from bushfit.units import alike, for_people, number, quantity
@@ -36,14 +35,14 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
             "peak_to_peak:sweep_axial; may be given again. A wrong EFFECT lists all."
         ),
         multiple=True,
-        shell_complete=completion.explanations,
+        shell_complete=explanations,
     ),
     option(
         "--without",
         "EFFECT",
         "Do not consider this effect or mistake; may be given again.",
         multiple=True,
-        shell_complete=completion.explanations,
+        shell_complete=explanations,
     ),
     option("--tolerance", "SHARE", "Gaps below this share of the stiffness do not count [1 %].", default="1 %"),
     file_option("--model", "Start from the effects of this model.json [the paper's three]."),
@@ -136,8 +135,8 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
     for parameter, entry in effect["parameters"].items():
         unit, factor = for_people(entry["unit"], 1.0, entry["value"])
         value, *ends = alike([factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, least=2)
-        size = f"{value} {unit}".removesuffix(" -")
-        console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
+        sure = f"95 % {' to '.join(ends)}" if ends else "without an interval"
+        console.print(f"    {parameter} = {f'{value} {unit}'.removesuffix(' -')}, {sure}")
     if effect["twins"]:
         names = " or ".join((effect["name"], *effect["twins"]))
         if effect["alternatives"]:

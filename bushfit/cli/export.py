@@ -84,5 +84,4 @@ def command(
         for loss in exported.losses:
             options.say(f"{name} leaves out: {loss}")
     options.warn(outcome.predicted.warnings)
-    files = {**outcome.files, **options.formats.files(outcome.contents)}
-    options.write(folder, files, outcome.document)
+    options.write(folder, {**outcome.files, **options.formats.files(outcome.contents)}, outcome.document)

@@ -87,7 +87,7 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
                 expected=expected,
                 hint='write decimals with a point, "0.5", and numbers of a list apart, "1, 5"',
             )
-        parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.].*)", text)
+        parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.][^,]*)", text)
         if not parts or parts[1].count(":") not in (0, 2):
             raise UnitError("these are no values with a unit", found=repr(text), expected=expected)
         counted = ":" in parts[1]

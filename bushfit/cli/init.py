@@ -40,13 +40,15 @@ _WORDS = {
     "at_amplitude": 'its amplitude, such as "0.1 mm"',
     "at_frequency": 'its frequency, such as "10 Hz"',
     "temperature": 'its temperature, such as "23 degC"',
+    "preload": 'preload of these tests, such as "500 N axial" or "none"; Enter leaves it open',
     "inner_diameter": 'inner diameter of the rubber, where it meets the inner sleeve, such as "20 mm"',
     "outer_diameter": 'its outer diameter, such as "36 mm"',
     "length": 'its length, the mean of inside and outside, such as "34 mm"',
 }
-#: The key that an answer is of, and of columns and units the role; the one that is asked for once for all files.
+#: The key that an answer is of, and of columns and units the role.
 _Key = tuple[str, str]
-_COUNTING: _Key = ("amplitude", "")
+#: What is asked for once for all files, with what is offered.
+_ONCE: dict[_Key, str] = {("amplitude", ""): "zero-to-peak", ("preload", ""): ""}
 _Seen = TypeVar("_Seen")
 
 
@@ -195,11 +197,11 @@ def _usable(
 
 
 def _look(source: Source, stated: Mapping[str, Any], *, is_sized: bool, is_asked: bool) -> Inspected:
-    """A test of which this is stated; where somebody `is_asked`, how amplitudes count is not taken for granted."""
+    """A test of which this is stated; where somebody `is_asked`, what it needs not say is asked for as well."""
     from bushfit.geometry import Specimen
     from bushfit.inspection.opening import BLOCK_KEYS
 
-    source = replace(source, stated=stated)
+    source = replace(source, stated={key: value for key, value in stated.items() if value != ""})
     with options_named():
         one = source.inspect()
         if is_sized and isinstance(one.direction, Specimen) and one.direction.kind == "shear":
@@ -214,6 +216,8 @@ def _look(source: Source, stated: Mapping[str, Any], *, is_sized: bool, is_asked
         raise direction_error(source.file, source.sheet)
     if is_asked and one.is_counting_open:
         raise MeasurementError("no header says how amplitudes are counted", file=source.file, hint="--amplitude")
+    if is_asked and one.kind != "history" and "preload" not in {*one.entry, *stated}:
+        raise MeasurementError("nothing says under which preload this was tested", file=source.file, hint="--preload")
     return one
 
 
@@ -228,8 +232,7 @@ def _tell(options: Options, seen: Inspected) -> None:
     facts = seen.facts
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
-    place = seen.file.parent / seen.label
-    options.say(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
+    options.say(f"{seen.file.parent / seen.label}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
     options.warn([f"{seen.label}: {sentence}" for sentence in seen.odd])
     if seen.assumed:
         options.say(f"  {seen.assumed}")
@@ -241,7 +244,7 @@ class Questions:
 
     options: Options
     asked: bool
-    _answers: dict[_Key, Any] = field(default_factory=lambda: {_COUNTING: None})
+    _answers: dict[_Key, Any] = field(default_factory=lambda: dict.fromkeys(_ONCE))
 
     @classmethod
     def of(cls, options: Options, *, no_input: bool) -> Questions:
@@ -254,7 +257,10 @@ class Questions:
         given: dict[_Key, Any] = {}
         while True:
             try:
-                return look(_together(stated, given))
+                every = dict(stated)
+                for (name, role), answer in given.items():
+                    every |= {f"{name}s": {**every.get(f"{name}s", {}), role: answer}} if role else {name: answer}
+                return look(every)
             except BushfitError as error:
                 if not self.asked:
                     raise
@@ -271,22 +277,14 @@ class Questions:
     def _answer(self, key: _Key, told: BushfitError) -> dict[_Key, Any]:
         name, role = key
         known = self._answers.get(key)
-        if key != _COUNTING or known is None:
+        if key not in _ONCE or known is None:
             self.options.say(f"\n{told}")
             words = _WORDS.get(name, name.replace("_", " ")).format(role=role.replace("_", " "))
-            usual = "zero-to-peak" if key == _COUNTING else known
-            known = click.prompt(words, default=usual, type=TYPES.get(name), err=True)
+            usual = _ONCE.get(key, known)
+            known = click.prompt(words, default=usual, type=TYPES.get(name), show_default=usual != "", err=True)
             key = ("frequency", "") if name == "rate" and "Hz" in known else key
         self._answers[key] = known
         return {key: known}
-
-
-def _together(stated: Mapping[str, Any], given: Mapping[_Key, Any]) -> dict[str, Any]:
-    """What is stated of a test, and the answers."""
-    every = dict(stated)
-    for (name, role), answer in given.items():
-        every |= {f"{name}s": {**every.get(f"{name}s", {}), role: answer}} if role else {name: answer}
-    return every
 
 
 def _wanted(error: BushfitError) -> list[_Key]:

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any, cast
 import click
 from rich.markup import escape
 
-from bushfit.cli import completion
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options, positive
-from bushfit.cli.options import FILE, Size, command_called, file_option, option, place_option, under
+from bushfit.cli.options import FILE, Size, command_called, effect_lists, file_option, option, place_option, under
 from bushfit.cli.show import tell_table
 from bushfit.errors import naming
 from bushfit.units import for_people, number
@@ -62,7 +61,7 @@ _MOST_VALUES = 6
         "--rivals",
         "NAME,...",
         "Effects to tell apart [what diagnose leaves open].",
-        shell_complete=completion.effect_lists,
+        shell_complete=effect_lists,
     ),
     file_option("--campaign", "With MODEL.json: take [rig] and [predict] of this."),
 )
@@ -117,8 +116,7 @@ def command(
     _tell(options, outcome)
     if count and outcome.plan.planned.tests:
         outcome = replace(outcome, check=_checked(options, outcome, count, seed))
-    files = {**options.formats.files(outcome.contents), **outcome.campaign}
-    options.write(folder, files, outcome.document)
+    options.write(folder, {**options.formats.files(outcome.contents), **outcome.campaign}, outcome.document)
     if outcome.plan.planned.tests:
         options.say(f"next: make the tests in the order of {folder / options.formats.table('plan')}")
     if missed := [name for name, target in outcome.document["targets"].items() if not target["met"]]:

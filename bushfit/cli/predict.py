@@ -97,7 +97,13 @@ def tell_predictions(options: Options, outcome: Predicted) -> None:
         place = str(prediction.direction)
         whose = "" if prediction.direction in outcome.result.specimens else f"{outcome.result.name}: "
         low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
-        corners = table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].itertuples(index=False)
-        rows = ([*(number(x, 6) for x in row[:2]), *(alike([x], 4)[0] for x in row[2:4])] for row in corners)
-        tell_table(options, f"{whose}{place}, corners", list(table.columns[:4]), rows)
+        rows = []
+        for _, row in table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].iterrows():
+            cells = [number(value, 6) for value in row.iloc[:2]]
+            for name, digits in zip(table.columns[2:4], (4, 3), strict=True):
+                band = row[f"{name}, low"], row[f"{name}, high"]
+                value, *ends = alike([row[name], *band], digits)
+                cells.append(f"{value} ({' to '.join(ends)})" if band[0] < band[1] else value)
+            rows.append(cells)
+        tell_table(options, f"{whose}{place}, corners, with 95 % bands", list(table.columns[:4]), rows, names=2)
     options.warn(outcome.warnings)

@@ -5,14 +5,13 @@ from typing import Any
 
 import click
 
-from bushfit.cli import completion
 from bushfit.cli.common import Options, with_options
-from bushfit.cli.options import command_called
+from bushfit.cli.options import command_called, schemas
 from bushfit.cli.show import tell_table
 
 
 @command_called("schema", "", "model")
-@click.argument("name", required=False, shell_complete=completion.schemas)
+@click.argument("name", required=False, shell_complete=schemas)
 @with_options("nothing is written")
 def command(name: str | None, options: Options) -> None:
     """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, tell which there are.

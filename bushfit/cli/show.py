@@ -63,11 +63,12 @@ def tell_tests(options: Options, tested: Sequence[Misfit], usable: Sequence[Usab
     tests = [test for test in tested if options.verbose or test.held is None]
     worst = sorted(tests, key=lambda test: -test.reduced_chi_square)[: len(tests) if options.verbose else _MOST_TESTS]
     if len(tests) > 1:
-        title = "test by test: NRMSE and gain off [%], chi2 the reduced chi-square"
+        title = "test by test: NRMSE and gain off [%] (+: the model is stiffer), chi2 the reduced chi-square"
         columns, rows = ("test", "place", "points", "NRMSE", "chi2", "gain", ""), []
         for test in (test for test in tests if test in worst):
             name = test.test if test.held is None else f"  {_held(test)}"
-            figures = (number(100 * test.nrmse, 2), number(test.reduced_chi_square, 2), f"{100 * test.gain:+.2f}")
+            gain = f"{round(100 * test.gain, 2) + 0.0:+.2f}"  # no -0
+            figures = (number(100 * test.nrmse, 2), number(test.reduced_chi_square, 2), gain)
             rows.append((name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted"))
         tell_table(options, title, columns, rows, names=2)
     if left := len(tests) - len(worst):

@@ -1,6 +1,5 @@
 """The library of effects: what is said of them in library.toml, their laws one physics a file."""
 
-import difflib
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
@@ -18,7 +17,7 @@ from bushfit.effects.contract import Modifier as Modifier
 from bushfit.effects.contract import Parameter as Parameter
 from bushfit.effects.contract import Setting as Setting
 from bushfit.effects.history import History as History
-from bushfit.errors import ModelError
+from bushfit.errors import ModelError, did_you_mean
 from bushfit.geometry import Direction
 
 #: Directions along lines.
@@ -103,13 +102,8 @@ def effect_named(name: str) -> Effect:
         return unnamed.EFFECT
     if place := place_of(name):
         return FAMILIES[name.partition(".")[0]].of_place(place)
-    near = difflib.get_close_matches(name, LIBRARY, n=1)
-    raise ModelError(
-        "unknown effect",
-        found=name,
-        expected="one of " + ", ".join(LIBRARY),
-        hint=f"did you mean {near[0]}?" if near else None,
-    )
+    near = did_you_mean(name, LIBRARY, likeness=0.5)
+    raise ModelError("unknown effect", found=name, expected="one of " + ", ".join(LIBRARY), hint=near)
 
 
 def place_of(name: str) -> str | None:

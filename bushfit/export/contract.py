@@ -23,6 +23,8 @@ from bushfit.units import CELSIUS, agrees, factor, number, told
 _BASES = ("m", "kg", "s", "N")
 #: Relative error up to which a force counts as mass times acceleration: pounds and inches are known to ten digits.
 _ROUNDING = 1e-6
+#: Whose bulk data the format `nastran` writes: MSC and NX Nastran's, or Altair OptiStruct's.
+Dialect = Literal["nastran", "optistruct"]
 
 
 @dataclass(frozen=True)
@@ -91,10 +93,6 @@ class UnitSystem:
 
 #: The system of most decks for bushings.
 MM_T_S_N = UnitSystem(Unit("mm", 1e3), Unit("t", 1e-3), Unit("s", 1.0), Unit("N", 1.0))
-
-
-#: Whose bulk data the format `nastran` writes: MSC and NX Nastran's, or Altair OptiStruct's.
-Dialect = Literal["nastran", "optistruct"]
 
 
 @dataclass(frozen=True, eq=False)

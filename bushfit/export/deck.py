@@ -25,6 +25,8 @@ _WIDTH = 80
 _UNPRINTABLE = re.compile(r"[^\x20-\x7e]")
 #: Degrees of freedom that a direction stands for, the bushing's axis along z: 1 to 3 are x, y and z, 6 turns about z.
 DOFS = {Direction.AXIAL: (3,), Direction.RADIAL: (1, 2), Direction.TORSION: (6,)}
+#: What every law over frequency leaves out.
+NO_LOOPS = "no law in time: loops, overtones and transients need another format (fmu)"
 
 
 class Table(NamedTuple):
@@ -156,10 +158,8 @@ def of_levels(
 
 def stated(level: Iterable[Table]) -> str:
     """The amplitudes of a level in words: "axial at 0.2 mm, torsion at 1 deg"."""
-    displayed = [(table, table.direction.display.displacement) for table in level]
-    return ", ".join(
-        f"{table.direction} at {number(table.amplitude * factor, 6)} {unit}" for table, (unit, factor) in displayed
-    )
+    shown = [(table.direction, table.amplitude, *table.direction.display.displacement) for table in level]
+    return ", ".join(f"{place} at {number(amplitude * factor, 6)} {unit}" for place, amplitude, unit, factor in shown)
 
 
 def real(value: float, digits: int = 5) -> str:
@@ -170,10 +170,6 @@ def real(value: float, digits: int = 5) -> str:
 def to_bytes(lines: Iterable[str]) -> bytes:
     """The bytes of a deck; a sign beyond ASCII in it is a fault."""
     return ("\n".join(lines) + "\n").encode("ascii")
-
-
-#: What every law over frequency leaves out.
-NO_LOOPS = "no law in time: loops, overtones and transients need another format (fmu)"
 
 
 def of_tables(order: Order, form: Form) -> Iterator[str]:

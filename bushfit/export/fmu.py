@@ -43,6 +43,14 @@ _OPTIONS = (
 _MACHINES = {"x86_64-macos": (0x01000007, 3), "aarch64-macos": (0x0100000C, 0)}
 #: Libraries in it begin at multiples of 2 to this power [bytes].
 _ALIGNED = 14
+#: The sources that all FMUs share.
+_SHARED = ("fmu.c", "bushing.c", "bushing.h", "fmi2.h")
+#: Exponents of SI base units of the units that have whole ones; others are known by name alone.
+_BASE: Mapping[str, Mapping[str, int]] = TABLES["units"]
+#: What XML cannot hold.
+_NO_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+#: Values 0 and 1 stand first on the list of the C sources.
+_FIRST = 2
 
 
 def libraries(sources: Mapping[str, bytes], name: str, systems: Collection[str] = tuple(SYSTEMS)) -> dict[str, bytes]:
@@ -91,16 +99,6 @@ def _joined(parts: Mapping[str, bytes]) -> bytes:
     return head + bytes(step - len(head)) + body
 
 
-#: The sources that all FMUs share.
-_SHARED = ("fmu.c", "bushing.c", "bushing.h", "fmi2.h")
-#: Exponents of SI base units of the units that have whole ones; others are known by name alone.
-_BASE: Mapping[str, Mapping[str, int]] = TABLES["units"]
-#: What XML cannot hold.
-_NO_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-#: Values 0 and 1 stand first on the list of the C sources.
-_FIRST = 2
-
-
 def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
     """The FMU of an order, with one input and one output a place.
 
@@ -125,11 +123,6 @@ def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
     return Exported({f"{name}.fmu": _archive(content)}, found.losses, found.arms)
 
 
-def references(found: InTime) -> dict[str, int]:
-    """The reference of each value by its name."""
-    return {value.name: _FIRST + place for place, value in enumerate(found.values)}
-
-
 def model_h(found: InTime, guid: str) -> str:
     """Sizes of the lists, and what an importer knows the FMU by."""
     sizes = {
@@ -145,7 +138,7 @@ def model_h(found: InTime, guid: str) -> str:
 
 def model_c(found: InTime) -> str:
     """The lists themselves."""
-    reference, values = references(found), found.values
+    values, reference = found.values, {value.name: at for at, value in enumerate(found.values, start=_FIRST)}
     lists = {
         "start": [0.0, 1.0, *(value.value for value in values)],
         "least": [0.0, 1.0, *(value.bounds[0] for value in values)],
@@ -159,9 +152,8 @@ def model_c(found: InTime) -> str:
     for own, lever in zip(found.fields, found.levers, strict=True):
         neutrals = {field: int(field in ONE) for field in known if field not in own}
         set_ = {**neutrals, **{field: reference[name] for field, name in own.items()}}
-        lines.append(
-            f"    {{{', '.join(f'.{field} = {place}' for field, place in set_.items())}, .lever = {lever!r}}},"
-        )
+        listed = ", ".join(f".{field} = {place}" for field, place in set_.items())
+        lines.append(f"    {{{listed}, .lever = {lever!r}}},")
     lines += ["};", "const Arm arms[ARMS] = {"]
     arms = found.arm_rows or ((0, 0.0, 1.0),)
     lines += [f"    {{{part}, {share!r}, {time!r}}}," for part, share, time in arms]
@@ -215,7 +207,7 @@ def _variables(found: InTime) -> list[tuple[dict[str, str], dict[str, str]]]:
             shown = displays[unit].name if unit in displays else ""
             real = {"unit": "" if unit == "1" else unit, "displayUnit": shown, **start}
             listed.append(({**variable, "variability": "continuous", **initial}, real))
-    for value, reference in zip(found.values, references(found).values(), strict=True):
+    for reference, value in enumerate(found.values, start=_FIRST):
         kind = {"causality": "parameter", "variability": "tunable"} if value.settable else {
             "causality": "local", "variability": "constant",
         }  # fmt: skip

@@ -61,9 +61,8 @@ def _property(names: Sequence[str], form: Form, units: UnitSystem, pid: int, lev
         yield from _card("PBUSHT", [str(pid), *_by_dof(names, numbers)])
         for dof, frequency, *parts in rows:
             for part, column in enumerate(parts):
-                pairs = [
-                    text for f, value in zip(frequency, column, strict=True) for text in (real(f, 10), real(value))
-                ]
+                points = zip(frequency, column, strict=True)
+                pairs = [text for f, value in points for text in (real(f, 10), real(value))]
                 yield from _card("TABLED1*", [numbers[part][dof], "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
 
 

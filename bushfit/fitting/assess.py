@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.errors import FitError
 from bushfit.fitting.common_error import Joined
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual, together
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, reached, repeats_of, rows_of
-from bushfit.geometry import Bushing, Direction, stiffness_per_modulus
+from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Quality, Range
@@ -30,6 +31,8 @@ _MOST_STIFFENING = 20.0
 #: [K] Range of temperatures that the tests of one fit may have; chosen: filled rubber softens by up to 1 % a kelvin,
 #: and a test chamber keeps its temperature within less.
 _ONE_TEMPERATURE = 3.0
+#: Strain amplitude that no filled rubber bears for long; chosen: tests reach a third, a wrong prefix is 1000 times.
+_MOST_STRAIN = 3.0
 _CHECK = "check the units of displacement and force, and the dimensions of what was tested"
 
 
@@ -239,6 +242,21 @@ def implausible(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> list[s
         return [f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, which no rubber does: {_CHECK}"]
     said = f"a shear modulus of {told('Pa', moduli[hardest])} is that of no rubber: {_CHECK}"
     return [] if _SOFTEST < moduli[hardest] < _HARDEST else [said]
+
+
+def refuse_strain(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> None:
+    """Raise a FitError where a test strains its rubber by more than any bears: a unit, or a size, is wrong."""
+    for each in data_sets:
+        largest = float(np.max(each.amplitude))
+        if (strain := largest * unit_strain(bushing, each.direction)) > _MOST_STRAIN:
+            amplitude = told(each.direction.motion.displacement_unit, largest)
+            raise FitError(
+                "no rubber bears the amplitude of this test",
+                place=each.name,
+                found=f"{amplitude}, {each.direction}: a strain of {number(100 * strain, 2)} %",
+                expected=f"a strain below {100 * _MOST_STRAIN:g} %",
+                hint=_CHECK,
+            )
 
 
 def apart_in_temperature(model: Model, data_sets: Sequence[DataSet]) -> list[str]:

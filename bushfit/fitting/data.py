@@ -13,6 +13,7 @@ from bushfit.campaign.session import measured_session
 from bushfit.effects import BASE, effect_named, effect_of, with_base
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError, naming
+from bushfit.fitting.assess import refuse_strain
 from bushfit.fitting.coordinates import Bounds, residual
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data, with_level_errors
 from bushfit.fitting.design import designed
@@ -43,17 +44,20 @@ class Data:
         """The data sets of a campaign as its [fit] asks for them.
 
         Raises:
-            FitError: a loop is not one whole cycle or more, rows of it are missing, or it gives energy.
+            FitError: a loop is not one whole cycle or more, lacks rows, or gives energy; a strain that no rubber bears.
             ModelError: [fit] effects has an unknown effect, or one twice.
         """
         with naming(campaign.path, place="[fit] effects"):
             Model.started(None, with_base(campaign.fit.effects), {})
-        return cls(
+        data = cls(
             campaign,
             tuple(loop_data(campaign.loops, campaign.rig, without_outliers=campaign.fit.loss != "linear")),
             tuple(sweep_data(campaign.sweeps, campaign.fit.residuals, campaign.rig)),
             {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
-        ).in_session()
+        )
+        with naming(campaign.path):
+            refuse_strain(campaign.bushing, data.data_sets)
+        return data.in_session()
 
     def in_session(self) -> "Data":
         """The same data, each point with what it was measured under."""

@@ -55,8 +55,8 @@ _STOPPED = (
 )
 #: What is said of levels that disagree by more than their repeats do.
 _LEVELS = "levels disagree by more than their repeats do: an error of {} of each counts as noise"
-#: What to do about a model that does not fit.
-_NEXT = "; bushfit diagnose looks for what is missing"
+#: What to do about a model that does not fit, until it is done.
+NEXT = "; bushfit diagnose looks for what is missing"
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ def fit_joint(
         data_sets = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
         found = _solve(data, data_sets, effects, {}, found.solution.model, solve)
     notes = [_LEVELS.format(words_of(errors.error))] if errors.matters and not at_limit and not error else []
-    notes += [*([model_error_warning(error) + _NEXT] if error else []), *unfitted(found.solution.model, left, _NEXT)]
+    notes += [*([model_error_warning(error) + NEXT] if error else []), *unfitted(found.solution.model, left, NEXT)]
     result = _result(data, [found], notes=notes, left=left)
     result = replace(result, usable=usable(found.solution, found.minimised, left), model_error=error)
     if not profile:
@@ -231,7 +231,7 @@ def _result(
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     of_tests = (*implausible(data.campaign.bushing, data_sets), *apart_in_temperature(model, data_sets))
     doubts = [*of_tests, *data.assumed]
-    odd = [note for step in steps for note in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)]
+    odd = [note for step in steps for note in cautions(model, step.solution, step.data_sets, data.bounds, cov, NEXT)]
     return Result(
         model,
         fitted,

@@ -7,7 +7,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Literal, NamedTuple
 
-from bushfit.errors import ModelError
+from bushfit.errors import ModelError, did_you_mean
 from bushfit.geometry import tube
 from bushfit.geometry.shape import NO_CORRECTION, Correction, radial_correction
 
@@ -138,14 +138,14 @@ class Bushing:
                 raise ModelError(
                     "impossible bushing",
                     place=key,
-                    found=f"{value:g} m",
+                    found=f"{1e3 * value:g} mm",
                     expected=f"a positive length, {_SHORTEST:g} to {_LONGEST:g} m",
                 )
         if self.inner_radius >= self.outer_radius:
             raise ModelError(
                 "impossible bushing",
                 place="inner_radius, outer_radius",
-                found=f"{self.inner_radius:g} m and {self.outer_radius:g} m",
+                found=f"{1e3 * self.inner_radius:g} mm and {1e3 * self.outer_radius:g} mm",
                 expected="inner_radius below outer_radius",
                 hint="check that radii were given, not diameters, and that they are not swapped",
             )
@@ -247,7 +247,8 @@ def place_named(name: str, specimens: Iterable[Specimen]) -> Place:
     """
     known: dict[str, Place] = {str(place): place for place in (*Direction, *specimens)}
     if name not in known:
-        raise ModelError("no such direction or specimen", found=name, expected="one of " + ", ".join(known))
+        near = did_you_mean(name, known)
+        raise ModelError("no such direction or specimen", found=name, expected="one of " + ", ".join(known), hint=near)
     return known[name]
 
 

@@ -141,15 +141,16 @@ def _tests_by_rows(source: Source) -> tuple[list[Source], list[str]]:
 def stated_of_each(sources: Sequence[Source], stated: Mapping[str, Any]) -> list[Source]:
     """Sources with what the user states of each.
 
-    A column that is stated for all, and that only some of them have, is left out for the others; so is a temperature
-    that is to choose rows, one of several in a file, for files that have no column for it.
+    A column that is stated for all, and that only some of them have, is left out for the others; so is a unit for those
+    whose headers say it, and a temperature that is to choose rows, one of several in a file, for files that have no
+    column for it.
     """
-    columns: Mapping[str, str] = stated.get("columns", {})
-    own = [{**stated, "columns": columns, **({"sheet": source.sheet} if source.sheet else {})} for source in sources]
-    for role in columns:
-        has = [_has_column(source.file, role, keys) for source, keys in zip(sources, own, strict=True)]
-        for keys in (keys for keys, one in zip(own, has, strict=True) if one is False and True in has):
-            keys["columns"] = {other: header for other, header in keys["columns"].items() if other != role}
+    tables: Mapping[str, Mapping[str, str]] = {key: stated.get(key, {}) for key in ("columns", "units")}
+    own = [{**stated, **tables, **({"sheet": source.sheet} if source.sheet else {})} for source in sources]
+    for key, role in ((key, role) for key, stated_by_role in tables.items() for role in stated_by_role):
+        needs = [_needs(source.file, key, role, keys) for source, keys in zip(sources, own, strict=True)]
+        for keys in (keys for keys, one in zip(own, needs, strict=True) if one is False and True in needs):
+            keys[key] = {other: text for other, text in keys[key].items() if other != role}
     if stated.get("temperature") and len(sources) > 1:
         counts = {}
         for index, source in enumerate(sources):
@@ -160,15 +161,19 @@ def stated_of_each(sources: Sequence[Source], stated: Mapping[str, Any]) -> list
     return [replace(source, stated=keys) for source, keys in zip(sources, own, strict=True)]
 
 
-def _has_column(file: Path, role: str, stated: Mapping[str, Any]) -> bool | None:
-    """Whether a file has the column that is stated for a role; None where it cannot be told."""
+def _needs(file: Path, key: str, role: str, stated: Mapping[str, Any]) -> bool | None:
+    """Whether a file has the column that is stated for a role, or lacks its unit; None where it cannot be told."""
     names = LOOP_COLUMNS if role in LOOP_COLUMNS else SWEEP_COLUMNS
+    mine = {"columns": {role: stated["columns"][role]}} if key == "columns" else {"units": {}}
     try:
-        return role in open_table(file, names, {**stated, "columns": {role: stated["columns"][role]}}).roles
+        column = open_table(file, names, {**stated, "units": {}, **mine}).roles.get(role)
     except NoColumnError:
         return False
     except BushfitError:  # which the inspection of the file tells
         return None
+    if column is None:
+        return None
+    return key == "columns" or column.unit is None
 
 
 def _in_folder(folder: Path) -> tuple[list[Source], list[str]]:
@@ -211,8 +216,7 @@ def _holding_tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
             pass
         tests.append(part)
     if tests and tests[0].sheet and without:
-        of_book = labels_above(
-            line for part in parts_of(tests[0].file) if part.sheet in without for line in part.head()
-        )
+        others = [part for part in parts_of(tests[0].file) if part.sheet in without]
+        of_book = labels_above(line for part in others for line in part.head())
         tests = [replace(test, of_book=of_book) for test in tests]
     return tests, left_out

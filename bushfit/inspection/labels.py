@@ -30,9 +30,9 @@ def temperatures_of(table: Table) -> int:
     return 1 if np.ptp(found) <= ONE_TEST else 2
 
 
-def labels_of_file(file: Path, stated: Mapping[str, Any]) -> Labels:
+def labels_of_file(file: Path, sheet: str, stated: Mapping[str, Any]) -> Labels:
     """What the name of a sheet and of its file say of a test; they count amplitudes as is stated, if it is."""
-    said = labels_in_names(stated.get("sheet", ""), file.stem)
+    said = labels_in_names(sheet, file.stem)
     counting = stated.get("amplitude")
     if counting is None:
         return said
@@ -93,7 +93,7 @@ def _held(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -
         f"nothing says at which {role} this was tested",
         found=f"{label}: {' and '.join(each.text for each in found)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
-        hint=f'state {key} = "{example}" in the campaign, or name the column: columns = {{ {role} = "..." }}',
+        hint=f'state {key} = "{example}" in the campaign, or name the column: {table.columns_key(role, expected)}',
     )
 
 

@@ -35,6 +35,16 @@ _FLAT_ROWS = 8
 _FLAT_RATIO = 5.0
 #: Share of the range within which values lie just below the extreme, or else one step of the converter.
 _JUST_BELOW = 2e-3
+#: Standard errors beyond which cycles differ; chosen: noise does not go that far in any of many tests.
+_REAL_CHANGE = 6.0
+#: Share of half the force's range beyond which cycles differ; chosen: less does not matter to a fit.
+_WORTH_TELLING = 2e-3
+#: Share of half its range by which a loop's zero is off; chosen: less does not matter to a fit. A preload is more.
+_OFF_ZERO = 0.02
+#: Cycles that are looked at from either end of a loop; chosen: what settles shows in them.
+_MOST_END_CYCLES = 6
+#: [s] A cycle that takes longer is in doubt; chosen: quasi-static tests take minutes.
+_LONGEST_CYCLE = 3000.0
 
 
 def sampling(history: Loop) -> str:
@@ -136,18 +146,6 @@ def _outliers(channel: Channel, time: Floats) -> Iterator[str]:
         more = f" and {rows.size - 3} more" if rows.size > 3 else ""
         outlier = "outliers" if rows.size > 1 else "an outlier"
         yield f"the {channel.name} has {outlier} at {listed}{more}"
-
-
-#: Standard errors beyond which cycles differ; chosen: noise does not go that far in any of many tests.
-_REAL_CHANGE = 6.0
-#: Share of half the force's range beyond which cycles differ; chosen: less does not matter to a fit.
-_WORTH_TELLING = 2e-3
-#: Share of half its range by which a loop's zero is off; chosen: less does not matter to a fit. A preload is more.
-_OFF_ZERO = 0.02
-#: Cycles that are looked at from either end of a loop; chosen: what settles shows in them.
-_MOST_END_CYCLES = 6
-#: [s] A cycle that takes longer is in doubt; chosen: quasi-static tests take minutes.
-_LONGEST_CYCLE = 3000.0
 
 
 def look_at_loop(loop: Loop, labels: Labels) -> Findings:

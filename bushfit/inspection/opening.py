@@ -37,6 +37,8 @@ from bushfit.validation import check_tables
 BLOCK_KEYS = ("area", "thickness", "elements")
 #: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
 _TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)
+#: [Hz] Frequency above which a motion in steps is a stepped sine; chosen: quasi-static loops are slower.
+_QUASI_STATIC = 1.0
 
 
 def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
@@ -163,12 +165,6 @@ def open_table(
     return Table.open(file, names, own["columns"], own["units"], written, motion, rows if any(rows) else None)
 
 
-#: [Hz] Frequency above which a motion in steps is a stepped sine; chosen: quasi-static loops are slower.
-_QUASI_STATIC = 1.0
-#: The key of a loop whose load cell counts the other way.
-_TURNED = {"force_sign": -1}
-
-
 def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) -> Inspected:
     """Recognise a test file, and say what it holds and what is odd about it.
 
@@ -184,7 +180,7 @@ def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) 
     # which of two translations it is makes no difference to reading
     read_as = direction or Direction.AXIAL
     entry = _entry(SweepFile if is_sweep else LoopFile, stated, table, direction)
-    by_name = labels_of_file(file, stated)
+    by_name = labels_of_file(file, table.source.sheet or "", stated)
     said, told, counted = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
     if "at_amplitude" in said:
         entry.pop("amplitude", None)  # counted already
@@ -264,15 +260,16 @@ def _read_loop(
     except MeasurementError as error:
         if "force_sign" in entry:
             raise
+        entry = {**entry, "force_sign": -1}
         try:
-            turned = read_loop(**_keywords(file, direction, {**entry, **_TURNED}, LoopFile))
+            turned = read_loop(**_keywords(file, direction, entry, LoopFile))
         except BushfitError:
             raise error from None
     odd = (
         f'"{table.roles["force"].header}" falls where "{table.roles["displacement"].header}" rises: the load cell '
         "counts the other way, and the campaign needs force_sign = -1"
     )
-    return turned, {**entry, **_TURNED}, [odd]
+    return turned, entry, [odd]
 
 
 def _look(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findings]:

@@ -21,6 +21,10 @@ from bushfit.validation import plain
 
 #: A hysteresis loop, a sweep, or the raw history of a stepped sine.
 Kind = Literal["loop", "sweep", "history"]
+#: What the content of a file tells: facts in words, by label, and a sentence for each thing that is odd.
+Findings = tuple[dict[str, str], list[str]]
+#: For each kind of test the array of tables that lists it in a campaign.
+_TABLES = {"loop": "loops", "sweep": "sweeps"}
 
 
 def told_frequencies(frequencies: Sequence[float] | Array) -> str:
@@ -71,10 +75,6 @@ class InspectionDocument(TypedDict):
     files: Annotated[list[InspectedFile], Doc("that can be used.")]
     left_out: Annotated[list[str], Doc("a sentence for each file or sheet that holds no test.")]
     campaign: Annotated[str, Doc("the text for a campaign, or a whole one.")]
-
-
-#: What the content of a file tells: facts in words, by label, and a sentence for each thing that is odd.
-Findings = tuple[dict[str, str], list[str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,10 +145,6 @@ class Inspected:
             "assumed": self.assumed,
             "odd": list(self.odd),
         }
-
-
-#: For each kind of test the array of tables that lists it in a campaign.
-_TABLES = {"loop": "loops", "sweep": "sweeps"}
 
 
 def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspected], folder: Path) -> str:

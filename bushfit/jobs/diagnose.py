@@ -14,7 +14,7 @@ from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import FitError, typed
 from bushfit.fitting.data import Data
-from bushfit.fitting.procedures import TwoStep, fit_two_step
+from bushfit.fitting.procedures import NEXT, TwoStep, fit_two_step
 from bushfit.jobs.fits import (
     Fit,
     FitStatic,
@@ -77,8 +77,7 @@ class Diagnose:
 
     def run(self, data: Data) -> Diagnosed:
         model = self.model or Model.started(data.campaign.bushing, data.effects, {})
-        parameters = tuple(model.parameters)
-        if not (self.settings.adopt or data.free(parameters)):
+        if not (self.settings.adopt or data.free(tuple(model.parameters))):
             raise FitError(
                 "there is nothing to fit, and so nothing to diagnose",
                 file=data.campaign.path,
@@ -86,26 +85,21 @@ class Diagnose:
                 found="every parameter is held with vary = false",
                 hint="bushfit fit says how well the values given meet the tests; free one to diagnose",
             )
-        found = with_plan(diagnose(data, self.model, self.settings), data.campaign.path)
+        found, path = diagnose(data, self.model, self.settings), data.campaign.path
+        if found.verdict == "ambiguous" and (sets := look_alikes(found)) and path.suffix == ".toml":
+            there = Path(path.name) if path.is_absolute() else path  # results keep no path of a machine
+            command = f"bushfit plan {typed(there)} --rivals {','.join(sets[0])}"
+            found = replace(found, next_test=f"{found.next_test}; {command} chooses tests that tell them apart")
         if not (found.changed or self.model or self.settings.adopt):  # then the model to use is that of `fit`
-            found = replace(found, result=found.odds.averaged((self.joint or Fit().run(data)).result))
-        return Diagnosed(campaign_document(data, "diagnose", self._options()), found)
-
-    def _options(self) -> tuple[str, ...]:
-        """What was asked for, as it is typed."""
+            joint = (self.joint or Fit().run(data)).result
+            asked = replace(joint, warnings=tuple(words.removesuffix(NEXT) for words in joint.warnings))
+            found = replace(found, result=found.odds.averaged(asked))
         mine, usual = self.settings, Settings()
-        model, sizes = "MODEL.json" if self.model else None, ("max_effects", "tolerance")
-        changed = {key: f"{getattr(mine, key):g}" for key in sizes if getattr(mine, key) != getattr(usual, key)}
-        return options_typed(model=model, adopt=mine.adopt, without=mine.without, **changed)
-
-
-def with_plan(found: Diagnosis, path: Path) -> Diagnosis:
-    """The diagnosis with the command that plans tests to tell look-alikes apart, where there are some."""
-    sets = look_alikes(found)
-    if found.verdict != "ambiguous" or not sets or path.suffix != ".toml":
-        return found
-    command = f"bushfit plan {typed(Path(path.name))} --rivals {','.join(sets[0])}"
-    return replace(found, next_test=f"{found.next_test}; {command} chooses tests that tell them apart")
+        sizes = ((key, getattr(mine, key), getattr(usual, key)) for key in ("max_effects", "tolerance"))
+        changed = {key: f"{size:g}" for key, size, default in sizes if size != default}
+        start = "MODEL.json" if self.model else None
+        options = options_typed(model=start, adopt=mine.adopt, without=mine.without, **changed)
+        return Diagnosed(campaign_document(data, "diagnose", options), found)
 
 
 class RunDocument(TypedDict, total=False):

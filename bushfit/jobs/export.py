@@ -96,8 +96,7 @@ class Export:
         predicted = self.predict.run(result, campaign)
         grids = [np.unique(prediction.frequency) for prediction in predicted.predictions]
         if not all(np.array_equal(grid, grids[0]) for grid in grids):
-            union = tuple(np.unique(np.concatenate(grids)).tolist())
-            asked = replace(self.predict.asked, frequencies=union)
+            asked = replace(self.predict.asked, frequencies=tuple(np.unique(np.concatenate(grids)).tolist()))
             predicted = replace(self.predict, asked=asked).run(result, campaign)
         settings = (self.accuracy, self.units, self.dialect, self.decimal_comma)
         day = datetime.now(UTC).date().isoformat()

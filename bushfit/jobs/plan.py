@@ -187,13 +187,10 @@ class Planned:
         """The smallest amounts that either programme finds of each effect."""
         for planned, standard in zip(self.plan.planned.visible, self.plan.standard.visible, strict=True):
             amounts = [each.amount if np.isfinite(each.amount) else None for each in (planned, standard)]
-            entry: Shown = {
-                "parameter": planned.parameter,
-                "unit": planned.unit,
-                "planned": amounts[0],
-                "standard": amounts[1],
-            }
-            yield planned.effect, entry
+            yield (
+                planned.effect,
+                Shown(parameter=planned.parameter, unit=planned.unit, planned=amounts[0], standard=amounts[1]),
+            )
 
     def _rivalry(self, planned: Programme, standard: Programme) -> Rivalry | None:
         if planned.apart is None or standard.apart is None:

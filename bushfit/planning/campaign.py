@@ -45,6 +45,10 @@ _UNITS: Mapping[str, str | None] = {
     "amplitude": None,
     "amplitudes": None,
 }
+#: Of one campaign what was found less the truth, (k,); None where no fit was possible.
+Found = Array | None
+#: Does work(seeds) for parts of the seeds, in some order, and gives the number and the result of each.
+Every = Callable[[Sequence[int], Callable[[Sequence[int]], list[Found]]], Iterable[tuple[int, Found]]]
 
 
 def settings_of(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateSettings:
@@ -112,12 +116,6 @@ def _line(key: str, value: Any, test: Test | None = None) -> str:
 def _number(value: float) -> str:
     """A number to twelve digits, in which no rounding of a unit is left."""
     return f"{value:.12g}"
-
-
-#: Of one campaign what was found less the truth, (k,); None where no fit was possible.
-Found = Array | None
-#: Does work(seeds) for parts of the seeds, in some order, and gives the number and the result of each.
-Every = Callable[[Sequence[int], Callable[[Sequence[int]], list[Found]]], Iterable[tuple[int, Found]]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,9 @@ from bushfit.progress import counting
 
 #: Fall of the logarithm of the variance that a run, or an exchange, is worth; chosen: a quarter per cent of the error.
 _WORTH = 5e-3
+#: Weight of what the parameters take of a drift, beside what shows of it; chosen: orders then keep it below a fifth of
+#: a standard error for 1 % over the session.
+_STEADY = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,11 +193,6 @@ def filled(
         counts[best] += 1
         so_far = values[best]
     return counts
-
-
-#: Weight of what the parameters take of a drift, beside what shows of it; chosen: orders then keep it below a fifth of
-#: a standard error for 1 % over the session.
-_STEADY = 100.0
 
 
 @dataclass(frozen=True, eq=False)

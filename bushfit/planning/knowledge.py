@@ -3,10 +3,11 @@
 from collections import defaultdict
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
-from bushfit.campaign.compound import Compound
+from bushfit.campaign.quantities import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.evidence import Evidence, fit, result_of
 from bushfit.diagnosis.propose import proposals
@@ -27,6 +28,40 @@ from bushfit.model.result import Result
 from bushfit.planning.contract import Knowledge, Noise, Test
 from bushfit.planning.sensitivity import ROWS_PER_CYCLE, relative_slopes
 from bushfit.units import number
+
+#: Density of carbon black [g/cm^3]; handbooks: 1.7 to 1.9.
+_BLACK_DENSITY = 1.8
+#: Density of polymers [g/cm^3]; handbooks.
+_DENSITY = {"natural": 0.92, "SBR": 0.94, "EPDM": 0.86, "NBR": 1.0, "CR": 1.23, "IIR": 0.92}
+#: Filler of the paper's compound [phr].
+_PAPER_FILLER = 27.0
+#: Angular frequency that a reading of a durometer after 3 s stands for [rad/s]: its inverse.
+_READING = 1.0 / 3.0
+#: Angular frequency at which the springpot is held against the spring, 10 Hz [rad/s]: the middle of usual sweeps.
+_MIDDLE = 2.0 * np.pi * 10.0
+#: Springpot over spring at 10 Hz [1], from Table 1: 0.2/2 62.8^0.24/1.09.
+_SPRINGPOT = 0.25
+#: Order of the springpot, from Table 1.
+_ORDER = 0.24
+#: Friction at small strain over spring [1], from Table 1: 14.6/(2 0.013 1090).
+_FRICTION = 0.515
+#: Strain at half of the friction, from Table 1.
+_HALF_STRAIN = 0.013
+#: Power of the filler's volume share with which its network stiffens; Heinrich and Klueppel 2002: 3.5.
+_NETWORK = 3.5
+#: Volume share of filler at least: the little friction of rubber without filler.
+_LEAST_SHARE = 0.02
+#: Standard deviation of a stated hardness [Shore A]: compounds are sold within 5 degrees, which is taken for 95 %.
+_HARDNESS_ERROR = 2.5
+#: Of ln G where the hardness is known; chosen: relations between hardness and modulus differ by some 20 %, and rubber
+#: in a mould is not rubber in a sheet.
+_MODULUS_ERROR = 0.2
+#: Of ln q, ln alpha, ln r and ln eps_half in natural rubber: factors of 2.4, 1.7, 2.7 and 2.2 hold 95 %.
+_SHAPE_ERRORS = np.array([0.45, 0.27, 0.5, 0.4])
+#: The same in other rubbers, none of which the numbers come from; an EPDM that was measured has alpha below 0.1.
+_OTHER_ERRORS = np.array([0.7, 0.5, 0.7, 0.5])
+#: Of the power of the network's stiffness: blacks differ in it.
+_NETWORK_ERROR = 1.0
 
 
 def of_result(result: Result, noise: Noise | None = None, source: str = "") -> Knowledge:
@@ -151,9 +186,16 @@ def _each_added(plain: Evidence, names: Sequence[str], held: Sequence[str], boun
 
 
 def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:
-    """The sets of effects that a diagnosis cannot tell apart; without mistakes and faults, which no plan tells."""
-    sets = ((named.name, *named.alternatives) for named in found.effects if named.alternatives and not named.test)
-    return [names for names in sets if not names[1].startswith("fault:")]
+    """The sets of effects that a diagnosis cannot tell apart; without mistakes and faults, which no plan tells, and of
+    effects that make one explanation together without those that every explanation has."""
+    sets, every = [], [each.name for each in found.effects]
+    for named in found.effects:
+        if named.alternatives and not named.test and not named.alternatives[0].startswith("fault:"):
+            others = [label.split(" + ") for label in named.alternatives]
+            own = every if max(map(len, others)) > 1 else [named.name]
+            names = [name for name in dict.fromkeys(chain(own, *others)) if name in LIBRARY]
+            sets.append(tuple(name for name in names if not all(name in each for each in (own, *others))))
+    return [names for names in sets if len(names) > 1]
 
 
 def noise_of(data: Data) -> Noise:
@@ -190,42 +232,6 @@ def _tests(data: Data) -> Iterator[Test]:
             held = (float(sweep.held[block[0]]),)
             amplitudes, frequencies = (held, steps) if stepped == "frequency" else (steps, held)
             yield SimulatedSweep(sweep.direction, amplitudes, frequencies, stepped or "frequency")
-
-
-#: Density of carbon black [g/cm^3]; handbooks: 1.7 to 1.9.
-_BLACK_DENSITY = 1.8
-#: Density of polymers [g/cm^3]; handbooks.
-_DENSITY = {"natural": 0.92, "SBR": 0.94, "EPDM": 0.86, "NBR": 1.0, "CR": 1.23, "IIR": 0.92}
-#: Filler of the paper's compound [phr].
-_PAPER_FILLER = 27.0
-#: Angular frequency that a reading of a durometer after 3 s stands for [rad/s]: its inverse.
-_READING = 1.0 / 3.0
-#: Angular frequency at which the springpot is held against the spring, 10 Hz [rad/s]: the middle of usual sweeps.
-_MIDDLE = 2.0 * np.pi * 10.0
-#: Springpot over spring at 10 Hz [1], from Table 1: 0.2/2 62.8^0.24/1.09.
-_SPRINGPOT = 0.25
-#: Order of the springpot, from Table 1.
-_ORDER = 0.24
-#: Friction at small strain over spring [1], from Table 1: 14.6/(2 0.013 1090).
-_FRICTION = 0.515
-#: Strain at half of the friction, from Table 1.
-_HALF_STRAIN = 0.013
-#: Power of the filler's volume share with which its network stiffens; Heinrich and Klueppel 2002: 3.5.
-_NETWORK = 3.5
-#: Volume share of filler at least: the little friction of rubber without filler.
-_LEAST_SHARE = 0.02
-
-#: Standard deviation of a stated hardness [Shore A]: compounds are sold within 5 degrees, which is taken for 95 %.
-_HARDNESS_ERROR = 2.5
-#: Of ln G where the hardness is known; chosen: relations between hardness and modulus differ by some 20 %, and rubber
-#: in a mould is not rubber in a sheet.
-_MODULUS_ERROR = 0.2
-#: Of ln q, ln alpha, ln r and ln eps_half in natural rubber: factors of 2.4, 1.7, 2.7 and 2.2 hold 95 %.
-_SHAPE_ERRORS = np.array([0.45, 0.27, 0.5, 0.4])
-#: The same in other rubbers, none of which the numbers come from; an EPDM that was measured has alpha below 0.1.
-_OTHER_ERRORS = np.array([0.7, 0.5, 0.7, 0.5])
-#: Of the power of the network's stiffness: blacks differ in it.
-_NETWORK_ERROR = 1.0
 
 
 def gent_modulus(shore: float) -> float:

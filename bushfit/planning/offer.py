@@ -39,6 +39,14 @@ _CHOICES = (
 )
 #: Axial strain per displacement of the paper's bushing [1/m]: 1/sqrt(2 (b^2 - a^2) ln(b/a)), a = 10 mm, b = 18 mm.
 _PAPER_STRAIN = float(1.0 / np.sqrt(2.0 * (0.018**2 - 0.010**2) * np.log(1.8)))
+#: The 90 % quantile of the normal distribution.
+_NINE_OF_TEN = 1.2815515655446004
+#: Amount of an effect over its standard error that a test of one in twenty finds in nine of ten cases: the 97.5 % and
+#: the 90 % quantile of the normal distribution.
+FOUND = Z95 + _NINE_OF_TEN
+#: Expected chi-square between rivals from which on `diagnose` tells them apart in nine of ten cases: of d it finds d
+#: with a standard deviation of 2 sqrt(d), and it takes those for one set that are within TELLS.
+RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + TELLS))) ** 2
 
 
 def minutes(test: Test, rig: RigSettings) -> float:
@@ -126,7 +134,7 @@ def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
         limits += [(force, rig.max_force), (size, rig.max_displacement), (speed, rig.max_velocity)]
     elif place.motion is ROTATION:
         limits += [(force, rig.max_moment), (size, rig.max_rotation)]
-    bearable = size * known.model.unit_strain(place) <= max(0.5, known.strain or 0.0)  # or what it has borne
+    bearable = size * known.model.unit_strain(place) <= max(0.5, known.strain or 0.0)  # what it has borne
     for reached, limit in limits:
         bearable &= reached <= (limit or np.inf) * (1.0 + 1e-9)  # rounding
     if isinstance(test, SimulatedLoop):
@@ -141,16 +149,6 @@ def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
 def _rounded(value: float) -> float:
     """To two digits, as a set point is typed."""
     return float(f"{value:.2g}")
-
-
-#: The 90 % quantile of the normal distribution.
-_NINE_OF_TEN = 1.2815515655446004
-#: Amount of an effect over its standard error that a test of one in twenty finds in nine of ten cases: the 97.5 % and
-#: the 90 % quantile of the normal distribution.
-FOUND = Z95 + _NINE_OF_TEN
-#: Expected chi-square between rivals from which on `diagnose` tells them apart in nine of ten cases: of d it finds d
-#: with a standard deviation of 2 sqrt(d), and it takes those for one set that are within TELLS.
-RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + TELLS))) ** 2
 
 
 @dataclass(frozen=True, eq=False)

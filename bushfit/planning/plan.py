@@ -102,7 +102,7 @@ class _Planner:
     @property
     def sound(self) -> bool:
         """Whether all effects show as in the standard programme, and repeats tell the scatter."""
-        return not self.lacking and self._scatter_freedom(self.best) >= [_SCATTER_FREEDOM]
+        return not self._lacking(self.best) and self._scatter_freedom(self.best) >= [_SCATTER_FREEDOM]
 
     def plan(self) -> Plan:
         """See the function."""
@@ -216,11 +216,6 @@ class _Planner:
         """How often each test stands among the runs, (tests,)."""
         return np.bincount(np.array(runs, dtype=int), minlength=len(self.offer.tests))
 
-    @cached_property
-    def lacking(self) -> list[str]:
-        """Effects that the best runs show less well than the standard programme."""
-        return self._lacking(self.best)
-
     def _lacking(self, counts: Array) -> list[str]:
         """Effects that so many runs of each test show less well than the standard programme."""
         reached = noncentrality_of(self.offer.views[0].together(counts))[0]
@@ -243,10 +238,8 @@ class _Planner:
     def least(self) -> Array:
         """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
         reached = noncentrality_of(self.offer.views[0].together(self._counts(self.standard_runs)))[0]
-        seen = [
-            column.reach * np.sqrt(size) >= FOUND for column, size in zip(self.offer.grid.columns, reached, strict=True)
-        ]
-        return np.where(seen, reached, 0.0)
+        reach = np.array([column.reach for column in self.offer.grid.columns])
+        return np.where(reach * np.sqrt(reached) >= FOUND, reached, 0.0)
 
     def _drifting(self, counts: Array) -> Drifting:
         """What a drift does to so many runs of each test."""
@@ -370,8 +363,8 @@ class _Planner:
             )
         if missed and self._scatter_freedom(self.best) < [_SCATTER_FREEDOM]:
             yield "too few repeats tell how sweeps scatter: intervals may come out half as wide again as planned"
-        if self.lacking:
-            yield f"the standard programme shows these effects better: {', '.join(self.lacking)}"
+        if lacking := self._lacking(self.best):
+            yield f"the standard programme shows these effects better: {', '.join(lacking)}"
         tellable = {tuple(pair) for pair in self.offer.tellable.T.tolist()}
         for one, other in self.offer.pairs.T.tolist():
             if (one, other) not in tellable:

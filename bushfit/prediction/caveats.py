@@ -16,6 +16,8 @@ from bushfit.units import CELSIUS, number, told
 #: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
 #: set points by less.
 MARGIN = 0.01
+#: What is said of a prediction outside of the tests.
+BEYOND = "extrapolated beyond"
 #: Share by which a finite bulk modulus lowers the radial stiffness, from which that is said: that of the other errors.
 _NOTED_LOWERING = 0.01
 #: Relative difference of two stiffnesses that is none.
@@ -170,5 +172,5 @@ def extrapolations(
     for axis, unit, digits, asked, (low, high) in axes:
         if asked.min() < low * (1 - MARGIN) or asked.max() > high * (1 + MARGIN):
             here, there = (told(unit, *ends, digits=digits) for ends in ((asked.min(), asked.max()), (low, high)))
-            said = f"predicted at {axis} of {here}, but fitted at {there} only: extrapolated beyond"
+            said = f"predicted at {axis} of {here}, but fitted at {there} only: {BEYOND}"
             yield f"{what or direction}: {said}"

@@ -55,7 +55,7 @@ _UNITS_OF = {"a": ("m", "rad"), "k": ("N/m", "N*m/rad")}
 #: Names of an amplitude that count it peak-to-peak by themselves.
 _PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
 #: The word "peak".
-_PEAK = r"(?:peak|pk|spitze|crete|cresta|pico|pic)"
+_PEAK = r"(?:peak|pk|spitze|sp\.?|crete|cresta|pico|pic)"
 #: Where a word begins; an underscore parts words.
 _WORD_START = r"(?<![^\W_])"
 #: Where a word ends.
@@ -165,8 +165,7 @@ class Vocabulary:
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str) -> Heading | None:
-        marked = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header)))
-        whole = marked.translate(_SPELLINGS)
+        whole = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header))).translate(_SPELLINGS)
         text, convention = split_convention(whole)
         if plain(header) in self._roles:  # a campaign may name a header with its unit
             name, unit = units.split_header(text)

@@ -11,10 +11,11 @@ import re
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import replace
 from functools import lru_cache
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,6 +37,8 @@ _UFF_QUANTITIES = {
 }
 #: What begins and ends a dataset of UFF.
 _UFF_MARK = b"    -1"
+#: ID line 5 of data at nodes: reference, its direction, numerator, denominator.
+_UFF_CODES = re.compile(r"(\s*-?\d+){4}\s*")
 #: The direction of UFF from which on a displacement is a rotation, and a force a moment.
 _UFF_ROTATIONS = 4
 #: The names that a base of recording goes by.
@@ -43,7 +46,7 @@ _BASES = Vocabulary({"time": LOOP_COLUMNS["time"], "frequency": SWEEP_COLUMNS["f
 #: What may be done about files without channels.
 _HINT = "export it again, with its channels"
 _MATLAB_HINT = 'save vectors, or structs of them, with -v7; a table by way of table2struct(T, "ToScalar", true)'
-_UFF_HINT = "export records or frequency responses as dataset 58"
+_UFF_HINT = "export records or frequency responses as dataset 58; of data at nodes (55) only the latter are read"
 
 
 class Channel(NamedTuple):
@@ -184,15 +187,20 @@ def arrow(data: bytes, _: Path) -> Iterator[Group]:
 
 
 def uff(data: bytes, file: Path) -> Iterator[Group]:
-    """The records of a UFF file together, and each of its complex functions of a frequency by itself."""
+    """The records of a UFF file together, and each of its complex functions of a frequency by itself.
+
+    Data at nodes (dataset 55) are taken where the file holds no functions (dataset 58).
+    """
     import pyuff
 
     if not data.rstrip().endswith(_UFF_MARK):
         raise ValueError("its last dataset has no end")
     book = pyuff.UFF(str(file))
-    sets = [book.read_sets(number) for number, kind in enumerate(book.get_set_types()) if kind in (58, 164)]
+    kinds = list(book.get_set_types())
+    kept = 58 if 58 in kinds else 55
+    sets = [book.read_sets(number) for number, kind in enumerate(kinds) if kind in (kept, 164)]
     factors: Mapping[str, Any] = next((one for one in sets if one["type"] == 164), {})
-    functions = [one for one in sets if one["type"] == 58]
+    functions = [one for one in sets if one["type"] == 58] or [*_at_nodes(one for one in sets if one["type"] == 55)]
     quantities = Counter(one["ordinate_spec_data_type"] for one in functions)
     records: list[Channel] = []
     for number, one in enumerate(functions, start=1):
@@ -212,6 +220,27 @@ def uff(data: bytes, file: Path) -> Iterator[Group]:
             values, unit = values / lower.values, f"{unit}/{lower.unit}" if unit and lower.unit else ""
         yield title, [Channel(name, values, unit, over)], [(one[f"id{line}"],) for line in range(1, 6)]
     yield "", records, ()
+
+
+def _at_nodes(steps: Iterable[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Frequency responses at nodes, of which each dataset 55 holds one frequency, as functions of dataset 58.
+
+    ID line 5 says what a value is over what, as of I-DEAS Test: reference, its direction, numerator, denominator.
+    """
+    runs: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
+    for one in steps:
+        if one["analysis_type"] == 5 and np.iscomplexobj(one["r1"]):
+            said = [int(word) for word in one["id5"].split()] if _UFF_CODES.fullmatch(one["id5"]) else [0, 0, 0, 0]
+            runs.setdefault((one["load_case"], one["id1"], *said), []).append(one)
+    labels = dict.fromkeys((f"{axis}_axis_units_lab" for axis in ("abscissa", "ordinate", "orddenom")), "NONE")
+    for (_, title, _, direction, upper, lower), run in runs.items():
+        of_all = {"abscissa_spec_data_type": 18, "ordinate_spec_data_type": upper, "orddenom_spec_data_type": lower}
+        of_all |= labels | {"x": np.array([one["freq"] for one in run]), "ref_dir": direction}
+        for node, (axis, name) in product(run[0]["node_nums"], enumerate("XYZ", start=1)):
+            values = [dict(zip(one["node_nums"], one[f"r{axis}"], strict=True)).get(node, 0.0) for one in run]
+            if any(values):
+                own = {"id1": f"{title}, node {node} {name}", "rsp_node": node, "rsp_dir": axis}
+                yield {**run[0], **of_all, **own, "data": np.array(values), "ordinate_axis_lab": "NONE"}
 
 
 def _uff_text(function: Mapping[str, Any], key: str) -> str:

@@ -90,8 +90,7 @@ class Loop:
 
     def at(self, rows: slice | NDArray[np.bool_]) -> Loop:
         """The record of these rows alone."""
-        channels = {name: getattr(self, name)[rows] for name in ("time", "displacement", "force")}
-        return replace(self, **channels)
+        return replace(self, **{name: getattr(self, name)[rows] for name in ("time", "displacement", "force")})
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +194,10 @@ def rebuild_time(
             duration = 0.5 / frequency
         else:
             raise TypeError("rebuild_time needs a rate or a frequency")
-        elapsed = _strictly_increasing(share) * duration
+        highest, row = np.maximum.accumulate(share), np.arange(share.size)
+        keep = np.append(highest[1:] > highest[:-1], True) & (highest > highest[0])
+        keep[0] = True
+        elapsed = np.interp(row, row[keep], highest[keep]) * duration  # in straight lines where it stands still
         time[first : last + 1] = time[first] + elapsed - elapsed[0]
     return time
 
@@ -214,15 +216,6 @@ def _stroke_edges(displacement: Floats) -> NDArray[np.intp]:
     if turns.size and displacement[turns[-1]] == displacement[-1]:
         turns = turns[:-1]
     return np.concatenate([[0], turns, [displacement.size - 1]])
-
-
-def _strictly_increasing(values: Floats) -> Floats:
-    """The running maximum of values, with straight lines where it stands still."""
-    highest = np.maximum.accumulate(values)
-    keep = np.append(highest[1:] > highest[:-1], True) & (highest > highest[0])
-    keep[0] = True
-    index = np.arange(values.size)
-    return np.interp(index, index[keep], highest[keep])
 
 
 def loss_factor(stiffness: Complex) -> Floats:

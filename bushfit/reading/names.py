@@ -168,7 +168,8 @@ def _label_above(line: Line) -> Labels:
     values = [_COMMA.sub(r"\1.", value) for value in (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}")]
     key = _KEY_OF.get(plain(name))
     if key in ("date", "operator", "specimen_number"):
-        stated: dict[str, Any] = {key: cells[1]} if len(cells[1]) <= _LONGEST_VALUE else {}
+        is_value = len(cells[1]) <= _LONGEST_VALUE and plain(cells[1]) not in _KEY_OF  # else a row of headers
+        stated: dict[str, Any] = {key: cells[1]} if is_value else {}
         return Labels(**stated)
     for value in values:
         if key == "temperature" and _is_quantity(value, "K"):

@@ -14,7 +14,9 @@ from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.columns import Columns, Rows
 from bushfit.reading.files import sha256, to_utf8, view_bytes
 from bushfit.reading.headers import (
+    LOOP_COLUMNS,
     OF_MOTION,
+    SWEEP_COLUMNS,
     Column,
     Heading,
     Vocabulary,
@@ -103,7 +105,12 @@ class Table(Columns):
             found = f"header_line = {stated.header_line}"
             raise MeasurementError("there is no header on this line", file=file, found=found, hint="lines count from 1")
         table = cls(file, source, layout, stated, {}, checksum, names, motion)
-        table._check_header()
+        if len(table.headers) < 2:
+            found = table.headers[0] if table.headers else "nothing"
+            expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
+            raise table.header_error("there is only one column", found=found, expected=expected)
+        if all(is_like_number(cell) for cell in table.headers):
+            raise table.header_error("there is no header", expected=_EXPECTED_HEADER)
         named = columns or {} if understood is vocabulary else {}
         table = replace(table, roles=table._recognise(understood, named, stated_units or {}))
         return table if rows is None else table.taking(rows)
@@ -155,8 +162,15 @@ class Table(Columns):
         return self.header_error(
             f"there is no column for the {_label(role)}",
             expected=f'a header such as "{_label(role)} [{units.example(expected)}]"',
-            hint=f'name the column in the campaign: columns = {{ {role} = "..." }}' + (f", {hint}" if hint else ""),
+            hint=f"name the column in the campaign: {self.columns_key(role, expected)}" + (f", {hint}" if hint else ""),
         )
+
+    def columns_key(self, role: str, unit: str) -> str:
+        """The key that names the column of a role, with the one header that names none and has a unit that fits."""
+        usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
+        free = (header for header in self.headers if usual.heading(header) is None)
+        found = [header for header in free if units.agrees(units.split_header(header)[1] or "", unit)]
+        return f'columns = {{ {role} = "{found[0] if len(found) == 1 else "..."}" }}'
 
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
         """Refuse headers that would name a role in a test of the other kind of motion: strain, or displacement.
@@ -178,17 +192,6 @@ class Table(Columns):
                 expected=expected,
                 hint=hint,
             )
-
-    def _check_header(self) -> None:
-        """Refuse a header of one cell, or of numbers alone."""
-        if len(self.headers) < 2:
-            raise self.header_error(
-                "there is only one column",
-                found=self.headers[0] if self.headers else "nothing",
-                expected=f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks",
-            )
-        if all(is_like_number(cell) for cell in self.headers):
-            raise self.header_error("there is no header", expected=_EXPECTED_HEADER)
 
     def _recognise(
         self, vocabulary: Vocabulary, columns: Mapping[str, str], stated_units: Mapping[str, str]

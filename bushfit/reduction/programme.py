@@ -71,10 +71,6 @@ class _Span:
         ranges, periods = np.log(self.range / other.range), np.log(self.period / other.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
-    def goes_on_as(self, other: "_Span") -> bool:
-        """Whether the part after it is the same one, which a disturbance broke off."""
-        return self.like(other) and resumes_in_phase((other.begin - self.end) / self.period, step=0.5)
-
 
 def programme(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
     """The loops of a record in their order: one for each part of constant amplitude and rate.
@@ -144,8 +140,9 @@ def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_Span]:
         return []
     joined: list[_Span] = []
     for span in found:
-        if joined and joined[-1].goes_on_as(span):
-            joined[-1] = replace(joined[-1], end=span.end)
+        last = joined[-1] if joined else None
+        if last and last.like(span) and resumes_in_phase((span.begin - last.end) / last.period, step=0.5):
+            joined[-1] = replace(last, end=span.end)  # a disturbance broke it off
         else:
             joined.append(span)
     before = [float(time[0]), *(span.end for span in joined[:-1])]

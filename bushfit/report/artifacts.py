@@ -27,6 +27,12 @@ from bushfit.report.compared import SideBySide
 from bushfit.report.contents import Contents
 from bushfit.units import number
 
+#: Columns of the sheet, those of a plan without any test too.
+_COLUMNS = (
+    *("order", "direction", "test", "amplitude", "frequency [Hz]", "cycles", "repeat", "force up to", "minutes"),
+    *("minutes so far", "what for"),
+)
+
 
 def fit_contents(result: Result, title: str, loops: Sequence[LoopData], sweeps: Sequence[SweepData]) -> Contents:
     """`loops` and `sweeps` of a fit, a table and a picture each; nothing where there are no such tests."""
@@ -142,13 +148,6 @@ def names_of_more(places: Sequence[Place], what: str) -> list[str]:
             more += "_"
         names.append(more)
     return names
-
-
-#: Columns of the sheet, those of a plan without any test too.
-_COLUMNS = (
-    *("order", "direction", "test", "amplitude", "frequency [Hz]", "cycles", "repeat", "force up to", "minutes"),
-    *("minutes so far", "what for"),
-)
 
 
 def plan_contents(plan: Plan) -> Contents:

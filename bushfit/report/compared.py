@@ -17,7 +17,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
 from bushfit.prediction.comparison import ParameterContrast
-from bushfit.report.compare_document import SCHEMA, ComparisonFile, Pair
+from bushfit.report.compare_document import SCHEMA, ComparisonFile
 from bushfit.report.tables import numbers, required
 from bushfit.units import for_people, number, split_header, told
 from bushfit.validation import check_tables
@@ -107,13 +107,29 @@ class SideBySide:
     def tables(self) -> dict[str, pd.DataFrame]:
         """`parameters`, `differences` and, of families, `families`."""
         pairs = self.document["pairs"]
-        rows = {"parameters": [_flat(pair, row) for pair in pairs for row in pair["parameters"]]}
-        rows |= {"families": [*self._families()]} if self.document["families"] else {}
+        parameters = [
+            {
+                "parameter": row.name,
+                "unit": row.unit,
+                "reference": pair["reference"],
+                "other": pair["other"],
+                "reference value": row.reference,
+                "other value": row.other,
+                "difference": row.difference,
+                "difference, low": row.interval and row.interval[0],
+                "difference, high": row.interval and row.interval[1],
+                "difference is": "relative" if row.relative else "absolute",
+                "p": row.p,
+                "p by Holm": row.holm,
+                "not tested": row.note,
+            }
+            for pair in pairs
+            for row in pair["parameters"]
+        ]
+        families = {"families": pd.DataFrame([*self._families()])} if self.document["families"] else {}
         at = [self.at(place) for place in self.places]
-        tables = [each[pair["other"]] for pair in pairs for each in at]
-        return {name: pd.DataFrame(each) for name, each in rows.items()} | {
-            "differences": pd.concat(tables, ignore_index=True)
-        }
+        differences = pd.concat([each[pair["other"]] for pair in pairs for each in at], ignore_index=True)
+        return {"parameters": pd.DataFrame(parameters), **families, "differences": differences}
 
     def _families(self) -> Iterator[dict[str, Any]]:
         """A family a row: how it meets the tests, and what was held out of them."""
@@ -240,25 +256,6 @@ class Heads(NamedTuple):
         bands = [f"{what}{end}" for what in (*sides, *found[2:]) for end in ("", ", low", ", high")]
         required(table, "frequency [Hz]", amplitude, *bands, *(f"{what}, sure" for what in found[2:]))
         return found
-
-
-def _flat(pair: Pair, row: ParameterContrast) -> dict[str, Any]:
-    """A parameter of two results in SI as a row of a table."""
-    return {
-        "parameter": row.name,
-        "unit": row.unit,
-        "reference": pair["reference"],
-        "other": pair["other"],
-        "reference value": row.reference,
-        "other value": row.other,
-        "difference": row.difference,
-        "difference, low": row.interval and row.interval[0],
-        "difference, high": row.interval and row.interval[1],
-        "difference is": "relative" if row.relative else "absolute",
-        "p": row.p,
-        "p by Holm": row.holm,
-        "not tested": row.note,
-    }
 
 
 #: Heads of `family_cells`, and of `parameter_cells` without the labels of the two results.

@@ -34,6 +34,18 @@ from bushfit.errors import CONTROL, OutputError
 _AT_FDCWD = -100
 #: Linux' flag of renameat2 that swaps two paths (linux/fs.h).
 _RENAME_EXCHANGE = 2
+#: Start of the name of a stage, the hidden folder in which a set of files is written.
+_STAGE = ".bushfit-"
+#: Name of a set of files that is complete and waits to be moved into the folder around it.
+_DECIDED = ".bushfit-decided"
+#: Name of the record, in a folder of results, of the files that each command wrote there: as JSON their SHA-256 by
+#: command and name, and the names that the last one took away.
+_RECORD = ".bushfit.json"
+#: Characters of a document that steer a terminal; the ends of its lines do not.
+_STEERING = re.compile(rf"(?!\n){CONTROL.pattern}")
+#: Most files of a folder that is exchanged [files]; one that holds more is no folder of results, and linking its files
+#: would take longer than moving the new ones in.
+_MOST_LINKED = 2000
 
 
 def exchange(one: Path, other: Path) -> None:
@@ -128,20 +140,6 @@ def _libc() -> Any:
     return ctypes.CDLL(None, use_errno=True) if sys.platform.startswith("linux") else None
 
 
-#: Start of the name of a stage, the hidden folder in which a set of files is written.
-_STAGE = ".bushfit-"
-#: Name of a set of files that is complete and waits to be moved into the folder around it.
-_DECIDED = ".bushfit-decided"
-#: Name of the record, in a folder of results, of the files that each command wrote there: as JSON their SHA-256 by
-#: command and name, and the names that the last one took away.
-_RECORD = ".bushfit.json"
-#: Characters of a document that steer a terminal; the ends of its lines do not.
-_STEERING = re.compile(rf"(?!\n){CONTROL.pattern}")
-#: Most files of a folder that is exchanged [files]; one that holds more is no folder of results, and linking its files
-#: would take longer than moving the new ones in.
-_MOST_LINKED = 2000
-
-
 @dataclass(frozen=True)
 class _Record:
     """SHA-256 of the files in a folder by command and name, and the names of those that the last one took away."""
@@ -217,9 +215,7 @@ def write_files(
     try:
         place = folder.resolve()
         with _parents(place.parent):
-            fixed = place in (Path.cwd(), *Path.cwd().parents) or place.is_mount()  # the working folder, or a drive
-            exchangeable = len(files) > 1 and not fixed and os.access(place.parent, os.W_OK)
-            inside = place.is_dir() and not exchangeable
+            inside = place.is_dir() and (len(files) == 1 or not _exchangeable(place))
             with _staged(place if inside else place.parent, files) as ready, locked(place.parent):
                 _end_decided(place)
                 check_free(folder, list(files), force=force)
@@ -242,9 +238,9 @@ def _record(place: Path, ready: Path, files: Mapping[str, bytes], by: str | None
     known = _recorded(place)
     if by is None or not (known.written or len(files) > 1):
         return
-    there = {place / name: (name, digest) for name, digest in known.written.get(by, {}).items() if name not in files}
-    mine = {file: hashlib.sha256(file.read_bytes()).hexdigest() for file in there if file.is_file()}
-    left = dict(there[file] for file, digest in mine.items() if there[file][1] == digest)
+    before = known.written.get(by, {})
+    there = [name for name in before if name not in files and (place / name).is_file()]
+    left = [name for name in there if hashlib.sha256((place / name).read_bytes()).hexdigest() == before[name]]
     written = {
         command: {name: digest for name, digest in names.items() if name not in files and not (force and name in left)}
         for command, names in known.written.items()
@@ -309,6 +305,12 @@ def _clear_abandoned(home: Path) -> None:
     for stage in home.glob(_STAGE + "????????"):
         if is_abandoned(stage):
             shutil.rmtree(stage, ignore_errors=True)
+
+
+def _exchangeable(place: Path) -> bool:
+    """Whether a folder may be exchanged for another: not the working folder or one above it, nor a mounted drive."""
+    here = Path.cwd()
+    return place not in (here, *here.parents) and not place.is_mount() and os.access(place.parent, os.W_OK)
 
 
 def _exchanged(ready: Path, place: Path) -> bool:

@@ -17,7 +17,7 @@ from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.prediction.comparison import Comparison, Contrast, relative
-from bushfit.prediction.stiffness import PredictedResonance, Prediction
+from bushfit.prediction.stiffness import Band, PredictedResonance, Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.reduction.resonance import Resonance
 from bushfit.reduction.result import Reduction
@@ -83,17 +83,17 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     moved, _, resisted = words(prediction.direction)
     force = f"{resisted} [{stiffness}]"
+    names, scales = (force, "loss factor [-]", f"storage {force}", f"loss {force}"), (factor, 1.0, factor, factor)
 
-    def four(of: Prediction) -> dict[str, tuple[Any, float]]:
-        loss, storage = (of.loss_factor, 1.0), (of.storage_stiffness, factor)
-        parts = (of.stiffness, factor), loss, storage, (of.loss_stiffness, factor)
-        return dict(zip((force, "loss factor [-]", f"storage {force}", f"loss {force}"), parts, strict=True))
+    def four(of: Prediction) -> list[tuple[str, Band, float]]:
+        bands = of.stiffness, of.loss_factor, of.storage_stiffness, of.loss_stiffness
+        return list(zip(names, bands, scales, strict=True))
 
     columns = {"frequency [Hz]": prediction.frequency, f"{moved} [{length}]": prediction.amplitude * length_factor}
-    columns |= {name: band.value * scale for name, (band, scale) in four(prediction).items()}
-    for name, (band, scale) in four(prediction).items():
+    columns |= {name: band.value * scale for name, band, scale in four(prediction)}
+    for name, band, scale in four(prediction):
         columns |= {f"{name}, low": band.low * scale, f"{name}, high": band.high * scale}
-    for name, (band, scale) in four(prediction.if_rigs).items() if prediction.if_rigs else ():
+    for name, band, scale in four(prediction.if_rigs) if prediction.if_rigs else ():
         columns[f"{name}, {IF_RIGS}"] = band.value * scale
     if (measured := prediction.measured) is not None:
         columns |= {f"measured {force}": np.abs(measured) * factor, "measured loss factor [-]": loss_factor(measured)}
@@ -296,7 +296,7 @@ def contrast_table(found: Comparison, each: Contrast) -> pd.DataFrame:
     return pd.DataFrame(values)
 
 
-def _ends(band: Any) -> dict[str, Array]:
+def _ends(band: Band) -> dict[str, Array]:
     """A band by the end of its columns' names."""
     return {"": band.value, ", low": band.low, ", high": band.high}
 
@@ -348,6 +348,11 @@ def resonance_table(found: Resonance) -> pd.DataFrame:
             "rows averaged": found.rows,
         }
     )
+
+
+def shortened(name: str, letters: int) -> str:
+    """A name of at most so many letters: what is too long loses its middle."""
+    return name if len(name) <= letters else f"{name[: (letters - 1) // 2]}…{name[-(letters // 2) :]}"
 
 
 def spread(count: int, most: int) -> Array:

@@ -103,6 +103,17 @@ def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed: C
     assert (shop / "all/batch.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_one_campaign_is_a_batch_of_one_which_has_no_scatter(typed: Callable[..., Any], shop: Path) -> None:
+    (shop / "limits.toml").write_text('[[stiffness]]\nat = "axial 999 Hz 0.1 mm"\nmax = "1 N/mm"\n')
+    done = typed("batch", "bushings/b0/bushing.toml", "--limits", "limits.toml", "-o", "one", "--no-plots")
+    assert done.returncode == 1, done.stderr
+    (row,) = rows(shop / "one")
+    assert row["out of limits"].startswith("stiffness axial 999 Hz 0.1 mm = ")
+    assert "bushing: 1 bushing\n" in done.stderr
+    assert "1 bushing with a point beyond the tests" in done.stderr
+    assert ["mu", "MPa"] in [line.split()[::2] for line in done.stderr.splitlines()], done.stderr
+
+
 def test_a_bad_row_costs_that_row(typed: Callable[..., Any], shop: Path) -> None:
     (shop / "bushings/b1/sweep_axial.csv").write_text("nonsense\n1\n")
     (shop / "m.csv").write_text(
@@ -111,6 +122,7 @@ def test_a_bad_row_costs_that_row(typed: Callable[..., Any], shop: Path) -> None
     done = typed("batch", "m.csv", "-o", "all", "--junit", "all/report.xml")
     assert done.returncode == 1
     assert "2 failed" in done.stderr
+    assert "absent.toml: there is no such file; expected: an existing file;" in done.stderr
     good, bad, absent = rows(shop / "all")
     assert good["name"].startswith("'="), "a spreadsheet must not run a name"
     assert (good["status"], bad["status"], absent["status"]) == ("done", "failed", "failed")

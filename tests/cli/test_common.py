@@ -78,7 +78,7 @@ def test_a_missed_limit_is_status_1_and_results_go_to_a_folder_of_the_campaign(
     missed = bushfit("fit", CAMPAIGN, "-o", tmp_path / "x", "--no-plots", "--max-nrmse", "1e-4", status=1)
     assert "is above --max-nrmse 0.0001" in missed.stderr
     assert "model.json" in names(tmp_path / "x")
-    bushfit("fit", CAMPAIGN, "-o", tmp_path / "y", "--no-plots", "--max-nrmse", "0.05")
+    bushfit("fit", CAMPAIGN, "-o", tmp_path / "y", "--no-plots", "--max-nrmse", "5 %")
     typed("fit-static", work / CAMPAIGN, "--no-plots")
     assert (tmp_path / "results" / "CMP 15 961" / "static.json").exists()
 

@@ -150,6 +150,7 @@ def test_look_alikes_are_told_with_their_odds(work: Path, bushfit: Run) -> None:
     assert shares == sorted(shares, reverse=True)
     assert 0.97 <= sum(shares) <= 1.0
     page = html.unescape((work / "alike/report.html").read_text(encoding="utf-8"))
+    assert "bushfit diagnose looks for" not in run.stderr + (work / "alike/model.json").read_text(encoding="utf-8")
     for each in written["odds"]:
         line = f"{each['chances']}: {each['words']}"
         assert re.search(r"\d in 10", line)

@@ -198,7 +198,7 @@ def answering(monkeypatch: pytest.MonkeyPatch, *lines: str) -> Person:
 
 #: Of a loop without time and a sweep without units: wrong answers among the right ones.
 ANSWERS = [
-    *("My B", "0.1", "0.1 Hz", "sine", "up", "axial"),
+    *("My B", "0.1", "0.1 Hz", "sine", "up", "axial", "500 N axial"),
     *("Kx", "K", "Hz", "N", "mm", "N/mm", "radial", "peak-to-peak"),
     *("20", "20 mm", "18 mm", "34 mm", "20 mm", "36 mm", "34 mm"),
 ]
@@ -231,6 +231,7 @@ def test_at_a_terminal_what_lacks_is_asked_for(
         0.018,
     )
     assert [str(test.direction) for test in (*campaign.loops, *campaign.sweeps)] == ["axial", "radial"]
+    assert campaign.path.read_text(encoding="utf-8").count('preload = "500 N axial"') == 2, "asked for once"
     assert campaign.sweeps[0].amplitude.max() == pytest.approx(0.25e-3)
     assert campaign.loops[0].time[-1] == pytest.approx(30.0, rel=0.01)
 
@@ -254,7 +255,12 @@ def test_programs_are_asked_nothing(
 
 
 def test_a_command_that_says_all_is_asked_nothing(
-    typed: Run, tests: list[Path], monkeypatch: pytest.MonkeyPatch
+    typed: Run, tests: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answering(monkeypatch)
-    typed("init", *tests, *GEOMETRY, "--amplitude", "zero-to-peak", "-o", "x")
+    all_said = (*tests, *GEOMETRY, "--amplitude", "zero-to-peak")
+    typed("init", *all_said, "--preload", "none", "-o", "x")
+    answering(monkeypatch, "")
+    typed("init", *all_said, "-o", "y")
+    campaigns = [(folder / "campaign.toml").read_text(encoding="utf-8") for folder in (tmp_path / "x", tmp_path / "y")]
+    assert [text.count('preload = "none"') for text in campaigns] == [len(tests), 0], "Enter leaves a preload open"

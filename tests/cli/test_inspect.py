@@ -144,6 +144,11 @@ def test_a_column_is_named_where_it_stands_and_the_text_holds_in_any_folder(
     assert "columns" not in other
     assert "amplitudes: 0.05 mm" in done.stderr
     assert "amplitudes: 0.1 mm" in done.stderr
+    first = tmp_path / files[0]
+    first.write_text(first.read_text().replace("Pegel SS [mm]", "Pegel SS"))
+    done = typed("inspect", *files, "--no-plots", "--column", "amplitude=Pegel SS", "--unit", "amplitude=um")
+    one, other = tomllib.loads(done.stdout)["sweeps"]
+    assert (one["units"], "units" in other) == ({"amplitude": "um"}, False)
     (tmp_path / "lab").mkdir()
     (tmp_path / "lab/axial.csv").write_bytes((root / CLEAN[0]).read_bytes())
     done = typed("inspect", "lab/axial.csv", "--no-plots")
@@ -158,7 +163,7 @@ def test_a_column_is_named_where_it_stands_and_the_text_holds_in_any_folder(
     ("levels", "said"),
     [
         (("amplitude", "amplitude"), ('axial_0.csv, line 1: there is no column "Pegel SS"', "the header that")),
-        (("Pegel SS", "Niveau"), ("axial_1.csv, line 1", '--column "amplitude=..."', "--at-amplitude")),
+        (("Pegel SS", "Niveau"), ("axial_1.csv, line 1", '--column "amplitude=Niveau [mm]"', "--at-amplitude")),
     ],
 )
 def test_a_column_that_no_file_has_is_refused(

@@ -19,7 +19,6 @@ from bushfit.inspection.gathering import gather
 from bushfit.jobs.compare import Compare
 from bushfit.jobs.plan import PlanTests
 from bushfit.jobs.predict import Predict
-from bushfit.jobs.report import report as reported
 from bushfit.model.file import load_result, to_document
 from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.loops import read_loop
@@ -29,6 +28,7 @@ from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
 from bushfit.report.contents import pages_of
 from bushfit.report.folder import to_json
+from bushfit.report.page import folder_contents
 
 CORPUS = Path(__file__).with_name("corpus")
 #: The files of a folder of results, by their names.
@@ -113,7 +113,7 @@ def report(folder: Path, data: bytes) -> None:
     file.write_bytes(content)
     try:
         with clear_errors():
-            pages_of(reported(folder))
+            pages_of(folder_contents(folder))
         if file.suffix == ".json":
             with clear_errors():
                 job = Compare()

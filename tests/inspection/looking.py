@@ -13,8 +13,8 @@ from bushfit.geometry import Direction
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.record import Inspected
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.reading.tablefile import to_csv
+from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 
 NOISE = {
     "good": {"noise": 1e-3, "force_noise": 5e-4, "displacement_noise": 1e-4},

@@ -23,8 +23,8 @@ from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import Labels
-from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.reading.stated import LoopFile
+from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import load_campaign, model_of
-from bushfit.campaign.compound import Compound, Polymer
+from bushfit.campaign.quantities import Compound, Polymer
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE
 from bushfit.fitting.data import Data

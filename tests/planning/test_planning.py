@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.campaign.compound import Compound
+from bushfit.campaign.quantities import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError

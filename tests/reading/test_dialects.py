@@ -44,7 +44,8 @@ def test_what_a_header_says_of_its_column(vocabulary: Vocabulary, header: str, h
 PEAK_TO_PEAK = [
     "Amplitude pk-pk [mm]", "amplitude (p-p) (mm)", "Amplitude peak-to-peak [mm]", "amplitude_pp_mm",
     "Displacement p-p [mm]", "double amplitude [mm]", "Doppelamplitude [mm]", "Schwingbreite in mm",
-    "Amplitude Spitze-Spitze [mm]", "Amplitude crête à crête [mm]", "Amplitude crete-a-crete [mm]",
+    "Amplitude Spitze-Spitze [mm]", "Amplitude Sp-Sp (mm)", "Amplitude Sp.-Sp. [mm]",
+    "Amplitude crête à crête [mm]", "Amplitude crete-a-crete [mm]",
     "Amplitud pico a pico [mm]", "Amplitude [mm p-p]", "Amplitude SS [mm]", "Amplitude s-s (mm)",
     "Amplitude Spitze zu Spitze / mm", "Amplitude [mm SS]", "Amplitude [mmpp]", "Weg [mmp-p]", "Weg SS in mm",
     "Schwingweite [mm]", "2A [mm]", "total amplitude [mm]", "displacement range [mm]", "amplitude totale [mm]",

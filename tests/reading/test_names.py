@@ -83,6 +83,7 @@ def test_lines_above_a_table_and_the_name_before_the_headers() -> None:
     lines = [
         "# Prüftemperatur: 23,5 °C",
         "Datum;2024-05-03",
+        ["Operator", "Date"],
         ["Operator", "", "3"],
         "Amplitude (p-p): 0,2 mm",
         "Frequency\t10\tHz",

@@ -24,10 +24,10 @@ from bushfit.errors import MeasurementError, OutputError
 from bushfit.geometry import Direction
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.tablefile import Form, defused, ending, to_bytes, to_csv
+from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 
 Sheets = dict[str, list[list[object]]]
 

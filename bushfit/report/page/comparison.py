@@ -156,6 +156,5 @@ def _files(compared: Sequence[ComparedEntry]) -> list[tuple[str, str]]:
         named = [(entry["source"], entry["sha256"] or ""), *((str(s.file), s.sha256) for s in entry["inputs"])]
         for each in named:
             found.setdefault(each, []).append(entry["label"])
-    return [
-        (f"{', '.join(dict.fromkeys(labels))}: {file}", sha256) for (file, sha256), labels in found.items() if sha256
-    ]
+    words_of = {file: f"{', '.join(dict.fromkeys(labels))}: {file[0]}" for file, labels in found.items()}
+    return [(words, sha256) for (_, sha256), words in words_of.items() if sha256]

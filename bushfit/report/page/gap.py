@@ -24,13 +24,17 @@ from bushfit.report.page.chart import (
 )
 from bushfit.report.page.readback import ReportData
 from bushfit.report.page.sweeps import Level, by_stepped, levels_of
-from bushfit.report.tables import columns_of, complete, moved_of, numbers, spread
+from bushfit.report.tables import columns_of, complete, moved_of, numbers, shortened, spread
 from bushfit.units import number, split_header, told
 
 #: Rows of all loops of a page, with which it stays below 500 kB; but no loop has fewer than `_FEWEST`.
 _MOST_ROWS, _FEWEST = 2400, 24
 #: Width of a point of a loop [pixels].
 _DOT = 2.6
+#: Most columns and rows of a map of cells: each is then some pixels wide and high.
+_MOST_COLUMNS, _MOST_LEVELS = 24, 12
+#: Letters of the name of a row at most.
+_LONGEST = 24
 
 
 def loop_panels(found: ReportData) -> list[Panel]:
@@ -82,12 +86,6 @@ def _charts(place: Place, loops: dict[str, Array]) -> list[Markup]:
         chart(f"{place}: hysteresis", labels, whole, loops_in_words, dot=_DOT),
         chart(f"{place}: measured less model", labels, left, left_in_words, dot=_DOT, rules=[Rule(0.0, "")]),
     ]
-
-
-#: Most columns and rows of a map of cells: each is then some pixels wide and high.
-_MOST_COLUMNS, _MOST_LEVELS = 24, 12
-#: Letters of the name of a row at most.
-_LONGEST = 24
 
 
 def gap_panels(found: ReportData) -> list[Panel]:
@@ -144,10 +142,7 @@ def _map(part: str, levels: Sequence[Level], along: Array, ends: tuple[str, str,
         sums = np.bincount(cell, -np.nan_to_num(off), minlength=size)
         sides.append(np.where(count > 0, sums / np.maximum(count, 1), np.nan).reshape(len(first), -1))
     same = np.array_equal(sides[0], sides[1], equal_nan=True)
-    names = [levels[n].name for n in first]
-    short = [
-        name if len(name) <= _LONGEST else f"{name[: _LONGEST // 2]}…{name[1 - _LONGEST // 2 :]}" for name in names
-    ]
+    short = [shortened(levels[n].name, _LONGEST) for n in first]
     return Cells(part, short, ends, sides[:1] if same else sides)
 
 

@@ -45,6 +45,23 @@ _BEYOND, _USUAL = "#b4500c", "#1f4e9c"
 _MEASURED = re.compile(r"measured stiffness (.+) (\S+) Hz (\S+) (\S+) \[(.+)\]")
 #: Least and largest.
 Ends = Sequence[float]
+#: What "schema" of the document says.
+SCHEMA = "bushfit/batch/1"
+#: Cells of the table at most, of which a curve weighs three: with these the page stays below 500 kB.
+_MOST_CELLS = 4000
+#: Quantities with charts at most, those with limits first, and bushings that differ or failed, named at most.
+_MOST_CHARTS, _MOST_NAMED = 12, 20
+#: Bushings that a quantity must be known of for a chart.
+_FEWEST = 3
+#: How the rows are ordered: what needs a look first.
+_ORDER = ("failed", "fail", "conditional fail", "differs", "conditional pass")
+#: Columns of words, and those that end a row as remarks.
+_WORDS = ("campaign name", "subgroup", "status", "limits", "verdict", "named effects")
+_REMARKS = ("out of limits", "on the edge", "differs in", "on a bound", "warnings")
+#: What curves are compared by, and the column of how far each is off.
+_CURVE, _OFF = "measured stiffness", "measured stiffness off the median [%]"
+#: Limits are told by these words, and coloured so.
+_TONES = {"pass": "good", "conditional pass": "fair", "conditional fail": "bad", "fail": "bad"}
 
 
 @dataclass(frozen=True)
@@ -204,25 +221,6 @@ class Curves:
         return Markup(filled("spark.html", {"alt": f"{low} to {high} % off the median", **drawn, **size}))
 
 
-#: What "schema" of the document says.
-SCHEMA = "bushfit/batch/1"
-#: Cells of the table at most, of which a curve weighs three: with these the page stays below 500 kB.
-_MOST_CELLS = 4000
-#: Quantities with charts at most, those with limits first, and bushings that differ or failed, named at most.
-_MOST_CHARTS, _MOST_NAMED = 12, 20
-#: Bushings that a quantity must be known of for a chart.
-_FEWEST = 3
-#: How the rows are ordered: what needs a look first.
-_ORDER = ("failed", "fail", "conditional fail", "differs", "conditional pass")
-#: Columns of words, and those that end a row as remarks.
-_WORDS = ("campaign name", "subgroup", "status", "limits", "verdict", "named effects")
-_REMARKS = ("out of limits", "on the edge", "differs in", "on a bound", "warnings")
-#: What curves are compared by, and the column of how far each is off.
-_CURVE, _OFF = "measured stiffness", "measured stiffness off the median [%]"
-#: Limits are told by these words, and coloured so.
-_TONES = {"pass": "good", "conditional pass": "fair", "conditional fail": "bad", "fail": "bad"}
-
-
 @dataclass(frozen=True)
 class Differing:
     """differ: a bushing that differs from the others, the number of its row from 1, and by what: robust z."""
@@ -292,7 +290,7 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
     together = np.asarray(order), named if all(named) else []
     columns = [Column(name, each, table[name].to_numpy(), *together) for name, each in known.items()]
     by = {each.row - 1: each.by for each in batch.differ if 0 < each.row <= len(table)}
-    shown = [name for name in _WORDS if name in table and (name == "status" or len(set(table[name])) > 1)]
+    shown = [name for name in _WORDS if name in table and len(set(table[name])) > 1]
     remarks = [name for name in _REMARKS if name in table]
     curves = Curves.of(table) if _OFF in table else None
     listed, important = _ordered(table, by)
@@ -350,7 +348,7 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
             }
             for at in chosen
         ],
-        "left": (important - len(first), len(others) - len(sample)),
+        "left_rows": (important - len(first), len(others) - len(sample)),
         "important": important,
         "tones": _TONES,
         "enough": ENOUGH,

@@ -47,6 +47,14 @@ _STATED = {
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 #: Regions and tests that a page lists at most: the documents have all.
 MOST = 12
+#: Side of a cell, the way from one to the next, and the room left for the ends of intervals [pixels].
+_CELL, _PITCH, _LEFT, _TOP = 76.0, 80.0, 52.0, 26.0
+#: Half a cell is so many times an ellipse that touches both edges.
+_ROOM = 1.12
+#: Corners of an ellipse as it is drawn.
+_CORNERS = 48
+#: Way from the middle of a cell to the ends of an interval of well known errors, as a share of its side.
+_END = 0.5 * 1.96 / (2.45 * _ROOM)
 
 
 def report_context(found: ReportData) -> dict[str, Any]:
@@ -119,9 +127,8 @@ def _of_tables(found: ReportData) -> Iterator[Iterator[str]]:
 
 
 def tube(bushing: Bushing) -> str:
-    inner, outer, length = (
-        number(1e3 * size, 4) for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length)
-    )
+    sizes = 2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length
+    inner, outer, length = (number(1e3 * size, 4) for size in sizes)
     formulas = "; radial formulas corrected by finite elements" if bushing.shape == "calibrated" else ""
     return f"rubber tube, inner diameter {inner} mm, outer diameter {outer} mm, length {length} mm{formulas}"
 
@@ -245,16 +252,6 @@ def corners(table: pd.DataFrame, amplitude: str, amplitudes: int, frequencies: i
     for level in levels[spread(levels.size, amplitudes)]:
         mine = table[table[amplitude] == level].sort_values("frequency [Hz]").to_dict("records")
         yield from ({str(key): cell for key, cell in mine[at].items()} for at in spread(len(mine), frequencies))
-
-
-#: Side of a cell, the way from one to the next, and the room left for the ends of intervals [pixels].
-_CELL, _PITCH, _LEFT, _TOP = 76.0, 80.0, 52.0, 26.0
-#: Half a cell is so many times an ellipse that touches both edges.
-_ROOM = 1.12
-#: Corners of an ellipse as it is drawn.
-_CORNERS = 48
-#: Way from the middle of a cell to the ends of an interval of well known errors, as a share of its side.
-_END = 0.5 * 1.96 / (2.45 * _ROOM)
 
 
 def corner(result: Result) -> Markup | None:

@@ -259,10 +259,15 @@ def _curve(place: Place, along: str, held: str, level: Level, predicted: pd.Data
     if held != "test":
         there = there.groupby(along, as_index=False)[headers[1:]].mean()
     points = numbers(there, *headers)[:, every_nth(len(there), most)]
-    known = None
+    names, line, band, rigs = _four(place), _parted(points[[0, 3, 4]]), None, None
     if predicted is not None and not isinstance(level.value, str):
-        known = _predicted(predicted, along, held, level.value, _four(place))
-    line, band, rigs = known or (_parted(points[[0, 3, 4]]), None, None)
+        other = [f"{name}, {IF_RIGS}" for name in names]
+        ends = [f"{name}, {end}" for name in names for end in ("low", "high")]
+        known = complete(predicted, along, held, *names, *ends)
+        near = known[np.abs(known[held] - level.value) < 0.02 * abs(level.value)].sort_values(along)
+        if not near.empty:
+            line, band = numbers(near, along, *names), numbers(near, *ends)
+            rigs = numbers(near, *other) if other[0] in near else None
     return _Curve(level.name, _parted(points[:3]), line, band, rigs, most if len(there) > most else 0)
 
 
@@ -287,17 +292,3 @@ def by_stepped(
     for stepped, names in kinds.items():
         along, held = (amplitude, frequency) if stepped == "amplitude" else (frequency, amplitude)
         yield stepped, along, held if stepped else "test", rows[rows["test"].isin(names)]
-
-
-def _predicted(
-    table: pd.DataFrame, along: str, held: str, level: float, names: Sequence[str]
-) -> tuple[Array, Array, Array | None] | None:
-    """The prediction at a level: x and the four; their band; and the four if they are the rig's; None where there is no
-    such prediction."""
-    rigs = [f"{name}, {IF_RIGS}" for name in names]
-    band = [f"{name}, {end}" for name in names for end in ("low", "high")]
-    known = complete(table, along, held, *names, *band)
-    near = known[np.abs(known[held] - level) < 0.02 * abs(level)].sort_values(along)
-    if near.empty:
-        return None
-    return numbers(near, along, *names), numbers(near, *band), numbers(near, *rigs) if rigs[0] in near else None

@@ -14,6 +14,7 @@ from bushfit.effects.contract import Array
 from bushfit.reduction.arrays import scatter
 from bushfit.report.compared import SideBySide
 from bushfit.report.plots import style
+from bushfit.report.tables import shortened
 from bushfit.units import number
 
 #: Colour of limits and of what is out of them.
@@ -34,6 +35,12 @@ _FURTHEST = 12.0
 _COLUMNS = 2
 #: Most panels of a picture: it is then a metre high.
 _MOST_PANELS = 40
+#: Width of a line [point].
+_STROKE = 1.3
+#: Dashes of the smallest and of the largest value that is held.
+_DASHES = ("-", (0, (4, 1.5)))
+#: Markers on a line, or fewer: they tell lines apart in grey print.
+_MARKS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +68,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
     The names of the bushings, (n,), stand along x too where they are few.
     """
     drawn = panels[:_MOST_PANELS]
-    along = [_short(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
+    along = [shortened(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
     lines = math.ceil(len(drawn) / _COLUMNS)
     height = style.ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * style.FRAME
     height += 0.12 * max(0, max(map(len, along), default=0) - 16)  # there is room for 16 letters as it is
@@ -84,13 +91,9 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
     beyond = "Triangles: further out than the panel reaches, the furthest by name and value."
     few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in drawn)
     more = f"The first {len(drawn)} of {len(panels)} quantities." * (len(panels) > len(drawn))
-    style.explain(figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more)
-    return figure
-
-
-def _short(name: str, letters: int) -> str:
-    """A name of at most so many letters."""
-    return name if len(name) <= letters else name[: letters - 1] + "…"
+    return style.explained(
+        figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more
+    )
 
 
 def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
@@ -105,15 +108,11 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     good_style = {**style.DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, 1500 / values.size))} if cloud else style.POINT
     if ends is not None and not cloud:
         axes.vlines(place + 1, *ends, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
-    for chosen, color, look, order in (
-        (~bad, _GOOD, good_style, 2),
-        (bad, _OUT, style.POINT if not cloud else style.DOT, 4),
-    ):
+    kinds = (~bad, _GOOD, good_style, 2), (bad, _OUT, style.DOT if cloud else style.POINT, 4)
+    for chosen, color, look, order in kinds:
         for marker, which in (("o", shown == values), ("^", shown < values), ("v", shown > values)):
-            x, y = place[chosen & which] + 1, shown[chosen & which]
-            axes.plot(
-                x, y, marker, color=color, zorder=order, rasterized=cloud, **(look if marker == "o" else style.POINT)
-            )
+            at, drawn = chosen & which, look if marker == "o" else style.POINT
+            axes.plot(place[at] + 1, shown[at], marker, color=color, zorder=order, rasterized=cloud, **drawn)
     axes.axhline(float(np.median(values)), color=style.GREY, lw=0.9, zorder=1)
     for limit in filter(math.isfinite, panel.allowed):
         axes.axhline(limit, color=_OUT, lw=0.9, ls=(0, (5, 2)), zorder=3)
@@ -164,7 +163,7 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
     taken: list[tuple[float, float, int, bool]] = []
     for k in sorted(beyond.union(panel.missed), key=order)[:_MOST_NAMED]:
         value = float(np.clip(panel.values[k], *reach))
-        text = _short(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in beyond else "")
+        text = shortened(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in beyond else "")
         place, above = (k + 0.5) / panel.values.size, value < (reach[0] + reach[1]) / 2.0
         half, line = 0.5 * _LETTER * len(text), 1
         center = min(max(place, half), 1.0 - half)
@@ -186,16 +185,8 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
             color=_OUT if k in panel.missed else style.GREY,
             family=style.fonts(),
             parse_math=False,
-            zorder=5,
+            zorder=1.5,
         )
-
-
-#: Width of a line [point].
-_STROKE = 1.3
-#: Dashes of the smallest and of the largest value that is held.
-_DASHES = ("-", (0, (4, 1.5)))
-#: Markers on a line, or fewer: they tell lines apart in grey print.
-_MARKS = 5
 
 
 def comparison_figure(found: SideBySide) -> Figure:
@@ -216,22 +207,18 @@ def comparison_figure(found: SideBySide) -> Figure:
                 axes.plot(line.x, line.value, color=look.color, **markers, **along)
                 # bands of several results lie on each other
                 axes.fill_between(line.x, line.low, line.high, color=look.color, alpha=0.18, lw=0)
-            style.label_axes(axes, sides.along, panel.header if panel.least else f"{sides.place} {panel.header}")
-            style.log_if_wide(axes, panel.lines[0].x)
+            shown_as = panel.header if panel.least else f"{sides.place} {panel.header}"
+            style.label_axes(axes, sides.along, shown_as, panel.lines[0].x)
             if panel.least:
                 axes.axhline(0.0, color=looks[first].color, lw=_STROKE)
                 style.least_span(axes, panel.least)
-        lines = [
-            Line2D([], [], color=look.color, lw=_STROKE, marker=look.marker, **style.POINT) for look in looks.values()
-        ]
-        dashes = [
-            Line2D([], [], color=style.INK, lw=_STROKE, ls=_DASHES[level]) for level, _ in enumerate(sides.levels)
-        ]
+        marked = {"lw": _STROKE, **style.POINT}
+        lines = [Line2D([], [], color=look.color, marker=look.marker, **marked) for look in looks.values()]
+        dashes = [Line2D([], [], color=style.INK, lw=_STROKE, ls=dash) for dash in _DASHES[: len(sides.levels)]]
         called = [f"{label}: {style.file_name(name)}" for label, name in found.names.items()]
         style.legend(grid[2 * i, 1], lines, called, "", besides=dict(zip(sides.levels, dashes, strict=True)))
-    style.explain(
+    return style.explained(
         figure,
         "Shaded: 95 % bands. Lower panels: the band of each point by itself; "
         "compare.json and the terminal say what holds at all points at once.",
     )
-    return figure

@@ -17,6 +17,7 @@ from bushfit.reduction.result import Reduction
 from bushfit.report.plots import style
 from bushfit.report.plots.points import BINS, Kind, Repeats, held_with, ranges
 from bushfit.report.plots.prediction import axis_label, pair_labels
+from bushfit.report.tables import words
 from bushfit.units import for_people, told
 
 #: Colour of a history.
@@ -25,6 +26,10 @@ _COLOR = "#3b528b"
 _MOST_ROWS = 6000
 #: A common scale over the range of a panel at most; chosen: it fills a third, as is said below the picture.
 _ALIKE = 3
+#: Height of a history, and of the panels of noise and distortion [cm].
+_STRIP, _NOISE_ROW = 2.7, 4.2
+#: Most histories that are drawn: with more the figure leaves the page.
+_MOST_HISTORIES = 4
 
 
 def inspection_figure(every: Sequence[Inspected], first: int = 0, count: int = 5) -> Figure:
@@ -53,8 +58,7 @@ def inspection_figure(every: Sequence[Inspected], first: int = 0, count: int = 5
     swept = any(isinstance(seen.measured, Sweep) for seen in files)
     sweeps = "Sweeps: every point as measured, lines through the means of the repeats." if swept else ""
     scales = "Panels of one direction have the same scales where each fills a third of them."
-    style.explain(figure, sweeps, scales if len(files) > 1 else "")
-    return figure
+    return style.explained(figure, sweeps, scales if len(files) > 1 else "")
 
 
 def _scale_alike(panels: Sequence[Axes]) -> None:
@@ -80,9 +84,8 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
     over_time = [figure.add_subplot(grid[0, -1])]
     over_time.append(figure.add_subplot(grid[1, -1], sharex=over_time[0]))
     motion, load = to_length * history.displacement, to_force * history.force
-    for axes, values, label in zip(
-        over_time, (motion, load), (f"{names[0]}\n[{length}]", f"{names[1]}\n[{force}]"), strict=True
-    ):
+    labels = f"{names[0]}\n[{length}]", f"{names[1]}\n[{force}]"
+    for axes, values, label in zip(over_time, (motion, load), labels, strict=True):
         if history.time.size <= 2 * BINS:
             axes.plot(history.time, values, lw=0.8, color=_COLOR)
         else:
@@ -114,7 +117,7 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
     levels = np.unique(at_level)
     drawn = style.styles(levels.size, held)
     kinds = (
-        (factor * np.abs(sweep.stiffness), f"|K| [{stiffness}]"),
+        (factor * np.abs(sweep.stiffness), f"{words(sweep.direction)[2].replace('stiffness', '|K|')} [{stiffness}]"),
         (sweep.stiffness.imag / sweep.stiffness.real, "loss factor [-]"),
     )
     for axes, (values, label) in zip(pair, kinds, strict=True):
@@ -124,18 +127,11 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
             axes.plot(points.along, points.mean(values[at]), color=look.color, ls=look.dashes, lw=0.8)
             axes.plot(x[at], values[at], look.marker, color=look.color, alpha=0.75, **style.POINT)
         axes.set_label(str(sweep.direction))
-        style.label_axes(axes, axis_label(sweep.direction, axis), label)
-        style.log_if_wide(axes, x)
+        style.label_axes(axes, axis_label(sweep.direction, axis), label, x)
     labels = [told(unit, length * level) for level in levels]
     if sweep.stepped:
         style.name_levels(pair[-1], labels, held, [True] * levels.size)
     return pair[0]
-
-
-#: Height of a history, and of the panels of noise and distortion [cm].
-_STRIP, _NOISE_ROW = 2.7, 4.2
-#: Most histories that are drawn: with more the figure leaves the page.
-_MOST_HISTORIES = 4
 
 
 def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str) -> Figure:
@@ -160,13 +156,12 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
     quality = [figure.add_subplot(grid[len(shown) + 1, column], sharex=points[0]) for column in range(2)]
     _draw_quality(quality, steps, looks)
     left_out = f" The first {len(shown)} of {len(histories)} histories." if len(histories) > len(shown) else ""
-    style.explain(
+    return style.explained(
         figure,
         f"Top: displacement over time; coloured: the steady cycles used, grey: ramps, pauses, transients.{left_out}",
         "Bars: twice the standard error. Noise: standard error of a point, relative to |K|.",
         "Distortion: overtones over the fundamental (THD), filled of the force, hollow of the displacement.",
     )
-    return figure
 
 
 def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[float, style.Style]) -> None:
@@ -199,11 +194,10 @@ def _draw_points(
             axes.vlines(frequency, value - 2 * error, value + 2 * error, color=look.color, lw=0.9)
             axes.plot(frequency, value, look.marker, color=look.color, **style.POINT)
     for axes, name in zip(pair, names, strict=True):
-        style.label_axes(axes, "", name)
+        style.label_axes(axes, "", name, steps["frequency"].to_numpy())
         axes.tick_params(labelbottom=False)
-        style.log_if_wide(axes, steps["frequency"].to_numpy())
     handles = [look.handle(True) for look in looks.values()]
-    style.legend(pair[-1], handles, [told(unit, length * level, digits=4) for level in looks], "amplitude")
+    style.legend(pair[-1], handles, [told(unit, length * level) for level in looks], "amplitude")
 
 
 def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, style.Style]) -> None:
@@ -216,12 +210,11 @@ def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, 
             (pair[1], mine["force_distortion"], style.POINT),
             (pair[1], mine["displacement_distortion"], hollow),
         )
-        for axes, share, words in drawn:
-            axes.plot(mine["frequency"], 100 * share, look.marker, color=look.color, **words)
+        for axes, share, look_of in drawn:
+            axes.plot(mine["frequency"], 100 * share, look.marker, color=look.color, **look_of)
     for axes, name in zip(pair, ("noise [%]", "distortion [%]"), strict=True):
-        style.label_axes(axes, "frequency [Hz]", name)
+        style.label_axes(axes, "frequency [Hz]", name, steps["frequency"].to_numpy())
         axes.set_ylim(bottom=0.0)
-        style.log_if_wide(axes, steps["frequency"].to_numpy())
 
 
 def resonance_figure(found: Resonance, title: str) -> Figure:
@@ -253,13 +246,11 @@ def resonance_figure(found: Resonance, title: str) -> Figure:
         low, high = axes.get_ylim()
         axes.vlines(found.frequency, values - error, values + error, color=color, lw=0.7, alpha=0.6)
         axes.set_ylim(low, high)
-        style.label_axes(axes, "frequency [Hz]", label)
-    style.log_if_wide(loss, found.test.frequency)
+        style.label_axes(axes, "frequency [Hz]", label, found.test.frequency)
     least = f"Where the error of K is beyond {100 * LARGEST_ERROR:g} % there is no point."
-    style.explain(
+    return style.explained(
         figure,
         "Grey line: mass over base acceleration as measured. Points: means of neighbouring rows.",
         "Bars: twice the standard error, large where the mass moves almost as the base does; they may leave the panel.",
         least * bool(found.left_out.size),
     )
-    return figure

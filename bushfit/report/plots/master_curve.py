@@ -19,6 +19,8 @@ from bushfit.units import CELSIUS, for_people, number
 _FINE = 200
 #: Ratio of amplitudes that count as one level.
 _NEAR = 1.3
+#: Factor by which the picture goes beyond the band, to show how arms end.
+_BEYOND = 4.0
 
 
 def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> Figure:
@@ -32,9 +34,8 @@ def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> F
         reached = np.sort(np.concatenate([each.sweep.amplitude for each in mine]))
         near = np.searchsorted(reached, _NEAR * reached) - np.arange(reached.size)
         level = float(np.median(reached[near.argmax() :][: near.max()]))  # near it most points lie
-        levels.append(
-            f"{place} {number(level * place.display.displacement.factor, 3)} {place.display.displacement.name}"
-        )
+        moved, length = place.display.displacement
+        levels.append(f"{place} {number(level * length, 3)} {moved}")
         unit, factor = for_people(*place.display.stiffness, max(np.abs(each.reduced_stiffness).max() for each in mine))
         reach = np.concatenate([each.reduced_frequency for each in mine])
         frequency = np.geomspace(reach.min(), reach.max(), _FINE)
@@ -50,12 +51,11 @@ def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> F
         style.label_axes(stiffness, "reduced frequency f a_T [Hz]", f"{place}\n|{words(place)[2]}| [{unit}]")
         style.label_axes(loss, "reduced frequency f a_T [Hz]", "loss factor [-]")
         style.name_levels(loss, [f"{degree:g}" for degree in degrees], "temperature", [True] * len(degrees))
-    style.explain(
+    return style.explained(
         figure,
         f"Line: the model at 23 degC, {', '.join(levels)}. Points: measured at the temperatures beside [degC], brought",
         "to 23 degC by the model's shift factors, and by how its moduli change.",
     )
-    return figure
 
 
 def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -> Figure:
@@ -74,21 +74,16 @@ def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -
         axes.errorbar(kelvin - CELSIUS, points, Z95 * unsure, fmt="o", color=color, lw=0.8, **style.POINT)
     style.label_axes(factors, "temperature [degC]", "log10 a_T [-]")
     style.label_axes(off, "temperature [degC]", "log10 a_T, own less law [-]")
-    style.explain(
+    return style.explained(
         figure,
         f"Line: the law, with a shift of {number(result.model.values[SHIFT], 3)} 1/K at 23 degC, grey its 95 % band.",
         "Points: what each sweep asks for by itself, bars 95 %.",
     )
-    return figure
 
 
 def _degree(found: Shifted) -> float:
     """The temperature of a sweep to a degree [degC]."""
     return float(np.round(found.temperature - CELSIUS))
-
-
-#: Factor by which the picture goes beyond the band, to show how arms end.
-_BEYOND = 4.0
 
 
 def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
@@ -109,15 +104,12 @@ def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
             moduli.plot(frequency, factor * share(made), color=look.color, lw=1.1, ls=dashes)
         off = 100.0 * np.abs(made / whole - 1.0)[inside]
         errors.plot(frequency[inside], off, color=look.color, lw=1.1)
-    style.label_axes(moduli, "frequency [Hz]", f"modulus [{unit}]")
-    style.label_axes(errors, "frequency [Hz]", "error of the modulus [%]")
-    for axes in (moduli, errors):
-        style.log_if_wide(axes, frequency)
+    style.label_axes(moduli, "frequency [Hz]", f"modulus [{unit}]", frequency)
+    style.label_axes(errors, "frequency [Hz]", "error of the modulus [%]", frequency)
     moduli.axvspan(low, high, color="#ebebeb", lw=0, zorder=0)
     errors.set_ylim(bottom=0.0)
-    style.explain(
+    return style.explained(
         figure,
         "Wide grey: the model; coloured: its arms; solid storage, dashed loss. Shaded: where the arms were fitted.",
         *(f"{part.sentence}." for part in arms),
     )
-    return figure

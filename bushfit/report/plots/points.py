@@ -13,7 +13,8 @@ from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.prediction.stiffness import Band
-from bushfit.reading.measurement import Stepped
+from bushfit.reading.measurement import SAME_TEMPERATURE, Stepped
+from bushfit.units import CELSIUS, number, told
 
 _T = TypeVar("_T", SweepData, LoopData)
 
@@ -24,6 +25,8 @@ SECTORS = 36
 BINS = 1500
 #: What is drawn along the x axis: what a test steps through while it holds the other.
 Axis = Literal["frequency", "amplitude"]
+#: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
+_MOST_ROWS = 24
 
 
 def by_direction(data_sets: Sequence[_T]) -> dict[Place, list[_T]]:
@@ -45,6 +48,11 @@ class Kind(NamedTuple):
         """What lies along x; the frequency, too, where nothing was held."""
         return "amplitude" if self.stepped == "amplitude" else "frequency"
 
+    @property
+    def palette(self) -> str:
+        """The colours of `curves_of` it."""
+        return "temperature" if self.stepped else "loop"
+
 
 def by_kind(data_sets: Sequence[SweepData]) -> dict[Kind, list[SweepData]]:
     """The sweeps of each place that step through the same, in the order of the tests."""
@@ -52,6 +60,31 @@ def by_kind(data_sets: Sequence[SweepData]) -> dict[Kind, list[SweepData]]:
     for data_set in data_sets:
         kinds.setdefault(Kind(data_set.direction, data_set.sweep.stepped), []).append(data_set)
     return kinds
+
+
+class Curve(NamedTuple):
+    """Points that are drawn as one curve: the number of their test, which of its points, (n,) bool, and a name."""
+
+    test: int
+    points: Array
+    name: str
+
+
+def curves_of(data_sets: Sequence[SweepData], kind: Kind) -> list[Curve]:
+    """The curves of sweeps whose levels tests do not share: each test where nothing was held, and of tests that lie
+    apart in temperature each level of each, the coldest first; none of others."""
+    if kind.stepped is None:
+        return [Curve(at, np.ones(one.frequency.size, dtype=bool), one.name) for at, one in enumerate(data_sets)]
+    degrees = [float(np.mean(one.temperature)) - CELSIUS for one in data_sets]
+    if not np.ptp(degrees) > SAME_TEMPERATURE:
+        return []
+    held = [getattr(one, held_with(kind.axis)) for one in data_sets]
+    unit, scale = ("Hz", 1.0) if kind.axis == "amplitude" else kind.place.display.displacement
+    return [
+        Curve(at, held[at] == level, f"{number(degrees[at], 3)} degC, {told(unit, scale * level)}")
+        for at in np.argsort(degrees, kind="stable").tolist()
+        for level in np.unique(held[at])
+    ]
 
 
 def held_with(axis: Axis) -> Axis:
@@ -122,12 +155,6 @@ def means(data_sets: Sequence[SweepData]) -> Points:
     return Points(repeats.along, repeats.held, band(np.abs), band(lambda k: k.imag / k.real))
 
 
-def outliers(data_set: LoopData) -> tuple[Array, Array]:
-    """Phase [cycles] and force [N or N m] of a loop's outliers, the rows that are faults of the record, (k,) each."""
-    loop, rows = data_set.test, data_set.drive.outliers["force"].rows
-    return (loop.time[rows] - loop.time[0]) * data_set.drive.frequency, loop.force[rows]
-
-
 def ranges(time: Array, values: Array) -> tuple[Array, Array, Array]:
     """Start of each bin of time that holds rows, and the least and the largest value there, (k,) each, k <= BINS."""
     first = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], BINS + 1)[:-1]))
@@ -145,10 +172,6 @@ def over_sectors(data_set: LoopData) -> tuple[Array, Array]:
     sector = (phase_after_turn(data_set) * (SECTORS / 360.0)).astype(int) % SECTORS
     filled, count = np.unique(sector, return_counts=True)
     return (filled + 0.5) * (360.0 / SECTORS), (sector == filled[:, None]) / count[:, None]
-
-
-#: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
-_MOST_ROWS = 24
 
 
 class Map(NamedTuple):

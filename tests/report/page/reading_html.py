@@ -15,13 +15,13 @@ import numpy as np
 from hypothesis import strategies as st
 
 from bushfit.errors import printable
-from bushfit.jobs.report import report
 from bushfit.report.contents import pages_of
+from bushfit.report.page import folder_contents
 
 #: A page at most [bytes].
 LARGEST = 500_000
 #: Elements that have no end.
-VOID = {"meta", "link", "br", "hr", "img", "input"}
+VOID = {"meta", "link", "br", "wbr", "hr", "img", "input"}
 #: What makes a browser load something.
 LOADING = {"src", "srcset", "data", "poster", "background", "action", "formaction", "xlink:href"}
 
@@ -157,4 +157,4 @@ def page_of(folder: Path) -> str:
 
 def made_of(folder: Path) -> str:
     """The report that is made of what stands in a folder."""
-    return pages_of(report(folder))["report.html"].decode()
+    return pages_of(folder_contents(folder))["report.html"].decode()

@@ -18,9 +18,8 @@ from hypothesis import strategies as st
 from production import COUNT, LOSSY, SOFT
 from reading_html import LARGEST, NASTY, assert_harmless, drawn, loads, parsed, spoiled
 
-from bushfit.jobs.report import report
 from bushfit.report.contents import pages_of
-from bushfit.report.page import comparison_page
+from bushfit.report.page import comparison_page, folder_contents
 from bushfit.report.page.chart import Axis, Cells, Rule, Series, chart, maps
 from bushfit.report.page.index import index_page, read_batch
 
@@ -45,7 +44,7 @@ def documents(compared: Path) -> dict[str, Any]:
 @pytest.mark.parametrize("name", NAMES)
 def test_compare_writes_a_whole_page_and_its_folder_gives_the_same(compared: Path, name: str) -> None:
     page = (compared / name / "compare.html").read_text(encoding="utf-8")
-    assert pages_of(report(compared / name))["compare.html"].decode() == page
+    assert pages_of(folder_contents(compared / name))["compare.html"].decode() == page
     found = parsed(page)
     assert loads(page) == []
     assert len(page.encode()) < LARGEST

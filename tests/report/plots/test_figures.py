@@ -115,7 +115,7 @@ def test_reduction(paper_model: Model) -> None:
     reduction = reduce([history])
     figure = whole(reduction_figure(reduction, [history], "$ raw $.csv"))
     levels = sorted({step.level for step in reduction.steps})
-    assert legend(figure.axes[2]) == [f"{np.degrees(level):.4g} deg" for level in levels]
+    assert legend(figure.axes[2]) == [f"{np.degrees(level):.3g} deg" for level in levels]
     assert titles(figure) == [], "the title names one history"
     shown = {"time [s]", "frequency [Hz]", "noise [%]", "distortion [%]", "rotation [deg]"}
     assert {*shown, "torsion stiffness |K| [N m/rad]"} <= set(labels(figure))
@@ -253,6 +253,21 @@ def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int)
     assert len(points(left)) == count
     assert len(bar) == (count > 8)
     assert bar or len(legend(right)) == count
+
+
+def test_one_level_at_several_temperatures_is_a_curve_each(paper_model: Model) -> None:
+    """They are no repeats of one another: nothing is averaged over them, and each is named by its temperature."""
+    frequency, amplitude = np.geomspace(5.0, 150.0, 12), np.full(12, 1e-7)
+    sweeps = [
+        Sweep(f"{celsius}.csv", Direction.AXIAL, frequency, amplitude, factor * (1e6 + 1e5j) * np.ones(12),
+              stepped="frequency", temperature=273.15 + celsius)
+        for celsius, factor in ((40.0, 1.0), (-10.0, 3.0), (20.0, 2.0))
+    ]  # fmt: skip
+    figure = checked(sweeps_figure(paper_model, sweep_data(sweeps), "warm"))
+    assert legend(figure.axes[1]) == ["-10 degC, 0.1 um", "20 degC, 0.1 um", "40 degC, 0.1 um"]
+    stiffness = [line.get_ydata() for line in figure.axes[0].lines if line.get_marker() == "o"]
+    assert [np.unique(np.round(each)).size for each in stiffness] == [1, 1, 1]
+    assert np.array([np.mean(each) for each in stiffness]) == pytest.approx(np.array([3.0, 2.0, 1.0]) * abs(1e3 + 1e2j))
 
 
 @pytest.mark.parametrize("frequencies", some([(40.0,), tuple(np.geomspace(5.0, 150.0, 30))], {(40.0,)}))
