@@ -96,7 +96,7 @@ def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_ampl
     lines = [line.split() for line in done.stderr.splitlines() if line.split()[:1] == ["155"]]
     shown = [words[1] for words in lines]
     value, low, high = (float(lines[0][place].strip("()")) for place in (2, 3, 5))
-    first = pd.read_csv(tmp_path / "x/axial.csv").query("`frequency [Hz]` == 155").iloc[0]
+    first = pd.read_csv(tmp_path / "y/axial.csv").query("`frequency [Hz]` == 155").iloc[0]
     wanted = [first[f"stiffness [N/mm]{end}"] for end in ("", ", low", ", high")]
     assert (value, low, high) == pytest.approx(wanted, abs=0.051)
     assert len(shown) == 8
