@@ -8,24 +8,9 @@ TYPE_CHECKING = False  # as type checkers take it for true; to import typing tak
 if TYPE_CHECKING:
     from typing import Any
 
-    from bushfit.api import (
-        compare,
-        diagnose,
-        fit,
-        fit_dynamic,
-        fit_static,
-        load_campaign,
-        load_model,
-        parameters,
-        picture,
-        predict,
-        run,
-        save,
-        simulate,
-        table,
-    )
+    from bushfit.api import *  # noqa: F403
 
-__all__ = [
+__all__ = [  # noqa: F405
     "compare",
     "diagnose",
     "fit",

@@ -19,10 +19,9 @@ from bushfit.errors import BushfitError, did_you_mean
 from bushfit.fitting.data import Data
 from bushfit.jobs import Outcome
 from bushfit.jobs.compare import MOST, Compare, Compared
-from bushfit.jobs.diagnose import Diagnose, Diagnosed
+from bushfit.jobs.diagnose import Diagnose, Diagnosed, Ran, Run
 from bushfit.jobs.fits import Fit, FitDynamic, FitStatic, Fitted
 from bushfit.jobs.predict import Predict, Predicted
-from bushfit.jobs.run import Ran, Run
 from bushfit.model.file import load_result
 from bushfit.model.model import Model
 from bushfit.model.result import Result

@@ -121,10 +121,25 @@ def quantity(value: object, *expected: str) -> float:
     Raises:
         UnitError: no text, no number, no unit, or a unit of another dimension.
     """
-    number, unit = _split_quantity(value, expected[0])
-    fitting = next((choice for choice in expected if agrees(unit, choice)), expected[0])
+    kind, unit = _kind(expected[0])
+    refused = partial(UnitError, expected=f'{kind} with its unit, such as "10 {unit}"')
+    text = str(value).strip()
+    number = _NUMBER.match(text)
+    if not isinstance(value, str | int | float) or isinstance(value, bool) or number is None:
+        raise refused("this is no quantity", found=f'"{text}"' if isinstance(value, str) else text)
+    own = text[number.end() :].strip()
+    if not own:
+        hint = None if expected[0] == "1" else f'write "{text} {unit}"'
+        raise refused("a number without a unit", found=text, hint=hint)
+    if own[0] in ",.":
+        parts = re.fullmatch(r"([+-]?\d+),(\d\d?|\d{4,})(\D*)", text)  # three digits may be thousands
+        way = f'write "{parts[1]}.{parts[2]}{parts[3]}", with' if parts else "write numbers with"
+        raise refused("this is no quantity", found=f'"{text}"', hint=f"{way} a decimal point")
+    if not math.isfinite(float(number[0])):
+        raise refused("the number is too large", found=f'"{text}"')
+    fitting = next((choice for choice in expected if agrees(own, choice)), expected[0])
     # to 15 digits: 18 mm are 0.018 m, and not 0.018000000000000002 m
-    return sized(float(f"{number * factor(unit, fitting):.{_MOST_DIGITS}g}"), fitting)
+    return sized(float(f"{float(number[0]) * factor(own, fitting):.{_MOST_DIGITS}g}"), fitting)
 
 
 def sized(value: float, unit: str) -> float:
@@ -227,25 +242,6 @@ def _kind(expected: str) -> tuple[str, str]:
     return _KINDS.get(expected, ("a quantity", expected))
 
 
-def _split_quantity(value: object, expected: str) -> tuple[float, str]:
-    kind, unit = _kind(expected)
-    refused = partial(UnitError, expected=f'{kind} with its unit, such as "10 {unit}"')
-    text = str(value).strip()
-    number = _NUMBER.match(text)
-    if not isinstance(value, str | int | float) or isinstance(value, bool) or number is None:
-        raise refused("this is no quantity", found=f'"{text}"' if isinstance(value, str) else text)
-    rest = text[number.end() :].strip()
-    if not rest:
-        raise refused("a number without a unit", found=text, hint=None if expected == "1" else f'write "{text} {unit}"')
-    if rest[0] in ",.":
-        parts = re.fullmatch(r"([+-]?\d+),(\d\d?|\d{4,})(\D*)", text)  # three digits may be thousands
-        way = f'write "{parts[1]}.{parts[2]}{parts[3]}", with' if parts else "write numbers with"
-        raise refused("this is no quantity", found=f'"{text}"', hint=f"{way} a decimal point")
-    if not math.isfinite(float(number[0])):
-        raise refused("the number is too large", found=f'"{text}"')
-    return float(number[0]), rest
-
-
 @lru_cache(maxsize=256)
 def _resolve(text: str) -> tuple[float, str]:
     """Factor to SI and SI base of a unit; angles keep their radian.
@@ -264,7 +260,8 @@ def _by_pint(text: str) -> tuple[float, str]:
         "unknown unit", found=f'"{text[:_LONGEST_UNIT]}"', expected="a unit such as mm, N, kN/mm, deg, Hz or %"
     )
     if len(text) <= _LONGEST_UNIT:
-        text = _POWER.sub("^", _JOINT.sub("*", _WORD.sub(_usual, text)))
+        text = _WORD.sub(lambda word: _EXACT.get(word[0]) or _SPELLINGS.get(word[0].lower(), word[0]), text)
+        text = _POWER.sub("^", _JOINT.sub("*", text))
     if len(text) > _LONGEST_UNIT or not _UNIT.fullmatch(text):
         raise unknown
     for word in _WORD.findall(text):
@@ -279,11 +276,6 @@ def _by_pint(text: str) -> tuple[float, str]:
     if zero.magnitude != 0.0:  # decibel and the like
         raise unknown
     return float(one.magnitude), str(one.units)
-
-
-def _usual(word: re.Match[str]) -> str:
-    """A word of a unit as pint spells it."""
-    return _EXACT.get(word[0]) or _SPELLINGS.get(word[0].lower(), word[0])
 
 
 @lru_cache(maxsize=1)

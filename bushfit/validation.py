@@ -1,7 +1,8 @@
 """Checks a parsed TOML or JSON file against dataclasses with pydantic, whose errors become the project's own.
 
-It knows no campaign and no model. A table of the file is a frozen dataclass. Where the keys of a field stand in the
-table itself and not under the field's own name, the field says so with `field(metadata=standing_in_table(keys))`.
+It knows no campaign and no model, but the kinds of values in their files: texts such as "10 mm" become SI. A table of
+the file is a frozen dataclass. Where the keys of a field stand in the table itself and not under the field's own name,
+the field says so with `field(metadata=standing_in_table(keys))`.
 """
 
 import re
@@ -15,6 +16,8 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, Valid
 from pydantic_core import ErrorDetails
 
 from bushfit.errors import BushfitError, CampaignError, did_you_mean
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
+from bushfit.units import quantity, stepped, temperature
 
 T = TypeVar("T")
 
@@ -193,3 +196,79 @@ def _parts(hint: Any) -> Iterable[Any]:
     yield hint
     for part in get_args(hint):
         yield from _parts(part)
+
+
+#: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
+#: far beyond every shaker, and numbers stay finite.
+LARGEST_SHAKEN = 1e6
+#: A list that is not empty; its check ends at the first error, as those of a hundred thousand would fill the memory.
+Several = Annotated[tuple[T, ...], Field(fail_fast=True), Field(min_length=1)]
+#: A value of a parameter: a number here, a text or a number in the file.
+Size = Annotated[
+    float, WithJsonSchema({"type": ["string", "number"], "description": "with its unit; a ratio may be a number"})
+]
+
+
+def si(*units: str) -> BeforeValidator:
+    """A validator that takes a text with any of these units, and gives SI."""
+    return converted(lambda raw, _: quantity(raw, *units), text(f"a number with a unit of {' or '.join(units)}"))
+
+
+def text(words: str) -> dict[str, Any]:
+    """The JSON Schema of a text that is described in words."""
+    return {"type": "string", "description": words}
+
+
+def motion(per: str = "") -> BeforeValidator:
+    """A validator as `si("m")`, but by the motion of the table's direction: [rad], or a strain; "/s" for a speed."""
+
+    def unit(direction: object) -> str:
+        return (direction.motion if isinstance(direction, Place) else TRANSLATION).displacement_unit + per
+
+    units = " or ".join(f"{each.displacement_unit}{per}" for each in (TRANSLATION, ROTATION, STRAINING))
+    written = text(f"a number with a unit of {units}, by what is tested")
+    return converted(lambda raw, info: quantity(raw, unit(info.data.get("direction"))), written)
+
+
+def table(convert: Callable[[dict[str, Any]], Any], written: Mapping[str, Any] | None = None) -> BeforeValidator:
+    """A validator that converts a table, whose JSON Schema is `written`; what is none it leaves to pydantic."""
+    return converted(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw, written)
+
+
+def _frequencies(raw: dict[str, Any]) -> list[str]:
+    """A list of frequencies as texts from { start, stop, step }, with both ends."""
+    expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
+    if set(raw) != {"start", "stop", "step"}:
+        raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
+    values = stepped(*(quantity(raw[key], "Hz") for key in ("start", "stop", "step")))
+    if not values:
+        raise CampaignError("this is no range of frequencies", found=str(raw), expected="0 < start <= stop, step > 0")
+    return [f"{value!r} Hz" for value in values]
+
+
+_HERTZ = text("a number with a unit of Hz")
+#: How frequencies are written: a list, or a range with both ends.
+_FREQUENCIES = {
+    "anyOf": [
+        {"type": "array", "items": _HERTZ, "minItems": 1},
+        {
+            "type": "object",
+            "properties": dict.fromkeys(("start", "stop", "step"), _HERTZ),
+            "required": ["start", "stop", "step"],
+            "additionalProperties": False,
+        },
+    ]
+}
+
+Temperature = Annotated[float, converted(lambda raw, _: temperature(raw), text('a temperature, such as "23 degC"'))]
+Length = Annotated[float, si("m"), Field(gt=0)]
+Angle = Annotated[float, si("rad"), Field(gt=0)]
+Strain = Annotated[float, si("1"), Field(gt=0)]
+Frequency = Annotated[float, si("Hz"), Field(gt=0)]
+Frequencies = Annotated[
+    tuple[Frequency, ...], Field(fail_fast=True), table(_frequencies, _FREQUENCIES), Field(min_length=1)
+]
+Displacement = Annotated[float, motion(), Field(gt=0)]
+SHAKEN = Field(ge=1.0 / LARGEST_SHAKEN, le=LARGEST_SHAKEN)
+Share = Annotated[float, si("1"), Field(ge=0, lt=1)]
+Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]  # of repeats or cycles: more than any rig runs

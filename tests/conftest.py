@@ -86,22 +86,14 @@ def result(campaign: Campaign) -> Result:
 @pytest.fixture(scope="session")
 def other_models() -> dict[str, Model]:
     """Bushings unlike the paper's: soft and long, stiff and thin, strongly filled."""
+    sizes = {
+        "soft and long": ((0.012, 0.028, 0.080), (4.5e5, 3.0e4, 0.31, 5.0e3, 1.0e-2)),
+        "stiff and thin": ((0.015, 0.019, 0.025), (1.9e6, 4.0e5, 0.19, 3.0e4, 2.0e-2)),
+        "strongly filled": ((0.009, 0.020, 0.040), (1.3e6, 4.5e5, 0.21, 6.0e4, 9.0e-3)),
+    }
     return {
-        "soft and long": Model(
-            Bushing("soft and long", 0.012, 0.028, 0.080),
-            BASE,
-            {"mu": 4.5e5, "m": 3.0e4, "alpha": 0.31, "sigma_fmax": 5.0e3, "eps_half": 1.0e-2},
-        ),
-        "stiff and thin": Model(
-            Bushing("stiff and thin", 0.015, 0.019, 0.025),
-            BASE,
-            {"mu": 1.9e6, "m": 4.0e5, "alpha": 0.19, "sigma_fmax": 3.0e4, "eps_half": 2.0e-2},
-        ),
-        "strongly filled": Model(
-            Bushing("strongly filled", 0.009, 0.020, 0.040),
-            BASE,
-            {"mu": 1.3e6, "m": 4.5e5, "alpha": 0.21, "sigma_fmax": 6.0e4, "eps_half": 9.0e-3},
-        ),
+        name: Model(Bushing(name, *size), BASE, dict(zip(TABLE_1, values, strict=True)))
+        for name, (size, values) in sizes.items()
     }
 
 

@@ -41,48 +41,37 @@ def expected(kind: Kind) -> list[Floats]:
 
 HEADERS: dict[str, dict[Kind, str]] = {
     "english": {
-        "loop": "time, displacement, force",
-        "sweep": "frequency, amplitude, stiffness, loss factor",
+        "loop": "time, displacement, force", "sweep": "frequency, amplitude, stiffness, loss factor",
         "coupon": "frequency, strain amplitude, storage modulus, loss modulus",
     },
     "camel": {
-        "loop": "Time, Axial Displacement, Axial Force",
-        "sweep": "Frequency, Amplitude, DynamicStiffness, TanDelta",
+        "loop": "Time, Axial Displacement, Axial Force", "sweep": "Frequency, Amplitude, DynamicStiffness, TanDelta",
     },
     "german": {
-        "loop": "Zeit, Weg, Kraft",
-        "sweep": "Frequenz, Amplitude, Dynamische Steifigkeit, Verlustfaktor",
+        "loop": "Zeit, Weg, Kraft", "sweep": "Frequenz, Amplitude, Dynamische Steifigkeit, Verlustfaktor",
         "coupon": "Frequenz, Scherdehnung, Speichermodul G', Verlustmodul G''",
     },
     "umlaut": {
-        "loop": "Prüfzeit, Prüfweg, Prüfkraft",
-        "sweep": "Prüffrequenz, Wegamplitude, Steifigkeit, Verlustfaktor",
+        "loop": "Prüfzeit, Prüfweg, Prüfkraft", "sweep": "Prüffrequenz, Wegamplitude, Steifigkeit, Verlustfaktor",
     },
     "ascii umlaut": {
-        "loop": "Pruefzeit, PRUEFWEG, Prufkraft",
-        "sweep": "Prueffrequenz, Wegamplitude, Steifigkeit, Verlustfaktor",
+        "loop": "Pruefzeit, PRUEFWEG, Prufkraft", "sweep": "Prueffrequenz, Wegamplitude, Steifigkeit, Verlustfaktor",
     },
     "french": {
-        "loop": "Temps, Déplacement, Effort",
-        "sweep": "Fréquence, Amplitude, Raideur, Facteur de pertes",
+        "loop": "Temps, Déplacement, Effort", "sweep": "Fréquence, Amplitude, Raideur, Facteur de pertes",
         "coupon": "Fréquence, Déformation dynamique, Module de conservation, Module de perte",
     },
-    "french ascii": {
-        "loop": "TEMPS, DEPLACEMENT, FORCE",
-        "sweep": "FREQUENCE, AMPLITUDE, RAIDEUR, FACTEUR DE PERTE",
-    },
+    "french ascii": {"loop": "TEMPS, DEPLACEMENT, FORCE", "sweep": "FREQUENCE, AMPLITUDE, RAIDEUR, FACTEUR DE PERTE"},
     "spanish": {
         "loop": "Tiempo, Desplazamiento, Fuerza",
         "sweep": "Frecuencia, Amplitud, Rigidez dinámica, Factor de pérdida",
         "coupon": "Frecuencia, Amplitud de deformación, Módulo de almacenamiento, Módulo de pérdida",
     },
     "spanish ascii": {
-        "loop": "tiempo, desplazamiento, carga",
-        "sweep": "frecuencia, amplitud, rigidez, factor de perdidas",
+        "loop": "tiempo, desplazamiento, carga", "sweep": "frecuencia, amplitud, rigidez, factor de perdidas",
     },
     "chinese": {
-        "loop": "时间, 位移, 力",
-        "sweep": "频率, 振幅, 刚度, 损耗因子",
+        "loop": "时间, 位移, 力", "sweep": "频率, 振幅, 刚度, 损耗因子",
         "coupon": "频率, 剪切应变, 储能模量, 损耗模量",
     },
     "bluehill": {"loop": "Time, Extension, Load"},
@@ -97,10 +86,7 @@ HEADERS: dict[str, dict[Kind, str]] = {
     },
     "test xpert french": {"loop": "Temps, Course standard, Force standard"},
     "mts": {"sweep": "Frequency, Dynamic Displacement p-p, K*, Tan Delta"},
-    "symbols": {
-        "sweep": "f, A, c dyn, tan δ",
-        "coupon": "f, Strain dyn, G', G''",
-    },
+    "symbols": {"sweep": "f, A, c dyn, tan δ", "coupon": "f, Strain dyn, G', G''"},
     "amplitude SS": {"sweep": "Frequenz, Amplitude SS, Dyn. Federrate, tan delta"},
     "metravib": {"sweep": "Fréquence, Amplitude crête, Raideur dynamique K*, tan(δ)"},
     "snake": {"coupon": "freq, strain_dyn, G_storage, G_loss"},
@@ -110,10 +96,10 @@ HEADERS: dict[str, dict[Kind, str]] = {
     "rheo compass omega": {"coupon": "Angular Frequency, Shear Strain, G', G''"},
     "rspace": {
         "coupon": "Frequency, Complex shear strain, "
-        "Shear modulus (elastic component), Shear modulus (viscous component)"
+        "Shear modulus (elastic component), Shear modulus (viscous component)",
     },
     "osc": {"coupon": "Freq, Strain, G', G\""},
-}
+}  # fmt: skip
 UNITS: dict[Kind, list[str]] = {
     "loop": ["s", "mm", "N"],
     "sweep": ["Hz", "mm", "N/mm", "-"],
@@ -294,6 +280,10 @@ DIALECTS = {
     "padded cells": Dialect(delimiter=";", pad=14),
     "other order": Dialect(order=[2, 0, 1], delimiter=";", decimal=",", language="spanish"),
     "other order, sweep": Dialect("sweep", order=[3, 2, 1, 0]),
+    "MTS data header": Dialect(
+        delimiter=";", unit=None, units={"s": "Sec"}, language="test suite", others=[(3, "Temp", "", "23")],
+        before=["Data Header: time axial disp 12.3 force sec 3/4/2024 10:11:12 AM", ""],
+    ),
     "remarks": Dialect(extra="remark"),
     "remarks, decimal commas": Dialect("sweep", extra="Bemerkung", delimiter=";", decimal=",", language="german"),
 }  # fmt: skip

@@ -15,14 +15,8 @@ COUNT, LOSSY, SOFT = 30, 7, 20
 #: mu drifts by this share of its size from the first test to the last; the last of the manifest was tested first.
 DRIFT = 0.10
 LIMITS = """
-[parameters.mu]
-min = "0.9 MPa"
-max = "1.25 MPa"
-[parameters.alpha]
-sigma = 3
-[[stiffness]]
-at = "axial 25 Hz 0.2 mm"
-max = "1000 N/mm"
+parameters = { mu = { min = "0.9 MPa", max = "1.25 MPa" }, alpha = { sigma = 3 } }
+stiffness = [{ at = "axial 25 Hz 0.2 mm", max = "1000 N/mm" }]
 """
 
 

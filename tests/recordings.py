@@ -114,6 +114,15 @@ def function(
     return made | said
 
 
+def at_nodes(response: Any, frequency: Any, title: str, upper: str, lower: str) -> Iterator[dict[str, Any]]:
+    """Datasets 55 of a ratio along z at node 7, one of each frequency, as I-DEAS Test names it in ID line 5."""
+    codes = "".join(f"{code:10}" for code in (2, 3, UFF[upper], UFF[lower]))
+    said = {"type": 55, "analysis_type": 5, "data_ch": 2, "spec_data_type": UFF[upper], "load_case": 1}
+    for number, (value, at) in enumerate(zip(response, frequency, strict=True), start=1):
+        values = {"node_nums": [7], "r1": np.zeros(1, complex), "r2": np.zeros(1, complex), "r3": np.array([value])}
+        yield {**said, **values, "freq_step_n": number, "freq": at, "id1": title, "id5": codes}
+
+
 def parquet(table: pd.DataFrame, file: Path) -> None:
     pa.parquet.write_table(arrow(table), file)
 

@@ -1,4 +1,4 @@
-"""Stale documentation fails: commands, keys, effects, recipes, the map of the code, and data that can be made again."""
+"""Stale documentation fails: commands, keys, effects, the map of the code, kept data; and what is built is whole."""
 
 from __future__ import annotations
 
@@ -6,9 +6,15 @@ import ast
 import importlib
 import io
 import json
+import os
 import re
 import shlex
+import shutil
+import subprocess
+import sys
+import tarfile
 import tomllib
+import zipfile
 from dataclasses import fields, is_dataclass
 from functools import reduce
 from pathlib import Path
@@ -28,8 +34,8 @@ from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.schema import CampaignFile
 from bushfit.cli import cli
 from bushfit.geometry import Direction
-from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.simulation.files import to_files
 from bushfit.simulation.measured import simulate
@@ -40,12 +46,9 @@ def blocks(page: Path, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
 
-def test_the_tables_of_effects_are_the_library() -> None:
+def test_effects_and_commands_are_in_the_tables_of_their_pages(root: Path) -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert renewed(page) == page, "run: python tests/effect_tables.py"
-
-
-def test_every_command_is_in_the_table_and_has_an_example(root: Path) -> None:
     readme = (root / "README.md").read_text(encoding="utf-8")
     names = cli.list_commands(click.Context(cli))
     assert [name for name in names if f"| `bushfit {name} " not in readme] == []
@@ -99,12 +102,6 @@ def test_recipes_for_ci_are_valid_and_run_what_there_is(root: Path) -> None:
         _, name, *arguments = shlex.split(line)
         assert name == "batch"
         batch.make_context("batch", arguments, parent=above)
-
-
-def test_json_keys_of_a_model_are_listed(root: Path) -> None:
-    page = (root / "bushfit/manual/report.md").read_text(encoding="utf-8")
-    document = json.loads((root / "data/arm_bushing/truth.json").read_text(encoding="utf-8"))
-    assert [key for key in document if key != "schema" and f"`{key}`" not in page] == []
 
 
 def test_the_page_on_diagnose_has_every_constant_that_moves_a_verdict(root: Path) -> None:
@@ -194,7 +191,7 @@ COPIES: dict[str, dict[str, Any]] = {
     },
     "cmp_15961_recordings/loop_axial.mf4": {},
     "cmp_15961_recordings/sweep_radial.parquet": {},
-    "cmp_15961_recordings/sweep_axial.uff": {"written": FileFormat(sheet="0.1 mm"), "at_amplitude": 1e-4},
+    "cmp_15961_recordings/sweep_axial.uff": {"sheet": "0.1 mm"},
 }
 
 
@@ -203,8 +200,11 @@ def test_files_of_other_formats_hold_their_csv(root: Path, copy: str) -> None:
     """Of a loop every fifth row; of a UFF file the first rows, which are those of an amplitude."""
     kind, direction = Path(copy).stem.split("_")
     read: Any = read_loop if kind == "loop" else read_sweep
-    kept = read(root / f"data/cmp_15961/{kind}_{direction}{'_1' * (kind == 'loop')}.csv", Direction(direction))
-    own = read(root / "data" / copy, Direction(direction), **COPIES[copy])
+    stated = LoopFile if kind == "loop" else SweepFile
+    csv_file = root / f"data/cmp_15961/{kind}_{direction}{'_1' * (kind == 'loop')}.csv"
+    kept = read(csv_file, Direction(direction), stated(file=""))
+    held = {"at_amplitude": 1e-4} if copy.endswith("uff") else {}
+    own = read(root / "data" / copy, Direction(direction), stated(file="", **COPIES[copy]), **held)
     columns = ("time", "displacement", "force") if kind == "loop" else ("frequency", "amplitude", "stiffness", "repeat")
     for column in columns:
         csv = getattr(kept, column)[:: 5 if kind == "loop" else 1][: getattr(own, column).size]
@@ -222,3 +222,64 @@ def test_the_second_bushing_can_be_made_again(root: Path) -> None:
         assert list(made) == list(kept)
         for column in made:
             np.testing.assert_allclose(made[column], kept[column], rtol=1e-5, atol=1e-6 * kept[column].abs().max())
+
+
+@pytest.fixture(scope="module")
+def wheel(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, built where the builder is installed."""
+    builder = pytest.importorskip("hatchling.builders.wheel").WheelBuilder(str(root))
+    return Path(next(builder.build(directory=str(tmp_path_factory.mktemp("wheel")), versions=["standard"])))
+
+
+def test_measured_rubber_has_a_licence_of_its_own_and_nothing_built_holds_it(
+    root: Path, wheel: Path, tmp_path: Path
+) -> None:
+    folders = [folder for folder in (root / "data/measured").iterdir() if folder.is_dir()]
+    assert folders
+    for folder in folders:
+        assert "LICENSE" in {file.name for file in folder.iterdir()}
+        assert "https://" in (folder / "README.md").read_text(encoding="utf-8")
+    targets = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["hatch"]["build"]["targets"]
+    assert targets["wheel"]["packages"] == ["bushfit"]
+    assert "/data/measured" in targets["sdist"]["exclude"]
+    sdist = pytest.importorskip("hatchling.builders.sdist").SdistBuilder(str(root))
+    archive = next(sdist.build(directory=str(tmp_path), versions=["standard"]))
+    with tarfile.open(archive) as opened:
+        names = opened.getnames()
+    names += zipfile.ZipFile(wheel).namelist()
+    assert any(name.endswith("data/reference/README.md") for name in names)
+    assert [name for name in names if "measured" in Path(name).parts] == []
+
+
+def test_the_wheel_is_for_every_machine_and_holds_every_file_of_the_package(root: Path, wheel: Path) -> None:
+    """Words and units, the marker that it carries types, pages, sources in other languages."""
+    assert wheel.name.endswith("-py3-none-any.whl")
+    package = root / "bushfit"
+    files = {file.relative_to(root).as_posix() for file in package.rglob("*") if file.is_file()}
+    files = {file for file in files if "__pycache__" not in file}
+    assert {"bushfit/py.typed", "bushfit/units.txt", "bushfit/manual/python.md"} <= files
+    assert {"bushfit/reading/words.toml", "bushfit/effects/library.toml"} <= files
+    held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    assert held == files
+
+
+@pytest.mark.slow
+def test_the_wheel_works_elsewhere(root: Path, wheel: Path, tmp_path: Path) -> None:
+    """Unpacked into another folder, with nothing of the repository but a campaign."""
+    zipfile.ZipFile(wheel).extractall(tmp_path / "site")
+    for name in ("configs", "data/cmp_15961"):
+        shutil.copytree(root / name, tmp_path / "work" / name)
+    code = "import bushfit, sys\nfrom bushfit.cli import main\nprint(bushfit.__file__, file=sys.stderr)\nmain()"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code, "run", "configs/cmp_15961.toml", "-o", "results", "--json"],
+        cwd=tmp_path / "work",
+        env={**os.environ, "PYTHONPATH": str(tmp_path / "site")},
+        capture_output=True,
+        text=True,
+        check=False,
+        encoding="utf-8",
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.startswith(str(tmp_path / "site"))
+    assert json.loads(done.stdout)["diagnosis"]["verdict"] == "consistent"
+    assert (tmp_path / "work/results/axial.png").exists()

@@ -1,11 +1,15 @@
-"""Cases that a commit tries, and those that wait for the slow tests."""
+"""Cases that a commit tries, those that wait for the slow tests, and how many campaigns a rate is taken over."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterable
 from typing import Any
 
 import pytest
+
+#: Campaigns of each rate of intervals that hold the truth; the figures on pages are of BUSHFIT_SEEDS=300.
+SEEDS = int(os.environ.get("BUSHFIT_SEEDS", "100"))
 
 
 def some(cases: Iterable[Any], quick: Collection[Any]) -> list[Any]:

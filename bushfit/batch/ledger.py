@@ -23,8 +23,8 @@ from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import Point
 from bushfit.errors import OutputError
-from bushfit.report import disk
 from bushfit.report.contents import Formats
+from bushfit.report.folder import claim
 from bushfit.version import __version__
 
 #: Layout of a record; records of another are done again.
@@ -49,14 +49,9 @@ def key(row: Row, points: tuple[Point, ...], formats: Formats) -> str:
     return hashlib.sha256(json.dumps([__version__, SCHEMA, asked], sort_keys=True).encode()).hexdigest()
 
 
-def folder_of(output: Path, row: Row) -> Path:
-    """The folder of a row's results."""
-    return output / ROWS / row.folder
-
-
 def valid_record(output: Path, row: Row, wanted: str) -> Record | None:
     """The record of a row that was done before with the same inputs and settings, all its files whole; else None."""
-    folder, campaign = folder_of(output, row), Path(row.campaign)
+    folder, campaign = output / ROWS / row.folder, Path(row.campaign)
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):  # torn: as good as absent
         record: Record = json.loads((folder / RECORD).read_bytes())
         if record["key"] != wanted or record["status"] != "done":
@@ -78,7 +73,7 @@ def keep(output: Path, row: Row, files: Mapping[str, bytes], record: Record) -> 
     Raises:
         OSError: the disk is full, or does not let itself be written.
     """
-    folder, staged = folder_of(output, row), output / STAGE / uuid.uuid4().hex
+    folder, staged = output / ROWS / row.folder, output / STAGE / uuid.uuid4().hex
     staged.mkdir()
     try:
         for name, content in files.items():
@@ -119,7 +114,7 @@ def held(output: Path) -> Iterator[None]:
     """
     os.makedirs(output / ROWS, exist_ok=True)  # noqa: PTH103
     try:
-        claim = disk.claim(output / ROWS, wait=False)
+        claimed = claim(output / ROWS, wait=False)
     except BlockingIOError:
         raise OutputError(
             "another batch is at work there", file=output, hint="wait for its end, or name another folder with -o"
@@ -130,4 +125,4 @@ def held(output: Path) -> Iterator[None]:
         yield
     finally:
         shutil.rmtree(output / STAGE, ignore_errors=True)
-        claim.close()
+        claimed.close()

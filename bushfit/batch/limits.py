@@ -24,14 +24,14 @@ from pydantic import ConfigDict, Field, ValidationInfo
 from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, At, Point, Quantity, at_point
-from bushfit.campaign.quantities import Share, Size, table, text, with_sizes
+from bushfit.campaign.quantities import with_sizes
 from bushfit.campaign.toml import read_toml
 from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
 from bushfit.units import number, quantity
-from bushfit.validation import converted
+from bushfit.validation import Share, Size, converted, table, text
 
 
 class Verdict(IntEnum):

@@ -18,14 +18,13 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from bushfit.batch.quantities import At, Point
-from bushfit.campaign.naming import folder_name
-from bushfit.campaign.quantities import Share
 from bushfit.campaign.toml import read_toml
 from bushfit.effects import Effect, effect_named
 from bushfit.effects.mistakes import candidate_named
 from bushfit.errors import CampaignError
 from bushfit.reading.files import read_utf8
-from bushfit.validation import Text, check_tables, converted, unknown_key
+from bushfit.reading.tablefile import folder_name
+from bushfit.validation import Share, Text, check_tables, converted, unknown_key
 
 Command = Literal["run", "fit", "diagnose", "predict"]
 
@@ -87,7 +86,7 @@ class Settings:
     @property
     def settings(self) -> Settings:
         """The settings alone of a row or of a manifest."""
-        return Settings(**{key: getattr(self, key) for key in _keys(Settings)})
+        return Settings(**{each.name: getattr(self, each.name) for each in fields(Settings)})
 
     @property
     def predicted(self) -> bool:
@@ -196,18 +195,15 @@ def _toml(path: Path) -> ManifestFile:
         return ManifestFile(bushings=(Entry(campaign=path.name),))
 
 
-def _keys(table: type) -> list[str]:
-    return [entry.name for entry in fields(table)]
-
-
 def _csv_entries(path: Path) -> Iterator[Entry]:
     """The lines of a CSV manifest; a header names the columns."""
     text = read_utf8(path, CampaignError).decode("utf-8-sig")
     delimiter = max(",;\t", key=text.lstrip().partition("\n")[0].count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
     header = next((cells for line in reader if any(cells := [cell.strip() for cell in line])), [])
+    known = [each.name for each in fields(Entry)]
     for column in header:
-        if column not in (known := _keys(Entry)):
+        if column not in known:
             error = unknown_key(column, known)
             error.file, error.place, error.hint = path, "header", error.hint or _OF_TESTS
             raise error

@@ -22,13 +22,12 @@ from bushfit.batch.together import Together
 from bushfit.batch.work import Orders
 from bushfit.effects.contract import Array
 from bushfit.prediction.caveats import BEYOND
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
 from bushfit.report.contents import Contents, Formats
 from bushfit.report.tables import BETWEEN
 
 if TYPE_CHECKING:
     import pandas as pd
-    from junitparser import TestCase
     from matplotlib.figure import Figure
 
     from bushfit.report.plots.batch import Panel
@@ -83,18 +82,14 @@ class Outcome:
     @cached_property
     def judgements(self) -> list[Judgement | None]:
         """On each row; None on all without limits, and on a row that failed."""
-        return [
-            self.judge(self._known(number), record) if self.judge and record["status"] == "done" else None
-            for number, record in enumerate(self.records)
-        ]
-
-    def _known(self, number: int) -> dict[str, list[float]]:
-        """The four figures of each quantity that is known of a row."""
-        return {
-            name: figures[:, number].tolist()
-            for name, figures in self.figures.items()
-            if math.isfinite(figures[0, number])
-        }
+        found = list[Judgement | None]()
+        for number, record in enumerate(self.records):
+            judged = None
+            if self.judge and record["status"] == "done":
+                row = {name: figures[:, number].tolist() for name, figures in self.figures.items()}
+                judged = self.judge({name: four for name, four in row.items() if math.isfinite(four[0])}, record)
+            found.append(judged)
+        return found
 
     @cached_property
     def status(self) -> Counter[str]:
@@ -120,16 +115,18 @@ class Outcome:
     @property
     def missed(self) -> list[tuple[str, str]]:
         """The name of each bushing that misses a limit, and what it misses, in words."""
-        pairs = zip(self.plan.rows, self.judgements, strict=True)
-        return [(row.name, "; ".join(judged.missed.values())) for row, judged in pairs if judged and judged.missed]
+        return [(name, "; ".join(judged.missed.values())) for name, judged in self._judged if judged.missed]
 
     @property
     def edge(self) -> list[tuple[str, str]]:
         """The name of each bushing that passes on condition, and why."""
-        pairs = [(row, judged) for row, judged in zip(self.plan.rows, self.judgements, strict=True) if judged]
-        return [
-            (row.name, "; ".join(judged.edge.values())) for row, judged in pairs if judged.edge and not judged.missed
-        ]
+        just = [(name, judged.edge) for name, judged in self._judged if judged.edge and not judged.missed]
+        return [(name, "; ".join(edge.values())) for name, edge in just]
+
+    @property
+    def _judged(self) -> list[tuple[str, Judgement]]:
+        pairs = zip(self.plan.rows, self.judgements, strict=True)
+        return [(row.name, judged) for row, judged in pairs if judged]
 
     @cached_property
     def together(self) -> Together:
@@ -194,7 +191,7 @@ class Outcome:
         """The same as a file: of each quantity its column of the table, its scatter and its limits there."""
         quantities: dict[str, Control] = {}
         for quantity, (middle, spread) in self.scatter.items():
-            allowed, tabled = self._allowed(quantity.name), quantity.tabled
+            allowed, tabled = self._allowed.get(quantity.name, ()), quantity.tabled
             ends = [end * tabled.factor if math.isfinite(end) else None for end in allowed]
             scale = tabled.factor / quantity.factor
             told = self.together.process[quantity.name]
@@ -204,9 +201,10 @@ class Outcome:
         counts = self._counts
         return {**counts, "title": self.plan.title, "quantities": quantities, "order": order, "least_told": least}
 
-    def _allowed(self, name: str) -> tuple[float, ...]:
-        """The lowest and the highest allowed value of a quantity; empty where there is no limit."""
-        return self.judge.allowed.get(name, ()) if self.judge else ()
+    @property
+    def _allowed(self) -> Mapping[str, tuple[float, float]]:
+        """The lowest and the highest allowed value of each quantity that has a limit, by its name."""
+        return self.judge.allowed if self.judge else {}
 
     @property
     def contents(self) -> Contents:
@@ -274,43 +272,36 @@ class Outcome:
 
         panels = []
         for name, quantity in self.quantities.items():
-            allowed, figures = self._allowed(name), self.figures.get(name, np.full((len(PARTS), 1), np.nan))
+            allowed, figures = self._allowed.get(name, ()), self.figures.get(name, np.full((len(PARTS), 1), np.nan))
             known = np.isfinite(figures[0])
             if known.sum() >= (1 if allowed else 3):  # fewer show no scatter
                 shown = quantity.for_people(float(np.median(figures[0, known])))
-                missed = [
-                    k for k, judged in enumerate(self.judgements) if judged and name in judged.missed and known[k]
-                ]
+                told = enumerate(self.judgements)
+                missed = {k for k, judged in told if judged and name in judged.missed and known[k]}
                 limits, ends = tuple(limit * shown.factor for limit in allowed), figures[1:3] * shown.factor
                 interval = ends if np.isfinite(ends).all(axis=0).any() else None
-                panels.append(Panel(shown.header, figures[0] * shown.factor, limits, set(missed), interval))
+                panels.append(Panel(shown.header, figures[0] * shown.factor, limits, missed, interval))
         return panels
 
     def junit(self) -> bytes:
         """A report for continuous integration: an error where a bushing failed, a failure where it misses limits."""
-        from junitparser import JUnitXml, TestSuite
+        from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
         suite = TestSuite(self.plan.title)
         for row, record, judged in zip(self.plan.rows, self.records, self.judgements, strict=True):
-            suite.add_testcase(_case(suite.name, row, record, judged))
+            case = TestCase(_printable(row.name), suite.name, record["seconds"])
+            failed, missed = record["status"] != "done", judged.missed if judged else {}
+            if failed or missed:
+                text = _printable(record["error"] if failed else "\n".join(missed.values()))
+                line = text.partition("\n")[0] if failed else "; ".join(text.splitlines())
+                result = Error(line, "failed") if failed else Failure(line, "limits")
+                result.text = text
+                case.result = [result]
+            suite.add_testcase(case)
         report = JUnitXml("bushfit batch")
         report.add_testsuite(suite)
         report.update_statistics()  # type: ignore[no-untyped-call]
         return b'<?xml version="1.0" encoding="utf-8"?>\n' + report.tostring()  # type: ignore[no-untyped-call]
-
-
-def _case(suite: str, row: Row, record: Record, judged: Judgement | None) -> TestCase:
-    from junitparser import Error, Failure, TestCase
-
-    case = TestCase(_printable(row.name), suite, record["seconds"])
-    failed, missed = record["status"] != "done", judged.missed if judged else {}
-    if failed or missed:
-        text = _printable(record["error"] if failed else "\n".join(missed.values()))
-        line = text.partition("\n")[0] if failed else "; ".join(text.splitlines())
-        result = Error(line, "failed") if failed else Failure(line, "limits")
-        result.text = text
-        case.result = [result]
-    return case
 
 
 def _printable(text: str) -> str:

@@ -35,11 +35,7 @@ _CHUNK_SECONDS, _LARGEST_CHUNK = 0.5, 64
 _CHUNKS_PER_WORKER = 2
 #: Environment of the workers. Python puts the current folder before its own on the path of what it starts, unless told
 #: not to. Below so many bytes glibc keeps freed memory for the next row: handing it back takes a tenth of the time.
-_ENVIRONMENT = {
-    "PYTHONSAFEPATH": "1",
-    "MALLOC_TRIM_THRESHOLD_": "134217728",
-    "MALLOC_MMAP_THRESHOLD_": "33554432",
-}
+_ENVIRONMENT = {"PYTHONSAFEPATH": "1", "MALLOC_TRIM_THRESHOLD_": "134217728", "MALLOC_MMAP_THRESHOLD_": "33554432"}
 
 
 class LocalPool:
@@ -82,15 +78,14 @@ class LocalPool:
 
 def _begin_worker() -> None:
     """Ctrl-C is for the parent to answer; and where the parent is gone, so is its worker."""
+
+    def follow(parent: Any) -> None:
+        parent.join()
+        os._exit(1)
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_follow, args=(parent,), daemon=True).start()
-
-
-def _follow(parent: Any) -> None:
-    parent.join()
-    os._exit(1)
+    if parent := multiprocessing.parent_process():
+        threading.Thread(target=follow, args=(parent,), daemon=True).start()
 
 
 class DaskPool:

@@ -27,10 +27,7 @@ from bushfit.report.folder import unwritable, write_files
 #: All that is written of the whole batch: what is said of it, its table, picture and page.
 KINDS = Kinds(("batch",), ("batch",), ("batch",), ("index",))
 #: The files of these in whatever form, in the batch's folder.
-FILES = [
-    "index.html",
-    *(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture))),
-]
+FILES = ["index.html", *(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture)))]
 #: Keys of a record that are not held in memory: the figures have its numbers, and a later run asks for the files.
 _NOT_HELD = {"parameters", "points", "inputs", "files"}
 
@@ -110,7 +107,14 @@ def run(plan: Plan, workers: Pool, tell: Callable[[Outcome], None]) -> Outcome:
 def _worked(plan: Plan, workers: Pool) -> Outcome:
     """Do every row, and take over its record and its numbers."""
     begin, count = time.perf_counter(), len(plan.rows)
-    earlier = list(_earlier(plan))
+    earlier = list[str]()
+    if folders := ledger.left_over(plan.orders.output, plan.rows):  # they are removed unless it goes on
+        fate = "are still in bushings/ (--force removes them)"
+        if not plan.orders.resume:
+            fate = "were removed from bushings/"
+            for folder in folders:
+                shutil.rmtree(folder)
+        earlier = [f"results of {len(folders)} bushings of an earlier batch, no rows of this one, {fate}"]
     records: list[Record] = [failed("") for _ in plan.rows]
     numbers = defaultdict[str, Array](lambda: np.full((len(PARTS), count), np.nan))
     count_of = Counter[str]()
@@ -124,14 +128,3 @@ def _worked(plan: Plan, workers: Pool) -> Outcome:
         records[number] = cast("Record", {key: entry for key, entry in record.items() if key not in _NOT_HELD})
         count_of[record["status"]] += 1
     return Outcome(plan, records, dict(numbers), time.perf_counter() - begin, earlier)
-
-
-def _earlier(plan: Plan) -> Iterator[str]:
-    """What is said of results of an earlier batch that are none of these rows'; they are removed unless it goes on."""
-    if folders := ledger.left_over(plan.orders.output, plan.rows):
-        fate = "are still in bushings/ (--force removes them)"
-        if not plan.orders.resume:
-            fate = "were removed from bushings/"
-            for folder in folders:
-                shutil.rmtree(folder)
-        yield f"results of {len(folders)} bushings of an earlier batch, no rows of this one, {fate}"

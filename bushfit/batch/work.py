@@ -99,7 +99,11 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
     if settings.model:
         inputs[settings.model] = ledger.digest(Path(settings.model).read_bytes())
     if "run" in (settings.commands or ()):
-        result, diagnosed = _run(campaign, orders.formats, files)
+        from bushfit.jobs.diagnose import Run
+
+        ran = Run().run(Data.of(campaign))  # whose tables of the prediction come in any case, as those of predict
+        files |= orders.formats.files(ran.contents) | replace(orders.formats, tables=True).files(ran.predicted.contents)
+        result, diagnosed = ran.result, ran.diagnosed
     else:
         result, diagnosed = _one_by_one(campaign, settings, orders.formats, files)
     found = _verdict(diagnosed.diagnosis) if diagnosed else Found()
@@ -107,15 +111,6 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
     dates = (str(test.source.conditions.get("date", "")) for test in tests if test.source)
     measured: Found = {"date": next(filter(None, dates), None), "curve": curve_of(campaign.sweeps)}
     return {"campaign_name": campaign.name, "inputs": inputs, **found, **numbers, **measured}
-
-
-def _run(campaign: Campaign, formats: Formats, files: dict[str, bytes]) -> tuple[Result, Diagnosed | None]:
-    """The whole chain, as `bushfit run` does it; the tables of the prediction come in any case, as of predict."""
-    from bushfit.jobs.run import Run
-
-    ran = Run().run(Data.of(campaign))
-    files |= formats.files(ran.contents) | replace(formats, tables=True).files(ran.predicted.contents)
-    return ran.result, ran.diagnosed
 
 
 def _one_by_one(

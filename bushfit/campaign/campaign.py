@@ -4,14 +4,11 @@ import hashlib
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bushfit.campaign.compound import Compound
-from bushfit.campaign.files import LoopFile, SweepFile
-from bushfit.campaign.head import ReportSettings, embedded
-from bushfit.campaign.places import place_tested
+from bushfit.campaign.quantities import Compound, ReportSettings, embedded
 from bushfit.campaign.schema import (
     CampaignFile,
     FitSettings,
@@ -25,20 +22,16 @@ from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.model.model import FIVE, Model
 from bushfit.progress import counting
-from bushfit.reading.columns import Rows
 from bushfit.reading.instruments import RECORDINGS
-from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.stated import LoopFile, SweepFile, place_tested
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reduction.programme import programme
 from bushfit.units import CELSIUS, quantity
 
 #: Endings of test files, which `bushfit init` makes a campaign of.
 TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods", *RECORDINGS)
-
-#: Keys of a test that its file has nothing to do with, and that results carry on.
-_CONDITIONS = ("order", "preload", "date", "operator", "specimen_number")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -97,38 +90,21 @@ def load_campaign(path: str | Path) -> Campaign:
     with naming(path):
         bushing = Bushing(**vars(content.bushing)) if content.bushing else None
         specimens = tuple(Specimen(**vars(table)) for table in content.specimens)
-        _check_bodies(bushing, specimens)
-        with naming(place="predict.directions"):
-            for name in content.predict.directions or ():
-                place_named(name, specimens)
         _check_places(content, specimens)
     with naming(place="[report] logo"):
         logo = embedded(path.parent / content.report.logo) if content.report.logo else None
-    return Campaign(
-        content.name or (bushing or specimens[0]).name,
-        path,
-        bushing,
-        tuple(
-            loop
-            for keywords in counting("loops read", reader_keywords(path, content.loops, specimens), len(content.loops))
-            for loop in programme(read_loop(**keywords), **keywords)
-        ),
-        tuple(
-            read_sweep(**keywords)
-            for keywords in counting(
-                "sweeps read", reader_keywords(path, content.sweeps, specimens), len(content.sweeps)
-            )
-        ),
-        content.fit,
-        content.predict,
-        content.simulate,
-        specimens,
-        content.rig,
-        content.compound,
-        hashlib.sha256(path.read_bytes()).hexdigest(),
-        content.report,
-        logo,
+    loops, sweeps = (
+        counting(f"{kind} read", reader_keywords(path, tests, specimens), len(tests))
+        for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps))
     )
+    found: dict[str, Any] = {
+        **{"name": content.name or (bushing or specimens[0]).name, "bushing": bushing, "specimens": specimens},
+        "loops": tuple(loop for each in loops for loop in programme(read_loop(**each), each["test"])),
+        "sweeps": tuple(read_sweep(**each) for each in sweeps),
+        "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        "logo": logo,
+    }
+    return Campaign(**{**vars(content), **found}, path=path)
 
 
 def load_bushing(path: Path) -> Bushing:
@@ -146,18 +122,17 @@ def load_bushing(path: Path) -> Bushing:
         return Bushing(**vars(table))
 
 
-def _check_bodies(bushing: Bushing | None, specimens: Sequence[Specimen]) -> None:
-    """Raise a CampaignError where there is no body, or two have one name."""
+def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
+    """Raise a CampaignError where there is no body or two have one name, a ModelError where a place is none of them."""
     names = [specimen.name for specimen in specimens]
-    if bushing is None and not names:
+    if not (content.bushing or names):
         expected = "[bushing] with its name, radii and length, or [[specimens]]"
         raise CampaignError("nothing is said of what was tested", expected=expected)
     if doubles := {name for name in names if names.count(name) > 1}:
         raise CampaignError("two specimens have one name", place="[[specimens]]", found=", ".join(sorted(doubles)))
-
-
-def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
-    """Raise a ModelError where an effect belongs to a place that the campaign does not have."""
+    with naming(place="predict.directions"):
+        for name in content.predict.directions or ():
+            place_named(name, specimens)
     simulated = content.simulate.effects if content.simulate else {}
     own = [f"{effect}.{name}" for effect, table in simulated.items() for name in table]
     for name in (*content.fit.effects, *content.fit.parameters, *own):
@@ -228,27 +203,24 @@ def reader_keywords(
     seen = set()
     places = [(os.path.normpath(campaign.parent / test.file), test.sheet, test.temperature) for test in tests]
     for test, place, name in zip(tests, places, _test_names(tests), strict=True):
-        file = campaign.parent / test.file
-        rows = Rows(test.direction, test.specimen_number, test.rows, shared=places.count(place) > 1)
-        if (own := (*place, *rows[:2], *test.rows.items())) in seen:
+        if (own := (*place, test.direction, test.specimen_number, *test.rows.items())) in seen:
             raise CampaignError(
                 "a file is listed twice", file=campaign, found=test.file, expected="each file once, or each sheet of it"
             )
         seen.add(own)
-        stated = {key: value for key, value in vars(test).items() if value is not None}
-        written = FileFormat(**{entry.name: stated.pop(entry.name, None) for entry in fields(FileFormat)})
-        conditions = {key: stated.pop(key) for key in _CONDITIONS if key in stated}
-        stated.pop("specimen", None)
-        stated["rows"] = rows
+        keywords: dict[str, Any] = {
+            "file": campaign.parent / test.file,
+            "test": test,
+            "name": name,
+            "shared": places.count(place) > 1,
+        }
         with naming(campaign, place=test.file):
-            stated["direction"] = place_tested(test.specimen, test.direction, specimens)
-            if amplitude := stated.pop("at_amplitude", None):
-                held = quantity(amplitude, stated["direction"].motion.displacement_unit)
+            keywords["direction"] = body = place_tested(test.specimen, test.direction, specimens)
+            if isinstance(test, SweepFile) and (amplitude := test.at_amplitude):
+                keywords["at_amplitude"] = held = quantity(amplitude, body.motion.displacement_unit)
                 if held <= 0.0:
                     raise CampaignError("at_amplitude is not positive", found=f'"{amplitude}"', expected="above zero")
-                stated["at_amplitude"] = held
-        named = {"file": file, "name": name, "listed_as": Path(test.file)}
-        yield {**stated, **named, "written": written, "conditions": conditions}
+        yield keywords
 
 
 def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:

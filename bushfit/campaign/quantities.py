@@ -1,95 +1,32 @@
-"""Kinds of values in a campaign file, and model parameters by name: texts such as "10 mm" become SI."""
+"""What only a campaign file states: model parameters by name; [compound], of an untested rubber; [report], its head."""
 
+import base64
 import re
-from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any, TypeVar
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from bushfit.effects import is_parameter, parameter_named, parameter_names
-from bushfit.errors import CampaignError, naming
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
-from bushfit.units import quantity, sized, stepped, temperature
-from bushfit.validation import LARGEST_NUMBER, converted, unknown_key
+from bushfit.errors import CampaignError, UnitError, naming
+from bushfit.reading.files import view_bytes
+from bushfit.units import quantity, sized
+from bushfit.validation import LARGEST_NUMBER, Name, converted, text, unknown_key
 
-#: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
-#: far beyond every shaker, and numbers stay finite.
-LARGEST_SHAKEN = 1e6
-T = TypeVar("T")
-#: A list that is not empty; its check ends at the first error, as those of a hundred thousand would fill the memory.
-Several = Annotated[tuple[T, ...], Field(fail_fast=True), Field(min_length=1)]
 #: The second to the power of alpha, at the end of the unit of m.
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
-#: A value of a parameter: a number here, a text or a number in the file.
-Size = Annotated[
-    float, WithJsonSchema({"type": ["string", "number"], "description": "with its unit; a ratio may be a number"})
-]
-
-
-def si(*units: str) -> BeforeValidator:
-    """A validator that takes a text with any of these units, and gives SI."""
-    return converted(lambda raw, _: quantity(raw, *units), text(f"a number with a unit of {' or '.join(units)}"))
-
-
-def text(words: str) -> dict[str, Any]:
-    """The JSON Schema of a text that is described in words."""
-    return {"type": "string", "description": words}
-
-
-def motion(per: str = "") -> BeforeValidator:
-    """A validator as `si("m")`, but by the motion of the table's direction: [rad], or a strain; "/s" for a speed."""
-
-    def unit(direction: object) -> str:
-        return (direction.motion if isinstance(direction, Place) else TRANSLATION).displacement_unit + per
-
-    units = " or ".join(f"{each.displacement_unit}{per}" for each in (TRANSLATION, ROTATION, STRAINING))
-    written = text(f"a number with a unit of {units}, by what is tested")
-    return converted(lambda raw, info: quantity(raw, unit(info.data.get("direction"))), written)
-
-
-def table(convert: Callable[[dict[str, Any]], Any], written: Mapping[str, Any] | None = None) -> BeforeValidator:
-    """A validator that converts a table, whose JSON Schema is `written`; what is none it leaves to pydantic."""
-    return converted(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw, written)
-
-
-def _frequencies(raw: dict[str, Any]) -> list[str]:
-    """A list of frequencies as texts from { start, stop, step }, with both ends."""
-    expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
-    if set(raw) != {"start", "stop", "step"}:
-        raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
-    values = stepped(*(quantity(raw[key], "Hz") for key in ("start", "stop", "step")))
-    if not values:
-        raise CampaignError("this is no range of frequencies", found=str(raw), expected="0 < start <= stop, step > 0")
-    return [f"{value!r} Hz" for value in values]
-
-
-_HERTZ = text("a number with a unit of Hz")
-#: How frequencies are written: a list, or a range with both ends.
-_FREQUENCIES = {
-    "anyOf": [
-        {"type": "array", "items": _HERTZ, "minItems": 1},
-        {
-            "type": "object",
-            "properties": dict.fromkeys(("start", "stop", "step"), _HERTZ),
-            "required": ["start", "stop", "step"],
-            "additionalProperties": False,
-        },
-    ]
-}
-
-Temperature = Annotated[float, converted(lambda raw, _: temperature(raw), text('a temperature, such as "23 degC"'))]
-Length = Annotated[float, si("m"), Field(gt=0)]
-Angle = Annotated[float, si("rad"), Field(gt=0)]
-Strain = Annotated[float, si("1"), Field(gt=0)]
-Frequency = Annotated[float, si("Hz"), Field(gt=0)]
-Frequencies = Annotated[
-    tuple[Frequency, ...], Field(fail_fast=True), table(_frequencies, _FREQUENCIES), Field(min_length=1)
-]
-Displacement = Annotated[float, motion(), Field(gt=0)]
-SHAKEN = Field(ge=1.0 / LARGEST_SHAKEN, le=LARGEST_SHAKEN)
-Share = Annotated[float, si("1"), Field(ge=0, lt=1)]
-Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]  # of repeats or cycles: more than any rig runs
+#: Polymers whose density is known, by the names that rubber engineers use; NR is natural rubber.
+Polymer = Literal["natural", "SBR", "EPDM", "NBR", "CR", "IIR"]
+#: Hardness between which Gent's relation is used [Shore A]: outside of it a durometer hardly tells rubbers apart.
+_HARDNESS = (20.0, 90.0)
+#: Carbon black at most [phr]: more is not mixed into rubber that is to move.
+_MOST_FILLER = 120.0
+#: A logo at most [bytes]: it stands in every model file of its campaign.
+LARGEST_LOGO = 64_000
+#: How a PNG file begins, and what the head of an SVG file holds; such a head at most [bytes].
+_PNG, _SVG, _HEAD = b"\x89PNG\r\n\x1a\n", b"<svg", 4096
 
 
 def parameter_value(place: str, name: str, raw: Any) -> float:
@@ -154,3 +91,98 @@ def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
                 raise CampaignError("these limits hold no value", place=name, found=str(raw[name]), expected=expected)
             table |= {key: float(end) for key, end in zip(("min", "max"), ends, strict=True) if key in table}
     return settings
+
+
+def hardness(raw: object) -> float:
+    """The number of a text such as "61 Shore A".
+
+    Raises:
+        UnitError: no such text.
+        CampaignError: a hardness for which Gent's relation does not hold.
+    """
+    found = _number(raw, r"sh(?:ore)?\.?\s*a", "a hardness", '"61 Shore A"')
+    if not _HARDNESS[0] <= found <= _HARDNESS[1]:
+        expected = f"{_HARDNESS[0]:g} to {_HARDNESS[1]:g} Shore A"
+        raise CampaignError("no modulus follows from this hardness", found=str(raw), expected=expected)
+    return found
+
+
+def filler(raw: object) -> float:
+    """The carbon black per hundred parts of rubber of a text such as "27 phr", or "27 phr carbon black".
+
+    Raises:
+        UnitError: no such text.
+        CampaignError: more filler than there is in bushings.
+    """
+    found = _number(raw, r"phr(?:\s+(?:of\s+)?carbon[\s-]black)?", "a filler", '"27 phr", of carbon black')
+    if found > _MOST_FILLER:
+        raise CampaignError("impossible filler", found=str(raw), expected=f"0 to {_MOST_FILLER:g} phr of carbon black")
+    return found
+
+
+def _number(raw: object, unit: str, what: str, expected: str) -> float:
+    """The number before a unit that pint does not know."""
+    match = re.fullmatch(rf"\s*(\d{{1,4}}(?:\.\d{{1,6}})?)\s*(?:{unit})\s*", str(raw), re.ASCII | re.IGNORECASE)
+    if not (isinstance(raw, str) and match):
+        raise UnitError(f"this is not {what}", found=str(raw), expected=expected)
+    return float(match[1])
+
+
+@dataclass(frozen=True)
+class Compound:
+    """[compound]: a rubber that was not tested yet, for `bushfit plan`.
+
+    Args:
+        hardness: [Shore A].
+        filler: carbon black, parts by weight per hundred of rubber [phr].
+        rubber: the polymer.
+    """
+
+    hardness: Annotated[float, converted(lambda raw, _: hardness(raw), text('such as "61 Shore A"'))]
+    filler: Annotated[float, converted(lambda raw, _: filler(raw), text('such as "27 phr"'))]
+    rubber: Polymer = "natural"
+
+
+@dataclass(frozen=True)
+class ReportSettings:
+    """[report]: what stands at the head of the report, as it is to be read there.
+
+    Args:
+        customer: whose part it is.
+        part_number: of the bushing.
+        drawing: its number, with the issue.
+        compound: the rubber, by its name.
+        laboratory: that tested it.
+        date: of the report.
+        logo: a PNG or SVG file, relative to the campaign file.
+    """
+
+    customer: Name | None = None
+    part_number: Name | None = None
+    drawing: Name | None = None
+    compound: Name | None = None
+    laboratory: Name | None = None
+    date: Name | None = None
+    logo: Name | None = None
+
+    @property
+    def lines(self) -> dict[str, str]:
+        """What is stated in words, in the order in which it is read."""
+        return {key: value for key, value in vars(self).items() if value is not None and key != "logo"}
+
+
+def embedded(file: Path) -> str:
+    """A logo as a data URI: the picture itself, for a page that stands alone.
+
+    Raises:
+        CampaignError: the file is missing, too large, or neither PNG nor SVG.
+    """
+    data = view_bytes(file, CampaignError, largest=LARGEST_LOGO, hint="save the logo with fewer pixels, or as SVG")
+    if data.startswith(_PNG):
+        kind = "png"
+    elif _SVG in data[:_HEAD]:
+        kind = "svg+xml"
+    else:
+        begins = f"a file that begins with {data[:12]!r}"
+        raise CampaignError("this is no picture that a page can show", file=file, found=begins, expected="PNG or SVG")
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"

@@ -7,37 +7,38 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
-from bushfit.campaign.compound import Compound
-from bushfit.campaign.files import LoopFile, SweepFile
-from bushfit.campaign.head import ReportSettings
-from bushfit.campaign.places import PLACE_KEYS, with_places
-from bushfit.campaign.quantities import (
-    LARGEST_SHAKEN,
-    SHAKEN,
-    Angle,
-    Count,
-    Displacement,
-    Frequencies,
-    Frequency,
-    Length,
-    Several,
-    Share,
-    Size,
-    Strain,
-    Temperature,
-    effect_values,
-    parameter_settings,
-    parameter_values,
-    si,
-    table,
-)
+from bushfit.campaign.quantities import Compound, ReportSettings, effect_values, parameter_settings, parameter_values
 from bushfit.effects import is_parameter, parameter_names
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.geometry import TRANSLATION, Direction, Place, Shape, Specimen, SpecimenKind, StatedStrain
 from bushfit.reading.measurement import Stepped, Waveform
 from bushfit.reading.resonance import FEWEST_ROWS
-from bushfit.validation import Flag, Name, Text, converted, known_keys, standing_in_table, unknown_key
+from bushfit.reading.stated import PLACE_KEYS, LoopFile, SweepFile, with_places
+from bushfit.validation import (
+    LARGEST_SHAKEN,
+    SHAKEN,
+    Angle,
+    Count,
+    Displacement,
+    Flag,
+    Frequencies,
+    Frequency,
+    Length,
+    Name,
+    Several,
+    Share,
+    Size,
+    Strain,
+    Temperature,
+    Text,
+    converted,
+    known_keys,
+    si,
+    standing_in_table,
+    table,
+    unknown_key,
+)
 
 #: What a sweep's residuals compare: real and imaginary part, or |K| and loss factor.
 Residuals = Literal["complex", "magnitude_loss_factor"]

@@ -1,12 +1,15 @@
-"""Reads a TOML file that a user wrote, and checks it against a schema."""
+"""TOML files: read and checked against a schema; tables of a campaign file as text."""
 
 import re
 import tomllib
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 from bushfit.errors import CampaignError
+from bushfit.geometry import Bushing, Place, Specimen
 from bushfit.reading.files import line_of, read_utf8
+from bushfit.units import CELSIUS
 from bushfit.validation import check_tables
 
 T = TypeVar("T")
@@ -33,17 +36,17 @@ def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", lar
         CampaignError: the file is missing, too large, no TOML, or has keys or values that are not understood.
         UnitError: a quantity without a unit, or with one that does not fit.
     """
-    return check_tables(_parse(path, what, largest), path, schema)
+    return check_tables(_parsed(path, what, largest), path, schema)
 
 
-def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
+def _parsed(path: Path, what: str, largest: int) -> dict[str, Any]:
     data = read_utf8(path, CampaignError, largest=largest, hint=f"give {what}, not a measurement")
-    if chain := _DEEP_KEY.search(data):
-        raise _too_deep(path, line_of(data, chain.start()))
+    chain = _DEEP_KEY.search(data)
     try:
-        tables = tomllib.loads(data.decode("utf-8-sig"))
-        repr(tables)  # an error may have to quote any part of it
-        return tables
+        if not chain:
+            tables = tomllib.loads(data.decode("utf-8-sig"))
+            repr(tables)  # an error may have to quote any part of it
+            return tables
     except ValueError as error:
         reason = re.fullmatch(r"(?P<problem>.*) \(at (?P<place>.*)\)", str(error), re.DOTALL)
         raise CampaignError(
@@ -58,13 +61,53 @@ def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
         ) from error
     except RecursionError:
         pass
-    raise _too_deep(path, None)  # outside of `except`: an error of a thousand frames cannot be pickled
+    expected = "keys of a few parts, such as simulate.effects.inertia.mass"
+    place = line_of(data, chain.start()) if chain else None
+    # outside of `except`: an error of a thousand frames cannot be pickled
+    raise CampaignError("the tables are nested too deeply", file=path, place=place, expected=expected)
 
 
-def _too_deep(file: Path, place: str | None) -> CampaignError:
-    return CampaignError(
-        "the tables are nested too deeply",
-        file=file,
-        place=place,
-        expected="keys of a few parts, such as simulate.effects.inertia.mass",
-    )
+def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[str]:
+    """The lines of [bushing] and [[specimens]]."""
+    lines = []
+    if bushing:
+        lines += ["[bushing]", f"name = {toml_value(bushing.name)}"]
+        lines += [
+            f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")
+        ]
+        lines += [f'shape = "{bushing.shape}"'] if bushing.shape != "paper" else []
+    for specimen in specimens:
+        lines += ["", *specimen_lines(specimen)]
+    return lines
+
+
+def specimen_lines(specimen: Specimen) -> list[str]:
+    """The lines of one of [[specimens]]."""
+    lines = ["[[specimens]]", f"name = {toml_value(specimen.name)}", f'kind = "{specimen.kind}"']
+    if specimen.strain != "engineering":
+        lines.append(f'strain = "{specimen.strain}"')
+    if specimen.area and specimen.thickness:
+        lines += [f'area = "{specimen.area * 1e6:.12g} mm^2"', f'thickness = "{specimen.thickness * 1e3:.12g} mm"']
+        lines.append(f"elements = {specimen.elements}")
+    return lines
+
+
+def table_lines(kind: str, file: str, place: Place, temperature: Any = None) -> list[str]:
+    """The lines of one of [[loops]] or [[sweeps]]: the file, what was tested, and at what temperature [K], if one."""
+    warm = [] if temperature is None else [f'temperature = "{temperature - CELSIUS:.6g} degC"']
+    return ["", f"[[{kind}]]", f"file = {toml_value(file)}", place_line(place), *warm]
+
+
+def place_line(place: Place) -> str:
+    """The line that says what a test is made on."""
+    return f"specimen = {toml_value(place.name)}" if isinstance(place, Specimen) else f'direction = "{place}"'
+
+
+def toml_value(value: Any) -> str:
+    """A value as TOML writes it."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {toml_value(entry)}" for key, entry in value.items()) + " }"
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    return str(value)

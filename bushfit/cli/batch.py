@@ -11,7 +11,7 @@ import click
 
 from bushfit.cli.common import Options, with_options
 from bushfit.cli.options import command_called, effect_option, file_option, flag, option, place_option, under
-from bushfit.cli.show import new_table
+from bushfit.cli.show import tell_table
 from bushfit.errors import naming
 from bushfit.units import alike, for_people
 
@@ -120,15 +120,15 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
     """Counts, the batch's own scatter, what failed, what misses limits and what passes on condition."""
     from bushfit.batch.run import KINDS
 
-    console, status, plan = options.console, outcome.status, outcome.plan
+    status, plan = outcome.status, outcome.plan
     if outcome.scatter:
-        title = f"{plan.title}: {status['done']} bushing{'s' * (status['done'] > 1)}"
-        table = new_table(title, "quantity", "median", "robust std dev", "unit")
+        rows = []
         for quantity, (middle, spread) in outcome.scatter.items():
             unit, factor = for_people(quantity.unit, 1.0, middle)
-            scatter = alike([spread * factor], 2)[0] if spread else ""  # one value tells of none
-            table.add_row(quantity.name, alike([middle * factor], 4)[0], scatter, unit)
-        console.print(table)
+            scattered = alike([spread * factor], 2)[0] if spread else ""  # one value tells of none
+            rows.append((quantity.name, alike([middle * factor], 4)[0], scattered, unit))
+        title = f"{plan.title}: {status['done']} bushing{'s' * (status['done'] > 1)}"
+        tell_table(options, title, ("quantity", "median", "robust std dev", "unit"), rows)
     rate = status.total() / max(outcome.seconds, 1e-9)
     kept = f", {outcome.kept} of them from before" if outcome.kept else ""
     options.say(f"{status['done']} done{kept}, {status['failed']} failed; {outcome.seconds:.1f} s, {rate:.1f} a second")

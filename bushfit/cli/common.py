@@ -1,12 +1,15 @@
-"""What the commands share: their options, where results go, and the order of work on a campaign."""
+"""What the commands share: options, where results go, how far long work is, and the order of work on a campaign."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
 from functools import wraps
 from pathlib import Path
+from threading import Timer
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,14 +17,16 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.markup import escape
 from rich.segment import Segment
 
-from bushfit.campaign.naming import folder_name
 from bushfit.cli.options import FILE, FORMS, Folder, Function, Parameter, Size, Written, flag, in_order, option, under
-from bushfit.cli.progress import shown_on
 from bushfit.errors import ModelError, printable, typed
+from bushfit.progress import heard_by
+from bushfit.reading.tablefile import folder_name
 from bushfit.report.contents import Formats, Kinds
 from bushfit.report.folder import check_free, to_json, write_files
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from bushfit.campaign.campaign import Campaign
     from bushfit.campaign.schema import Loss
     from bushfit.jobs import Found, Job
@@ -29,8 +34,67 @@ if TYPE_CHECKING:
     from bushfit.reading.tablefile import Form
     from bushfit.report.contents import Picture
 
+#: Seconds after which long work shows how far it is.
+_PATIENCE = 2.0
 #: Width of tables where standard error is no terminal, in characters.
 _WIDTH = 100
+
+
+def _told(done: int, total: int, seconds: float) -> str:
+    """How many are done, of how many, how fast, and the seconds that are left."""
+    if not done:
+        return f"0 of {total}"
+    pace = f"{done / seconds:.3g} a second" if done >= seconds else f"{seconds / done:.2g} s each"
+    return f"{done} of {total}, {pace}, {seconds / done * (total - done):.0f} s left"
+
+
+@contextmanager
+def shown_on(console: Console) -> Iterator[None]:
+    """A line for each kind of work within, from two seconds on; on a terminal alone, and not with --quiet."""
+    if console.quiet or not (console.is_interactive and console.file.isatty()):
+        yield
+        return
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(20),
+        TextColumn("{task.fields[told]} [red]{task.fields[remark]}"),
+    )
+    bar = Progress(*columns, console=console, transient=True, redirect_stdout=False)
+    lines, patient = dict[str, tuple[float, Any]](), True
+
+    def listen(what: str, done: int | None, total: int, remark: str) -> None:
+        if done is None:
+            bar.remove_task(lines.pop(what)[1])
+        else:
+            if what not in lines:
+                lines[what] = monotonic(), bar.add_task(what, total=total, told="", remark="")
+            begun, line = lines[what]
+            bar.update(line, completed=done, told=_told(done, total, monotonic() - begun), remark=remark)
+        show()
+
+    def show() -> None:
+        """What is printed between two kinds of work stands on a line of its own."""
+        if lines and not patient:
+            bar.start()
+        elif bar.live.is_started:
+            bar.stop()
+
+    def run_out() -> None:
+        nonlocal patient
+        patient = False
+        show()
+
+    timer = Timer(_PATIENCE, run_out)
+    timer.start()
+    try:
+        with heard_by(listen):
+            yield
+    finally:
+        timer.cancel()
+        timer.join()
+        bar.stop()
 
 
 class _Console(Console):
@@ -43,14 +107,23 @@ class _Console(Console):
 
 @dataclass(frozen=True)
 class Options:
-    """Options that every command takes."""
+    """Options that every command takes; those of forms only where it writes what has them."""
 
-    output: Path | None
-    verbose: bool
-    quiet: bool
-    as_json: bool
-    formats: Formats
-    force: bool
+    output: Path | None = None
+    verbose: bool = False
+    quiet: bool = False
+    as_json: bool = False
+    force: bool = False
+    no_plots: bool = False
+    no_report: bool = False
+    table_format: Form = Formats.table_form
+    plot_format: Sequence[Picture] = Formats.picture_forms
+
+    @property
+    def formats(self) -> Formats:
+        """What is written of a result, and in which forms."""
+        pictures = tuple(dict.fromkeys(self.plot_format))
+        return Formats(True, not self.no_plots, not self.no_report, self.table_format, pictures)
 
     def folder(self, name: str, form: str = "{}") -> Path:
         """Where results go: --output, or results/<name>, in which `form` says what stands around it."""
@@ -110,27 +183,10 @@ def with_options(folder: str, *written: Written) -> Parameter:
 
     def decorate(function: Function) -> Function:
         @wraps(function)
-        def wrapped(
-            output: Path | None,
-            verbose: bool,
-            quiet: bool,
-            as_json: bool,
-            no_plots: bool,
-            force: bool,
-            table_format: Form = Formats.table_form,
-            plot_format: Sequence[Picture] = Formats.picture_forms,
-            no_report: bool = False,
-            **others: Any,
-        ) -> Any:
-            formats = Formats(
-                pictures=not no_plots,
-                pages=not no_report,
-                table_form=table_format,
-                picture_forms=tuple(dict.fromkeys(plot_format)),
-            )
-            options = Options(output, verbose, quiet, as_json, formats, force)
+        def wrapped(**given: Any) -> Any:
+            options = Options(**{each.name: given.pop(each.name) for each in fields(Options) if each.name in given})
             with shown_on(options.console):
-                return function(options=options, **others)
+                return function(options=options, **given)
 
         return in_order(
             wrapped,

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli import completion
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options
-from bushfit.cli.options import FILE, command_called, option, place_option, under
-from bushfit.cli.show import new_table
+from bushfit.cli.options import FILE, command_called, effect_lists, option, place_option, under
+from bushfit.cli.show import tell_table
 from bushfit.errors import naming
 from bushfit.progress import counting
 
@@ -44,7 +43,7 @@ _ALL = "all"
         ),
         is_flag=False,
         flag_value=_ALL,
-        shell_complete=completion.effect_lists,
+        shell_complete=effect_lists,
     ),
 )
 @with_options("results/<names>", "tables", "pictures", "pages")
@@ -62,7 +61,7 @@ def command(
     from bushfit.campaign.campaign import load_campaign
     from bushfit.effects import effect_named
     from bushfit.jobs.compare import MOST, Compare
-    from bushfit.jobs.provenance import command_line, options_typed
+    from bushfit.jobs.fits import command_line, options_typed
 
     if families is None and not 2 <= len(sources) <= MOST:
         raise click.UsageError(f"2 to {MOST} results are compared; one campaign alone with '--families' after it.")
@@ -107,10 +106,7 @@ def _tell(options: Options, outcome: Compared) -> None:
         _tell_parameters(options, outcome)
     if outcome.families:
         title = "families; held out: root mean square in units of noise, 1 where noise is all"
-        table = new_table(title, *FAMILY_HEADS)
-        for cells in SideBySide.of(outcome.document).family_cells():
-            table.add_row(*cells)
-        options.console.print(table)
+        tell_table(options, title, FAMILY_HEADS, SideBySide.of(outcome.document).family_cells())
     for line in (*outcome.advice, *(outcome.words if options.verbose or not outcome.families else ())):
         options.say(line)
     options.warn(outcome.warnings)
@@ -123,10 +119,8 @@ def _tell_parameters(options: Options, outcome: Compared) -> None:
     first, *others = outcome.labels
     for label, found in zip(others, outcome.comparisons, strict=True):
         title = f"parameters of {label} against {first}; p: chance of such a difference, by Holm over all of them"
-        table = new_table(title, "parameter", first, label, "difference", "95 % interval", "p", "unit")
-        for row in found.parameters:
-            table.add_row(*parameter_cells(row))
-        options.console.print(table)
+        columns = ("parameter", first, label, "difference", "95 % interval", "p", "unit")
+        tell_table(options, title, columns, map(parameter_cells, found.parameters))
         if found.joint:
             p, count = found.joint
             options.say(f"all {count} together, correlations counted: p {chance(p)}")

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli import completion
 from bushfit.cli.common import Options, Task, open_model, with_task
-from bushfit.cli.options import command_called, file_option, option, under
-from bushfit.cli.show import new_table, parameter_table
+from bushfit.cli.options import command_called, explanations, file_option, option, under
+from bushfit.cli.show import tell_parameters, tell_table
 from bushfit.errors import BushfitError, naming
 from bushfit.units import alike, for_people, number, quantity
 
@@ -36,14 +35,14 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
             "peak_to_peak:sweep_axial; may be given again. A wrong EFFECT lists all."
         ),
         multiple=True,
-        shell_complete=completion.explanations,
+        shell_complete=explanations,
     ),
     option(
         "--without",
         "EFFECT",
         "Do not consider this effect or mistake; may be given again.",
         multiple=True,
-        shell_complete=completion.explanations,
+        shell_complete=explanations,
     ),
     option("--tolerance", "SHARE", "Gaps below this share of the stiffness do not count [1 %].", default="1 %"),
     file_option("--model", "Start from the effects of this model.json [the paper's three]."),
@@ -83,7 +82,7 @@ def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
         _tell_candidates(options, diagnosis)
     if diagnosis.added or options.verbose:
         title = "model with what was added" if diagnosis.added else "model as it was"
-        options.console.print(parameter_table(title, diagnosis.result))
+        tell_parameters(options, title, diagnosis.result)
     options.warn(outcome.document["warnings"])
 
 
@@ -115,13 +114,10 @@ def tell_findings(options: Options, outcome: Diagnosed) -> None:
 def _tell_gap(options: Options, document: Mapping[str, Any]) -> None:
     """The gap, held out first, and within what the model is usable."""
     gap, usable, console = document["gap"], document["usable"], options.console
-    table = new_table("gap, in units of noise (1 is the floor)", "", "before", "after")
     held = gap["heldout"]
-    table.add_row(
-        "held out", *([f"{held[when]:.2f}" for when in ("before", "after")] if held else ["not testable", ""])
-    )
-    table.add_row("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values()))
-    console.print(table)
+    held_out = [f"{held[when]:.2f}" for when in ("before", "after")] if held else ["not testable", ""]
+    rows = (("held out", *held_out), ("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values())))
+    tell_table(options, "gap, in units of noise (1 is the floor)", ("", "before", "after"), rows)
     if usable:
         how = "of what was predicted from other runs" if usable["held_out"] else "of what was fitted"
         words = f"{number(100 * usable['stiffness'], 2)} % of stiffness and {number(usable['loss_factor'], 2)}"
@@ -156,8 +152,6 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
 def _tell_candidates(options: Options, diagnosis: Diagnosis) -> None:
     """Every candidate that was refitted, and why it won or lost."""
     title = "candidates: what each takes off chi-square, and how probably it is part of what is missing"
-    table = new_table(title, "candidate", "why", "gain", "probability", names=2)
-    for judged in diagnosis.candidates:
-        if judged.gain is not None:
-            table.add_row(judged.name, judged.why, f"{judged.gain:.0f}", f"{judged.probability:.2f}")
-    options.console.print(table)
+    known = ((each, each.gain) for each in diagnosis.candidates if each.gain is not None)
+    rows = ((each.name, each.why, f"{gain:.0f}", f"{each.probability:.2f}") for each, gain in known)
+    tell_table(options, title, ("candidate", "why", "gain", "probability"), rows, names=2)

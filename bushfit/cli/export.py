@@ -59,7 +59,7 @@ def command(
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.errors import naming
-    from bushfit.export.systems import UnitSystem
+    from bushfit.export.contract import UnitSystem
     from bushfit.jobs.export import Export, source_of
     from bushfit.jobs.predict import Predict
     from bushfit.report.contents import Kinds
@@ -84,5 +84,4 @@ def command(
         for loss in exported.losses:
             options.say(f"{name} leaves out: {loss}")
     options.warn(outcome.predicted.warnings)
-    files = {**outcome.files, **options.formats.files(outcome.contents)}
-    options.write(folder, files, outcome.document)
+    options.write(folder, {**outcome.files, **options.formats.files(outcome.contents)}, outcome.document)

@@ -9,8 +9,7 @@ from typing import Any
 
 import click
 
-from bushfit.cli import completion
-from bushfit.cli.options import FILE, Function, Parameter, in_order, option, option_of, under
+from bushfit.cli.options import DIRECTIONS, FILE, Function, Parameter, in_order, option, option_of, under
 from bushfit.errors import BushfitError, MeasurementError
 
 #: What a test file does not say itself, as keys of a campaign, with metavar and words: of loops and sweeps, ...
@@ -19,9 +18,10 @@ _OF_TESTS = {
     "at_amplitude": ("SIZE", '"0.1 mm", without a column [found in the name].'),
     "at_frequency": ("FREQUENCY", '"10 Hz", without a column [found in the name].'),
     "temperature": ("TEMP", '"23 degC": of the test, or of the rows to take.'),
-    "rate": ("SPEED", '"10 mm/min": of a triangle without time.'),
+    "preload": ("LOAD", '"500 N axial", or "none": goes on to the report.'),
+    "rate": ("SPEED", None),
     "frequency": ("FREQUENCY", None),
-    "waveform": ("WAVE", '"0.1 Hz", sine or triangle: a loop without time.'),
+    "waveform": ("WAVE", 'Loop without time: "10 mm/min"; "0.1 Hz", sine.'),
     "specimen": ("NAME", "If this is no bushing, its name [coupon; bar]."),
     "area": ("AREA", None),
     "thickness": ("LENGTH", None),
@@ -41,7 +41,7 @@ _AS_WRITTEN = {
 _NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
 #: Types of what is stated, by key; else a text.
 TYPES: dict[str, click.ParamType[Any]] = {
-    "direction": click.Choice(completion.DIRECTIONS),
+    "direction": click.Choice(DIRECTIONS),
     "waveform": click.Choice(["sine", "triangle"]),
     "amplitude": click.Choice(["zero-to-peak", "peak-to-peak"]),
     **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),
@@ -64,7 +64,7 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
     told = ("direction", "force_sign", *keys, *_AS_WRITTEN)
 
     def known() -> tuple[str, ...]:
-        from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
+        from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 
         return tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
 

@@ -1,20 +1,21 @@
-"""`bushfit init`: test files and a geometry -> a campaign."""
+"""`bushfit init`: test files and a geometry -> a campaign; at a terminal it asks for what neither says."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from bushfit.cli.common import Options, with_options
-from bushfit.cli.file_options import direction_error, options_named, with_stated
+from bushfit.cli.file_options import STATED, TYPES, direction_error, options_named, with_stated
 from bushfit.cli.inspect import tell_left_out
 from bushfit.cli.options import command_called, flag, option, option_of, under
-from bushfit.cli.questions import Questions
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
 from bushfit.progress import counting
 from bushfit.report.folder import check_free
@@ -24,8 +25,31 @@ if TYPE_CHECKING:
     from bushfit.geometry import Bushing
     from bushfit.inspection.gathering import Source
     from bushfit.inspection.record import Inspected, InspectionDocument
+
 #: Sides of the rubber whose radius or diameter is asked for.
 _SIDES = ("inner", "outer")
+#: An option that the hint of an error names, perhaps with the role of a column.
+_NAMED = re.compile(r'--(?:(column|unit) "?(\w+)=|([a-z][a-z-]+))')
+#: How a question is put, by the key that its answer is of, or else by the key itself.
+_WORDS = {
+    "column": "header of the column of the {role}",
+    "unit": "unit of the {role}",
+    "rate": 'rate of the motion, such as "10 mm/min", or its frequency, such as "0.1 Hz"',
+    "waveform": "course of the motion in time",
+    "amplitude": "they count",
+    "at_amplitude": 'its amplitude, such as "0.1 mm"',
+    "at_frequency": 'its frequency, such as "10 Hz"',
+    "temperature": 'its temperature, such as "23 degC"',
+    "preload": 'preload of these tests, such as "500 N axial" or "none"; Enter leaves it open',
+    "inner_diameter": 'inner diameter of the rubber, where it meets the inner sleeve, such as "20 mm"',
+    "outer_diameter": 'its outer diameter, such as "36 mm"',
+    "length": 'its length, the mean of inside and outside, such as "34 mm"',
+}
+#: The key that an answer is of, and of columns and units the role.
+_Key = tuple[str, str]
+#: What is asked for once for all files, with what is offered.
+_ONCE: dict[_Key, str] = {("amplitude", ""): "zero-to-peak", ("preload", ""): ""}
+_Seen = TypeVar("_Seen")
 
 
 @command_called(
@@ -59,7 +83,7 @@ def command(
     tests; an option holds for all files of its kind. Writes campaign.toml, or -o my_bushing.toml.
     """
     from bushfit.geometry import Specimen
-    from bushfit.inspection.draft import campaign_text, campaigns_of_parts, with_specimens_named
+    from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named
 
     questions = Questions.of(options, no_input=no_input)
     usual = (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
@@ -173,11 +197,11 @@ def _usable(
 
 
 def _look(source: Source, stated: Mapping[str, Any], *, is_sized: bool, is_asked: bool) -> Inspected:
-    """A test of which this is stated; where somebody `is_asked`, how amplitudes count is not taken for granted."""
+    """A test of which this is stated; where somebody `is_asked`, what it needs not say is asked for as well."""
     from bushfit.geometry import Specimen
-    from bushfit.inspection.recognition import BLOCK_KEYS
+    from bushfit.inspection.opening import BLOCK_KEYS
 
-    source = replace(source, stated=stated)
+    source = replace(source, stated={key: value for key, value in stated.items() if value != ""})
     with options_named():
         one = source.inspect()
         if is_sized and isinstance(one.direction, Specimen) and one.direction.kind == "shear":
@@ -192,6 +216,8 @@ def _look(source: Source, stated: Mapping[str, Any], *, is_sized: bool, is_asked
         raise direction_error(source.file, source.sheet)
     if is_asked and one.is_counting_open:
         raise MeasurementError("no header says how amplitudes are counted", file=source.file, hint="--amplitude")
+    if is_asked and one.kind != "history" and "preload" not in {*one.entry, *stated}:
+        raise MeasurementError("nothing says under which preload this was tested", file=source.file, hint="--preload")
     return one
 
 
@@ -206,8 +232,69 @@ def _tell(options: Options, seen: Inspected) -> None:
     facts = seen.facts
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
-    place = seen.file.parent / seen.label
-    options.say(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
+    options.say(f"{seen.file.parent / seen.label}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
     options.warn([f"{seen.label}: {sentence}" for sentence in seen.odd])
     if seen.assumed:
         options.say(f"  {seen.assumed}")
+
+
+@dataclass(frozen=True)
+class Questions:
+    """Questions of one command, where somebody is `asked`; the last answer to one is offered when it comes again."""
+
+    options: Options
+    asked: bool
+    _answers: dict[_Key, Any] = field(default_factory=lambda: dict.fromkeys(_ONCE))
+
+    @classmethod
+    def of(cls, options: Options, *, no_input: bool) -> Questions:
+        """Those of a command, none where nobody is there to answer, or wants to be asked."""
+        asked = not (no_input or options.quiet or options.as_json) and sys.stdin is not None and sys.stdin.isatty()
+        return cls(options, asked)
+
+    def settled(self, stated: Mapping[str, Any], look: Callable[[Mapping[str, Any]], _Seen]) -> _Seen:
+        """What comes of what is stated, with answers to what the errors of that ask for."""
+        given: dict[_Key, Any] = {}
+        while True:
+            try:
+                every = dict(stated)
+                for (name, role), answer in given.items():
+                    every |= {f"{name}s": {**every.get(f"{name}s", {}), role: answer}} if role else {name: answer}
+                return look(every)
+            except BushfitError as error:
+                if not self.asked:
+                    raise
+                told = type(error)(**{**vars(error), "hint": None})
+                wanted = _wanted(error)
+                new = [key for key in wanted if key not in given and not stated.get(key[0])]
+                wrong = [key for key, answer in given.items() if key in wanted or _is_about(told, key, answer)]
+                if not (new or wrong):
+                    raise
+                for key in [] if new else [*given][[*given].index(wrong[0]) :]:  # and what was asked for after it
+                    del given[key], self._answers[key]
+                given |= self._answer((new or wrong)[0], told)
+
+    def _answer(self, key: _Key, told: BushfitError) -> dict[_Key, Any]:
+        name, role = key
+        known = self._answers.get(key)
+        if key not in _ONCE or known is None:
+            self.options.say(f"\n{told}")
+            words = _WORDS.get(name, name.replace("_", " ")).format(role=role.replace("_", " "))
+            usual = _ONCE.get(key, known)
+            known = click.prompt(words, default=usual, type=TYPES.get(name), show_default=usual != "", err=True)
+            key = ("frequency", "") if name == "rate" and "Hz" in known else key
+        self._answers[key] = known
+        return {key: known}
+
+
+def _wanted(error: BushfitError) -> list[_Key]:
+    """What an error asks for, a column last: that a file has one is seldom not known to bushfit."""
+    found = [(kind or option.replace("-", "_"), role) for kind, role, option in _NAMED.findall(error.hint or "")]
+    known = [(name, role) for name, role in found if role or name in STATED or name in _WORDS]
+    return sorted(known, key=lambda key: key[0] == "column")
+
+
+def _is_about(error: BushfitError, key: _Key, answer: Any) -> bool:
+    """Whether an error tells of an answer."""
+    place, quoted = option_of(key[0]) in (error.place or ""), f'"{answer}"' in error.problem
+    return place or quoted or (error.found or "").strip('"') == str(answer)

@@ -14,7 +14,7 @@ from rich.markup import escape
 from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import options_named, with_stated
 from bushfit.cli.options import command_called
-from bushfit.cli.show import new_table
+from bushfit.cli.show import tell_table
 from bushfit.errors import BushfitError
 from bushfit.progress import counting
 from bushfit.report import plots
@@ -41,8 +41,8 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     file cannot be used, the others are told, nothing is written, exit status 2. Writes inspect.png, and inspect_2.png
     and so on of more than five files.
     """
-    from bushfit.inspection.draft import pasted_text, with_specimens_named
     from bushfit.inspection.gathering import gather, with_contradictions
+    from bushfit.inspection.record import pasted_text, with_specimens_named
 
     sources, left_out = gather(files, stated)
     tell_left_out(options, left_out)
@@ -89,14 +89,12 @@ def tell(options: Options, seen: Inspected) -> None:
     """One file in words: columns, facts, oddities."""
     console = options.console
     written = ", ".join(f"{label} {value}" for label, value in seen.written.items())
-    table = new_table(
-        f"{seen.file.parent / seen.label}: {_KINDS[seen.kind]}, {seen.direction or 'direction unknown'}",
-        "column", "taken for", "unit", "from", "to",
-    )  # fmt: skip
+    title = f"{seen.file.parent / seen.label}: {_KINDS[seen.kind]}, {seen.direction or 'direction unknown'}"
+    rows = []
     for column in seen.columns:
         ends = ("" if end is None else f"{end:.6g}" for end in (column.low, column.high))
-        table.add_row(escape(column.header), column.role or "(not needed)", escape(column.unit or ""), *ends)
-    console.print(table)
+        rows.append((escape(column.header), column.role or "(not needed)", escape(column.unit or ""), *ends))
+    tell_table(options, title, ("column", "taken for", "unit", "from", "to"), rows)
     for label, value in {"written with": written, **seen.facts}.items():
         options.say(f"  {label}: {value}")
     if seen.assumed:

@@ -1,6 +1,9 @@
-"""What options are made of: their types, those that several commands have, and commands with examples."""
+"""What options are made of: types, those of several commands, what Tab offers for them, and commands with examples."""
 
-from collections.abc import Callable
+import json
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -8,18 +11,82 @@ from typing import Any, Literal, get_args
 import click
 from click.shell_completion import CompletionItem
 
-from bushfit.cli import completion
 from bushfit.reading.tablefile import Form
 from bushfit.report.contents import Picture
 
+#: In which a bushing is tested: geometry, which has them, is slow to import.
+DIRECTIONS = ("axial", "radial", "torsion")
+#: What click asks for the words at the cursor.
+Offer = Callable[[click.Context, click.Parameter, str], list[str]]
+#: What reads a file of this ending.
+_READ: dict[str, Callable[[str], Any]] = {".toml": tomllib.loads, ".json": json.loads}
 Function = Callable[..., Any]
 #: Decorator that gives the function of a command an option or an argument.
 Parameter = Callable[[Function], Function]
-
 #: Type of an option or an argument that names a file or a folder.
 FILE = click.Path(path_type=Path)
 #: Characters of names in a help beside which their words stand; longer ones have them on the next line.
 _NAMES = 26
+#: What a command writes that has forms, and the option of these.
+Written = Literal["tables", "pictures", "pages"]
+
+
+def _named(ctx: click.Context, tables: str, key: str) -> Iterator[str]:
+    """What the campaigns and models that are typed already have under a key of such tables, as far as they do.
+
+    While somebody types, no file is an error.
+    """
+    values = [path for value in ctx.params.values() for path in (value if isinstance(value, tuple) else [value])]
+    typed = {Path(path) for path in (*values, *ctx.args) if isinstance(path, str | Path)}
+    for path in (path for path in typed if path.suffix in _READ):
+        with suppress(OSError, ValueError):
+            document = _READ[path.suffix](path.read_text(encoding="utf-8"))
+            listed = document.get(tables) if isinstance(document, dict) else None
+            entries = listed if isinstance(listed, list) else []
+            yield from (str(entry[key]) for entry in entries if isinstance(entry, dict) and key in entry)
+
+
+def _offered(known: Callable[[click.Context], Iterable[str]], between: str = "") -> Offer:
+    """Offers what is known, of a list with certain signs `between` its names for the last."""
+
+    def offer(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
+        typed = re.match(f"(?:.*[{between}])?", incomplete) if between else None
+        before = typed[0] if typed else ""
+        return [before + name for name in known(ctx) if name.startswith(incomplete[len(before) :])]
+
+    return offer
+
+
+def _places(ctx: click.Context) -> Iterator[str]:
+    yield from DIRECTIONS
+    yield from _named(ctx, "specimens", "name")
+
+
+def _effects(_: click.Context) -> list[str]:
+    from bushfit.effects import BASE, LIBRARY
+
+    return [name for name in LIBRARY if name not in BASE]
+
+
+def _explanations(ctx: click.Context) -> Iterator[str]:
+    """Effects, and mistakes with the test that they may have been made in."""
+    from bushfit.effects.mistakes import MISTAKES, labelled
+
+    yield from _effects(ctx)
+    for name, mistake in MISTAKES.items():
+        yield from (
+            labelled(name, Path(file).stem) for kind in mistake.kinds for file in _named(ctx, f"{kind}s", "file")
+        )
+
+
+def _schemas(_: click.Context) -> Iterable[str]:
+    from bushfit.schemas import DESCRIBED
+
+    return DESCRIBED
+
+
+#: What is offered in place of an option: an explanation, a schema, or several effects between commas and plus signs.
+explanations, schemas, effect_lists = _offered(_explanations), _offered(_schemas), _offered(_effects, ",+")
 
 
 class Option(click.Option):
@@ -142,13 +209,13 @@ def option_of(key: str) -> str:
 def place_option(words: str) -> Parameter:
     """Directions or specimens by name, as `directions`."""
     return option(
-        "--direction directions", "PLACE", words, type=_Place(), multiple=True, shell_complete=completion.places
+        "--direction directions", "PLACE", words, type=_Place(), multiple=True, shell_complete=_offered(_places)
     )
 
 
 def effect_option(words: str) -> Parameter:
     """Effects to add by name, as `effects`."""
-    return option("--effect effects", "NAME", words, multiple=True, shell_complete=completion.effects)
+    return option("--effect effects", "NAME", words, multiple=True, shell_complete=_offered(_effects))
 
 
 def file_option(name: str, words: str) -> Parameter:
@@ -156,8 +223,6 @@ def file_option(name: str, words: str) -> Parameter:
     return option(name, "FILE", words, type=FILE)
 
 
-#: What a command writes that has forms, and the option of these.
-Written = Literal["tables", "pictures", "pages"]
 FORMS: dict[Written, Parameter] = {
     "tables": option(
         "--table-format",

@@ -5,26 +5,24 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 from rich.markup import escape
 
-from bushfit.cli import completion
 from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options, positive
-from bushfit.cli.options import FILE, Size, command_called, file_option, option, place_option, under
-from bushfit.cli.show import new_table
+from bushfit.cli.options import FILE, Size, command_called, effect_lists, file_option, option, place_option, under
+from bushfit.cli.show import tell_table
 from bushfit.errors import naming
 from bushfit.units import for_people, number
 
 if TYPE_CHECKING:
-    from bushfit.jobs.plan import Planned
-    from bushfit.jobs.plan_document import PlanFile, Shown
-    from bushfit.planning.check import Check
+    from bushfit.jobs.plan import PlanFile, Planned, Shown
+    from bushfit.planning.campaign import Check
     from bushfit.planning.contract import Aim
 
 #: Hours of the rig at most: months, as a typing error.
@@ -63,7 +61,7 @@ _MOST_VALUES = 6
         "--rivals",
         "NAME,...",
         "Effects to tell apart [what diagnose leaves open].",
-        shell_complete=completion.effect_lists,
+        shell_complete=effect_lists,
     ),
     file_option("--campaign", "With MODEL.json: take [rig] and [predict] of this."),
 )
@@ -118,8 +116,7 @@ def command(
     _tell(options, outcome)
     if count and outcome.plan.planned.tests:
         outcome = replace(outcome, check=_checked(options, outcome, count, seed))
-    files = {**options.formats.files(outcome.contents), **outcome.campaign}
-    options.write(folder, files, outcome.document)
+    options.write(folder, {**options.formats.files(outcome.contents), **outcome.campaign}, outcome.document)
     if outcome.plan.planned.tests:
         options.say(f"next: make the tests in the order of {folder / options.formats.table('plan')}")
     if missed := [name for name, target in outcome.document["targets"].items() if not target["met"]]:
@@ -146,13 +143,10 @@ def _tell(options: Options, outcome: Planned) -> None:
     options.say(f"known before: {document['source']}")
     _tell_tests(options, outcome)
     standard = f"standard, {number(document['hours_standard'], 3)} h"
-    columns = ("before", f"plan, {number(document['hours_planned'], 3)} h", standard)
-    table = new_table("standard errors [%]", "of", *columns)
+    columns = ("of", "before", f"plan, {number(document['hours_planned'], 3)} h", standard)
     rows = {**document["parameters"], **{f"stiffness, {place}": row for place, row in document["stiffness"].items()}}
     rows |= {f"loss factor, {place} [0.01]": row for place, row in document["loss_factor"].items()}
-    for name, row in rows.items():
-        table.add_row(escape(name), *(number(100.0 * row[key], 2) for key in ("before", "planned", "standard")))
-    options.console.print(table)
+    tell_table(options, "standard errors [%]", columns, _percents(rows, ("before", "planned", "standard")))
     _tell_targets(options, document)
     _tell_effects(options, document)
     if rivals := document["rivals"]:
@@ -171,18 +165,15 @@ def _tell_tests(options: Options, outcome: Planned) -> None:
     from bushfit.campaign.schema import SimulatedLoop
     from bushfit.planning.contract import motions
 
-    programme = outcome.plan.planned
-    table = new_table(
-        f"{len(programme.tests)} runs", "direction", "test", "amplitude", "frequency [Hz]", "runs", names=4
-    )
+    programme, rows = outcome.plan.planned, []
     for test, runs in Counter(programme.tests).items():
         unit, factor = test.direction.display.displacement
         sizes, rates = motions(test)
         what = f"loop, {test.cycles} cycles" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}"
-        table.add_row(
-            escape(str(test.direction)), what, f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0), str(runs)
-        )
-    options.console.print(table)
+        motion = f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0)
+        rows.append((escape(str(test.direction)), what, *motion, str(runs)))
+    columns = ("direction", "test", "amplitude", "frequency [Hz]", "runs")
+    tell_table(options, f"{len(programme.tests)} runs", columns, rows, names=4)
 
 
 def _listed(values: Sequence[float], factor: float) -> str:
@@ -191,16 +182,19 @@ def _listed(values: Sequence[float], factor: float) -> str:
     return ", ".join(words) if len(words) <= _MOST_VALUES else f"{words[0]} to {words[-1]} ({len(words)})"
 
 
+def _percents(rows: Mapping[str, Mapping[str, Any]], keys: Sequence[str]) -> list[tuple[str, ...]]:
+    """Each name with the shares that its row has under some keys, in percent."""
+    return [(escape(name), *(number(100.0 * row[key], 2) for key in keys)) for name, row in rows.items()]
+
+
 def _tell_targets(options: Options, document: PlanFile) -> None:
     """Each target beside what is reached now, by the plan and by the standard programme."""
-    keys = ("asked", "before", "planned", "standard")
-    columns = ("asked for", "before", "plan", "standard", "")
-    table = new_table("targets: 95 % interval either way, the widest [%]", "of", *columns)
-    for name, target in document["targets"].items():
-        sizes = (number(100.0 * target[key], 2) for key in keys)  # type: ignore[literal-required]
-        table.add_row(escape(name), *sizes, "met" if target["met"] else "not met")
-    if table.rows:
-        options.console.print(table)
+    targets = document["targets"]
+    sizes = _percents(targets, ("asked", "before", "planned", "standard"))
+    rows = [(*row, "met" if target["met"] else "not met") for row, target in zip(sizes, targets.values(), strict=True)]
+    if rows:
+        columns = ("of", "asked for", "before", "plan", "standard", "")
+        tell_table(options, "targets: 95 % interval either way, the widest [%]", columns, rows)
 
 
 def _tell_effects(options: Options, document: PlanFile) -> None:
@@ -212,19 +206,19 @@ def _tell_effects(options: Options, document: PlanFile) -> None:
     ranked = sorted(document["visible"].items(), key=lambda item: least_well(item[1]))
     kept = ranked if options.verbose else ranked[:_MOST_EFFECTS]
     title = f"smallest amounts found in nine of ten cases, {len(kept)} of {len(ranked)} effects"
-    table = new_table(title, "effect", "amount", "plan", "standard", "unit", names=2)
+    rows = []
     for name, shown in kept:
         sizes = [shown["planned"], shown["standard"]]
         unit, factor = for_people(shown["unit"], 1.0, next(filter(None, sizes), 1.0))
         words = ["none" if size is None else number(size * factor, 3) for size in sizes]
-        table.add_row(escape(name), escape(shown["parameter"]), *words, unit)
-    options.console.print(table)
+        rows.append((escape(name), escape(shown["parameter"]), *words, unit))
+    tell_table(options, title, ("effect", "amount", "plan", "standard", "unit"), rows, names=2)
 
 
 def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check:
     """The plan simulated, with a table of what was predicted and found."""
     from bushfit.batch import pool
-    from bushfit.planning.check import Found, check
+    from bushfit.planning.campaign import Found, check
     from bushfit.progress import counting
 
     def every(seeds: Sequence[int], work: Callable[[Sequence[int]], list[Found]]) -> Iterator[tuple[int, Found]]:
@@ -232,18 +226,12 @@ def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check
         return counting("campaigns simulated and fitted", come, count)
 
     found = check(outcome.plan, count, seed, every)
-    table = new_table(
-        f"{len(found.off)} simulated campaigns from seed {found.seed} on: standard errors [%]",
-        "of",
-        "predicted",
-        "found",
-        "95 %",
-    )
-    low, high = found.interval
+    title = f"{len(found.off)} simulated campaigns from seed {found.seed} on: standard errors [%]"
+    rows, (low, high) = [], found.interval
     for name, *sizes in zip(found.names, found.predicted, found.found, low, high, strict=True):
         predicted, scatter, *ends = (number(100.0 * size, 3) for size in sizes)
-        table.add_row(name, predicted, scatter, " to ".join(ends))
-    options.console.print(table)
+        rows.append((name, predicted, scatter, " to ".join(ends)))
+    tell_table(options, title, ("of", "predicted", "found", "95 %"), rows)
     if found.failed:
         options.say(f"{found.failed} could not be fitted")
     return found

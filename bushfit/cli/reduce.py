@@ -15,7 +15,7 @@ from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import direction_error, options_named, with_stated
 from bushfit.cli.grids import parse_grid, positive
 from bushfit.cli.options import command_called, option, under
-from bushfit.cli.show import new_table
+from bushfit.cli.show import tell_table
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.report import plots
 from bushfit.report.contents import Contents, Kinds
@@ -120,15 +120,15 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
         reduced_table(reduction),
         reduction.warnings,
         lambda options: _tell(options, reduction),
-        lambda: plots.reduction.reduction_figure(reduction, histories, title),
+        lambda: plots.inspection.reduction_figure(reduction, histories, title),
     )
 
 
 def _resonance_table(file: Path, stated: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
     """The table of a resonance test; None of a file without any of its columns, unless a mass or the like is stated."""
-    from bushfit.inspection.recognition import open_table
+    from bushfit.inspection.opening import open_table
+    from bushfit.reading.headers import RESONANCE_COLUMNS
     from bushfit.reading.resonance import is_resonance
-    from bushfit.reading.words import RESONANCE_COLUMNS
 
     said = any(value is not None for value in shaker.values())
     try:
@@ -146,7 +146,7 @@ def _resonance(
 ) -> _Reduced:
     """A resonance test, reduced."""
     from bushfit.geometry import Direction
-    from bushfit.inspection.recognition import direction_of
+    from bushfit.inspection.opening import direction_of
     from bushfit.reading.resonance import read_resonance
     from bushfit.reduction.resonance import reduce_resonance
     from bushfit.report.tables import resonance_table
@@ -178,7 +178,7 @@ def _resonance(
         resonance_table(reduction),
         reduction.warnings,
         lambda options: _tell_resonance(options, reduction),
-        lambda: plots.resonance.resonance_figure(reduction, title),
+        lambda: plots.inspection.resonance_figure(reduction, title),
         {"mass_kg": mass, "resonance_Hz": frequency, "transmissibility_at_resonance": largest},
     )
 
@@ -234,15 +234,10 @@ def _tell(options: Options, reduction: Reduction) -> None:
     def line(step: Step) -> tuple[float, ...]:
         return (step.level, step.repeat, *((step.nominal_frequency,) if options.verbose else ()))
 
-    count = len(reduction.steps)
-    table = new_table(
-        f"{count} point{'s' * (count > 1)} found; of each line the largest noise and distortion",
-        f"level [{unit}]", "repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]",
-        "THD [%]",
-    )  # fmt: skip
+    count, rows = len(reduction.steps), []
     for (level, repeat, *_), group in groupby(sorted(reduction.steps, key=line), line):
         steps = list(group)
-        table.add_row(
+        cells = (
             number(length * level, 4),
             f"{repeat:.0f}",
             f"{len(steps)}",
@@ -252,7 +247,10 @@ def _tell(options: Options, reduction: Reduction) -> None:
             number(100 * max(step.gain_error for step in steps), 1),
             number(100 * max(step.force_distortion for step in steps), 2),
         )
-    options.console.print(table)
+        rows.append(cells)
+    title = f"{count} point{'s' * (count > 1)} found; of each line the largest noise and distortion"
+    heads = ("repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]", "THD [%]")
+    tell_table(options, title, (f"level [{unit}]", *heads), rows)
     options.warn(reduction.warnings)
     if options.verbose:
         for skip in reduction.skipped:
@@ -268,12 +266,7 @@ def _tell_resonance(options: Options, found: Resonance) -> None:
 
     (unit, length), _, (stiffness_unit, factor) = TRANSLATION.display
     frequency, largest = found.peak
-    count = found.frequency.size
-    table = new_table(
-        f"{count} point{'s' * (count > 1)} of {found.test.frequency.size} rows; resonance at {frequency:.1f} Hz, "
-        f"|T| {largest:.2f}\nof each line the median of |K| and loss factor, and the largest error",
-        "f [Hz]", "points", f"amplitude [{unit}]", "|T|", f"|K| [{stiffness_unit}]", "loss factor", "error [%]",
-    )  # fmt: skip
+    count, cells = found.frequency.size, []
     lines = range(count) if options.verbose else (_LINES_AN_OCTAVE * np.log2(found.frequency)).round().tolist()
     for _, group in groupby(range(count), lambda place: lines[place]):
         rows = list(group)
@@ -281,16 +274,19 @@ def _tell_resonance(options: Options, found: Resonance) -> None:
             _span(alike(sorted(values[rows].tolist(), reverse=True), 3, least=3)[::-1])
             for values in (length * found.amplitude, np.abs(found.transmissibility))
         )
-        table.add_row(
-            _span([number(float(end), 4) for end in found.frequency[rows]]),
-            f"{len(rows)}",
-            amplitudes,
-            ratios,
+        figures = (
             number(factor * float(np.median(np.abs(found.stiffness[rows]))), 4),
             number(float(np.median(loss_factor(found.stiffness[rows]))), 3),
             number(100 * float(found.relative_error[rows].max()), 2),
         )
-    options.console.print(table)
+        ends = _span([number(float(end), 4) for end in found.frequency[rows]])
+        cells.append((ends, f"{len(rows)}", amplitudes, ratios, *figures))
+    title = (
+        f"{count} point{'s' * (count > 1)} of {found.test.frequency.size} rows; resonance at {frequency:.1f} Hz, "
+        f"|T| {largest:.2f}\nof each line the median of |K| and loss factor, and the largest error"
+    )
+    heads = ("f [Hz]", "points", f"amplitude [{unit}]", "|T|", f"|K| [{stiffness_unit}]", "loss factor", "error [%]")
+    tell_table(options, title, heads, cells)
     options.warn(found.warnings)
 
 

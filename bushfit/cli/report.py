@@ -21,13 +21,13 @@ def command(folder: Path, options: Options) -> None:
 
     Writes report.html, or for a batch index.html.
     """
-    from bushfit.jobs.report import report
     from bushfit.report.contents import pages_of
     from bushfit.report.folder import check_free
+    from bushfit.report.page import folder_contents
 
     target = options.output or folder
     base = "" if options.output is None else f"{folder.resolve().as_uri()}/"
-    contents = report(folder, base)
+    contents = folder_contents(folder, base)
     check_free(target, [f"{name}.html" for name in contents.pages], force=options.force)
     pages = pages_of(contents)
     options.write(target, pages, {"pages": {str(target / name): len(page) for name, page in pages.items()}})

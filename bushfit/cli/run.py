@@ -11,12 +11,12 @@ from bushfit.cli.common import Options, Task, with_task
 from bushfit.cli.diagnose import tell_findings, tell_verdict
 from bushfit.cli.options import command_called
 from bushfit.cli.predict import tell_predictions
-from bushfit.cli.show import new_table, report, tell_fit, tell_result, tell_sources
+from bushfit.cli.show import report, tell_fit, tell_result, tell_sources, tell_table
 from bushfit.units import alike, for_people, number
 
 if TYPE_CHECKING:
     from bushfit.fitting.procedures import TwoStep
-    from bushfit.jobs.run import Ran
+    from bushfit.jobs.diagnose import Ran
     from bushfit.model.result import Range, Result
 
 #: Standard errors up to which two fits are said to agree.
@@ -38,7 +38,7 @@ def command(task: Task) -> None:
     Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
     diagnosis.json, candidates.csv, report.html; as table and plot: loops, sweeps, gap, axial, radial, each specimen.
     """
-    from bushfit.jobs.run import Run
+    from bushfit.jobs.diagnose import Run
 
     task.perform(Run(), tell_run, _model_to_use)
 
@@ -145,19 +145,17 @@ def _tell_steps(options: Options, name: str, outcome: Ran) -> None:
 def _tell_passes(options: Options, two_step: TwoStep) -> None:
     parameters, last = two_step.result.model.parameters, two_step.passes[-1]
     units = {name: for_people(parameters[name].unit, 1.0, value) for name, value in last.items()}
-    headers = (f"{name} [{unit}]" for name, (unit, _) in units.items())
-    table = new_table("static and dynamic fit in turn, pass by pass", "pass", *headers)
+    headers = [f"{name} [{unit}]" for name, (unit, _) in units.items()]
     # from the last pass, whose decimals the others have
     columns = [alike([p[name] * factor for p in two_step.passes[::-1]], 5, 2) for name, (_, factor) in units.items()]
-    for count, row in enumerate(list(zip(*columns, strict=True))[::-1], start=1):
-        table.add_row(str(count), *row)
-    options.console.print(table)
+    rows = ((str(count), *row) for count, row in enumerate(list(zip(*columns, strict=True))[::-1], start=1))
+    tell_table(options, "static and dynamic fit in turn, pass by pass", ["pass", *headers], rows)
 
 
 def _tell_cost(options: Options, two_step: Result, joint: Result) -> None:
     """What the two-step procedure costs: its values and errors beside those of the joint fit."""
-    columns = ("two-step", "std error", "joint", "std error", "unit", "difference", "error ratio")
-    table = new_table("what the two-step procedure costs", "parameter", *columns)
+    columns = ("parameter", "two-step", "std error", "joint", "std error", "unit", "difference", "error ratio")
+    rows = []
     for name in (name for name in joint.fitted if name in two_step.model.values):
         one, other = two_step.model.values[name], joint.model.values[name]
         errors = two_step.covariance.stderr(name), joint.covariance.stderr(name)
@@ -165,5 +163,5 @@ def _tell_cost(options: Options, two_step: Result, joint: Result) -> None:
         unit, factor = for_people(joint.model.parameters[name].unit, 1.0, other)
         shown = ["" if error is None else alike([error * factor], 2)[0] for error in errors]
         second, first = alike([other * factor, one * factor], 4, least=2)
-        table.add_row(name, first, shown[0], second, shown[1], unit, f"{100 * (one / other - 1):+.1f} %", ratio)
-    options.console.print(table)
+        rows.append((name, first, shown[0], second, shown[1], unit, f"{100 * (one / other - 1):+.1f} %", ratio))
+    tell_table(options, "what the two-step procedure costs", columns, rows)

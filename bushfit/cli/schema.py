@@ -5,14 +5,13 @@ from typing import Any
 
 import click
 
-from bushfit.cli import completion
 from bushfit.cli.common import Options, with_options
-from bushfit.cli.options import command_called
-from bushfit.cli.show import new_table
+from bushfit.cli.options import command_called, schemas
+from bushfit.cli.show import tell_table
 
 
 @command_called("schema", "", "model")
-@click.argument("name", required=False, shell_complete=completion.schemas)
+@click.argument("name", required=False, shell_complete=schemas)
 @with_options("nothing is written")
 def command(name: str | None, options: Options) -> None:
     """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, tell which there are.
@@ -37,9 +36,7 @@ def command(name: str | None, options: Options) -> None:
     elif name:
         options.say(f"{name} describes: {DESCRIBED[name].files}")
     else:
-        table = new_table("schemas", "name", "describes", names=2)
-        for each, described in DESCRIBED.items():
-            table.add_row(each, described.files)
-        options.console.print(table)
+        rows = ((each, described.files) for each, described in DESCRIBED.items())
+        tell_table(options, "schemas", ("name", "describes"), rows, names=2)
     if not options.output:
         replace(options, as_json=options.as_json or name is not None).print_json(document)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -42,7 +42,7 @@ def report(options: Options, title: str, result: Result) -> None:
 def tell_result(options: Options, title: str, result: Result) -> None:
     """The parameters of a result and its quality."""
     console = options.console
-    console.print(parameter_table(title, result))
+    tell_parameters(options, title, result)
     if result.quality:
         quality = result.quality
         gain = quality.loop_gain_error
@@ -64,14 +64,13 @@ def tell_tests(options: Options, tested: Sequence[Misfit], usable: Sequence[Usab
     worst = sorted(tests, key=lambda test: -test.reduced_chi_square)[: len(tests) if options.verbose else _MOST_TESTS]
     if len(tests) > 1:
         title = "test by test: NRMSE and gain off [%] (+: the model is stiffer), chi2 the reduced chi-square"
-        table = new_table(title, "test", "place", "points", "NRMSE", "chi2", "gain", "", names=2)
-        for test in tests:
-            if test in worst:
-                name = test.test if test.held is None else f"  {_held(test)}"
-                figures = (number(100 * test.nrmse, 2), number(test.reduced_chi_square, 2))
-                gain = f"{round(100 * test.gain, 2) + 0.0:+.2f}"  # no -0
-                table.add_row(name, test.place, str(test.points), *figures, gain, "" if test.fitted else "not fitted")
-        options.console.print(table)
+        columns, rows = ("test", "place", "points", "NRMSE", "chi2", "gain", ""), []
+        for test in (test for test in tests if test in worst):
+            name = test.test if test.held is None else f"  {_held(test)}"
+            gain = f"{round(100 * test.gain, 2) + 0.0:+.2f}"  # no -0
+            figures = (number(100 * test.nrmse, 2), number(test.reduced_chi_square, 2), gain)
+            rows.append((name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted"))
+        tell_table(options, title, columns, rows, names=2)
     if left := len(tests) - len(worst):
         options.say(
             f"and {left} more {'test, which is' if left == 1 else 'tests, which are'} met better; -v shows them"
@@ -98,20 +97,23 @@ def tell_sources(options: Options, result: Result) -> None:
             options.say(f"input: {source.file} sha256 {source.sha256[:12]}")
 
 
-def new_table(title: str, *columns: str, names: int = 1) -> Table:
-    """An empty table: so many columns hold names, which wrap, the others numbers."""
+def tell_table(
+    options: Options, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, names: int = 1
+) -> None:
+    """A table of rows: so many columns hold names, which wrap, the others numbers."""
     table = Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, title_style="bold")
     for place, column in enumerate(columns):
         number = place >= names
         table.add_column(escape(column), justify="right" if number else "left", no_wrap=number, overflow="fold")
-    return table
+    for row in rows:
+        table.add_row(*row)
+    options.console.print(table)
 
 
-def parameter_table(title: str, result: Result) -> Table:
+def tell_parameters(options: Options, title: str, result: Result) -> None:
     """The paper's Table 1 with uncertainty: value, standard error, 95 % interval (by profile, if any), unit."""
     from bushfit.report.parameters import interval_kind, parameter_rows
 
-    table = new_table(title, "parameter", "value", "std error", interval_kind(result), "unit")
-    for row in parameter_rows(result):
-        table.add_row(row.label, row.value, row.error, row.interval, row.unit)
-    return table
+    columns = ("parameter", "value", "std error", interval_kind(result), "unit")
+    rows = ((row.label, row.value, row.error, row.interval, row.unit) for row in parameter_rows(result))
+    tell_table(options, title, columns, rows)

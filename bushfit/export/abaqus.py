@@ -17,11 +17,20 @@ from functools import partial
 import numpy as np
 
 from bushfit.effects import Level as EffectLevel
-from bushfit.effects.contract import Array
-from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import Form, Level, by_dof, commented, directions, of_levels, real, stated, tables, to_bytes
-from bushfit.export.losses import of_tables
-from bushfit.export.systems import MM_T_S_N, UnitSystem
+from bushfit.export.contract import MM_T_S_N, Exported, Order, UnitSystem
+from bushfit.export.deck import (
+    Form,
+    Level,
+    by_dof,
+    commented,
+    directions,
+    of_levels,
+    of_tables,
+    real,
+    stated,
+    tables,
+    to_bytes,
+)
 from bushfit.geometry import Specimen
 from bushfit.units import number
 
@@ -32,10 +41,7 @@ _LONG_TERM = "mu"
 #: Where the material's modulus is asked for: engineering shear strain, which is twice the equivalent strain.
 _COMPOUND = Specimen("compound", "modulus")
 
-_FORM = Form(
-    lambda f, k: (k.real, k.imag / (2.0 * np.pi * f)),
-    lambda f, a, b: a + 2j * np.pi * f * b,
-)
+_FORM = Form(lambda f, k: (k.real, k.imag / (2.0 * np.pi * f)), lambda f, a, b: a + 2j * np.pi * f * b)
 
 
 def export(order: Order) -> Exported:
@@ -61,15 +67,10 @@ def _behavior(units: UnitSystem, rank: int, level: Level) -> Iterator[str]:
     for keyword, diagonal in zip(("ELASTICITY", "DAMPING"), diagonals, strict=True):
         yield f"*CONNECTOR {keyword}, FREQUENCY DEPENDENCE=ON"
         for f, values in zip(frequency, diagonal.T, strict=True):
-            yield from _constants(values, f)
-
-
-def _constants(diagonal: Array, frequency: float) -> Iterator[str]:
-    """The lines of one frequency: the upper triangle of a diagonal matrix, (6,), column by column."""
-    triangle = np.diag(diagonal).T[np.tril_indices(6)]
-    texts = [*(real(value) for value in triangle), real(frequency, 10)]
-    for start in range(0, _CONSTANTS + 1, _A_LINE):
-        yield ", ".join(texts[start : start + _A_LINE])
+            triangle = np.diag(values).T[np.tril_indices(6)]  # the upper one of the matrix, column by column
+            texts = [*(real(value) for value in triangle), real(f, 10)]
+            for start in range(0, _CONSTANTS + 1, _A_LINE):
+                yield ", ".join(texts[start : start + _A_LINE])
 
 
 def _materials(order: Order, units: UnitSystem) -> Iterator[str]:

@@ -17,9 +17,21 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import DOFS, Table, commented, directions, heading, middle, real, stated, tables, to_bytes
-from bushfit.export.losses import of_all, of_band
-from bushfit.geometry import ROTATION, TRANSLATION, Direction
+from bushfit.export.deck import (
+    DOFS,
+    Table,
+    commented,
+    directions,
+    heading,
+    middle,
+    of_all,
+    of_band,
+    real,
+    stated,
+    tables,
+    to_bytes,
+)
+from bushfit.geometry import ROTATION, TRANSLATION
 from bushfit.prediction.caveats import percent_off
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import number
@@ -38,31 +50,21 @@ _KINDS = {
 
 
 class _Element(NamedTuple):
-    """What stands for a direction: its tables by amplitude, and the points of its curve, (n,) [m, N or rad, N m]."""
+    """What stands for a direction: its tables by amplitude, and the points of its curve, (n,) [m, N or rad, N m].
+
+    The damping is right at the frequency `at` [Hz] of the table `reference`, where the stiffness is `there`.
+    """
 
     tables: Sequence[Table]
     moved: Array
     force: Array
-
-    @property
-    def direction(self) -> Direction:
-        """That it stands for."""
-        return self.tables[0].direction
-
-    @property
-    def reference(self) -> Table:
-        """The table of the amplitude at which the damping is right."""
-        return middle(self.tables)
-
-    @property
-    def frequency(self) -> float:
-        """At which the damping is right [Hz]."""
-        return float(self.reference.frequency[self._row])
+    reference: Table
+    at: float
+    there: complex
 
     def damping(self, kind: str) -> float:
         """A damper's constant [N s/m or N m s/rad], or a loss angle [rad]."""
-        stiffness = self.reference.stiffness[self._row]
-        return float(stiffness.imag / (2.0 * np.pi * self.frequency) if kind == "car" else np.angle(stiffness))
+        return float(self.there.imag / (2.0 * np.pi * self.at) if kind == "car" else np.angle(self.there))
 
     def stiffness(self, kind: str, table: Table) -> Array:
         """Complex stiffness of the element at the points of a table, (n,)."""
@@ -70,11 +72,6 @@ class _Element(NamedTuple):
         if kind == "ride":
             return np.full(table.frequency.size, storage * (1.0 + 1j * np.tan(self.damping(kind))))
         return storage + 2j * np.pi * table.frequency * self.damping(kind)
-
-    @property
-    def _row(self) -> int:
-        """The middle of the frequencies, the lower of two."""
-        return (self.reference.frequency.size - 1) // 2
 
 
 def export(order: Order) -> Exported:
@@ -85,7 +82,15 @@ def export(order: Order) -> Exported:
         shared.append(f"the units asked for, {order.units}: the file states its own, which Adams converts")
     files, losses = dict[str, bytes](), list[str]()
     for kind in _KINDS:
-        own = [_frequency_lost(element, kind) for element in elements]
+        own = []
+        for element in elements:  # what one curve and one damping cost over the grid of a direction
+            pairs = [(element.stiffness(kind, table), table.stiffness) for table in element.tables]
+            found, exact = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+            loss = number(float(np.max(np.abs(loss_factor(found) - loss_factor(exact)))), 2)
+            own.append(
+                f"{element.reference.direction}, {kind}: frequency, one damping, of {number(element.at, 4)} Hz: over "
+                f"the grid |K| is {percent_off(np.abs(found / exact))} off, the loss factor up to {loss}"
+            )
         files[f"bushing_{kind}.bus"] = to_bytes(_file(order, elements, kind, [*own, *shared]))
         losses += own
     return Exported(files, (*losses, *shared))
@@ -101,32 +106,24 @@ def _element(own: Sequence[Table]) -> _Element:
     if amplitude.size == 1:
         amplitude, force = (values[0] * np.array([1.0, 2.0]) for values in (amplitude, force))
     moved, resisting = (np.concatenate([-values[::-1], [0.0], values]) for values in (amplitude, force))
-    return _Element(own, moved, resisting)
-
-
-def _frequency_lost(element: _Element, kind: str) -> str:
-    """What one curve and one damping cost over the grid of a direction."""
-    pairs = [(element.stiffness(kind, table), table.stiffness) for table in element.tables]
-    found, exact = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    loss = number(float(np.max(np.abs(loss_factor(found) - loss_factor(exact)))), 2)
-    return (
-        f"{element.direction}, {kind}: frequency, one damping, of {number(element.frequency, 4)} Hz: over the grid "
-        f"|K| is {percent_off(np.abs(found / exact))} off, the loss factor up to {loss}"
-    )
+    reference = middle(own)
+    row = (reference.frequency.size - 1) // 2  # the middle of the frequencies, the lower of two
+    at, there = float(reference.frequency[row]), complex(reference.stiffness[row])
+    return _Element(own, moved, resisting, reference, at, there)
 
 
 def _file(order: Order, elements: Sequence[_Element], kind: str, losses: Sequence[str]) -> Iterator[str]:
     """The lines of a property file."""
-    at = f"{number(elements[0].frequency, 4)} Hz, {stated([element.reference for element in elements])}"
+    at = f"{number(elements[0].at, 4)} Hz, {stated([element.reference for element in elements])}"
     about = [_KINDS[kind], f"damping at {at}; curves at the lowest frequency"]
     yield from commented("$", [*heading(order, ", ".join(_UNITS.values()), losses), *about])
     yield from _block("MDI_HEADER", {"FILE_TYPE": "'bus'", "FILE_VERSION": "4.0", "FILE_FORMAT": "'ASCII'"})
     yield from _block("UNITS", {name: f"'{unit}'" for name, unit in _UNITS.items()})
     damping, curves = dict[int, float](), dict[int, tuple[Array, Array]]()
     for element in elements:
-        displacement, force = _SCALES[element.direction.motion]
+        displacement, force = _SCALES[element.reference.direction.motion]
         scale = force / displacement if kind == "car" else float(np.degrees(1.0))
-        for dof in DOFS[element.direction]:
+        for dof in DOFS[element.reference.direction]:
             damping[dof] = scale * element.damping(kind)
             curves[dof] = element.moved * displacement, element.force * force
     values = {f"{resists.upper()}_DAMPING": real(damping.get(dof, 0.0)) for dof, (_, resists) in enumerate(_AXES, 1)}

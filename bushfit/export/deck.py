@@ -1,4 +1,6 @@
-"""What all solver decks share: tables over frequency for each amplitude, comments, and the heading."""
+"""What all solver decks share: tables over frequency for each amplitude, comments, the heading, and what decks cannot
+carry, in words, with the error that it costs over the exported grid.
+"""
 
 import re
 import textwrap
@@ -7,11 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bushfit.effects import Level as EffectLevel
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.export.contract import Order
-from bushfit.export.systems import UnitSystem
+from bushfit.export.contract import Order, UnitSystem
 from bushfit.geometry import Direction
+from bushfit.prediction.caveats import percent_off
 from bushfit.prediction.stiffness import Prediction
 from bushfit.units import number
 from bushfit.version import __version__
@@ -22,6 +25,8 @@ _WIDTH = 80
 _UNPRINTABLE = re.compile(r"[^\x20-\x7e]")
 #: Degrees of freedom that a direction stands for, the bushing's axis along z: 1 to 3 are x, y and z, 6 turns about z.
 DOFS = {Direction.AXIAL: (3,), Direction.RADIAL: (1, 2), Direction.TORSION: (6,)}
+#: What every law over frequency leaves out.
+NO_LOOPS = "no law in time: loops, overtones and transients need another format (fmu)"
 
 
 class Table(NamedTuple):
@@ -153,10 +158,8 @@ def of_levels(
 
 def stated(level: Iterable[Table]) -> str:
     """The amplitudes of a level in words: "axial at 0.2 mm, torsion at 1 deg"."""
-    displayed = [(table, table.direction.display.displacement) for table in level]
-    return ", ".join(
-        f"{table.direction} at {number(table.amplitude * factor, 6)} {unit}" for table, (unit, factor) in displayed
-    )
+    shown = [(table.direction, table.amplitude, *table.direction.display.displacement) for table in level]
+    return ", ".join(f"{place} at {number(amplitude * factor, 6)} {unit}" for place, amplitude, unit, factor in shown)
 
 
 def real(value: float, digits: int = 5) -> str:
@@ -167,3 +170,57 @@ def real(value: float, digits: int = 5) -> str:
 def to_bytes(lines: Iterable[str]) -> bytes:
     """The bytes of a deck; a sign beyond ASCII in it is a fault."""
     return ("\n".join(lines) + "\n").encode("ascii")
+
+
+def of_tables(order: Order, form: Form) -> Iterator[str]:
+    """What linear tables over frequency, one set an amplitude, do not carry, and what that costs."""
+    model = order.result.model.without(EffectLevel.INSTRUMENT)
+    for prediction in directions(order):
+        own, place = tables(prediction), prediction.direction
+        yield from _of_amplitude(own)
+        if own[0].frequency.size > 1:
+            worst = 0.0
+            for table in own:  # straight lines between its rows, halfway between two frequencies
+                halfway = 0.5 * (table.frequency[1:] + table.frequency[:-1])
+                lines = (0.5 * (part[1:] + part[:-1]) for part in form.parts(table.frequency, table.stiffness))
+                exact = model.stiffness(place, halfway, table.amplitude, under=order.under)
+                worst = max(worst, float(np.max(np.abs(form.joined(halfway, *lines) / exact - 1.0))))
+            yield f"{place}: between its frequencies |K| is up to {number(100.0 * worst, 2)} % off"
+        else:
+            yield f"{place}: one frequency, {number(own[0].frequency[0], 4)} Hz: K and loss are constants"
+        yield from of_band(prediction)
+    yield from of_all(order)
+
+
+def of_all(order: Order) -> Iterator[str]:
+    """What no deck for one element carries: time, coupling, and motions that the model does not know."""
+    yield NO_LOOPS
+    yield "each direction answers by itself: what motion in one does to another is not in it"
+    there = {prediction.direction for prediction in directions(order)}
+    missing = [str(direction) for direction in DOFS if direction not in there]
+    yield f"no stiffness in {', '.join([*missing, 'rotations about x and y'])}"
+    if specimens := [str(place) for place in order.places if place not in DOFS]:
+        yield f"specimens: {', '.join(specimens)}"
+
+
+def _of_amplitude(own: Sequence[Table]) -> Iterator[str]:
+    """What it costs that a property of a solver has one amplitude; nothing where there is but one."""
+    if len(own) > 1:
+        taken = middle(own)
+        off = np.concatenate([np.abs(taken.stiffness / table.stiffness) for table in own])
+        unit, factor = taken.direction.display.displacement
+        low, at, high = (number(table.amplitude * factor, 4) for table in (own[0], taken, own[-1]))
+        yield (
+            f"{taken.direction}: amplitude, one a property: taken at {at} {unit}, |K| is {percent_off(off)} off at "
+            f"{low} to {high} {unit}"
+        )
+
+
+def of_band(prediction: Prediction) -> Iterator[str]:
+    """The 95 % band, and the other reading where an effect may as well be the rig's."""
+    place, band = prediction.direction, prediction.stiffness
+    if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
+        yield f"{place}: the 95 % band, up to {number(100.0 * width, 2)} % of |K| either way"
+    if prediction.if_rigs:
+        off = percent_off(prediction.if_rigs.stiffness.value / band.value)
+        yield f"{place}: the other reading, by which |K| is {off} if what is unresolved is the rig's"

@@ -1,25 +1,48 @@
 """An FMU: FMI 2.0 for co-simulation, displacement in and force out, with the libraries for three systems.
 
 The libraries are compiled when the export is made, not when the package is built: the model's numbers are compiled in,
-so that an FMU reads no file while it runs, and who writes none needs no compiler.
+so that an FMU reads no file while it runs, and who writes none needs no compiler. The compiler is zig's, from the
+package `ziglang`, which makes libraries for Linux, Windows and macOS on any of them. The sources need no C library, so
+that nothing of the target system has to be there, and the libraries depend on nothing.
 """
 
 import hashlib
+import importlib.util
 import io
 import re
+import struct
+import subprocess
+import sys
+import tempfile
 import uuid
 import zipfile
 from collections.abc import Collection, Mapping, Sequence
 from importlib.resources import files
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from bushfit.campaign.naming import folder_name
-from bushfit.export.compiler import SYSTEMS, libraries
+from bushfit.errors import OutputError
 from bushfit.export.contract import Exported, Order
 from bushfit.export.in_time import FIELDS, ONE, TABLES, InTime, in_time
 from bushfit.geometry import Place, Unit
+from bushfit.reading.tablefile import folder_name
 from bushfit.version import __version__
 
+#: Folder of an FMU, ending of the library, and zig's names of the machines in it, by the system's name.
+SYSTEMS = {
+    "linux": ("linux64", ".so", ("x86_64-linux-none",)),
+    "windows": ("win64", ".dll", ("x86_64-windows-gnu",)),
+    "macos": ("darwin64", ".dylib", ("x86_64-macos", "aarch64-macos")),
+}
+#: Options of the compiler; without contraction all machines round alike.
+_OPTIONS = (
+    *("-shared", "-O2", "-std=c99", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-s"),
+    *("-ffreestanding", "-nostdlib", "-DFREESTANDING", "-Wall", "-Wextra", "-Werror"),
+)
+#: Machine in a file with a library for each of several, as macOS has them, and its variant: x86-64 and arm64.
+_MACHINES = {"x86_64-macos": (0x01000007, 3), "aarch64-macos": (0x0100000C, 0)}
+#: Libraries in it begin at multiples of 2 to this power [bytes].
+_ALIGNED = 14
 #: The sources that all FMUs share.
 _SHARED = ("fmu.c", "bushing.c", "bushing.h", "fmi2.h")
 #: Exponents of SI base units of the units that have whole ones; others are known by name alone.
@@ -28,6 +51,52 @@ _BASE: Mapping[str, Mapping[str, int]] = TABLES["units"]
 _NO_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 #: Values 0 and 1 stand first on the list of the C sources.
 _FIRST = 2
+
+
+def libraries(sources: Mapping[str, bytes], name: str, systems: Collection[str] = tuple(SYSTEMS)) -> dict[str, bytes]:
+    """The shared library of each system, by its path in an FMU: `linux64/<name>.so` and so on.
+
+    Raises:
+        OutputError: there is no compiler, or it failed.
+    """
+    if importlib.util.find_spec("ziglang") is None:
+        raise OutputError(
+            "there is no compiler for the FMU",
+            found="no package ziglang",
+            expected="the compiler that makes libraries for Linux, Windows and macOS on any of them",
+            hint='pip install "bushfit[fmu]"',
+        )
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for file, content in sources.items():
+            (Path(folder) / file).write_bytes(content)
+        files = [file for file in sources if file.endswith(".c")]
+        for system in systems:
+            where, ending, targets = SYSTEMS[system]
+            parts = {target: _compiled(Path(folder), files, target) for target in targets}
+            found[f"{where}/{name}{ending}"] = _joined(parts) if len(parts) > 1 else parts[targets[0]]
+    return found
+
+
+def _compiled(folder: Path, files: Collection[str], target: str) -> bytes:
+    """The library of one machine."""
+    made = folder / target
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *_OPTIONS, *files, "-o", made.name]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300.0, check=False)
+    if done.returncode:
+        raise OutputError("the compiler of the FMU failed", place=target, found=(done.stderr or done.stdout).strip())
+    return made.read_bytes()
+
+
+def _joined(parts: Mapping[str, bytes]) -> bytes:
+    """One file for several machines, in the format of macOS (mach-o/fat.h: big-endian words)."""
+    step = 1 << _ALIGNED
+    head, body, begin = struct.pack(">II", 0xCAFEBABE, len(parts)), b"", step
+    for target, content in parts.items():
+        head += struct.pack(">IIIII", *_MACHINES[target], begin, len(content), _ALIGNED)
+        body += content + bytes(-len(content) % step)
+        begin = step + len(body)
+    return head + bytes(step - len(head)) + body
 
 
 def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
@@ -54,11 +123,6 @@ def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
     return Exported({f"{name}.fmu": _archive(content)}, found.losses, found.arms)
 
 
-def references(found: InTime) -> dict[str, int]:
-    """The reference of each value by its name."""
-    return {value.name: _FIRST + place for place, value in enumerate(found.values)}
-
-
 def model_h(found: InTime, guid: str) -> str:
     """Sizes of the lists, and what an importer knows the FMU by."""
     sizes = {
@@ -74,7 +138,7 @@ def model_h(found: InTime, guid: str) -> str:
 
 def model_c(found: InTime) -> str:
     """The lists themselves."""
-    reference, values = references(found), found.values
+    values, reference = found.values, {value.name: at for at, value in enumerate(found.values, start=_FIRST)}
     lists = {
         "start": [0.0, 1.0, *(value.value for value in values)],
         "least": [0.0, 1.0, *(value.bounds[0] for value in values)],
@@ -88,9 +152,8 @@ def model_c(found: InTime) -> str:
     for own, lever in zip(found.fields, found.levers, strict=True):
         neutrals = {field: int(field in ONE) for field in known if field not in own}
         set_ = {**neutrals, **{field: reference[name] for field, name in own.items()}}
-        lines.append(
-            f"    {{{', '.join(f'.{field} = {place}' for field, place in set_.items())}, .lever = {lever!r}}},"
-        )
+        listed = ", ".join(f".{field} = {place}" for field, place in set_.items())
+        lines.append(f"    {{{listed}, .lever = {lever!r}}},")
     lines += ["};", "const Arm arms[ARMS] = {"]
     arms = found.arm_rows or ((0, 0.0, 1.0),)
     lines += [f"    {{{part}, {share!r}, {time!r}}}," for part, share, time in arms]
@@ -144,7 +207,7 @@ def _variables(found: InTime) -> list[tuple[dict[str, str], dict[str, str]]]:
             shown = displays[unit].name if unit in displays else ""
             real = {"unit": "" if unit == "1" else unit, "displayUnit": shown, **start}
             listed.append(({**variable, "variability": "continuous", **initial}, real))
-    for value, reference in zip(found.values, references(found).values(), strict=True):
+    for reference, value in enumerate(found.values, start=_FIRST):
         kind = {"causality": "parameter", "variability": "tunable"} if value.settable else {
             "causality": "local", "variability": "constant",
         }  # fmt: skip

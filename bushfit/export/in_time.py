@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array, Circumstances
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
 from bushfit.export.contract import Order
-from bushfit.export.losses import of_band
+from bushfit.export.deck import of_band
 from bushfit.geometry import Place
 from bushfit.model.arms import Arms, model_arms, qualified_size, values_under
 from bushfit.model.model import Model

@@ -9,35 +9,25 @@ Source: Autodesk Nastran 2025 reference, PBUSHT; Altair OptiStruct 2021 referenc
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.export.contract import Exported, Order
-from bushfit.export.deck import Form, Level, by_dof, of_levels, real, to_bytes
-from bushfit.export.losses import of_tables
-from bushfit.export.systems import MM_T_S_N, UnitSystem
+from bushfit.export.contract import MM_T_S_N, Exported, Order, UnitSystem
+from bushfit.export.deck import Form, Level, by_dof, of_levels, of_tables, real, to_bytes
 
-#: Characters of a field in the small and in the large format.
-_SMALL, _LARGE = 8, 16
 #: Distance between the numbers of the tables of two properties: that of K in degree of freedom n ends on n, of the loss
 #: on 10 + n.
 _TABLES = 100
 
 
-class _Dialect(NamedTuple):
-    """The names of the two tables, their form, and the name of the file."""
-
-    names: tuple[str, str]
-    form: Form
-    file: str
-
-
+#: The names of the two tables, their form, and the name of the file.
 _DIALECTS = {
-    "nastran": _Dialect(
-        ("K", "GE"), Form(lambda _, k: (k.real, k.imag / k.real), lambda _, a, b: a * (1.0 + 1j * b)), "bushing.bdf"
+    "nastran": (
+        ("K", "GE"),
+        Form(lambda _, k: (k.real, k.imag / k.real), lambda _, a, b: a * (1.0 + 1j * b)),
+        "bushing.bdf",
     ),
-    "optistruct": _Dialect(
+    "optistruct": (
         ("KMAG", "ANGLE"),
         Form(lambda _, k: (np.abs(k), np.angle(k, deg=True)), lambda _, a, b: a * np.exp(1j * np.radians(b))),
         "bushing.fem",
@@ -47,34 +37,33 @@ _DIALECTS = {
 
 def export(order: Order) -> Exported:
     """The bulk data of the bushing, without elements, and what it leaves out."""
-    dialect, units = _DIALECTS[order.dialect], order.units or MM_T_S_N
-    losses = tuple(of_tables(order, dialect.form))
+    (names, form, file), units = _DIALECTS[order.dialect], order.units or MM_T_S_N
+    losses = tuple(of_tables(order, form))
     used = (
         "the tables act in frequency response; PBUSH alone, at the lowest frequency, acts elsewhere; PARAM,G is added "
         "to the loss"
     )
-    lines = of_levels(order, "$", units, losses, used, "property ", partial(_property, dialect, units))
-    return Exported({dialect.file: to_bytes(lines)}, losses)
+    lines = of_levels(order, "$", units, losses, used, "property ", partial(_property, names, form, units))
+    return Exported({file: to_bytes(lines)}, losses)
 
 
-def _property(dialect: _Dialect, units: UnitSystem, pid: int, level: Level) -> Iterator[str]:
+def _property(names: Sequence[str], form: Form, units: UnitSystem, pid: int, level: Level) -> Iterator[str]:
     """PBUSH, PBUSHT and the tables of one amplitude."""
-    rows = [(dof, *dialect.form.in_units(table, units)) for dof, table in by_dof(level)]
+    rows = [(dof, *form.in_units(table, units)) for dof, table in by_dof(level)]
     several = level[0].frequency.size > 1
     nominal, numbers = [dict[int, str](), dict[int, str]()], [dict[int, str](), dict[int, str]()]
     for dof, _, *columns in rows:
         for part, column in enumerate(columns):
             nominal[part][dof] = real(column[0])
             numbers[part][dof] = str(_TABLES * pid + 10 * part + dof)
-    yield from _large("PBUSH*", [str(pid), *_by_dof(dialect.names, nominal)])
+    yield from _card("PBUSH*", [str(pid), *_by_dof(names, nominal)])
     if several:
-        yield from _small("PBUSHT", [str(pid), *_by_dof(dialect.names, numbers)])
+        yield from _card("PBUSHT", [str(pid), *_by_dof(names, numbers)])
         for dof, frequency, *parts in rows:
             for part, column in enumerate(parts):
-                pairs = [
-                    text for f, value in zip(frequency, column, strict=True) for text in (real(f, 10), real(value))
-                ]
-                yield from _large("TABLED1*", [numbers[part][dof], "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
+                points = zip(frequency, column, strict=True)
+                pairs = [text for f, value in points for text in (real(f, 10), real(value))]
+                yield from _card("TABLED1*", [numbers[part][dof], "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
 
 
 def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
@@ -85,16 +74,10 @@ def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
     return fields
 
 
-def _small(name: str, fields: Sequence[str]) -> Iterator[str]:
-    """A card of small fields, eight a line after its name."""
-    for start in range(0, len(fields), 8):
-        yield "".join(f"{text:<{_SMALL}}" for text in (name, *fields[start : start + 8])).rstrip()
-        name = ""
-
-
-def _large(name: str, fields: Sequence[str]) -> Iterator[str]:
-    """A card of large fields, four a line after its name; lines come in pairs."""
+def _card(name: str, fields: Sequence[str]) -> Iterator[str]:
+    """A card: of small fields eight a line after its name; of large ones, whose name ends in *, four, in pairs."""
+    count, shape, begin = (4, ">16", "*") if name.endswith("*") else (8, "<8", "")
     padded = [*fields, *[""] * (-len(fields) % 8)]
-    for start in range(0, len(padded), 4):
-        yield (f"{name:<{_SMALL}}" + "".join(f"{text:>{_LARGE}}" for text in padded[start : start + 4])).rstrip()
-        name = "*"
+    for start in range(0, len(padded), count):
+        yield (f"{name:<8}" + "".join(f"{text:{shape}}" for text in padded[start : start + count])).rstrip()
+        name = begin

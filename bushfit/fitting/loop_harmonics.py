@@ -12,9 +12,8 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.outliers import are_outliers, are_stuck, outlier_limit
 from bushfit.fitting.repeats import FLOOR
 from bushfit.reading.measurement import Loop
-from bushfit.reading.parallel import CHUNK, by_chunks
+from bushfit.reduction.arrays import CHUNK, MEDIAN_TO_SIGMA, by_chunks
 from bushfit.reduction.harmonics import as_complex, basis, least_squares, resolved_order, series, spread_rows
-from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
 #: Samples of one cycle where a series is drawn as a curve and the model answers; chosen: rows between two samples are
 #: interpolated linearly, which is then off by 5e-6 of the amplitude.

@@ -162,8 +162,6 @@ def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
         whose scale is the squares' own scatter, so that heavy tails make no slope. The exponent is that of greatest
         likelihood.
     """
-    from scipy.optimize import minimize_scalar
-
     squares, logs = [], []
     for line in lines:
         steps, place = np.unique(line.steps, return_inverse=True)
@@ -179,6 +177,8 @@ def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
     along = float(centred @ (ratio - 1.0)) ** 2 / max(float(centred @ centred) * scale, FLOOR**2)
     if chdtrc(1, along) > _BY_CHANCE:
         return None
+
+    from scipy.optimize import minimize_scalar
 
     def unlikely(exponent: float) -> float:
         parts = np.split(ratio * np.exp(-exponent * centred), np.cumsum([log.size for log in logs])[:-1])

@@ -11,7 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import chdtri, fdtri
 
 from bushfit.effects.contract import Array
-from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, median
+from bushfit.reduction.arrays import MEDIAN_TO_SIGMA, median
 
 #: Probability that noise alone makes an outlier among all rows of a test; chosen: one test in a hundred.
 _CHANCE = 0.01

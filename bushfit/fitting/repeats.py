@@ -17,7 +17,7 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.outliers import least_absolute
 from bushfit.fitting.rig_class import ASSUMED
 from bushfit.reading.measurement import Sweep
-from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, median
+from bushfit.reduction.arrays import MEDIAN_TO_SIGMA, median
 
 #: Least noise of any rig, relative to the largest force or to |K|.
 FLOOR = 1e-4

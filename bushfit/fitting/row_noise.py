@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import toeplitz
+from scipy.linalg import solve_banded, toeplitz
 
 from bushfit.effects.contract import Array
 
@@ -108,10 +108,11 @@ class RowNoise:
         return list(np.tensordot(self.error.T, np.array(moves), axes=1))
 
     def _coloured(self, rows: Array, delay: int = 0) -> Array:
-        """Independent numbers as the noise, over b_0, that they stand for, so many rows late."""
-        from scipy.signal import lfilter
-
-        return lfilter(np.eye(delay + 1)[delay], self.filter / self.filter[0], rows)
+        """Independent numbers as the noise, over b_0, that they stand for, so many rows late, (..., n)."""
+        late = np.zeros((rows.shape[-1], rows[..., 0].size))  # a banded system: no module of filters is loaded
+        late[delay:] = rows.reshape(late.shape[::-1])[:, : len(late) - delay].T
+        band = np.repeat((self.filter / self.filter[0])[:, None], len(late), axis=1)
+        return solve_banded((self.order, 0), band, late).T.reshape(rows.shape)
 
     def error_of_sums(self, shares: Array) -> Array:
         """Standard deviation of sums over rows in units of noise, each row with its share, (..., n) -> (...)."""

@@ -13,15 +13,14 @@ from bushfit.errors import BushfitError, NoColumnError, NoTestError
 from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.geometry import Direction
 from bushfit.inspection.labels import temperatures_of
-from bushfit.inspection.opening import inspect
-from bushfit.inspection.recognition import open_table, recognised
+from bushfit.inspection.opening import inspect, open_table, recognised
 from bushfit.inspection.record import Inspected
 from bushfit.reading.columns import same_text
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above
 from bushfit.reading.parts import parts_of
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 
 
 @dataclass(frozen=True)
@@ -217,8 +216,7 @@ def _holding_tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
             pass
         tests.append(part)
     if tests and tests[0].sheet and without:
-        of_book = labels_above(
-            line for part in parts_of(tests[0].file) if part.sheet in without for line in part.head()
-        )
+        others = [part for part in parts_of(tests[0].file) if part.sheet in without]
+        of_book = labels_above(line for part in others for line in part.head())
         tests = [replace(test, of_book=of_book) for test in tests]
     return tests, left_out

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,17 +22,6 @@ _HELD = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
 _AGREEMENT = 0.03
 
 
-class KeysFromLabels(NamedTuple):
-    """What is said of a test outside its columns: keys of its table in a campaign, and where what was found, by label.
-
-    `is_counted` tells whether it is known how an amplitude counts that no column has.
-    """
-
-    keys: dict[str, Any]
-    facts: dict[str, str]
-    is_counted: bool
-
-
 def temperatures_of(table: Table) -> int:
     """How many temperatures the rows of a table were tested at: 0 without a column for it, 1, or 2 for several."""
     if (column := table.roles.get("temperature")) is None:
@@ -41,9 +30,9 @@ def temperatures_of(table: Table) -> int:
     return 1 if np.ptp(found) <= ONE_TEST else 2
 
 
-def labels_of_file(file: Path, stated: Mapping[str, Any]) -> Labels:
+def labels_of_file(file: Path, sheet: str, stated: Mapping[str, Any]) -> Labels:
     """What the name of a sheet and of its file say of a test; they count amplitudes as is stated, if it is."""
-    said = labels_in_names(stated.get("sheet", ""), file.stem)
+    said = labels_in_names(sheet, file.stem)
     counting = stated.get("amplitude")
     if counting is None:
         return said
@@ -54,8 +43,9 @@ def labels_of_file(file: Path, stated: Mapping[str, Any]) -> Labels:
 
 def keys_from_labels(
     table: Table, place: Place, stated: Mapping[str, Any], by_name: Labels, of_book: Labels, *, is_sweep: bool
-) -> KeysFromLabels:
-    """The keys that a test has by what is said outside its columns, and where they were found.
+) -> tuple[dict[str, Any], dict[str, str], bool]:
+    """What is said of a test outside its columns: keys of its table in a campaign, where what was found, by label, and
+    whether it is known how an amplitude counts that no column has.
 
     What is stated goes first, then the table, its names (`by_name`), the lines above it, and what the other sheets say
     of all tests of their workbook (`of_book`). Of a sweep, frequency and amplitude have to be known; the
@@ -87,7 +77,7 @@ def keys_from_labels(
         if text and key not in table.roles and key not in stated:
             keys[key] = text
             facts.setdefault(label, []).append(f"{word} {text}")
-    return KeysFromLabels(keys, {label: ", ".join(words) for label, words in facts.items()}, is_counted)
+    return keys, {label: ", ".join(words) for label, words in facts.items()}, is_counted
 
 
 def _held(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -> tuple[str, Quantity]:

@@ -1,4 +1,4 @@
-"""What a hysteresis loop or a raw stepped-sine history holds: cycles or steps, sampling, noise, and what is odd."""
+"""What a hysteresis loop or a raw stepped-sine history holds: cycles or steps, noise, and faults of its channels."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -10,16 +10,31 @@ from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.drive import TOLD_MEAN, Drive, drive_of
 from bushfit.fitting.loop_cycles import waveform
 from bushfit.geometry import Unit
-from bushfit.inspection.channels import odd_channels, sampling
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Findings, told_frequencies
-from bushfit.reading.measurement import Loop
+from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.names import Labels
-from bushfit.reduction.cycles import least_prominence
+from bushfit.reduction.cycles import least_prominence, lone_outliers
 from bushfit.reduction.harmonics import cycle_harmonics, resolved_order
 from bushfit.reduction.steps import reduce
 from bushfit.units import alike, for_people, number
 
+#: Usual steps of the clock that make a gap; chosen: a clock that stutters takes fewer.
+_GAP_STEPS = 5.0
+#: Widest steps of an uneven clock that make a gap; chosen: rows kept at random leave no such holes.
+_GAP_WIDEST_STEPS = 3.0
+#: Share of its usual step by which the steps of an even clock differ; chosen: times are rounded in files.
+_EVEN_CLOCK = 0.02
+#: Rows that a stuck recorder repeats; chosen: a converter repeats fewer where the motion turns.
+_STUCK_ROWS = 5
+#: Share of its range by which the motion goes on meanwhile; chosen: a motion that stands still goes on by less.
+_STUCK_MOTION = 0.02
+#: Rows that hold the very same extreme where a top is cut off; chosen: noise makes fewer alike.
+_FLAT_ROWS = 8
+#: Such rows to one that lies just below the extreme; chosen: a top that is not cut off has more of the latter.
+_FLAT_RATIO = 5.0
+#: Share of the range within which values lie just below the extreme, or else one step of the converter.
+_JUST_BELOW = 2e-3
 #: Standard errors beyond which cycles differ; chosen: noise does not go that far in any of many tests.
 _REAL_CHANGE = 6.0
 #: Share of half the force's range beyond which cycles differ; chosen: less does not matter to a fit.
@@ -30,6 +45,107 @@ _OFF_ZERO = 0.02
 _MOST_END_CYCLES = 6
 #: [s] A cycle that takes longer is in doubt; chosen: quasi-static tests take minutes.
 _LONGEST_CYCLE = 3000.0
+
+
+def sampling(history: Loop) -> str:
+    """How the rows of a record lie in time, in words: "even, every 0.01 s"."""
+    steps = np.diff(history.time)
+    usual = float(np.median(steps))
+    if np.ptp(steps) < _EVEN_CLOCK * usual:
+        return f"even, every {usual:.4g} s"
+    return f"uneven, every {steps.min():.3g} to {steps.max():.3g} s, mostly {usual:.3g} s"
+
+
+class Channel(NamedTuple):
+    """A recorded channel: its values in SI, (n,), and the unit in which they are told with the factor to it."""
+
+    name: str
+    unit: str
+    factor: float
+    values: Floats
+
+    def shown(self, row: int) -> str:
+        """The value of a row in words, without its unit."""
+        return number(self.factor * self.values[row], 4)
+
+
+def odd_channels(history: Loop) -> Iterator[str]:
+    """A sentence for each fault in the channels of a loop or a raw history."""
+    names, units = history.direction.motion.words, history.direction.display
+    motion = Channel(names[0], *units.displacement, history.displacement)
+    force = Channel(names[1], *units.force, history.force)
+    yield from _gaps(motion, history.time, timed=history.timed)
+    yield from _stuck(motion, force)
+    for channel in (motion, force):
+        yield from _cut_off(channel)
+        yield from _outliers(channel, history.time)
+
+
+def _gaps(motion: Channel, time: Floats, *, timed: bool) -> Iterator[str]:
+    """A sentence on gaps in a recorded time; in a file without it, only the motion tells of them."""
+    steps = np.diff(time) if timed else np.abs(np.diff(motion.values))
+    widest = np.quantile(steps, 0.99)  # gaps left out
+    wide = steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * widest)
+    if not timed:
+        outliers = lone_outliers(time, motion.values)
+        wide &= (steps > least_prominence(motion.values)) & ~(outliers[1:] | outliers[:-1])
+    if wide.any():
+        first, count = int(np.argmax(wide)), int(wide.sum())
+        what = (
+            f"{steps[first]:.3g} s without a row, else mostly {np.median(steps):.3g} s"
+            if timed
+            else f"the {motion.name} goes from {motion.shown(first)} to {motion.shown(first + 1)} {motion.unit} at once"
+        )
+        where = "time" if timed else "the motion"
+        yield f"{count} gap{'s' * (count > 1)} in {where}, the first after data row {first + 1}: {what}"
+
+
+def _stuck(motion: Channel, force: Channel) -> Iterator[str]:
+    """A sentence on rows in which the recorder stood still though the motion went on."""
+    still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(np.int8), [0]))))
+    starts, ends = edges[::2], edges[1::2]
+    after = np.minimum(ends + 1, motion.values.size - 1)  # a record may end stuck: then nothing went on
+    moved = np.abs(motion.values[after] - motion.values[starts])
+    stuck = (ends - starts + 1 >= _STUCK_ROWS) & (moved > _STUCK_MOTION * np.ptp(motion.values))
+    if stuck.any():
+        longest = int(np.argmax(np.where(stuck, ends - starts, 0)))
+        yield (
+            f"{ends[longest] - starts[longest] + 1} rows from data row {starts[longest] + 1} on repeat one "
+            f"{motion.name} and {force.name}, while the motion went on"
+        )
+
+
+def _cut_off(channel: Channel) -> Iterator[str]:
+    """A sentence on each end of its range at which a channel is cut off."""
+    values, span = channel.values, float(np.ptp(channel.values))
+    rounding = 1e-9 * span
+    steps = np.abs(np.diff(values))
+    finest = float(steps[steps > rounding].min(initial=span))
+    width = max(1.01 * finest, _JUST_BELOW * span)  # one step of the converter, rounded
+    for side, row in (("top", int(np.argmax(values))), ("bottom", int(np.argmin(values)))):
+        depth = np.abs(values - values[row])
+        same = int(np.count_nonzero(depth <= rounding))
+        below = int(np.count_nonzero(depth <= width)) - same
+        if same >= _FLAT_ROWS and same >= _FLAT_RATIO * below:
+            yield (
+                f"the {channel.name} is cut off at its {side}: {same} rows hold exactly {channel.shown(row)} "
+                f"{channel.unit}"
+            )
+
+
+def _outliers(channel: Channel, time: Floats) -> Iterator[str]:
+    """A sentence on rows that lie alone far off their neighbours."""
+    rows = np.flatnonzero(lone_outliers(time, channel.values))
+    if rows.size:
+        listed = ", ".join(
+            f"data row {row + 1} ({channel.shown(row)} {channel.unit} between {channel.shown(row - 1)} and "
+            f"{channel.shown(row + 1)})"
+            for row in rows[:3]
+        )
+        more = f" and {rows.size - 3} more" if rows.size > 3 else ""
+        outlier = "outliers" if rows.size > 1 else "an outlier"
+        yield f"the {channel.name} has {outlier} at {listed}{more}"
 
 
 def look_at_loop(loop: Loop, labels: Labels) -> Findings:
@@ -62,8 +178,11 @@ def look_at_loop(loop: Loop, labels: Labels) -> Findings:
         *odd_channels(loop),
         *drive.notes,
         *_changing(drive),
-        *_too_slow(drive),
     ]
+    if drive.frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
+        mistakes = [mistake.in_words(drive.loop) for mistake in MISTAKES.values() if mistake.time < 1.0]
+        minutes = number(1.0 / drive.frequency / 60.0, 2)
+        odd.append(f"one cycle takes {minutes} min, as hardly any test does, unless {', or '.join(mistakes)}")
     if _OFF_ZERO * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and drive.datum is not None:
         odd.append(
             f"the motion is off zero by {number(to_length * mean_motion, 3)} {length}, "
@@ -99,14 +218,6 @@ def look_at_history(history: Loop, labels: Labels) -> Findings:
     return facts, odd
 
 
-def _too_slow(drive: Drive) -> Iterator[str]:
-    """A sentence on a loop that takes longer than any laboratory waits, and on what the file may say instead."""
-    if drive.frequency * _LONGEST_CYCLE < 1.0:
-        mistakes = [mistake for mistake in MISTAKES.values() if mistake.time < 1.0]
-        unless = ", or ".join(mistake.in_words(drive.loop) for mistake in mistakes)
-        yield f"one cycle takes {number(1.0 / drive.frequency / 60.0, 2)} min, as hardly any test does, unless {unless}"
-
-
 def look_at_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Findings:
     """Facts and oddities of a record that holds several loops, in order.
 
@@ -121,7 +232,7 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Fi
     facts = {
         "programme": f"{len(loops)} loops in one record: {_listed([factor * size for size in amplitudes])} {unit} "
         f"at {_listed(frequencies)} Hz, {_listed([min(cycles), max(cycles)], ' to ')} cycles used of each; "
-        f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out",
+        f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out"
     }
     odd = [*wrong_labels(labels, record.direction, amplitudes, frequencies), *odd_channels(record)]
     for place, (loop, drive) in enumerate(zip(loops, drives, strict=True), start=1):
@@ -141,44 +252,8 @@ def _listed(values: Sequence[float], between: str = ", ") -> str:
     return between.join(dict.fromkeys(f"{value:.3g}" for value in values))
 
 
-class _EndCycles(NamedTuple):
-    """Force amplitude, mean force and mean motion of the cycles at both ends of a loop, (k,) each.
-
-    `error` is the noise of the force over the root of the rows of a cycle [N or N m].
-    """
-
-    amplitude: Array
-    mean_force: Array
-    mean_motion: Array
-    error: float
-
-
-def _end_cycles(drive: Drive) -> _EndCycles | None:
-    """The first and the last cycles of a loop; None where it has only one, or too few rows in each."""
-    loop, count = drive.loop, int(drive.cycles + 0.01)
-    if count < 2:
-        return None
-    phase = (loop.time - loop.time[0]) * drive.frequency
-    numbers = sorted({*range(min(count, _MOST_END_CYCLES)), *range(max(count - _MOST_END_CYCLES, 0), count)})
-    outliers = drive.outliers["force"].rows
-    parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), outliers) for n in numbers]
-    rows = min(part.size for part in parts)
-    order = resolved_order(rows, 7)  # a loop of rubber has next to nothing beyond
-    if rows < 4 * order:
-        return None
-    fitted = [
-        cycle_harmonics(phase[part], np.stack((loop.force[part], loop.displacement[part]), axis=1), order)
-        for part in parts
-    ]
-    mean_force, mean_motion = np.array([mean for mean, *_ in fitted]).T
-    amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
-    error = max(drive.noise, *(left[0] for *_, left in fitted)) * np.sqrt(1.0 / rows)
-    return _EndCycles(amplitude, mean_force, mean_motion, error)
-
-
-def _settling(cycles: _EndCycles, least: float, name: str, unit: Unit) -> Iterator[str]:
-    """A sentence where the force amplitude changes over the cycles, by `least` or more [N or N m]."""
-    force, error = cycles.amplitude, cycles.error
+def _settling(force: Array, error: float, least: float, name: str, unit: Unit) -> Iterator[str]:
+    """A sentence where the force amplitude of the end cycles, (k,), changes by `least` or more [N or N m]."""
     change, last_change = force[-1] - force[0], force[-1] - force[-2]
     # the standard error of an amplitude is sqrt(2) `error`, that of a difference of two is 2 `error`
     if abs(change) > max(_REAL_CHANGE * 2.0 * error, least):
@@ -199,15 +274,28 @@ def _drifting(mean: Array, least: float, name: str, unit: Unit) -> Iterator[str]
 
 
 def _changing(drive: Drive) -> Iterator[str]:
-    """Sentences where force amplitude, mean force or mean motion change from cycle to cycle."""
-    cycles = _end_cycles(drive)
-    if cycles is None:
+    """Sentences where force amplitude, mean force or mean motion change over the cycles at both ends of a loop; none
+    where it has only one, or too few rows in each."""
+    loop, count = drive.loop, int(drive.cycles + 0.01)
+    if count < 2:
         return
-    loop = drive.loop
+    phase = (loop.time - loop.time[0]) * drive.frequency
+    numbers = sorted({*range(min(count, _MOST_END_CYCLES)), *range(max(count - _MOST_END_CYCLES, 0), count)})
+    outliers = drive.outliers["force"].rows
+    parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), outliers) for n in numbers]
+    rows = min(part.size for part in parts)
+    order = resolved_order(rows, 7)  # a loop of rubber has next to nothing beyond
+    if rows < 4 * order:
+        return
+    both = np.stack((loop.force, loop.displacement), axis=1)
+    fitted = [cycle_harmonics(phase[part], both[part], order) for part in parts]
+    mean_force, mean_motion = np.array([mean for mean, *_ in fitted]).T
+    amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
+    error = max(drive.noise, *(left[0] for *_, left in fitted)) * np.sqrt(1.0 / rows)  # of the force [N or N m]
     (motion, force, _), units = loop.direction.motion.words, loop.direction.display
     least = _WORTH_TELLING * np.ptp(loop.force) / 2.0
-    yield from _settling(cycles, least, force, units.force)
-    yield from _drifting(cycles.mean_force, max(_REAL_CHANGE * 1.5 * cycles.error, least), force, units.force)
+    yield from _settling(amplitude, error, least, force, units.force)
+    yield from _drifting(mean_force, max(_REAL_CHANGE * 1.5 * error, least), force, units.force)
     # a time that was made from the motion turns its noise into drift
     least_drift = 2.0 * _WORTH_TELLING * drive.amplitude if loop.timed else least_prominence(loop.displacement)
-    yield from _drifting(cycles.mean_motion, least_drift, motion, units.displacement)
+    yield from _drifting(mean_motion, least_drift, motion, units.displacement)

@@ -1,6 +1,7 @@
-"""The inspection of a test file: it is recognised by its columns, read, and told apart by its content."""
+"""The inspection of a test file: recognised by its columns, on which body or in which direction, and looked at."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from itertools import chain
@@ -10,30 +11,158 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign.campaign import reader_keywords
-from bushfit.campaign.files import LoopFile, SweepFile
-from bushfit.errors import BushfitError, MeasurementError, naming
-from bushfit.geometry import Direction, Place, Specimen
+from bushfit.campaign.schema import SpecimenTable
+from bushfit.errors import BushfitError, MeasurementError, NoTestError, naming, typed
+from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.inspection.labels import keys_from_labels, labels_of_file, temperatures_of
 from bushfit.inspection.loops import look_at_history, look_at_loop, look_at_programme
-from bushfit.inspection.recognition import direction_of, place_of, recognised
 from bushfit.inspection.record import ColumnSeen, Findings, Inspected, Kind
 from bushfit.inspection.sweeps import look_at_sweep
-from bushfit.reading.layout import DELIMITERS
+from bushfit.reading.columns import Rows
+from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary, of_motion
+from bushfit.reading.layout import DELIMITERS, FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.names import NO_LABELS, Labels
+from bushfit.reading.names import NO_LABELS, Labels, direction_of_file
+from bushfit.reading.resonance import is_resonance
 from bushfit.reading.source import Channels, Sheet
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reduction.programme import programme
 from bushfit.reduction.steps import sines
 from bushfit.validation import check_tables
 
+#: Sizes of a block in shear, as [[specimens]] has them.
+BLOCK_KEYS = ("area", "thickness", "elements")
+#: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
+_TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)
 #: [Hz] Frequency above which a motion in steps is a stepped sine; chosen: quasi-static loops are slower.
 _QUASI_STATIC = 1.0
-#: The key of a loop whose load cell counts the other way.
-_TURNED = {"force_sign": -1}
+
+
+def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
+    """The table of a file, and whether it is a sweep's and not a loop's.
+
+    The user states keys of [[loops]] and [[sweeps]], as TOML has them; each is used where it fits.
+
+    Raises:
+        NoTestError: a file that cannot be opened as a table, or whose columns make no test.
+        MeasurementError, UnitError: one whose columns might, if they were clear.
+    """
+    opened: list[tuple[Table, bool]] = []
+    failed: list[tuple[Mapping[str, Sequence[str]], BushfitError]] = []
+    kinds = [(names, motion) for motion in (TRANSLATION, STRAINING) for names in (LOOP_COLUMNS, SWEEP_COLUMNS)]
+    for names, motion in kinds:
+        is_sweep = names is SWEEP_COLUMNS
+        try:
+            table = open_table(file, names, stated, motion)
+        except BushfitError as error:
+            failed.append((of_motion(names, motion), error))
+            continue
+        opened.append((table, is_sweep))
+        if _missing(table, is_sweep=is_sweep) is None:
+            return table, is_sweep
+    _refuse_resonance(file, stated)
+    if not opened:
+        raise NoTestError(**vars(failed[0][1]))
+    best, is_sweep = max(opened, key=lambda one: len(one[0].roles))
+    for usual, failure in failed:
+        if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):
+            raise failure
+    known = ", ".join(role.replace("_", " ") for role in best.roles)
+    raise best.header_error(
+        "the columns do not make a test",
+        kind=NoTestError,
+        found=", ".join(best.headers) + (f" (understood: {known})" if known else ""),
+        expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
+        hint=f"correct the header, or name the column: --column {_missing(best, is_sweep=is_sweep)}=...",
+    )
+
+
+def _refuse_resonance(file: Path, stated: Mapping[str, Any]) -> None:
+    """Refuse a resonance test, with the way to make a sweep of it."""
+    try:
+        table = open_table(file, RESONANCE_COLUMNS, stated)
+    except BushfitError:  # then it is none
+        return
+    if is_resonance(table):
+        raise table.error(
+            "this is a resonance test, not a sweep",
+            kind=NoTestError,
+            expected="loops and sweeps",
+            hint=f'bushfit reduce {typed(file)} --mass "..." makes a sweep of it',
+        )
+
+
+def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | None:
+    """What a test was made on: a specimen, or the bushing in a direction, as stated or as the file says; else None.
+
+    A modulus is that of a specimen, a stiffness that of the bushing unless sizes of a block in shear are stated.
+
+    Raises:
+        MeasurementError: units of torsion where the user states another direction.
+        CampaignError, UnitError, ModelError: sizes that make no specimen.
+    """
+    keys: dict[str, Any] = {"kind": "shear"} | {key: stated[key] for key in BLOCK_KEYS if key in stated}
+    if table.motion is STRAINING:
+        headers = table.layout.written or [column.header for column in table.roles.values()]
+        keys = {"kind": "modulus"} | ({"strain": "tension"} if any(map(_TENSILE.search, headers)) else {})
+    elif len(keys) == 1:
+        return direction_of(file, table, stated)
+    name = stated.get("specimen", "bar" if "strain" in keys else "coupon")
+    return Specimen(**vars(check_tables({"name": name, **keys}, None, SpecimenTable)))
+
+
+def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Direction | None:
+    """The direction of a test of the bushing as the user states it, or else as its file does; None where neither does.
+
+    Raises:
+        MeasurementError: a file that says another direction than the user.
+    """
+    turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
+    headers = table.layout.written or table.headers
+    in_column = dict.fromkeys(table.row_labels.get("direction", (0, ()))[1])
+    named = direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
+    found = Direction(*in_column) if len(in_column) == 1 else named
+    if "direction" not in stated:
+        if len(in_column) > 1:
+            problem, hint = "this file holds tests in several directions", "state one: --direction axial"
+            raise table.header_error(problem, found=", ".join(in_column), expected="one direction", hint=hint)
+        return found
+    if found and found != stated["direction"] and len(in_column) < 2:
+        raise table.header_error(
+            f"{'the units say' if turns else 'the file says'} {found}, and --direction {stated['direction']}",
+            found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),
+            expected="one direction",
+            hint="leave --direction out; or give the file a name that says its direction, which goes before its header",
+        )
+    return Direction(stated["direction"])
+
+
+def _missing(table: Table, *, is_sweep: bool) -> str | None:
+    """The first role that a table lacks to be a test; None where it is one.
+
+    Of a sweep, frequency or amplitude may be held, and stated outside the table.
+    """
+    roles = set(table.roles)
+    nearest = max(STIFFNESS_PAIRS, key=lambda pair: len(roles & set(pair)))
+    if is_sweep and not roles & {"frequency", "amplitude"}:
+        return "frequency"
+    needed = nearest if is_sweep else ("displacement", "force")
+    return next((role for role in needed if role not in roles), None)
+
+
+def open_table(
+    file: Path, names: Mapping[str, Sequence[str]], stated: Mapping[str, Any], motion: Motion = TRANSLATION
+) -> Table:
+    """The table of a file if it is that of a test whose columns go by `names`, with what the user states of those."""
+    own = {
+        key: {role: text for role, text in stated.get(key, {}).items() if role in names} for key in ("columns", "units")
+    }
+    written = FileFormat(**{field.name: stated.get(field.name) for field in fields(FileFormat)})
+    rows = Rows(stated.get("direction"), stated.get("specimen_number"), stated.get("rows", {}))
+    return Table.open(file, names, own["columns"], own["units"], written, motion, rows if any(rows) else None)
 
 
 def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) -> Inspected:
@@ -51,11 +180,11 @@ def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) 
     # which of two translations it is makes no difference to reading
     read_as = direction or Direction.AXIAL
     entry = _entry(SweepFile if is_sweep else LoopFile, stated, table, direction)
-    by_name = labels_of_file(file, stated)
-    outside = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
-    if "at_amplitude" in outside.keys:
+    by_name = labels_of_file(file, table.source.sheet or "", stated)
+    said, told, counted = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
+    if "at_amplitude" in said:
         entry.pop("amplitude", None)  # counted already
-    entry |= outside.keys
+    entry |= said
     turned: list[str] = []
     measured: Loop | Sweep
     kind: Kind
@@ -64,9 +193,9 @@ def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) 
         kind, (facts, odd) = "sweep", look_at_sweep(measured, by_name)
     else:
         measured, entry, turned = _read_loop(file, read_as, entry, table)
-        kind, (facts, odd) = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile))
+        kind, (facts, odd) = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile)["test"])
     columns = _columns(table, is_sweep=is_sweep)
-    facts, counted = facts | outside.facts, outside.is_counted
+    facts |= told
     if is_sweep and (amplitude := table.roles.get("amplitude")):
         counted = amplitude.convention is not None
         if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):
@@ -131,18 +260,19 @@ def _read_loop(
     except MeasurementError as error:
         if "force_sign" in entry:
             raise
+        entry = {**entry, "force_sign": -1}
         try:
-            turned = read_loop(**_keywords(file, direction, {**entry, **_TURNED}, LoopFile))
+            turned = read_loop(**_keywords(file, direction, entry, LoopFile))
         except BushfitError:
             raise error from None
     odd = (
         f'"{table.roles["force"].header}" falls where "{table.roles["displacement"].header}" rises: the load cell '
         "counts the other way, and the campaign needs force_sign = -1"
     )
-    return turned, {**entry, **_TURNED}, [odd]
+    return turned, entry, [odd]
 
 
-def _look(measured: Loop, by_name: Labels, keywords: Mapping[str, Any]) -> tuple[Kind, Findings]:
+def _look(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findings]:
     """The kind of a recorded test, a loop, a programme of loops or a history, with its facts and oddities."""
     steps = sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in steps}
@@ -151,7 +281,7 @@ def _look(measured: Loop, by_name: Labels, keywords: Mapping[str, Any]) -> tuple
     if len(points) > 1 and fast:
         with suppress(MeasurementError):  # no steady sine after all
             return "history", look_at_history(measured, by_name)
-    loops = programme(measured, **keywords)
+    loops = programme(measured, test)
     if len(loops) > 1:
         return "loop", look_at_programme(measured, loops, by_name)
     facts, odd = look_at_loop(loops[0], by_name)

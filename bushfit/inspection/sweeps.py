@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.stats import linregress, poisson
+from scipy.special import pdtrc, stdtr
 
 from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import MISTAKES
@@ -15,8 +15,8 @@ from bushfit.inspection.record import Findings, told_frequencies
 from bushfit.reading.measurement import Sweep, loss_factor
 from bushfit.reading.names import Labels
 from bushfit.reading.runs import rows_alike
+from bushfit.reduction.arrays import MEDIAN_TO_SIGMA
 from bushfit.reduction.result import MISSED_LEVEL
-from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 from bushfit.units import number
 
 #: Standard deviations from which a point is off its repeats, or a block off the others; chosen: no noise goes that far.
@@ -63,8 +63,7 @@ def look_at_sweep(sweep: Sweep, labels: Labels) -> Findings:
         *_outliers(sweep, noise),
         *_odd_blocks(sweep),
         *_missed_level(sweep),
-        *_negative_loss(sweep),
-        *_doubtful_loss(sweep),
+        *_odd_loss(sweep),
     ]
     return facts, odd
 
@@ -91,7 +90,7 @@ def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
         scatter = noise.random[sweep.name, float(sweep.held[rows[0]])][0] * magnitude[rows[0]]
         same = min(float(finest[rows[0]] / scatter), 1.0)  # two draws fall on the same last digit
         expected += rows.size * (rows.size - 1) / 2.0 * same * max(same, _SAME_PHASE_P)
-    if copies and poisson.sf(copies - 1, expected) < _CHANCE:
+    if copies and pdtrc(copies - 1, expected) < _CHANCE:
         verb = "s repeat others" if copies > 1 else " repeats another"
         yield (
             f"{copies} row{verb} digit by digit, the first of them at {sweep.frequency[first]:.4g} Hz (data row "
@@ -181,9 +180,10 @@ def _odd_blocks(sweep: Sweep) -> Iterator[str]:
             )
     repeat = np.array([sweep.repeat[rows[0]] for rows in blocks], dtype=float)
     if np.unique(repeat).size > 2 and np.ptp(gain) > 0.0:
-        line = linregress(repeat, gain)
-        drift = line.slope * np.ptp(repeat)
-        if line.pvalue < _CHANCE and abs(drift) > _LEAST_DRIFT:
+        correlation, freedom = float(np.corrcoef(repeat, gain)[0, 1]), repeat.size - 2
+        drift = correlation * float(np.std(gain) / np.std(repeat) * np.ptp(repeat))  # of the line through the gains
+        t = abs(correlation) * np.sqrt(freedom / max(1.0 - correlation**2, 1e-20))
+        if 2.0 * stdtr(freedom, -t) < _CHANCE and abs(drift) > _LEAST_DRIFT:
             yield (
                 f"|K| drifts by {number(100 * drift, 2, '+')} % from the first repeat to the last: warming up, or "
                 "settling?"
@@ -195,14 +195,13 @@ def _missed_level(sweep: Sweep) -> Iterator[str]:
     off = sweep.amplitude_reached / sweep.amplitude - 1.0
     row = int(np.argmax(np.abs(off)))
     if abs(off[row]) > MISSED_LEVEL:
-        reached, level = (
-            shown_amplitude(sweep.direction, sweep.amplitude_reached[row]),
-            shown_amplitude(sweep.direction, sweep.amplitude[row]),
-        )
+        both = sweep.amplitude_reached[row], sweep.amplitude[row]
+        reached, level = (shown_amplitude(sweep.direction, size) for size in both)
         yield f"{reached} was reached where the level is {level} ({sweep.frequency[row]:.4g} Hz)"
 
 
-def _negative_loss(sweep: Sweep) -> Iterator[str]:
+def _odd_loss(sweep: Sweep) -> Iterator[str]:
+    """Sentences on losses below zero, and on one that hardly any rubber has, with what the file may say instead."""
     bad = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if bad.size:
         level = shown_amplitude(sweep.direction, sweep.amplitude[bad[0]])
@@ -210,10 +209,6 @@ def _negative_loss(sweep: Sweep) -> Iterator[str]:
             f"{bad.size} point{'s' * (bad.size > 1)} with a loss factor below zero, the first at "
             f"{sweep.frequency[bad[0]]:.4g} Hz, {level}: is the force channel late?"
         )
-
-
-def _doubtful_loss(sweep: Sweep) -> Iterator[str]:
-    """A sentence on a loss that hardly any filled rubber has, and on what the file may say instead."""
     mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.possible(sweep)]
     if mistakes:
         unless = ", or ".join(mistake.in_words(sweep) for mistake in mistakes)

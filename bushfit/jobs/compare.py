@@ -109,8 +109,7 @@ class Compared:
         for label, entry, found in zip(self.labels, self.entries, predicted, strict=True):
             for line in warnings_of(entry.result, [prediction.warnings for prediction in found]):
                 of_each.setdefault(line, []).append(label)
-        told = [f"{', '.join(who)}: {line}" for line, who in of_each.items()]
-        return [*self.notes, *self._shared(), *told]
+        return [*self.notes, *self._shared(), *(f"{', '.join(who)}: {line}" for line, who in of_each.items())]
 
     def _shared(self) -> list[str]:
         """That results were fitted to the same files, and what this does."""
@@ -258,8 +257,7 @@ class Compare:
             for family in families
         ]
         first = families[0].evidence
-        no_gap = lack_of_fit(first.model, data_sets, first.parameters) is None
-        notes = [_NO_GAP] if no_gap else []
+        notes = [_NO_GAP] if lack_of_fit(first.model, data_sets, first.parameters) is None else []
         if left:
             odds = number(100.0 * sum(left.values()), 2)
             notes.append(f"{len(left)} more families have odds of {odds} % together: {', '.join(left)}")

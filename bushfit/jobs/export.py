@@ -12,8 +12,7 @@ from typing_extensions import Doc, TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.errors import ModelError
-from bushfit.export.contract import Dialect, Exported, Order
-from bushfit.export.systems import UnitSystem
+from bushfit.export.contract import Dialect, Exported, Order, UnitSystem
 from bushfit.jobs.predict import Predict, Predicted
 from bushfit.model.result import Result
 from bushfit.progress import counting
@@ -97,8 +96,7 @@ class Export:
         predicted = self.predict.run(result, campaign)
         grids = [np.unique(prediction.frequency) for prediction in predicted.predictions]
         if not all(np.array_equal(grid, grids[0]) for grid in grids):
-            union = tuple(np.unique(np.concatenate(grids)).tolist())
-            asked = replace(self.predict.asked, frequencies=union)
+            asked = replace(self.predict.asked, frequencies=tuple(np.unique(np.concatenate(grids)).tolist()))
             predicted = replace(self.predict, asked=asked).run(result, campaign)
         settings = (self.accuracy, self.units, self.dialect, self.decimal_comma)
         day = datetime.now(UTC).date().isoformat()

@@ -1,10 +1,12 @@
-"""plan: which tests next, chosen for what they would tell."""
+"""plan: which tests next, chosen for what they would tell, and the file that says so, key by key."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Annotated, Literal
 
 import numpy as np
+from typing_extensions import Doc, TypedDict
 
 from bushfit.campaign.campaign import Campaign, model_of
 from bushfit.campaign.schema import PredictSettings, RigSettings, SimulatedLoop
@@ -13,22 +15,118 @@ from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Place, place_named
 from bushfit.jobs.grid import asked_or, default_grid, grid_settings
-from bushfit.jobs.plan_document import Checked, PlanFile, PlannedRun, Reached, Rivalry, Shown, TargetEntry
 from bushfit.model.result import Result
-from bushfit.planning.campaign import campaign_toml
-from bushfit.planning.check import Check
+from bushfit.planning.campaign import Check, campaign_toml
 from bushfit.planning.contract import Aim, Knowledge, Plan, Points, Programme, Target, Test, Wanted, motions
-from bushfit.planning.guess import guess
-from bushfit.planning.knowledge import of_campaign, of_result, rig_of
+from bushfit.planning.knowledge import guess, of_campaign, of_result, rig_of
 from bushfit.planning.offer import RIVALS_APART
 from bushfit.planning.plan import plan
+from bushfit.report.artifacts import plan_contents
 from bushfit.report.contents import Contents, Kinds
-from bushfit.report.planned import plan_contents
 
 #: Quantities of predictions that may be targets.
 PREDICTED = ("stiffness", "loss_factor")
 #: File of the plan that `simulate` takes.
 CAMPAIGN_FILE = "campaign.toml"
+
+
+class PlannedRun(TypedDict):
+    """One run of the rig, in the order of the plan."""
+
+    place: Annotated[str, Doc("direction, or specimen by its name.")]
+    kind: Annotated[Literal["loop", "sweep"], Doc("of the test.")]
+    stepped: Annotated[
+        Literal["frequency", "amplitude"] | None,
+        Doc("what changes from point to point of a sweep, the other is held; null of a loop."),
+    ]
+    amplitudes: Annotated[list[float], Doc("zero-to-peak, in the unit.")]
+    unit: Annotated[str, Doc('SI, of the amplitudes: "m", "rad" or "1".')]
+    frequencies_Hz: Annotated[list[float], Doc("of the points, or of the loop.")]
+    cycles: Annotated[int | None, Doc("of a loop; null of a sweep.")]
+    minutes: Annotated[float, Doc("that it takes, with the change of direction before it.")]
+
+
+class Reached(TypedDict):
+    """What is known before, with the planned tests, and with the standard programme of as many hours."""
+
+    before: Annotated[float, Doc("without further tests.")]
+    planned: Annotated[float, Doc("with the tests of the plan.")]
+    standard: Annotated[float, Doc("with the standard programme instead.")]
+
+
+class TargetEntry(Reached):
+    """Half of a 95 % interval over its value, the widest of all points that are wanted."""
+
+    asked: Annotated[float, Doc("at most.")]
+    met: Annotated[bool, Doc("whether the planned tests meet it.")]
+    why: Annotated[str | None, Doc("what they fail by, in words; null where it is met.")]
+
+
+class Shown(TypedDict):
+    """The smallest amount of an effect that a test of 5 % finds in 90 % of the cases."""
+
+    parameter: Annotated[str, Doc("whose amount it is.")]
+    unit: Annotated[str, Doc('SI; "1" of a ratio.')]
+    planned: Annotated[float | None, Doc("by the tests of the plan.")]
+    standard: Annotated[float | None, Doc("by the standard programme.")]
+
+
+class Rivalry(TypedDict):
+    """Models that explain what is known alike."""
+
+    effects: Annotated[list[str], Doc("that each adds.")]
+    planned: Annotated[
+        float,
+        Doc("expected chi-square between the two nearest after the best refit of either, by the tests of the plan."),
+    ]
+    standard: Annotated[float, Doc("the same by the standard programme.")]
+    enough: Annotated[float, Doc("from which on they are told apart in nine of ten cases.")]
+
+
+class Checked(TypedDict):
+    """The plan simulated many times, each campaign fitted anew."""
+
+    campaigns: Annotated[int, Doc("that were simulated.")]
+    failed: Annotated[int, Doc("that could not be fitted.")]
+    seed: Annotated[int, Doc("of the first; the others count on.")]
+    predicted: Annotated[dict[str, float], Doc("relative standard error of each parameter by the plan, by name.")]
+    found: Annotated[dict[str, float], Doc("the same from the scatter of the fits.")]
+    ci95: Annotated[dict[str, list[float]], Doc("of what was found, least and largest.")]
+
+
+class PlanFile(TypedDict):
+    """plan.json: tests chosen for an aim, and what they would tell."""
+
+    schema: Annotated[str, Doc("of this file.")]
+    source: Annotated[str, Doc("where what is known before comes from, in words.")]
+    aim: Annotated[Aim, Doc("what the plan is for.")]
+    hours: Annotated[float, Doc("of the rig, at most.")]
+    tests: Annotated[list[PlannedRun], Doc("runs in their order.")]
+    hours_planned: Annotated[float, Doc("that they take.")]
+    hours_standard: Annotated[
+        float,
+        Doc("that the standard programme takes, as often as it fits into the hours that the plan needs."),
+    ]
+    hours_left: Annotated[float, Doc("of those of the rig, that no test takes.")]
+    enough: Annotated[str | None, Doc("why hours stay free, in words; null where they are used.")]
+    targets: Annotated[dict[str, TargetEntry], Doc("95 % intervals that were asked for, by name; none but for them.")]
+    parameters: Annotated[dict[str, Reached], Doc("relative standard error of each parameter, by name.")]
+    stiffness: Annotated[
+        dict[str, Reached],
+        Doc("root mean square relative standard error of the stiffness where it is wanted, by place."),
+    ]
+    loss_factor: Annotated[dict[str, Reached], Doc("the same of the loss factor, in loss factor.")]
+    visible: Annotated[dict[str, Shown], Doc("effects that the standard programme shows, by name.")]
+    drift: Annotated[
+        dict[str, float],
+        Doc(
+            "largest shift of a parameter over its standard error by a drift of the gain of 1 % over the session; by "
+            "the order of the plan, and by direction and level in turn."
+        ),
+    ]
+    rivals: Annotated[Rivalry | None, Doc("null where there are none.")]
+    check: Annotated[Checked | None, Doc("null where the plan was not simulated.")]
+    warnings: Annotated[list[str], Doc("what a user must know.")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,13 +187,10 @@ class Planned:
         """The smallest amounts that either programme finds of each effect."""
         for planned, standard in zip(self.plan.planned.visible, self.plan.standard.visible, strict=True):
             amounts = [each.amount if np.isfinite(each.amount) else None for each in (planned, standard)]
-            entry: Shown = {
-                "parameter": planned.parameter,
-                "unit": planned.unit,
-                "planned": amounts[0],
-                "standard": amounts[1],
-            }
-            yield planned.effect, entry
+            yield (
+                planned.effect,
+                Shown(parameter=planned.parameter, unit=planned.unit, planned=amounts[0], standard=amounts[1]),
+            )
 
     def _rivalry(self, planned: Programme, standard: Programme) -> Rivalry | None:
         if planned.apart is None or standard.apart is None:

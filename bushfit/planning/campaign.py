@@ -1,18 +1,35 @@
-"""A plan as a campaign that `bushfit simulate` runs: its tests, the errors of the rig, and the model."""
+"""A plan on the virtual rig: the campaign that `bushfit simulate` runs, and whether the plan keeps what it promises.
+
+Notes:
+    For that it is simulated many times, and each campaign is fitted anew. What is simulated is all that a fit would
+    see: noise that it has to estimate from the repeats, errors of runs and levels, start values read off the data.
+    Nothing is told to the fit but the rig's class, which a campaign states too.
+"""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtri
+from threadpoolctl import threadpool_limits
 
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.campaign.written import body_lines, place_line, toml_value
+from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.toml import body_lines, place_line, toml_value
 from bushfit.effects import BASE, qualified
+from bushfit.effects.contract import Array
+from bushfit.errors import FitError
+from bushfit.fitting.coordinates import Coordinates
+from bushfit.fitting.data import Data
+from bushfit.fitting.information import relative_sizes
+from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Specimen
-from bushfit.model.model import Model
 from bushfit.planning.contract import Noise, Plan, Test
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 #: Settings of [simulate] that are written as they are, in the order of the file.
 _SETTINGS = (
@@ -28,6 +45,10 @@ _UNITS: Mapping[str, str | None] = {
     "amplitude": None,
     "amplitudes": None,
 }
+#: Of one campaign what was found less the truth, (k,); None where no fit was possible.
+Found = Array | None
+#: Does work(seeds) for parts of the seeds, in some order, and gives the number and the result of each.
+Every = Callable[[Sequence[int], Callable[[Sequence[int]], list[Found]]], Iterable[tuple[int, Found]]]
 
 
 def settings_of(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateSettings:
@@ -61,32 +82,22 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
         "# All repeats of a sweep follow each other here; the order on the rig is that of the sheet.",
         *body_lines(known.model.bushing, dict.fromkeys(each for each in tested if isinstance(each, Specimen))),
         *("", "[simulate]", *(_line(key, getattr(settings, key)) for key in _SETTINGS)),
-        *_model_lines(known.model),
+        *("", "[simulate.parameters]"),
     ]
+    for record in known.model.records:
+        lines += [] if record.name in BASE else ["", f"[simulate.effects.{toml_value(record.name)}]"]
+        for parameter in record.parameters:
+            value = _number(known.model.values[qualified(record, parameter)])
+            text = value if parameter.unit == "1" else toml_value(f"{value} {parameter.unit}")
+            lines.append(f"{parameter.name} = {text}")
     for kind, tests in (("loops", settings.loops), ("sweeps", settings.sweeps)):
         for test in tests:
-            lines += ["", f"[[simulate.{kind}]]", *_test_lines(test)]
+            lines += ["", f"[[simulate.{kind}]]", place_line(test.direction)]
+            for each in fields(test):  # what it states other than the default
+                value = getattr(test, each.name)
+                if each.name not in ("direction", "temperature") and value != each.default:
+                    lines.append(_line(each.name, value, test))
     return "\n".join(lines) + "\n"
-
-
-def _model_lines(model: Model) -> Iterator[str]:
-    """The lines of [simulate.parameters] and of each added effect, in SI."""
-    yield from ("", "[simulate.parameters]")
-    for record in model.records:
-        if record.name not in BASE:
-            yield from ("", f"[simulate.effects.{toml_value(record.name)}]")
-        for parameter in record.parameters:
-            value = _number(model.values[qualified(record, parameter)])
-            yield f"{parameter.name} = {value if parameter.unit == '1' else toml_value(f'{value} {parameter.unit}')}"
-
-
-def _test_lines(test: Test) -> Iterator[str]:
-    """The lines of one test: what it states other than the default."""
-    yield place_line(test.direction)
-    for each in fields(test):
-        value = getattr(test, each.name)
-        if each.name not in ("direction", "temperature") and value != each.default:
-            yield _line(each.name, value, test)
 
 
 def _line(key: str, value: Any, test: Test | None = None) -> str:
@@ -105,3 +116,76 @@ def _line(key: str, value: Any, test: Test | None = None) -> str:
 def _number(value: float) -> str:
     """A number to twelve digits, in which no rounding of a unit is left."""
     return f"{value:.12g}"
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """Standard errors of relative changes of k parameters: those promised, and those that simulated campaigns show.
+
+    Args:
+        names: of the parameters.
+        predicted: by the plan, (k,).
+        off: found less true values of each campaign, relative, (campaigns, k).
+        failed: campaigns that could not be fitted.
+        seed: of the first campaign; the others count on.
+    """
+
+    names: tuple[str, ...]
+    predicted: Array
+    off: Array
+    failed: int
+    seed: int
+
+    @property
+    def found(self) -> Array:
+        """Standard deviation of what the campaigns show about the truth, (k,)."""
+        return np.sqrt(np.mean(np.square(self.off), axis=0))
+
+    @property
+    def interval(self) -> tuple[Array, Array]:
+        """95 % interval of each standard error found, (k,) each: of n campaigns, n found^2 / chi-square of n."""
+        n = len(self.off)
+        low, high = (self.found * np.sqrt(n / chdtri(n, p)) for p in (0.025, 0.975))
+        return low, high
+
+
+def check(plan: Plan, count: int, seed: int, every: Every) -> Check:
+    """Simulate and fit a plan `count` times.
+
+    A plan that adds to tests of a campaign is simulated with those, as it will be fitted with them.
+
+    Args:
+        seed: of the first campaign; the others count on.
+        every: gives work(seeds) of parts of the seeds, each with its number: as `batch.pool.run` does on all cores.
+
+    Raises:
+        FitError: none of the campaigns could be fitted.
+    """
+    known = plan.knowledge
+    settings = settings_of((*known.tests, *plan.planned.tests), known.noise)
+    work = partial(_several, undisturbed(known.model, settings), settings, plan.wanted.rig, known.names)
+    found = dict(every(range(seed, seed + count), work))
+    fitted = [row for _, row in sorted(found.items()) if row is not None]
+    if not fitted:
+        raise FitError("no simulated campaign of this plan could be fitted", found=f"{count} campaigns")
+    predicted = plan.planned.errors if known.tests else plan.planned.alone
+    return Check(known.names, predicted, np.array(fitted), count - len(fitted), seed)
+
+
+def _several(
+    clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str], seeds: Sequence[int]
+) -> list[Found]:
+    """Of each seed the parameters found less the true ones, relative; None without a fit."""
+    truth, found = clean.truth, list[Found]()
+    coordinates, sizes = Coordinates.of(truth, names), relative_sizes(truth, names)
+    with threadpool_limits(1):
+        for seed in seeds:
+            campaign = replace(measure(clean, replace(settings, seed=seed)).campaign(), rig=rig)
+            with suppress(FitError):
+                data = Data.of(campaign)
+                places = list(dict.fromkeys(str(data_set.direction) for data_set in data.data_sets))
+                model = fit_joint(data, effects=truth.effects, directions=places).model
+                found.append((coordinates.point(model.values) - coordinates.point(truth.values)) / sizes)
+                continue
+            found.append(None)
+    return found

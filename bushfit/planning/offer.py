@@ -1,22 +1,44 @@
-"""What is on offer: the runs that a rig can make, what each would tell of models that may be right, and its cost."""
+"""What is on offer: the runs that a rig can make, their cost, the standard programme, and what each run would tell."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from bushfit.campaign.schema import SimulatedLoop
+from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.priors import TELLS
 from bushfit.effects.contract import Array
+from bushfit.errors import ModelError
 from bushfit.fitting.coordinates import residual
 from bushfit.fitting.data_sets import new_sweep
+from bushfit.geometry import ROTATION, TRANSLATION, Direction, Place
 from bushfit.model.covariance import Z95
-from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
-from bushfit.planning.contract import Knowledge, Test, Wanted
+from bushfit.planning.contract import Knowledge, Test, Wanted, operating_points
 from bushfit.planning.criterion import Budget, View, distances
 from bushfit.planning.sensitivity import Grid, relative_slopes
 from bushfit.planning.targets import ENDLESS, Goal, goals
+from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
 
+#: Time to bring the rig to another run, for its control to settle [s]; chosen.
+_RUN_SECONDS = 120.0
+#: Cycles of the loops that are considered: few, and so many that the noise of the rows hardly counts.
+_LOOP_CYCLES = (3, 20)
+#: Which of ten frequencies, evenly spaced below three near the top and the top, a run steps through: all of the seven,
+#: few, the ends, either end more densely, and those near the top with none, one or two of the lowest.
+_CHOICES = (
+    (0, 1, 2, 3, 4, 5, 9),
+    (0, 2, 4, 9),
+    (0, 3, 9),
+    (0, 9),
+    (0, 1, 2),
+    (4, 5, 9),
+    (6, 7, 8, 9),
+    (0, 7, 8, 9),
+    (0, 1, 6, 7, 8, 9),
+)
+#: Axial strain per displacement of the paper's bushing [1/m]: 1/sqrt(2 (b^2 - a^2) ln(b/a)), a = 10 mm, b = 18 mm.
+_PAPER_STRAIN = float(1.0 / np.sqrt(2.0 * (0.018**2 - 0.010**2) * np.log(1.8)))
 #: The 90 % quantile of the normal distribution.
 _NINE_OF_TEN = 1.2815515655446004
 #: Amount of an effect over its standard error that a test of one in twenty finds in nine of ten cases: the 97.5 % and
@@ -25,6 +47,108 @@ FOUND = Z95 + _NINE_OF_TEN
 #: Expected chi-square between rivals from which on `diagnose` tells them apart in nine of ten cases: of d it finds d
 #: with a standard deviation of 2 sqrt(d), and it takes those for one set that are within TELLS.
 RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + TELLS))) ** 2
+
+
+def minutes(test: Test, rig: RigSettings) -> float:
+    """Time that one run takes, without a change of direction before it."""
+    if isinstance(test, SimulatedLoop):
+        return (_RUN_SECONDS + test.cycles / test.frequency) / 60.0
+    per_point = rig.minutes_per_point or 30.0  # [s], chosen: some cycles to settle, and some to average
+    return (_RUN_SECONDS + per_point * test.points[0].size) / 60.0
+
+
+def standard_tests(known: Knowledge, wanted: Wanted) -> list[Test]:
+    """Every run of the standard programme once: the paper's, axial and radial; of specimens, the axial ones.
+
+    Displacements are those that make the paper's axial strains, within the limits of the rig.
+    """
+    if known.model.bushing is None:
+        return [test for place in wanted.places for test in _of_paper(known, wanted.rig, place)]
+    loops = [test for test in _of_paper(known, wanted.rig, Direction.AXIAL) if isinstance(test, SimulatedLoop)]
+    sweeps = [test for place in (Direction.AXIAL, Direction.RADIAL) for test in _of_paper(known, wanted.rig, place)]
+    return [*loops, *(test for test in sweeps if isinstance(test, SimulatedSweep))]
+
+
+def candidates(known: Knowledge, wanted: Wanted) -> list[Test]:
+    """Runs to choose from: the standard programme's, and others of few points, over its amplitudes and beyond.
+
+    Raises:
+        ModelError: there is none within the limits of the rig.
+    """
+    found = [test for test in standard_tests(known, wanted) if test.direction in wanted.places]
+    found += [replace(test, cycles=_LOOP_CYCLES[-1]) for test in found if isinstance(test, SimulatedLoop)]
+    for place in wanted.places:
+        wished = [points for points in wanted.points if points.place == place]
+        usual = [test for test in _of_paper(known, wanted.rig, place) if isinstance(test, SimulatedSweep)]
+        if usual:
+            sizes = np.concatenate([*(each.amplitude for each in wished), *(each.amplitudes for each in usual)])
+            rates = np.concatenate([*(each.frequency for each in wished), *(each.frequencies for each in usual)])
+            found += _runs(known, wanted.rig, place, sizes, rates)
+    if not found:
+        places = " and ".join(map(str, wanted.places))
+        raise ModelError(
+            "the rig can make no test of this bushing",
+            place="[rig]",
+            found=f"limits below every test that is considered, {places}",
+            expected="limits that let it make two points of a sweep, or a loop",
+        )
+    return list(dict.fromkeys(found))
+
+
+def _of_paper(known: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
+    """The paper's loop and axial sweeps at a place, as far as the rig can make them; a run for each amplitude."""
+    of_strain = Direction.AXIAL if place is Direction.RADIAL else place  # the paper's radial displacements are axial
+    scale = _PAPER_STRAIN / known.model.unit_strain(of_strain)
+    loops = [replace(loop, direction=place, amplitude=_rounded(loop.amplitude * scale)) for loop in PAPER_LOOPS]
+    sweep = PAPER_SWEEPS[0]
+    sweeps = [replace(sweep, direction=place, amplitudes=(_rounded(x * scale),)) for x in sweep.amplitudes]
+    tests: list[Test] = [*loops, *sweeps]
+    return [kept for test in tests if (kept := _within(known, rig, test)) is not None]
+
+
+def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates: Array) -> Iterator[Test]:
+    """Sweeps and loops at one place over amplitudes [m or rad] and frequencies [Hz], and beyond.
+
+    Frequencies go to twice those of the standard programme, where [rig] says that the rig can; those near the top show
+    masses, delays and resonances in fewer points than a whole sweep.
+    """
+    amplitudes = [_rounded(x) for x in np.geomspace(sizes.min(), 2.0 * sizes.max(), 6)]
+    top = min(2.0 * float(rates.max()), rig.max_frequency or float(rates.max()))
+    even = np.geomspace(0.2 * rates.min(), top, 7)
+    frequencies = [min(_rounded(f), top) for f in (*even[:-1], 0.7 * top, 0.8 * top, 0.9 * top, top)]
+    steps = [tuple(sorted({frequencies[i] for i in chosen})) for chosen in _CHOICES]
+    runs: list[Test] = [SimulatedSweep(place, (x,), stepped) for x in amplitudes for stepped in steps]
+    runs += [SimulatedSweep(place, tuple(amplitudes), (frequencies[i],), "amplitude") for i in (0, 2, 4, 9)]
+    # quasi-static loops, and as fast as most rigs still record
+    runs += [SimulatedLoop(place, x, f, n) for x in amplitudes for f in (0.1, 1.0) for n in _LOOP_CYCLES]
+    yield from (kept for run in runs if (kept := _within(known, rig, run)) is not None)
+
+
+def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
+    """A test less the steps that are beyond the limits of the rig or what rubber bears; None where too few are left."""
+    (frequency, size), place = operating_points(test), test.direction
+    force = np.abs(known.model.stiffness(place, frequency, size)) * size
+    limits = [(frequency, rig.max_frequency)]
+    if place.motion is TRANSLATION:
+        speed = 2.0 * np.pi * frequency * size
+        limits += [(force, rig.max_force), (size, rig.max_displacement), (speed, rig.max_velocity)]
+    elif place.motion is ROTATION:
+        limits += [(force, rig.max_moment), (size, rig.max_rotation)]
+    bearable = size * known.model.unit_strain(place) <= max(0.5, known.strain or 0.0)  # what it has borne
+    for reached, limit in limits:
+        bearable &= reached <= (limit or np.inf) * (1.0 + 1e-9)  # rounding
+    if isinstance(test, SimulatedLoop):
+        return test if bearable.all() else None
+    kept = np.array(test.steps)[bearable]
+    if kept.size < 2:
+        return None
+    steps = tuple(kept.tolist())
+    return replace(test, frequencies=steps) if test.stepped == "frequency" else replace(test, amplitudes=steps)
+
+
+def _rounded(value: float) -> float:
+    """To two digits, as a set point is typed."""
+    return float(f"{value:.2g}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,13 +225,13 @@ class Offer:
             else (test.direction, test.stepped, test.held)
             for test in self.tests
         ]
-        known = list(dict.fromkeys(lines))
+        known, setup = list(dict.fromkeys(lines)), self.wanted.rig.minutes_per_setup
         return Budget(
             np.array([minutes(test, self.wanted.rig) for test in self.tests]),
             np.array([places.index(test.direction) for test in self.tests]),
             np.array([known.index(line) for line in lines]),
             np.array([1000 * (test.direction in self.wanted.places) for test in self.tests]),
-            setup_minutes(self.wanted.rig),
+            30.0 if setup is None else setup / 60.0,  # half an hour where the rig states none (chosen)
             np.inf,
         )
 

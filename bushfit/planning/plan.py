@@ -14,11 +14,18 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.repeats import FEWEST_STEPS
 from bushfit.geometry import Place, Specimen
-from bushfit.planning.candidates import standard_tests
 from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible, Wanted
-from bushfit.planning.criterion import Budget, Criterion, best_runs, filled, noncentrality_of, root_of
-from bushfit.planning.offer import FOUND, RIVALS_APART, Offer, smallest_found
-from bushfit.planning.order import Drifting, ordered
+from bushfit.planning.criterion import (
+    Budget,
+    Criterion,
+    Drifting,
+    best_runs,
+    filled,
+    noncentrality_of,
+    ordered,
+    root_of,
+)
+from bushfit.planning.offer import FOUND, RIVALS_APART, Offer, smallest_found, standard_tests
 from bushfit.planning.sensitivity import Information
 from bushfit.planning.targets import ENDLESS, Goal, percent, untested
 from bushfit.reading.measurement import loss_factor
@@ -72,8 +79,15 @@ class _Planner:
 
     @cached_property
     def best(self) -> Array:
-        """So many runs of each test, (tests,); none where no test fits into the hours."""
-        return self._with_repeats(self._choice())
+        """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be; none
+        where no test fits into the hours."""
+        kept, standard = self.kept, self._counts(self.standard_runs)
+        best = best_runs(self._criterion(_PENALTY), self.budget, kept, kept)
+        if self._lacking(best):
+            starts = [best, *([] if kept.any() else [np.minimum(standard, self.budget.runs)])]
+            every = (best_runs(self.strict, self.budget, start, kept) for start in starts)
+            best = min(every, key=self.strict.together)
+        return self._with_repeats(best)
 
     @property
     def reaches(self) -> bool:
@@ -88,7 +102,7 @@ class _Planner:
     @property
     def sound(self) -> bool:
         """Whether all effects show as in the standard programme, and repeats tell the scatter."""
-        return not self.lacking and self._scatter_freedom(self.best) >= [_SCATTER_FREEDOM]
+        return not self._lacking(self.best) and self._scatter_freedom(self.best) >= [_SCATTER_FREEDOM]
 
     def plan(self) -> Plan:
         """See the function."""
@@ -102,19 +116,12 @@ class _Planner:
             )
         planned = self._programme(ordered(best, self.budget.place, self._drifting(best)) if best.any() else [])
         before, standard = self._programme([]), self._programme(self.standard_runs)
-        missed, reasons = tuple(self._missed(best, goal) for goal in self.offer.goals), self._purposes(best)
+        missed, reasons = tuple(self._missed(best, goal) for goal in self.offer.goals), dict[Test, str]()
+        for test in np.flatnonzero(best).tolist():
+            lost = self._lost(best, np.where(np.arange(best.size) == test, 0, best))
+            reasons[self.offer.tests[test]] = lost or "shows effects that the model lacks"
         enough, notes = self._enough(planned, missed), tuple(self._notes(planned, missed))
         return Plan(self.offer.known, self.offer.wanted, before, planned, standard, reasons, missed, enough, notes)
-
-    def _choice(self) -> Array:
-        """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be."""
-        kept, standard = self.kept, self._counts(self.standard_runs)
-        best = best_runs(self._criterion(_PENALTY), self.budget, kept, kept)
-        if self._lacking(best):
-            starts = [best, *([] if kept.any() else [np.minimum(standard, self.budget.runs)])]
-            every = (best_runs(self.strict, self.budget, start, kept) for start in starts)
-            best = min(every, key=self.strict.together)
-        return best
 
     def _with_repeats(self, counts: Array) -> Array:
         """The runs with a test of each place made twice, that a drift shows as in the standard programme, in place of
@@ -122,8 +129,11 @@ class _Planner:
         standard = self._drifting(self._counts(self.standard_runs)).noncentrality(self.standard_runs)
         for place in np.unique(self.budget.place[counts > 0]):
             mine = np.flatnonzero((counts > 0) & (self.budget.place == place))
-            again = mine[self.budget.runs[mine] > 1]
-            if mine.size > 2 and (counts[mine].max() < 2 or self._drift_shown(counts) < standard):
+            again, drifting = mine[self.budget.runs[mine] > 1], self._drifting(counts)
+            if mine.size > 2 and (
+                counts[mine].max() < 2
+                or drifting.noncentrality(ordered(counts, self.budget.place, drifting)) < standard
+            ):
                 quickest = again[np.argsort(self.budget.minutes[again])][:4]
                 counts = min(self._once_more(counts, quickest), key=self.strict.together, default=counts)
         return self._with_scatter(counts)
@@ -149,10 +159,6 @@ class _Planner:
         """What the interval of a goal does not hold because nothing was tested there, nor is by so many runs."""
         place = goal.target.place
         return untested(self.offer.known, place, self._tested(counts)) if place else None
-
-    def _drift_shown(self, counts: Array) -> float:
-        """Noncentrality of a drift by so many runs of each test, in their best order."""
-        return (drifting := self._drifting(counts)).noncentrality(ordered(counts, self.budget.place, drifting))
 
     def _with_scatter(self, counts: Array) -> Array:
         """The runs with further repeats of sweeps, until a fit can tell their scatter from what repeats differ by, as
@@ -210,11 +216,6 @@ class _Planner:
         """How often each test stands among the runs, (tests,)."""
         return np.bincount(np.array(runs, dtype=int), minlength=len(self.offer.tests))
 
-    @cached_property
-    def lacking(self) -> list[str]:
-        """Effects that the best runs show less well than the standard programme."""
-        return self._lacking(self.best)
-
     def _lacking(self, counts: Array) -> list[str]:
         """Effects that so many runs of each test show less well than the standard programme."""
         reached = noncentrality_of(self.offer.views[0].together(counts))[0]
@@ -237,10 +238,8 @@ class _Planner:
     def least(self) -> Array:
         """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
         reached = noncentrality_of(self.offer.views[0].together(self._counts(self.standard_runs)))[0]
-        seen = [
-            column.reach * np.sqrt(size) >= FOUND for column, size in zip(self.offer.grid.columns, reached, strict=True)
-        ]
-        return np.where(seen, reached, 0.0)
+        reach = np.array([column.reach for column in self.offer.grid.columns])
+        return np.where(reach * np.sqrt(reached) >= FOUND, reached, 0.0)
 
     def _drifting(self, counts: Array) -> Drifting:
         """What a drift does to so many runs of each test."""
@@ -259,6 +258,8 @@ class _Planner:
         found = view.together(counts)
         off, covariance = view.off(found)[0], np.linalg.inv(found.own[0])
         gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.offer.slopes, off, self.offer.slopes))
+        wanted, model = self.offer.wanted.points, self.offer.known.model
+        loss = np.concatenate([loss_factor(model.stiffness(at.place, at.frequency, at.amplitude)) for at in wanted])
         moved = root_of(found.own[0]) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
         # tests alone leave open what they tell less of than rounding; without tests errors are beyond all use
         values, vectors = np.linalg.eigh(found.own[0] - view.prior)
@@ -269,18 +270,12 @@ class _Planner:
             np.sqrt(np.diag(off))[:k],
             np.linalg.norm(alone, axis=1)[:k],
             gain,
-            phase * (1.0 + np.square(self._loss_factor())),
+            phase * (1.0 + np.square(loss)),
             float(self.offer.apart(counts, self.offer.tellable).min()) if self.offer.known.rivals else None,
             tuple(goal.half(off) for goal in self.offer.goals),
             tuple(self._visible(noncentrality_of(found)[0], drifting.noncentrality(runs))),
             0.01 * float(np.abs(moved[:k]).max()),
         )
-
-    def _loss_factor(self) -> Array:
-        """Of the model at the points wanted, (n,)."""
-        model = self.offer.known.model
-        stiffness = [model.stiffness(each.place, each.frequency, each.amplitude) for each in self.offer.wanted.points]
-        return np.concatenate([loss_factor(each) for each in stiffness])
 
     def _visible(self, reached: Array, drifting: float) -> Iterator[Visible]:
         """The smallest amount found of each effect that the standard programme shows, in the shape it shows best."""
@@ -318,14 +313,6 @@ class _Planner:
             return f"{number(self.hours, 3)} h are too few, about {hours} h would do"
         reached = percent(goal.half(self.offer.off(more)))
         return f"{hours} h would reach {reached}, and no further run would take a quarter per cent off that"
-
-    def _purposes(self, counts: Array) -> dict[Test, str]:
-        """In words, of each test with all its repeats, what of the aim would be lost without it."""
-        found = {}
-        for test in np.flatnonzero(counts).tolist():
-            without = np.where(np.arange(counts.size) == test, 0, counts)
-            found[self.offer.tests[test]] = self._lost(counts, without) or "shows effects that the model lacks"
-        return found
 
     def _lost(self, counts: Array, without: Array) -> str | None:
         """What fewer runs lose of the aim, the worst of it; None of next to nothing."""
@@ -376,8 +363,8 @@ class _Planner:
             )
         if missed and self._scatter_freedom(self.best) < [_SCATTER_FREEDOM]:
             yield "too few repeats tell how sweeps scatter: intervals may come out half as wide again as planned"
-        if self.lacking:
-            yield f"the standard programme shows these effects better: {', '.join(self.lacking)}"
+        if lacking := self._lacking(self.best):
+            yield f"the standard programme shows these effects better: {', '.join(lacking)}"
         tellable = {tuple(pair) for pair in self.offer.tellable.T.tolist()}
         for one, other in self.offer.pairs.T.tolist():
             if (one, other) not in tellable:

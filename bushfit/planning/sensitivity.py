@@ -56,9 +56,8 @@ class Information:
 
     def times(self, counts: Array) -> Information:
         """Each test so many times, (tests,)."""
-        return Information(
-            self.own * counts[:, None, None], self.cross * counts[:, None, None], self.size * counts[:, None]
-        )
+        by = counts[:, None, None]
+        return Information(self.own * by, self.cross * by, self.size * counts[:, None])
 
     def total(self) -> Information:
         """All tests together, (1, ...)."""

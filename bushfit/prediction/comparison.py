@@ -174,8 +174,7 @@ def compare(
 
 def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
     """The comparisons with the probabilities of all their parameters taken together."""
-    tested = [row.p for each in comparisons for row in each.parameters if row.p is not None]
-    found = iter(holm(tested))
+    found = iter(holm([row.p for each in comparisons for row in each.parameters if row.p is not None]))
 
     def counted(row: ParameterContrast) -> ParameterContrast:
         return row if row.p is None else replace(row, holm=next(found))
@@ -231,8 +230,10 @@ def _parameters(
     half, freedom = covariance.half_width(np.eye(len(rows))), covariance.freedom(np.eye(len(rows)))
     found, tested = list[ParameterContrast](), list[int]()
     for i, (name, exponent) in enumerate(rows):
-        parameter, note = reference.model.parameters[name], _untested(name, reference, other)
+        parameter = reference.model.parameters[name]
         of_ratio = parameter.log or exponent is not None
+        bounds = dict.fromkeys(result.at_bound[name] for result in (reference, other) if name in result.at_bound)
+        note = f"at its {' and '.join(bounds)}" if bounds else ""
         if not note and not np.isfinite(difference[i]):
             note = "zero in one"
         if not note and not error[i]:
@@ -264,12 +265,6 @@ def _equally_held(name: str, *results: Result) -> bool:
     """Whether a parameter was held at one value in all results."""
     free = any(result.covariance.stderr(name) for result in results)
     return not free and len({result.model.values[name] for result in results}) == 1
-
-
-def _untested(name: str, *results: Result) -> str:
-    """Why the standard error of a parameter tells nothing in one of the results, or ""."""
-    ends = [result.at_bound[name] for result in results if name in result.at_bound]
-    return f"at its {' and '.join(dict.fromkeys(ends))}" if ends else ""
 
 
 def _side(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) -> tuple[Array, Array]:

@@ -37,8 +37,6 @@ _RESONANCE_POINTS = 600
 #: Transmissibility from which a point counts as near the peak; chosen: about 0.6 to 1.3 of the peak's frequency, where
 #: the mount decides how far the mass moves.
 _NEAR_PEAK = 1.5
-
-
 #: What is predicted, each with its band.
 _BANDS = ("stiffness", "loss_factor", "storage_stiffness", "loss_stiffness")
 
@@ -119,7 +117,11 @@ def predict(
     measured = None if sweeps is None else _measured(direction, frequency, amplitude, sweeps)
     found = replace(first, if_rigs=others[-1] if others else None, measured=measured)
     every = (first, *others, *alternatives)
-    bands: dict[str, Any] = {name: _spanned([getattr(each, name) for each in every]) for name in _BANDS}
+    bands: dict[str, Any] = {}
+    for name in _BANDS:  # from the least to the largest of all
+        each_band = [getattr(each, name) for each in every]
+        low, high = (np.array([getattr(band, end) for band in each_band]) for end in ("low", "high"))
+        bands[name] = replace(each_band[0], low=low.min(axis=0), high=high.max(axis=0))
     points = np.array((frequency, amplitude, first.stiffness.value))
     if_rigs = others[-1].stiffness.value if others else None
     told = of_points(result, direction, points, if_rigs, None if rig else measured, temperature)
@@ -185,12 +187,6 @@ def _open_to(
     if model.unnamed:
         return parts * off * stiffness / (1.0 + share), np.sqrt(1.0 - np.square(stands))
     return parts * np.hypot(off, [share.real, share.imag]) * stiffness, np.sqrt(1.0 - np.square(stands))
-
-
-def _spanned(bands: Sequence[Band]) -> Band:
-    """The first band, from the least to the largest of all."""
-    low, high = (np.array([getattr(band, end) for band in bands]) for end in ("low", "high"))
-    return replace(bands[0], low=low.min(axis=0), high=high.max(axis=0))
 
 
 def _measured(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequence[SweepData]) -> Array:

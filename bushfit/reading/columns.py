@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.headers import Column, Vocabulary
+from bushfit.reading.headers import ROW_COLUMNS, Column, Vocabulary
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.layout import FileFormat, Layout, fits
 from bushfit.reading.measurement import Floats
@@ -20,7 +20,6 @@ from bushfit.reading.names import named_direction
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, is_like_number, weigh
 from bushfit.reading.runs import rows_alike
 from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, Channels, RowSource, Sheet, Text, rows
-from bushfit.reading.words import ROW_COLUMNS
 
 #: Rows that are taken apart at a time where a library cannot; chosen: their texts fill some MiB.
 _CHUNK_ROWS = 1 << 16

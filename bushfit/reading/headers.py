@@ -1,18 +1,43 @@
 """What the header of a column says in a test file: its role, its unit, and how it counts amplitudes."""
 
 import re
+import tomllib
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Literal
 
 from bushfit import units
-from bushfit.reading.words import WORDS
+from bushfit.geometry import STRAINING, Motion
 
+#: The words of words.toml, by table and key.
+WORDS: Mapping[str, Mapping[str, Sequence[str]]] = tomllib.loads(
+    Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
+)
+#: For each column of a loop, the headers it goes by.
+LOOP_COLUMNS = WORDS["loop"]
+#: For each column of a sweep, the headers it goes by.
+SWEEP_COLUMNS = WORDS["sweep"]
+#: For each column that says which test a row belongs to, by key, the headers it goes by.
+ROW_COLUMNS = {**WORDS["rows"], "specimen_number": WORDS["above"]["specimen_number"], "run": SWEEP_COLUMNS["repeat"]}
+#: For each column of a test of strain and modulus, the headers it goes by in place of those above.
+_STRAINING = {role: names for role, names in WORDS["straining"].items() if role != "amplitude_of"} | {
+    "amplitude": [
+        *SWEEP_COLUMNS["amplitude"],
+        *(
+            way.format(strain)
+            for strain in WORDS["straining"]["displacement"]
+            for way in WORDS["straining"]["amplitude_of"]
+        ),
+        *WORDS["straining"]["amplitude"],
+    ]
+}
+#: The columns of which the headers depend on the motion: those of what moves and of what resists it.
+OF_MOTION = (*_STRAINING, "amplitude_reached")
 #: How an amplitude is counted.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak"]
-
 #: How the headers of a frequency in radians begin.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsation", "角频率")
 #: What a rig writes of a channel in brackets: "Load(Linear:Load) (kN)".
@@ -61,6 +86,32 @@ _SPELLINGS: dict[int, int | str] = {
 }
 #: Where a name may end and a unit begin, other than at a bracket: "force_N", "Kraft in N", "F / kN", "load, N".
 _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
+
+
+def _made_of(body: str, quantity: str) -> list[str]:
+    """Every name of a quantity, such as "acceleration", before and after every name of a body, such as "base"."""
+    parts = WORDS["resonance_parts"]
+    return [way for name in parts[body] for word in parts[quantity] for way in (f"{name} {word}", word + name)]
+
+
+#: For each column of a resonance test (a mass on a mount on a shaker), the headers it goes by.
+RESONANCE_COLUMNS: Mapping[str, Sequence[str]] = {
+    "frequency": SWEEP_COLUMNS["frequency"],
+    **{f"{body}_{word}": _made_of(body, word) for word in ("acceleration", "phase") for body in ("base", "mass")},
+    **WORDS["resonance"],
+    **{
+        f"{body}_{part}": [
+            f"{name} {word}" for name in _made_of(body, "acceleration") for word in WORDS["resonance_parts"][part]
+        ]
+        for body in ("base", "mass")
+        for part in ("real", "imaginary")
+    },
+}
+
+
+def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
+    """The headers that columns go by in a test of one kind of motion: G' names a modulus, and no stiffness."""
+    return {role: _STRAINING.get(role, usual) if motion is STRAINING else usual for role, usual in names.items()}
 
 
 @dataclass(frozen=True)
@@ -114,8 +165,7 @@ class Vocabulary:
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str) -> Heading | None:
-        marked = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header)))
-        whole = marked.translate(_SPELLINGS)
+        whole = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header))).translate(_SPELLINGS)
         text, convention = split_convention(whole)
         if plain(header) in self._roles:  # a campaign may name a header with its unit
             name, unit = units.split_header(text)

@@ -1,20 +1,16 @@
 """Hysteresis loops read from files, or one error that tells why a file cannot be a loop."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from bushfit.geometry import Place, stated_strain
-from bushfit.reading.columns import Rows
-from bushfit.reading.headers import Column
-from bushfit.reading.layout import FileFormat
-from bushfit.reading.measurement import Floats, Loop, Waveform, rebuild_time, source_of
+from bushfit.reading.headers import LOOP_COLUMNS, Column
+from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.source import LEAST_VALUE
+from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS
 
 #: Rows of the shortest loop; chosen: fewer do not show a shape.
 _FEWEST_LOOP_ROWS = 10
@@ -23,60 +19,52 @@ _FEWEST_LOOP_ROWS = 10
 def read_loop(
     file: Path,
     direction: Place,
+    test: LoopFile,
     *,
     name: str | None = None,
-    listed_as: Path | None = None,
-    columns: Mapping[str, str] | None = None,
-    units: Mapping[str, str] | None = None,
-    written: FileFormat | None = None,
-    force_sign: Literal[1, -1] = 1,
-    rate: float | None = None,
-    frequency: float | None = None,
-    waveform: Waveform = "triangle",
-    noise: float | None = None,
-    weight: float = 1.0,
-    temperature: float | None = None,
-    conditions: Mapping[str, str | float] | None = None,
-    rows: Rows | None = None,
+    shared: bool = False,
 ) -> Loop:
     """Read a hysteresis loop.
 
     Args:
         file: a table with columns time (optional), displacement and force.
         direction: direction of the test, or its specimen, which settles the headers and units that fit.
+        test: what the file does not say itself, and the file as the campaign names it.
         name: of the loop; default the stem of the file.
-        listed_as: the file as the campaign names it, for provenance; default its name.
-        columns: header of a role (a key of LOOP_COLUMNS), where it is not a usual one.
-        units: unit of a role, where the file does not tell it.
-        written: how the file is written, where it does not tell.
-        force_sign: -1 turns the recorded force around.
-        rate: speed of the displacement [m/s or rad/s], for a file without time.
-        frequency: cycles per time [Hz], for a file without time; goes with `waveform`.
-        waveform: course of the displacement in time.
-        noise, weight: of the loop, see `Loop`.
-        temperature, conditions: at which it was tested [K], and what else is stated of the test, for provenance.
-        rows: of the file that make the test.
+        shared: whether the file holds other tests, too, so that a column has to tell them apart.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    table = Table.open(file, LOOP_COLUMNS, columns, units, written, direction.motion, rows or Rows())
+    rows = test.taken(shared=shared)
+    table = Table.open(file, LOOP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
     _check_not_swapped(table, direction)
-    wanted = _loop_columns(table, direction, force_sign, has_clock=rate is not None or frequency is not None)
+    wanted = _loop_columns(table, direction, test)
     values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
     displacement, force, time = values["displacement"], values["force"], values.get("time")
     for role in ("displacement", "force"):
         if np.ptp(values[role][:_FEWEST_LOOP_ROWS]) < LEAST_VALUE and np.ptp(values[role]) < LEAST_VALUE:
             raise table.error(f"the {role} never changes", column=wanted[role], expected="a loop")
-    _check_sense(table, wanted["force"], displacement, force, force_sign)
+    _check_sense(table, wanted["force"], displacement, force, test.force_sign)
     if time is None:
-        time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
+        time = test.clock(displacement)
     else:
-        _check_increases(table, wanted["time"], time)
-    source = source_of(file, listed_as, table.sha256, temperature, conditions, table.not_understood())
-    timed = "time" in values
+        later, hint = "a later time on every row", "if a column tells runs, bushfit init makes a loop of each"
+        table.refuse(np.append(False, time[1:] <= time[:-1]), wanted["time"], "time does not increase", later, hint)
+        if time[-1] - time[0] < LEAST_VALUE:
+            expected = f"{LEAST_VALUE:g} s or more"
+            raise table.error("the record takes no time", column=wanted["time"], expected=expected)
     return Loop(
-        name or file.stem, direction, time, displacement, force, noise, source, timed, weight, temperature=temperature
+        name or file.stem,
+        direction,
+        time,
+        displacement,
+        force,
+        test.noise,
+        test.source(table.sha256, test.temperature, table.not_understood()),
+        "time" in values,
+        test.weight,
+        temperature=test.temperature,
     )
 
 
@@ -95,15 +83,15 @@ def _check_not_swapped(table: Table, direction: Place) -> None:
         )
 
 
-def _loop_columns(table: Table, direction: Place, force_sign: int, *, has_clock: bool) -> dict[str, Column]:
-    """The columns of a loop with their units; only one `has_clock`, a rate or frequency that is stated, lacks time."""
+def _loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Column]:
+    """The columns of a loop with their units; only one with a rate or frequency that is stated lacks time."""
     displacement = table.column("displacement", direction.motion.displacement_unit)
     displacement = replace(displacement, scale=stated_strain(direction) * displacement.scale)
     force = table.column("force", direction.motion.force_unit)
-    wanted = {"displacement": displacement, "force": replace(force, scale=force_sign * force.scale)}
+    wanted = {"displacement": displacement, "force": replace(force, scale=test.force_sign * force.scale)}
     if "time" in table.roles:
         wanted["time"] = table.column("time", "s")
-    elif not has_clock:
+    elif test.rate is None and test.frequency is None:
         hint = 'or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign'
         raise table.missing("time", "s", hint)
     return wanted
@@ -120,11 +108,3 @@ def _check_sense(table: Table, column: Column, displacement: Floats, force: Floa
             if force_sign == 1
             else "take force_sign = -1 out of the campaign",
         )
-
-
-def _check_increases(table: Table, column: Column, time: Floats) -> None:
-    """Refuse a time that does not increase from row to row."""
-    expected, hint = "a later time on every row", "if a column tells runs, bushfit init makes a loop of each"
-    table.refuse(np.append(False, time[1:] <= time[:-1]), column, "time does not increase", expected, hint)
-    if time[-1] - time[0] < LEAST_VALUE:
-        raise table.error("the record takes no time", column=column, expected=f"{LEAST_VALUE:g} s or more")

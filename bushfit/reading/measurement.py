@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
-from bushfit.units import CELSIUS
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -42,19 +41,6 @@ class Source:
     sha256: str
     conditions: Mapping[str, str | float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-
-
-def source_of(
-    file: Path,
-    listed_as: Path | None,
-    sha256: str,
-    temperature: float | None,
-    conditions: Mapping[str, str | float] | None,
-    notes: Iterable[str] = (),
-) -> Source:
-    """The provenance of a test: its file as the campaign names it, and its conditions, a temperature [K] in degC."""
-    degrees = {} if temperature is None else {"temperature_degC": round(temperature - CELSIUS, 6)}
-    return Source(listed_as or Path(file.name), sha256, {**(conditions or {}), **degrees}, tuple(notes))
 
 
 @dataclass(frozen=True)
@@ -104,8 +90,7 @@ class Loop:
 
     def at(self, rows: slice | NDArray[np.bool_]) -> Loop:
         """The record of these rows alone."""
-        channels = {name: getattr(self, name)[rows] for name in ("time", "displacement", "force")}
-        return replace(self, **channels)
+        return replace(self, **{name: getattr(self, name)[rows] for name in ("time", "displacement", "force")})
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +194,10 @@ def rebuild_time(
             duration = 0.5 / frequency
         else:
             raise TypeError("rebuild_time needs a rate or a frequency")
-        elapsed = _strictly_increasing(share) * duration
+        highest, row = np.maximum.accumulate(share), np.arange(share.size)
+        keep = np.append(highest[1:] > highest[:-1], True) & (highest > highest[0])
+        keep[0] = True
+        elapsed = np.interp(row, row[keep], highest[keep]) * duration  # in straight lines where it stands still
         time[first : last + 1] = time[first] + elapsed - elapsed[0]
     return time
 
@@ -228,15 +216,6 @@ def _stroke_edges(displacement: Floats) -> NDArray[np.intp]:
     if turns.size and displacement[turns[-1]] == displacement[-1]:
         turns = turns[:-1]
     return np.concatenate([[0], turns, [displacement.size - 1]])
-
-
-def _strictly_increasing(values: Floats) -> Floats:
-    """The running maximum of values, with straight lines where it stands still."""
-    highest = np.maximum.accumulate(values)
-    keep = np.append(highest[1:] > highest[:-1], True) & (highest > highest[0])
-    keep[0] = True
-    index = np.arange(values.size)
-    return np.interp(index, index[keep], highest[keep])
 
 
 def loss_factor(stiffness: Complex) -> Floats:

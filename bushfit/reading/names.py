@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 from bushfit import units
 from bushfit.errors import UnitError
 from bushfit.geometry import Direction
-from bushfit.reading.headers import AmplitudeConvention, Vocabulary, plain, split_convention
+from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, AmplitudeConvention, Vocabulary, plain, split_convention
 from bushfit.reading.layout import Line
-from bushfit.reading.words import SWEEP_COLUMNS, WORDS
 
 #: Units as names have them, in lower case, with the usual spelling of those that have another one elsewhere.
 _UNITS = {

@@ -8,10 +8,9 @@ import numpy as np
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
-from bushfit.reading.headers import Column
+from bushfit.reading.headers import RESONANCE_COLUMNS, Column
 from bushfit.reading.measurement import Complex, Floats, Source
 from bushfit.reading.table import Table
-from bushfit.reading.words import RESONANCE_COLUMNS
 
 #: The columns that each make a transmissibility, in order of preference; a base acceleration may stand beside them.
 _WAYS = (

@@ -70,13 +70,17 @@ def runs_of(
         levels = nominal(_group_medians(amplitude, passes))  # every pass over the frequencies nearly keeps to one
         kept_frequency, kept_level = 0.0, 1.0
     of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
-    counted = repeat if repeat is not None else _occurrence(frequency, levels)
+    if repeat is None:
+        import pandas as pd
+
+        points = pd.DataFrame({"frequency": frequency, "level": levels}).groupby(["frequency", "level"])
+        repeat = np.asarray(points.cumcount(), dtype=np.int64) + 1
     if stepped is None:
         by_order: Stepped = "amplitude" if kept_frequency > kept_level else "frequency"
         in_order = max(kept_frequency, kept_level) >= _IN_ORDER
         order_tells = in_order and (of_level if by_order == "amplitude" else of_frequency) >= _FEWEST_STEPS
         stepped = by_order if order_tells else "amplitude" if of_level > of_frequency else "frequency"
-    return Runs(stepped, levels, counted)
+    return Runs(stepped, levels, repeat)
 
 
 def nominal(amplitude: Floats) -> Floats:
@@ -158,10 +162,3 @@ def _group_medians(values: Floats, group: NDArray[np.intp]) -> Floats:
 def _group_numbers(*keys: Floats | NDArray[np.int64]) -> NDArray[np.intp]:
     """A number from 0 for each combination of keys, (n,)."""
     return np.unique(np.stack(keys), axis=1, return_inverse=True)[1].ravel()
-
-
-def _occurrence(*keys: Floats) -> NDArray[np.int64]:
-    """How often the keys of each row have occurred up to it, from 1, (n,)."""
-    import pandas as pd
-
-    return np.asarray(pd.DataFrame(dict(enumerate(keys))).groupby([*range(len(keys))]).cumcount(), dtype=np.int64) + 1

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from bushfit import units as si
 from bushfit.geometry import Place, stated_strain
-from bushfit.reading.columns import Rows
-from bushfit.reading.headers import AmplitudeConvention, Column
-from bushfit.reading.layout import FileFormat
-from bushfit.reading.measurement import SAME_TEMPERATURE, Complex, Floats, Stepped, Sweep, source_of
+from bushfit.reading.headers import OF_MOTION, SWEEP_COLUMNS, AmplitudeConvention, Column
+from bushfit.reading.measurement import SAME_TEMPERATURE, Complex, Floats, Sweep
 from bushfit.reading.runs import runs_of
+from bushfit.reading.stated import SweepFile
 from bushfit.reading.table import Table
-from bushfit.reading.words import OF_MOTION, SWEEP_COLUMNS
 
 #: The pairs of columns that each make a complex stiffness, in order of preference.
 STIFFNESS_PAIRS = (
@@ -55,21 +53,11 @@ _ZERO_TO_PEAK: dict[AmplitudeConvention, float] = {"zero-to-peak": 1.0, "peak-to
 def read_sweep(
     file: Path,
     direction: Place,
+    test: SweepFile,
     *,
     name: str | None = None,
-    listed_as: Path | None = None,
-    columns: Mapping[str, str] | None = None,
-    units: Mapping[str, str] | None = None,
-    written: FileFormat | None = None,
-    amplitude: AmplitudeConvention | None = None,
+    shared: bool = False,
     at_amplitude: float | None = None,
-    at_frequency: float | None = None,
-    stepped: Stepped | None = None,
-    noise: float | None = None,
-    weight: float = 1.0,
-    temperature: float | None = None,
-    conditions: Mapping[str, str | float] | None = None,
-    rows: Rows | None = None,
 ) -> Sweep:
     """Read a sweep.
 
@@ -77,26 +65,25 @@ def read_sweep(
         file: a table with columns frequency, amplitude and one of STIFFNESS_PAIRS, long or wide (see `wide`). More are
             optional: repeat (without it, an operating point that occurs again is a repeat), amplitude reached (where
             the rig missed the amplitude of the level), temperature, and relative error.
-        direction, name, listed_as, columns, units, written: as of `read_loop`, with the roles of SWEEP_COLUMNS.
-        amplitude: how file and campaign count amplitudes, where its header does not say so: zero-to-peak unless stated.
-            The sweep has them zero-to-peak.
-        at_amplitude: of a file without a column for it [m or rad, or strain], counted as `amplitude` has it.
-        at_frequency: of a file without a column for it [Hz].
-        stepped: what was stepped while the other was held, where the order of the rows does not tell it.
-        noise, weight, conditions, rows: as of `read_loop`.
-        temperature: at which it was tested [K], where it is stated; of a file with a column for it, the rows near it.
+        direction, test, name, shared: as of `read_loop`; of a file with a column for the temperature, the rows near
+            the one that is stated make the test.
+        at_amplitude: that of the test in SI [m or rad, or strain]; it counts as file and campaign do, the sweep's are
+            zero-to-peak.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    table = Table.open(file, SWEEP_COLUMNS, columns, units, written, direction.motion, rows or Rows())
+    rows = test.taken(shared=shared)
+    table = Table.open(file, SWEEP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
     pair = _stiffness_pair(table)
-    stated = {"frequency": at_frequency, "amplitude": at_amplitude}
+    stated = {"frequency": test.at_frequency, "amplitude": at_amplitude}
     at = {role: value for role, value in stated.items() if value is not None}
     wanted = _sweep_columns(table, direction, pair, at)
-    to_peak = _ZERO_TO_PEAK[_convention(table, wanted.get("amplitude"), amplitude)]
+    to_peak = _ZERO_TO_PEAK[_convention(table, wanted.get("amplitude"), test.amplitude)]
     if at_amplitude is not None:  # as the file counts
-        at["amplitude"] = at_amplitude * stated_strain(direction) * _ZERO_TO_PEAK[amplitude or "zero-to-peak"] / to_peak
+        at["amplitude"] = (
+            at_amplitude * stated_strain(direction) * _ZERO_TO_PEAK[test.amplitude or "zero-to-peak"] / to_peak
+        )
     values = table.read(wanted, fewest_rows=_FEWEST_SWEEP_ROWS)
     table.check_positive(_POSITIVE, wanted, values)
     for role, value in at.items():
@@ -106,17 +93,16 @@ def read_sweep(
     _check_loss(table, wanted[pair[1]], loss_factor)
     _check_agreement(table, pair, values, stiffness)
     repeat = _repeats(table, wanted, values)
-    taken, temperature, degrees = _of_temperature(table, values, temperature)
+    taken, temperature, degrees = _of_temperature(table, values, test.temperature)
     frequency, level = values["frequency"][taken], to_peak * values["amplitude"][taken]
     reached = values["amplitude_reached"][taken] if "amplitude_reached" in values else None
     if reached is not None:
         own = wanted["amplitude_reached"].convention
         reached = reached * (_ZERO_TO_PEAK[own] if own else to_peak)
-    runs = runs_of(frequency, level, None if repeat is None else repeat[taken], stepped)
+    runs = runs_of(frequency, level, None if repeat is None else repeat[taken], test.stepped)
     if reached is None and not np.array_equal(runs.amplitude, level):
         reached = level
     odd = table.not_understood(taken, frequency, runs.amplitude)
-    source = source_of(file, listed_as, table.sha256, temperature, conditions, odd)
     return Sweep(
         name or file.stem,
         direction,
@@ -124,12 +110,12 @@ def read_sweep(
         runs.amplitude,
         stiffness[taken],
         runs.repeat,
-        noise,
-        source,
+        test.noise,
+        test.source(table.sha256, temperature, odd),
         reached,
         runs.stepped,
         values["relative_error"][taken] if "relative_error" in values else None,
-        weight=weight,
+        weight=test.weight,
         temperature=degrees,
     )
 
@@ -287,19 +273,15 @@ def _convention(table: Table, column: Column | None, stated: AmplitudeConvention
 def _complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tuple[Complex, Floats]:
     """Complex stiffness and loss factor by one of STIFFNESS_PAIRS, (n,) each."""
     size, loss = (values[role] for role in pair)
-    match pair:
-        case (_, "loss_stiffness"):
-            return size + 1j * loss, loss / size
-        case ("stiffness", "phase"):
-            return size * np.exp(1j * loss), _tangent(loss)
-    factor = _tangent(loss) if pair[1] == "phase" else loss
+    if pair[1] == "loss_stiffness":
+        return size + 1j * loss, loss / size
+    factor = loss
+    if pair[1] == "phase":
+        factor = np.where(np.abs(loss) < np.pi / 2, np.tan(loss), np.nan)  # none from 90 deg on
+    if pair == ("stiffness", "phase"):
+        return size * np.exp(1j * loss), factor
     storage = size / np.hypot(1.0, factor) if pair[0] == "stiffness" else size
     return storage * (1.0 + 1j * factor), factor
-
-
-def _tangent(phase: Floats) -> Floats:
-    """The loss factor of a phase [rad], (n,); nan from 90 deg on."""
-    return np.where(np.abs(phase) < np.pi / 2, np.tan(phase), np.nan)
 
 
 def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64] | None:

@@ -12,15 +12,24 @@ from bushfit import units
 from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.columns import Columns, Rows
-from bushfit.reading.encoding import to_utf8
-from bushfit.reading.files import sha256, view_bytes
-from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, plain, split_convention
+from bushfit.reading.files import sha256, to_utf8, view_bytes
+from bushfit.reading.headers import (
+    LOOP_COLUMNS,
+    OF_MOTION,
+    SWEEP_COLUMNS,
+    Column,
+    Heading,
+    Vocabulary,
+    is_angular,
+    of_motion,
+    plain,
+    split_convention,
+)
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.parts import open_part
 from bushfit.reading.source import RowSource, Sheet, Text
 from bushfit.reading.wide import as_long
-from bushfit.reading.words import LOOP_COLUMNS, OF_MOTION, SWEEP_COLUMNS, of_motion
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 #: Likeness, from 0 to 1, from which a header is suggested for one that is not there; chosen: one word of two suffices.
@@ -96,7 +105,12 @@ class Table(Columns):
             found = f"header_line = {stated.header_line}"
             raise MeasurementError("there is no header on this line", file=file, found=found, hint="lines count from 1")
         table = cls(file, source, layout, stated, {}, checksum, names, motion)
-        table._check_header()
+        if len(table.headers) < 2:
+            found = table.headers[0] if table.headers else "nothing"
+            expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
+            raise table.header_error("there is only one column", found=found, expected=expected)
+        if all(is_like_number(cell) for cell in table.headers):
+            raise table.header_error("there is no header", expected=_EXPECTED_HEADER)
         named = columns or {} if understood is vocabulary else {}
         table = replace(table, roles=table._recognise(understood, named, stated_units or {}))
         return table if rows is None else table.taking(rows)
@@ -179,17 +193,6 @@ class Table(Columns):
                 hint=hint,
             )
 
-    def _check_header(self) -> None:
-        """Refuse a header of one cell, or of numbers alone."""
-        if len(self.headers) < 2:
-            raise self.header_error(
-                "there is only one column",
-                found=self.headers[0] if self.headers else "nothing",
-                expected=f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks",
-            )
-        if all(is_like_number(cell) for cell in self.headers):
-            raise self.header_error("there is no header", expected=_EXPECTED_HEADER)
-
     def _recognise(
         self, vocabulary: Vocabulary, columns: Mapping[str, str], stated_units: Mapping[str, str]
     ) -> dict[str, Column]:
@@ -224,9 +227,15 @@ class Table(Columns):
                     else f'choose it in the campaign: columns = {{ {role} = "{header}" }}',
                 )
             roles[role] = column
-        for role in columns:
-            if role not in roles:
-                raise self._no_column(role, columns[role])
+        for role in (role for role in columns if role not in roles):
+            near = next(iter(get_close_matches(columns[role], self.headers, n=1, cutoff=_ALIKE)), "")
+            raise self.header_error(
+                f'there is no column "{columns[role]}"',
+                kind=NoColumnError,
+                expected=f"the header that was named for the {_label(role)}",
+                hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
+                + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
+            )
         if "amplitude_reached" in roles and "amplitude" not in roles:
             roles["amplitude"] = replace(roles.pop("amplitude_reached"), role="amplitude")
         return roles
@@ -247,17 +256,6 @@ class Table(Columns):
                 expected="one unit, from the header, the units row or the campaign",
             )
         return column
-
-    def _no_column(self, role: str, named: str) -> MeasurementError:
-        """The error for a role whose column was named by a header that is not there."""
-        near = next(iter(get_close_matches(named, self.headers, n=1, cutoff=_ALIKE)), "")
-        return self.header_error(
-            f'there is no column "{named}"',
-            kind=NoColumnError,
-            expected=f"the header that was named for the {_label(role)}",
-            hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
-            + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
-        )
 
 
 def _is_k(header: str) -> bool:

@@ -41,6 +41,10 @@ _MADE = datetime(1980, 1, 1, tzinfo=UTC)
 _ROWS_AT_ONCE = 10_000
 #: Widest column [characters].
 _WIDEST = 60
+#: Characters that some operating system does not allow in a name, and halves of surrogate pairs.
+_UNSAFE_IN_FOLDERS = re.compile(r'[\x00-\x1f\x7f\ud800-\udfff/\\:*?"<>|]+')
+#: Names that Windows keeps for devices, with any ending.
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 
 def ending(form: Form) -> str:
@@ -182,3 +186,12 @@ def _sheet_name(title: str, taken: set[str]) -> str:
         name = _cut(plain, _LONGEST_SHEET - len(end)) + end
     taken.add(name.lower())
     return name
+
+
+def folder_name(name: str) -> str:
+    """A text as the name of one folder; it is never empty, and never leads out of the folder that it is put in.
+
+    It has 60 characters at most: with the folders above it, a path stays below the 260 that Windows takes.
+    """
+    safe = _UNSAFE_IN_FOLDERS.sub("_", name)[:60].strip(" .") or "campaign"
+    return f"_{safe}" if _DEVICES.fullmatch(safe) else safe

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.reading.measurement import Complex, Floats
-from bushfit.reading.parallel import CHUNK
+from bushfit.reduction.arrays import CHUNK, MEDIAN_TO_SIGMA, scatter
 from bushfit.reduction.harmonics import basis
-from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, scatter
 
 #: Rows of an array.
 Integers = NDArray[np.intp]

@@ -6,13 +6,13 @@ the crossings of their middles. A run of alike ones is a part; ramps, pauses and
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.measurement import Floats, Loop, Part, rebuild_time
+from bushfit.reading.measurement import Floats, Loop, Part
+from bushfit.reading.stated import LoopFile
 from bushfit.reduction.cycles import (
     change_after,
     least_prominence,
@@ -42,6 +42,8 @@ _LEAST_SOFTENING, _MEMORY, _MEMORY_FROM_REST = 0.02, 0.25, 0.75
 #: Harmonics that are fitted to a cycle of force (a loop of rubber has next to nothing beyond), and the unknowns then,
 #: with mean and slope.
 _HARMONICS, _UNKNOWNS = 5, 12
+#: What is said of a record with a time.
+_TIMED = LoopFile(file="")
 
 
 @dataclass(frozen=True)
@@ -69,17 +71,13 @@ class _Span:
         ranges, periods = np.log(self.range / other.range), np.log(self.period / other.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
-    def goes_on_as(self, other: "_Span") -> bool:
-        """Whether the part after it is the same one, which a disturbance broke off."""
-        return self.like(other) and resumes_in_phase((other.begin - self.end) / self.period, step=0.5)
 
-
-def programme(loop: Loop, **keywords: Any) -> tuple[Loop, ...]:
+def programme(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
     """The loops of a record in their order: one for each part of constant amplitude and rate.
 
     Args:
         loop: the whole record.
-        keywords: it was read with; rate, frequency and waveform settle the time of a record without it.
+        test: what a campaign says of it; rate, frequency and waveform settle the time of a record without it.
 
     Returns:
         The record itself where it has but one amplitude and rate, whatever comes before and after; else its parts,
@@ -98,8 +96,7 @@ def programme(loop: Loop, **keywords: Any) -> tuple[Loop, ...]:
         return (loop,)
     if all(span.like(spans[0]) for span in spans[1:]):
         return (replace(loop, softening=_softening(loop, spans[0], from_rest=True)),)
-    clock = {key: value for key, value in keywords.items() if key in ("rate", "frequency", "waveform")}
-    return tuple(_loops(loop, time, spans, clock))
+    return tuple(_loops(loop, time, spans, test))
 
 
 def _thinned(loop: Loop) -> tuple[Floats, Floats]:
@@ -143,8 +140,9 @@ def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_Span]:
         return []
     joined: list[_Span] = []
     for span in found:
-        if joined and joined[-1].goes_on_as(span):
-            joined[-1] = replace(joined[-1], end=span.end)
+        last = joined[-1] if joined else None
+        if last and last.like(span) and resumes_in_phase((span.begin - last.end) / last.period, step=0.5):
+            joined[-1] = replace(last, end=span.end)  # a disturbance broke it off
         else:
             joined.append(span)
     before = [float(time[0]), *(span.end for span in joined[:-1])]
@@ -208,7 +206,7 @@ def _to_its_ends(span: _Span, time: Floats, motion: Floats, before: float, after
     return replace(span, begin=begin, end=float(time[-1]) if time[-1] - end < near else end)
 
 
-def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], clock: dict[str, Any]) -> Iterator[Loop]:
+def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], test: LoopFile) -> Iterator[Loop]:
     """A loop for each part, with what was left out between them."""
     whole, last_end = _clock(loop), float(time[0])
     for number, span in enumerate(spans, start=1):
@@ -228,7 +226,7 @@ def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], clock: dict[str, An
             part=Part(rows.start, said),
             softening=_softening(loop, span, from_rest=number == 1),
         )
-        yield part if loop.timed else replace(part, time=rebuild_time(part.displacement, **clock))
+        yield part if loop.timed else replace(part, time=test.clock(part.displacement))
         last_end = span.end
 
 

@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import Annotated, Required
 
 import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import Doc, TypedDict
 
 from bushfit.geometry import Place
@@ -105,10 +104,6 @@ class Reduction:
     steps: tuple[Step, ...]
     skipped: tuple[Skipped, ...]
     outliers: int = 0
-
-    def array(self, name: str) -> NDArray[np.generic]:
-        """One quantity of all steps by its name in `Step`, (n,)."""
-        return np.array([getattr(step, name) for step in self.steps])
 
     @property
     def warnings(self) -> tuple[str, ...]:

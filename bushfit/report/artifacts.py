@@ -1,5 +1,6 @@
-"""The tables and pictures of a result, by the names of their files without endings."""
+"""The tables and pictures of a result or a plan, by the names of their files without endings."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from typing import Any
@@ -7,20 +8,30 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bushfit.campaign.naming import folder_name
+from bushfit.campaign.schema import SimulatedLoop
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import Level
+from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData
 from bushfit.fitting.master_curve import master_curve
 from bushfit.geometry import Direction, Place
 from bushfit.model.arms import Arms
 from bushfit.model.model import Model
 from bushfit.model.result import Result
+from bushfit.planning.contract import Plan, Test, operating_points
 from bushfit.prediction.caveats import rig_effects, warnings_of
 from bushfit.prediction.stiffness import Prediction, predict
+from bushfit.reading.tablefile import folder_name
 from bushfit.report import plots, tables
 from bushfit.report.compared import SideBySide
 from bushfit.report.contents import Contents
+from bushfit.units import number
+
+#: Columns of the sheet, those of a plan without any test too.
+_COLUMNS = (
+    *("order", "direction", "test", "amplitude", "frequency [Hz]", "cycles", "repeat", "force up to", "minutes"),
+    *("minutes so far", "what for"),
+)
 
 
 def fit_contents(result: Result, title: str, loops: Sequence[LoopData], sweeps: Sequence[SweepData]) -> Contents:
@@ -83,7 +94,7 @@ def more_contents(
 def arms_contents(model: Model, arms: Sequence[Arms], places: Sequence[Place], title: str) -> Contents:
     """`arms`: Maxwell arms as a table, and a picture of their modulus and its error; nothing where there are none."""
     table = partial(tables.arms_table, model, arms, places)
-    found = Contents.shown("arms", table, lambda: plots.arms.arms_figure(model, arms, title))
+    found = Contents.shown("arms", table, lambda: plots.master_curve.arms_figure(model, arms, title))
     return found if arms else Contents()
 
 
@@ -101,23 +112,21 @@ def measured_contents(result: Result, fitted: Sequence[SweepData], left: Sequenc
 def diagnosis_contents(diagnosis: Diagnosis, title: str) -> Contents:
     """`gap` and `candidates` of a diagnosis, tables, and a picture of the gap."""
     before, after, held = diagnosis.before, diagnosis.after, diagnosis.holdout
-    tests = before.data_sets, after.data_sets
 
     def picture() -> Any:
         words = f"{diagnosis.verdict}: {diagnosis.summary}"
         words += f". Held out, {held.before:.2f} x noise before and {held.after:.2f} after" if held.parts else ""
-        return plots.gap.gap_figure(before.model, after.model, tests[0], title, words, mended=tests[1])
+        return plots.gap.gap_figure(before.model, after.model, before.data_sets, title, words, mended=after.data_sets)
 
-    gap = partial(tables.gap_table, before.model, after.model, *tests, diagnosis.result.model)
     candidates = {"candidates": partial(tables.candidates_table, diagnosis)}
-    return Contents.shown("gap", gap, picture) | Contents(tables=candidates)
+    return Contents.shown("gap", partial(tables.gap_table, diagnosis), picture) | Contents(tables=candidates)
 
 
 def comparison_contents(document: Mapping[str, Any]) -> Contents:
     """`compare`, document, picture and page; and `parameters`, `differences` and, of families, `families`, tables."""
     names = ("parameters", *(["families"] if document["families"] else []), "differences")
     made = {name: partial(lambda name: SideBySide.of(document).tables()[name], name) for name in names}
-    picture = {"compare": lambda: plots.comparison.comparison_figure(SideBySide.of(document))}
+    picture = {"compare": lambda: plots.batch.comparison_figure(SideBySide.of(document))}
     return Contents({"compare": document}, made, picture)
 
 
@@ -139,3 +148,43 @@ def names_of_more(places: Sequence[Place], what: str) -> list[str]:
             more += "_"
         names.append(more)
     return names
+
+
+def plan_contents(plan: Plan) -> Contents:
+    """`plan`: the sheet as a table, and the picture."""
+    return Contents.shown("plan", partial(plan_sheet, plan), lambda: plots.plan.plan_figure(plan))
+
+
+def plan_sheet(plan: Plan) -> pd.DataFrame:
+    """A row for each run of the rig, in the order in which they are made.
+
+    Amplitudes count zero-to-peak. The force, moment or stress is what the model expects at most, to choose a load cell.
+    """
+    tests = plan.planned.tests
+    counts, seen, rows = Counter(tests), Counter[Test](), []
+    for order, (test, minutes) in enumerate(zip(tests, plan.planned.minutes, strict=True), start=1):
+        seen[test] += 1
+        (frequency, amplitude), (length, force, _) = operating_points(test), test.direction.display
+        stiffness = np.abs(plan.knowledge.model.stiffness(test.direction, frequency, amplitude))
+        most = number(force.factor * float(np.max(stiffness * amplitude)), 2)
+        rows.append(
+            {
+                "order": order,
+                "direction": str(test.direction),
+                "test": "loop" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}",
+                "amplitude": f"{_listed(length.factor * amplitude)} {length.name}",
+                "frequency [Hz]": _listed(frequency),
+                "cycles": str(test.cycles) if isinstance(test, SimulatedLoop) else "until steady",
+                "repeat": f"{seen[test]} of {counts[test]}",
+                "force up to": f"{most} {force.name}",
+                "minutes": round(float(minutes), 1),
+                "minutes so far": round(float(np.sum(plan.planned.minutes[:order])), 1),
+                "what for": plan.purposes[test],
+            }
+        )
+    return pd.DataFrame(rows, columns=_COLUMNS)
+
+
+def _listed(values: Array) -> str:
+    """The distinct numbers among some, in their order."""
+    return " ".join(dict.fromkeys(number(value, 4) for value in values.tolist()))

@@ -26,12 +26,10 @@ class ComparedEntry(TypedDict):
     bushing: Annotated[BushingTable | None, Doc("null where specimens of the compound alone are known.")]
     effects: Annotated[list[str], Doc("of its model.")]
     reduced_chi_square: Annotated[
-        Number | None,
-        Doc("mean square residual in units of noise; null where it was not fitted."),
+        Number | None, Doc("mean square residual in units of noise; null where it was not fitted.")
     ]
     nrmse: Annotated[
-        Number | None,
-        Doc("root mean square difference of model and tests, relative; null where it was not fitted."),
+        Number | None, Doc("root mean square difference of model and tests, relative; null where it was not fitted.")
     ]
     measured: Annotated[Range | None, Doc("what it was fitted at; null where it was not fitted.")]
     inputs: Annotated[
@@ -78,8 +76,7 @@ class Family(TypedDict):
     reduced_chi_square: Annotated[Number, Doc("mean square residual in units of noise.")]
     bic: Annotated[Number, Doc("chi-square + parameters ln n; lower is better.")]
     heldout: Annotated[
-        Number | None,
-        Doc("root mean square of what was held out, in units of noise; null where nothing can be."),
+        Number | None, Doc("root mean square of what was held out, in units of noise; null where nothing can be.")
     ]
     first_there: Annotated[Number | None, Doc("that of the first family on the same parts.")]
     gain: Annotated[

@@ -17,7 +17,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
 from bushfit.prediction.comparison import ParameterContrast
-from bushfit.report.compare_document import SCHEMA, ComparisonFile, Pair
+from bushfit.report.compare_document import SCHEMA, ComparisonFile
 from bushfit.report.tables import numbers, required
 from bushfit.units import for_people, number, split_header, told
 from bushfit.validation import check_tables
@@ -36,8 +36,7 @@ LEAST_PERCENT = 1.0
 LEAST_LOSS = 0.005
 
 
-@dataclass(frozen=True, eq=False)
-class Line:
+class Line(NamedTuple):
     """One result over x at one value that is held: values with the ends of their 95 % bands, each (n,).
 
     `level` is 0 of the smallest value that is held, 1 of the largest.
@@ -59,13 +58,10 @@ class Panel(NamedTuple):
     least: float
 
 
-@dataclass(frozen=True, eq=False)
-class Sides:
+class Sides(NamedTuple):
     """A place as all results have it: stiffness and loss factor, then how far these are off the first's.
 
-    Args:
-        along: header of what lies along x.
-        levels: what is held, in words: its smallest value, and its largest.
+    Along x lies what the header `along` names; `levels` are what is held, in words: its smallest value, its largest.
     """
 
     place: str
@@ -111,12 +107,29 @@ class SideBySide:
     def tables(self) -> dict[str, pd.DataFrame]:
         """`parameters`, `differences` and, of families, `families`."""
         pairs = self.document["pairs"]
-        rows = {"parameters": [_flat(pair, row) for pair in pairs for row in pair["parameters"]]}
-        rows |= {"families": [*self._families()]} if self.document["families"] else {}
-        tables = [self._at(pair, place) for pair in pairs for place in pair["places"]]
-        return {name: pd.DataFrame(each) for name, each in rows.items()} | {
-            "differences": pd.concat(tables, ignore_index=True)
-        }
+        parameters = [
+            {
+                "parameter": row.name,
+                "unit": row.unit,
+                "reference": pair["reference"],
+                "other": pair["other"],
+                "reference value": row.reference,
+                "other value": row.other,
+                "difference": row.difference,
+                "difference, low": row.interval and row.interval[0],
+                "difference, high": row.interval and row.interval[1],
+                "difference is": "relative" if row.relative else "absolute",
+                "p": row.p,
+                "p by Holm": row.holm,
+                "not tested": row.note,
+            }
+            for pair in pairs
+            for row in pair["parameters"]
+        ]
+        families = {"families": pd.DataFrame([*self._families()])} if self.document["families"] else {}
+        at = [self.at(place) for place in self.places]
+        differences = pd.concat([each[pair["other"]] for pair in pairs for each in at], ignore_index=True)
+        return {"parameters": pd.DataFrame(parameters), **families, "differences": differences}
 
     def _families(self) -> Iterator[dict[str, Any]]:
         """A family a row: how it meets the tests, and what was held out of them."""
@@ -164,21 +177,23 @@ class SideBySide:
         Raises:
             ModelError: a place of only some, or columns that do not go together.
         """
-        return {pair["other"]: self._at(pair, place) for pair in self.document["pairs"]}
-
-    def _at(self, pair: Pair, place: str) -> pd.DataFrame:
-        columns = pair["places"].get(place, {})
-        texts = [name for name, cells in columns.items() if isinstance(next(iter(cells), None), str)]
-        sizes = {len(cells) for cells in columns.values()}
-        if len(sizes) != 1 or 0 in sizes or not all(map(_SURE.search, texts)):
-            raise ModelError(
-                "columns that do not go together",
-                place=f"pairs, {pair['other']}, places, {place}",
-                expected="as many numbers in each, and yes or no of what is sure",
-            )
-        table = pd.DataFrame({name: pd.Series(column, dtype=object) for name, column in columns.items()})
-        table = table.astype(dict.fromkeys(table.columns.difference(texts), float))
-        return pd.concat([pd.DataFrame({"other": pair["other"], "place": place}, index=table.index), table], axis=1)
+        found = {}
+        for pair in self.document["pairs"]:
+            columns = pair["places"].get(place, {})
+            texts = [name for name, cells in columns.items() if isinstance(next(iter(cells), None), str)]
+            sizes = {len(cells) for cells in columns.values()}
+            if len(sizes) != 1 or 0 in sizes or not all(map(_SURE.search, texts)):
+                raise ModelError(
+                    "columns that do not go together",
+                    place=f"pairs, {pair['other']}, places, {place}",
+                    expected="as many numbers in each, and yes or no of what is sure",
+                )
+            table = pd.DataFrame({name: pd.Series(column, dtype=object) for name, column in columns.items()})
+            table = table.astype(dict.fromkeys(table.columns.difference(texts), float))
+            table.insert(0, "other", pair["other"])
+            table.insert(1, "place", place)
+            found[pair["other"]] = table
+        return found
 
     def sides(self, place: str) -> Sides:
         """The lines of a place, over frequency, or over amplitude where there is one frequency."""
@@ -241,25 +256,6 @@ class Heads(NamedTuple):
         bands = [f"{what}{end}" for what in (*sides, *found[2:]) for end in ("", ", low", ", high")]
         required(table, "frequency [Hz]", amplitude, *bands, *(f"{what}, sure" for what in found[2:]))
         return found
-
-
-def _flat(pair: Pair, row: ParameterContrast) -> dict[str, Any]:
-    """A parameter of two results in SI as a row of a table."""
-    return {
-        "parameter": row.name,
-        "unit": row.unit,
-        "reference": pair["reference"],
-        "other": pair["other"],
-        "reference value": row.reference,
-        "other value": row.other,
-        "difference": row.difference,
-        "difference, low": row.interval and row.interval[0],
-        "difference, high": row.interval and row.interval[1],
-        "difference is": "relative" if row.relative else "absolute",
-        "p": row.p,
-        "p by Holm": row.holm,
-        "not tested": row.note,
-    }
 
 
 #: Heads of `family_cells`, and of `parameter_cells` without the labels of the two results.

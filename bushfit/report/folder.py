@@ -10,22 +10,30 @@ How `write_files` does it:
    leaves the decided folder, and the next run that writes there finishes the moves first.
 """
 
+from __future__ import annotations
+
+import ctypes
 import errno
 import hashlib
 import json
 import os
+import re
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from bushfit.errors import CONTROL, OutputError
-from bushfit.report import disk
 
+#: Linux' word for the working folder, in calls that take a folder and a path (fcntl.h).
+_AT_FDCWD = -100
+#: Linux' flag of renameat2 that swaps two paths (linux/fs.h).
+_RENAME_EXCHANGE = 2
 #: Start of the name of a stage, the hidden folder in which a set of files is written.
 _STAGE = ".bushfit-"
 #: Name of a set of files that is complete and waits to be moved into the folder around it.
@@ -33,9 +41,103 @@ _DECIDED = ".bushfit-decided"
 #: Name of the record, in a folder of results, of the files that each command wrote there: as JSON their SHA-256 by
 #: command and name, and the names that the last one took away.
 _RECORD = ".bushfit.json"
+#: Characters of a document that steer a terminal; the ends of its lines do not.
+_STEERING = re.compile(rf"(?!\n){CONTROL.pattern}")
 #: Most files of a folder that is exchanged [files]; one that holds more is no folder of results, and linking its files
 #: would take longer than moving the new ones in.
 _MOST_LINKED = 2000
+
+
+def exchange(one: Path, other: Path) -> None:
+    """Swap two folders of one file system in a single step: whoever looks sees the one or the other, whole.
+
+    Raises:
+        OSError: this system, or this file system, cannot do it; both are as they were.
+    """
+    rename = getattr(_libc(), "renameat2", None)
+    if rename is None:
+        raise OSError(errno.ENOSYS, "folders cannot be exchanged here")
+    if rename(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE) != 0:
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number), str(other))
+
+
+def flush(files: list[int]) -> None:
+    """Make sure that open files are on the disk and not only in memory.
+
+    In one go where the system can: one by one costs several times as much.
+
+    Raises:
+        OSError: the disk is full or fails.
+    """
+    sync = getattr(_libc(), "syncfs", None)
+    if files and sync is not None and sync(ctypes.c_int(files[0])) == 0:
+        return
+    for descriptor in files:
+        os.fsync(descriptor)
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Let no other run of bushfit work on a folder while the body runs; wait until none does.
+
+    The lock is no file, and ends with the process. Where the system or the file system has no such locks, the body runs
+    without.
+    """
+    with closing(claim(folder)):
+        yield
+
+
+def claim(folder: Path, *, wait: bool = True) -> Claim:
+    """Mark a folder as in use, for other runs to see, until the claim is closed or this process ends.
+
+    Raises:
+        BlockingIOError: another holds it, and `wait` is False.
+    """
+    if sys.platform == "win32":
+        return Claim(None)
+    import fcntl
+
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return Claim(None)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError as error:
+        os.close(descriptor)
+        if isinstance(error, BlockingIOError):
+            raise
+        return Claim(None)
+    return Claim(descriptor)
+
+
+def is_abandoned(folder: Path) -> bool:
+    """Whether no run claims a folder any more; False where that cannot be told."""
+    try:
+        left = claim(folder, wait=False)
+    except BlockingIOError:
+        return False
+    left.close()
+    return left.descriptor is not None
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A folder marked as in use: the open folder that holds the lock, None where there are no locks."""
+
+    descriptor: int | None
+
+    def close(self) -> None:
+        """End the claim."""
+        if self.descriptor is not None:
+            os.close(self.descriptor)
+
+
+@cache
+def _libc() -> Any:
+    """Linux' C library; None on other systems."""
+    return ctypes.CDLL(None, use_errno=True) if sys.platform.startswith("linux") else None
 
 
 @dataclass(frozen=True)
@@ -49,8 +151,7 @@ class _Record:
 def to_json(document: Mapping[str, Any]) -> bytes:
     """A document as the bytes of its file, in which no character steers a terminal."""
     text = json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False)
-    safe = "\n".join(CONTROL.sub(lambda sign: f"\\u{ord(sign[0]):04x}", line) for line in text.split("\n"))
-    return f"{safe}\n".encode()
+    return (_STEERING.sub(lambda sign: f"\\u{ord(sign[0]):04x}", text) + "\n").encode()
 
 
 def check_free(folder: Path, names: list[str], *, force: bool) -> None:
@@ -65,7 +166,13 @@ def check_free(folder: Path, names: list[str], *, force: bool) -> None:
             raise OutputError(
                 "the output is not a folder", file=folder, expected="a folder", hint="another -o/--output"
             )
-        _check_writable(folder)
+        # the folder, or the nearest one above it that exists, has to take new files
+        place = folder.absolute()
+        nearest = next(path for path in (place, *place.parents) if os.path.lexists(path))
+        if nearest.exists() and not nearest.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(nearest))
+        if not os.access(nearest, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, "no right to write there", str(nearest))
         standing = [name for name in names if os.path.lexists(folder / name)]
         folders = [name for name in standing if (folder / name).is_dir()]
     except OSError as error:
@@ -83,16 +190,6 @@ def check_free(folder: Path, names: list[str], *, force: bool) -> None:
             found=", ".join(standing),
             hint="--force replaces them; -o/--output names another folder",
         )
-
-
-def _check_writable(folder: Path) -> None:
-    """Raise OSError unless the folder, or the nearest one above it that exists, takes new files."""
-    place = folder.absolute()
-    nearest = next(path for path in (place, *place.parents) if os.path.lexists(path))
-    if nearest.exists() and not nearest.is_dir():
-        raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(nearest))
-    if not os.access(nearest, os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, "no right to write there", str(nearest))
 
 
 def write_files(
@@ -119,7 +216,7 @@ def write_files(
         place = folder.resolve()
         with _parents(place.parent):
             inside = place.is_dir() and (len(files) == 1 or not _exchangeable(place))
-            with _staged(place if inside else place.parent, files) as ready, disk.locked(place.parent):
+            with _staged(place if inside else place.parent, files) as ready, locked(place.parent):
                 _end_decided(place)
                 check_free(folder, list(files), force=force)
                 _record(place, ready, files, by, force=force)
@@ -142,7 +239,8 @@ def _record(place: Path, ready: Path, files: Mapping[str, bytes], by: str | None
     if by is None or not (known.written or len(files) > 1):
         return
     before = known.written.get(by, {})
-    left = {name: digest for name, digest in before.items() if name not in files and _digest(place / name) == digest}
+    there = [name for name in before if name not in files and (place / name).is_file()]
+    left = [name for name in there if hashlib.sha256((place / name).read_bytes()).hexdigest() == before[name]]
     written = {
         command: {name: digest for name, digest in names.items() if name not in files and not (force and name in left)}
         for command, names in known.written.items()
@@ -165,11 +263,6 @@ def _recorded(folder: Path) -> _Record:
     return record if all(Path(name).name == name for name in names) else _Record()
 
 
-def _digest(file: Path) -> str | None:
-    """SHA-256 of a file; None where there is none."""
-    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else None
-
-
 @contextmanager
 def _parents(folder: Path) -> Iterator[None]:
     """Make a folder and the missing ones above it; remove them again if the body fails."""
@@ -187,34 +280,30 @@ def _parents(folder: Path) -> Iterator[None]:
 @contextmanager
 def _staged(home: Path, files: Mapping[str, bytes]) -> Iterator[Path]:
     """Write the files to a stage in `home` and give the folder they are in; the stage is removed in the end."""
-    with disk.locked(home):
+    with locked(home):
         _clear_abandoned(home)
         stage = Path(tempfile.mkdtemp(prefix=_STAGE, dir=home))
-        claim = disk.claim(stage)
+        held = claim(stage)
     try:
         ready = stage / "new"
         ready.mkdir()
-        _write(ready, files)
+        with ExitStack() as opened:
+            streams = [opened.enter_context((ready / name).open("xb")) for name in files]
+            for stream, content in zip(streams, files.values(), strict=True):
+                stream.write(content)
+                stream.flush()
+            flush([stream.fileno() for stream in streams])
         yield ready
     finally:
         shutil.rmtree(stage, ignore_errors=True)
-        claim.close()
-
-
-def _write(folder: Path, files: Mapping[str, bytes]) -> None:
-    with ExitStack() as opened:
-        streams = [opened.enter_context((folder / name).open("xb")) for name in files]
-        for stream, content in zip(streams, files.values(), strict=True):
-            stream.write(content)
-            stream.flush()
-        disk.flush([stream.fileno() for stream in streams])
+        held.close()
 
 
 @cache  # once a run is enough: a batch writes into one folder a thousand times
 def _clear_abandoned(home: Path) -> None:
     """Remove the stages of runs that were killed, which nobody claims any more."""
     for stage in home.glob(_STAGE + "????????"):
-        if disk.is_abandoned(stage):
+        if is_abandoned(stage):
             shutil.rmtree(stage, ignore_errors=True)
 
 
@@ -240,7 +329,7 @@ def _exchanged(ready: Path, place: Path) -> bool:
     try:
         shutil.copytree(ready, whole, copy_function=os.link)
         shutil.copytree(place, whole, symlinks=True, ignore=passed_over, copy_function=os.link, dirs_exist_ok=True)
-        disk.exchange(whole, place)
+        exchange(whole, place)
     except OSError:  # no links, no exchange, or an owner that a copy would lose: moving the files needs none of these
         return False
     return True

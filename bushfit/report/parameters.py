@@ -47,18 +47,13 @@ def parameter_rows(result: Result) -> Iterator[Row]:
             stderr = interval = None
         elif interval == parameter.bounds:
             interval = None
-        digits, (unit, factor) = _digits(value, stderr), for_people(parameter.unit, 1.0, value)
+        digits, (unit, factor) = _PLAIN_DIGITS, for_people(parameter.unit, 1.0, value)
+        if stderr and value:  # two of the standard error
+            carried = math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2
+            digits = min(max(carried, _FEWEST_DIGITS), _MOST_DIGITS)
         known = [end * factor for end in interval or () if end is not None]
         shown, *texts = alike([value * factor, *known], digits, least=2)
         ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
         error = "" if stderr is None else alike([stderr * factor], 2)[0]
         state = f"at {result.at_bound[name]}" if name in result.at_bound else "held" * (name not in result.fitted)
         yield Row(name, state, shown, error, " to ".join(ends), unit, parameter.meaning)
-
-
-def _digits(value: float, stderr: float | None) -> int:
-    """Digits that carry meaning: two of the standard error."""
-    if not stderr or not value:
-        return _PLAIN_DIGITS
-    carried = math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2
-    return int(min(max(carried, _FEWEST_DIGITS), _MOST_DIGITS))

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from bushfit.export.contract import Exported, Order
-from bushfit.export.losses import NO_LOOPS
+from bushfit.export.deck import NO_LOOPS
 from bushfit.model.result import Result
 from bushfit.reading.tablefile import to_csv, to_xlsx
 from bushfit.report.artifacts import place_names
@@ -18,9 +18,8 @@ _OF_ALL = ("parameters", "provenance")
 
 def csv(order: Order) -> Exported:
     """A file for each table."""
-    named = {f"{name.replace(' ', '_')}.csv": table for name, table in _tables(order).items()}
-    files = {name: to_csv(table, decimal_comma=order.decimal_comma) for name, table in named.items()}
-    return Exported(files, (NO_LOOPS,))
+    written = {name: to_csv(table, decimal_comma=order.decimal_comma) for name, table in _tables(order).items()}
+    return Exported({f"{name.replace(' ', '_')}.csv": file for name, file in written.items()}, (NO_LOOPS,))
 
 
 def xlsx(order: Order) -> Exported:

@@ -17,7 +17,7 @@ from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.prediction.comparison import Comparison, Contrast, relative
-from bushfit.prediction.stiffness import PredictedResonance, Prediction
+from bushfit.prediction.stiffness import Band, PredictedResonance, Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.reduction.resonance import Resonance
 from bushfit.reduction.result import Reduction
@@ -83,17 +83,17 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     moved, _, resisted = words(prediction.direction)
     force = f"{resisted} [{stiffness}]"
+    names, scales = (force, "loss factor [-]", f"storage {force}", f"loss {force}"), (factor, 1.0, factor, factor)
 
-    def four(of: Prediction) -> dict[str, tuple[Any, float]]:
-        loss, storage = (of.loss_factor, 1.0), (of.storage_stiffness, factor)
-        parts = (of.stiffness, factor), loss, storage, (of.loss_stiffness, factor)
-        return dict(zip((force, "loss factor [-]", f"storage {force}", f"loss {force}"), parts, strict=True))
+    def four(of: Prediction) -> list[tuple[str, Band, float]]:
+        bands = of.stiffness, of.loss_factor, of.storage_stiffness, of.loss_stiffness
+        return list(zip(names, bands, scales, strict=True))
 
     columns = {"frequency [Hz]": prediction.frequency, f"{moved} [{length}]": prediction.amplitude * length_factor}
-    columns |= {name: band.value * scale for name, (band, scale) in four(prediction).items()}
-    for name, (band, scale) in four(prediction).items():
+    columns |= {name: band.value * scale for name, band, scale in four(prediction)}
+    for name, band, scale in four(prediction):
         columns |= {f"{name}, low": band.low * scale, f"{name}, high": band.high * scale}
-    for name, (band, scale) in four(prediction.if_rigs).items() if prediction.if_rigs else ():
+    for name, band, scale in four(prediction.if_rigs) if prediction.if_rigs else ():
         columns[f"{name}, {IF_RIGS}"] = band.value * scale
     if (measured := prediction.measured) is not None:
         columns |= {f"measured {force}": np.abs(measured) * factor, "measured loss factor [-]": loss_factor(measured)}
@@ -192,32 +192,28 @@ def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
     return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
 
 
-def gap_table(
-    before: Model,
-    after: Model,
-    data_sets: Sequence[DataSet],
-    mended: Sequence[DataSet] | None = None,
-    result: Model | None = None,
-) -> pd.DataFrame:
+def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """Every residual of a diagnosis, before and after, in units of noise and in %: a row per sweep point or loop row.
 
-    `mended` are the tests that belong to the model after, where they are others: a row says where it was recorded.
-    `result` is the model to use, `after` unless given, whose response stands beside what was measured.
+    Where the test that belongs to the model after is another, a row says where it was recorded. The response of the
+    model to use stands beside what was measured.
     """
+    before, after = diagnosis.before, diagnosis.after
 
     def rows(data_set: DataSet, later: DataSet) -> pd.DataFrame:
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
         columns |= data_set.columns()
-        for name, model, test in (("before", before, data_set), ("after", after, later)):
+        for name, model, test in (("before", before.model, data_set), ("after", after.model, later)):
             parts = zip(test.components, np.split(test.misfit(model), test.parts), strict=True)
             columns |= {f"{part} {name} [noise]": values for part, values in parts}
             off = zip(test.components, test.off(model), strict=True)
             columns |= {f"{part} {name} [%]": 100.0 * values for part, values in off}
         table: Any = loops_table if data_set.kind == "loop" else sweeps_table
-        shown = table(result or after, [data_set])
+        shown = table(diagnosis.result.model, [data_set])
         return pd.DataFrame(columns | {name: shown[name] for name in shown if _MEASURED.match(name)})
 
-    return pd.concat([rows(*pair) for pair in zip(data_sets, mended or data_sets, strict=True)], ignore_index=True)
+    both = zip(before.data_sets, after.data_sets, strict=True)
+    return pd.concat([rows(*pair) for pair in both], ignore_index=True)
 
 
 def master_curve_table(found: Sequence[Shifted]) -> pd.DataFrame:
@@ -300,7 +296,7 @@ def contrast_table(found: Comparison, each: Contrast) -> pd.DataFrame:
     return pd.DataFrame(values)
 
 
-def _ends(band: Any) -> dict[str, Array]:
+def _ends(band: Band) -> dict[str, Array]:
     """A band by the end of its columns' names."""
     return {"": band.value, ", low": band.low, ", high": band.high}
 
@@ -352,6 +348,11 @@ def resonance_table(found: Resonance) -> pd.DataFrame:
             "rows averaged": found.rows,
         }
     )
+
+
+def shortened(name: str, letters: int) -> str:
+    """A name of at most so many letters: what is too long loses its middle."""
+    return name if len(name) <= letters else f"{name[: (letters - 1) // 2]}…{name[-(letters // 2) :]}"
 
 
 def spread(count: int, most: int) -> Array:

@@ -6,12 +6,17 @@ import json
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
+import pandas as pd
 from typing_extensions import Doc, TypedDict
 
-from bushfit.campaign.written import body_lines, table_lines
+from bushfit.campaign.toml import body_lines, table_lines
 from bushfit.errors import typed
-from bushfit.geometry import Specimen
+from bushfit.geometry import STRAINING, Display, Place, Specimen, Unit, stated_strain
 from bushfit.model.document import ModelFile
+from bushfit.model.file import to_document
+from bushfit.reading.measurement import Loop, Sweep, loss_factor
+from bushfit.reading.resonance import ResonanceTest
 from bushfit.reading.tablefile import Form, ending, to_bytes
 from bushfit.simulation.measured import Simulated
 
@@ -28,9 +33,6 @@ def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
 
     A resonance test is what `bushfit reduce` takes; `campaign.toml` says how.
     """
-    from bushfit.model.file import to_document
-    from bushfit.reading.rawtable import raw_loop_table, raw_resonance_table, raw_sweep_table
-
     tables = {
         **{loop.name: raw_loop_table(loop) for loop in simulated.loops},
         **{sweep.name: raw_sweep_table(sweep) for sweep in simulated.sweeps},
@@ -62,3 +64,58 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
         lines += [f'# bushfit reduce {file} --mass "{mass:.6g} kg" --{tested} {place} -o {folder}']
         lines += [f"# {line}" for line in table_lines("sweeps", f"{test.name}/sweep.{end}", test.direction) if line]
     return "\n".join(lines) + "\n"
+
+
+def raw_loop_table(loop: Loop) -> pd.DataFrame:
+    """A loop as a rig writes it: time, displacement and force in the units of engineers, or strain and stress."""
+    moves, resists, _ = loop.direction.motion.words
+    (length, length_factor), (force, force_factor), _ = _as_stated(loop.direction)
+    return pd.DataFrame(
+        {
+            "time [s]": loop.time,
+            f"{moves} [{length}]": loop.displacement * length_factor,
+            f"{resists} [{force}]": loop.force * force_factor,
+        }
+    )
+
+
+def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
+    """A sweep as a rig writes it: frequency, amplitude, repeat, stiffness and loss factor in the units of engineers.
+
+    Where the amplitude is stepped, it is written as reached, without its level.
+    """
+    motion = sweep.direction.motion
+    amplitude, relates = "strain amplitude" if motion is STRAINING else "amplitude", motion.words[2]
+    (length, length_factor), _, (stiffness, factor) = _as_stated(sweep.direction)
+    level, reached = sweep.amplitude, sweep.reached
+    if sweep.stepped == "amplitude" and reached is not None:
+        level, reached = reached, None
+    return pd.DataFrame(
+        {
+            "frequency [Hz]": sweep.frequency,
+            f"{amplitude} [{length}]": level * length_factor,
+            **({} if reached is None else {f"amplitude reached [{length}]": reached * length_factor}),
+            "repeat": sweep.repeat,
+            f"{relates} [{stiffness}]": np.abs(sweep.stiffness) * factor,
+            "loss factor [-]": loss_factor(sweep.stiffness),
+        }
+    )
+
+
+def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
+    """A resonance test as a shaker's controller writes it: accelerations of base and mass, and their phase."""
+    return pd.DataFrame(
+        {
+            "frequency [Hz]": test.frequency,
+            "base acceleration [m/s^2]": test.base_acceleration,
+            "mass acceleration [m/s^2]": test.base_acceleration * np.abs(test.transmissibility),
+            "phase [deg]": np.degrees(np.angle(test.transmissibility)),
+        }
+    )
+
+
+def _as_stated(place: Place) -> Display:
+    """The units in which files of a place have displacement, force and stiffness; tensor strain is half of gamma."""
+    (unit, factor), force, stiffness = place.display
+    stated = stated_strain(place)
+    return Display(Unit(unit, factor / stated), force, stiffness)

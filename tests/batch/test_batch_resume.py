@@ -1,25 +1,30 @@
-"""`batch` that goes on: results that stand, what is torn or changed, and a batch that was killed."""
+"""batch that goes on: results that stand, what is torn or changed, a batch that was killed, and workers that die."""
 
 from __future__ import annotations
 
 import json
-import random
+import multiprocessing
+import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import openpyxl
 import pytest
-from trees import PATTERN, command, kept, list_many, rows, stamps, tree, wait_for
+from trees import PATTERN, command, kept, list_many, stamps, tree, wait_for
 
 from bushfit.batch import ledger
-from bushfit.batch.manifest import Settings, read_manifest
+from bushfit.batch.manifest import Row, Settings, read_manifest
+from bushfit.batch.pool import LocalPool, run
 from bushfit.batch.quantities import parse_point
-from bushfit.errors import OutputError
+from bushfit.batch.work import Orders, failed, work
+from bushfit.errors import BatchError
 from bushfit.report.contents import Formats
 
 ALL = ("batch", PATTERN, "-o", "all", "--no-plots")
@@ -111,51 +116,91 @@ def test_the_key_changes_with_all_that_the_answer_depends_on(shop: Path) -> None
     assert ledger.key(row, points, plain) == ledger.key(*asked[1])
 
 
-@pytest.mark.parametrize(("kills", "many"), [(1, 8), pytest.param(3, 20, marks=pytest.mark.slow)])
-def test_killed_at_any_moment_and_resumed_it_is_as_if_it_had_run_through(
-    typed: Callable[..., Any], shop: Path, kills: int, many: int
-) -> None:
-    list_many(shop, many)
+def test_killed_in_mid_run_and_resumed_it_is_as_if_it_had_run_through(typed: Callable[..., Any], shop: Path) -> None:
+    list_many(shop, 8)
     assert typed("batch", "many.csv", "-o", "whole", "--no-plots", "-q").returncode == 0
-    draw, left = random.Random(5), []
-    for wanted in sorted(draw.sample(range(2, many - 4), kills)):
-        running = subprocess.Popen(command("killed", "--resume", "-q"), cwd=shop, stderr=subprocess.DEVNULL)
-        wait_for(running, shop / "killed", wanted)
-        time.sleep(draw.uniform(0.0, 0.03))
-        running.send_signal(signal.SIGKILL)
-        running.wait()
-        left.append(kept(shop / "killed"))
+    running = subprocess.Popen(command("killed", "--resume", "-q"), cwd=shop, stderr=subprocess.DEVNULL)
+    wait_for(running, shop / "killed", 3)
+    running.send_signal(signal.SIGKILL)
+    running.wait()
+    left = kept(shop / "killed")
     time.sleep(1.0)
     workers = subprocess.run(["pgrep", "-f", str(shop)], capture_output=True, text=True, check=False).stdout
     assert workers == "", "workers follow their parent"
     before = stamps(shop / "killed/bushings")
     done = subprocess.run(command("killed", "--resume", "-q"), cwd=shop, check=False)
-    print(f"killed with {left} of {many} rows kept")
+    print(f"killed with {left} of 8 rows kept")
     assert done.returncode == 0
-    assert 0 < left[0] < many, "killed in mid-run"
+    assert 0 < left < 8, "killed in mid-run"
     assert before.items() <= stamps(shop / "killed/bushings").items(), "nothing kept is done again"
     assert tree(shop / "killed") == tree(shop / "whole")
 
 
-def test_one_batch_holds_a_folder_and_clears_what_a_killed_one_left(tmp_path: Path) -> None:
-    left = tmp_path / ledger.STAGE / "half"
+@pytest.mark.parametrize("option", ["--force", "--resume"])
+def test_one_batch_holds_a_folder_and_clears_what_a_killed_one_left(
+    typed: Callable[..., Any], shop: Path, option: str
+) -> None:
+    left = shop / "all" / ledger.STAGE / "half"
     left.mkdir(parents=True)
-    with ledger.held(tmp_path):
+    with ledger.held(shop / "all"):
         assert not left.exists()
-        with pytest.raises(OutputError, match="another batch is at work there"), ledger.held(tmp_path):
-            pass
-    assert not (tmp_path / ledger.STAGE).exists()
-
-
-@pytest.mark.slow
-def test_two_batches_do_not_share_a_folder(typed: Callable[..., Any], shop: Path) -> None:
-    list_many(shop, 80)
-    first = subprocess.Popen(command("all", "-q", "--jobs", "1"), cwd=shop)
-    wait_for(first, shop / "all", 1)
-    for option in ("--force", "--resume"):
-        second = typed("batch", PATTERN, "-o", "all", option)
-        assert first.poll() is None, "refused at once"
+        second = typed(*ALL, option)
         assert (second.returncode, second.stdout) == (2, "")
         assert "another batch is at work there" in second.stderr
-    assert first.wait() == 0
-    assert [row["status"] for row in rows(shop / "all")] == ["done"] * 80
+    assert not (shop / "all" / ledger.STAGE).exists()
+
+
+def double(rows: Sequence[int], folder: Path, deadly: tuple[int, ...] = (), once: tuple[int, ...] = ()) -> list[str]:
+    """Twice each row; deadly rows kill this process, some only the first time."""
+    for row in rows:
+        mark = folder / f"died at {row}"
+        if row in deadly or (row in once and not mark.exists()):
+            mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+    return [str(2 * row) for row in rows]
+
+
+@pytest.mark.parametrize(
+    ("count", "once", "deadly"), [(300, (), ()), (40, (100, 117), ()), (30, (), (103, 120))], ids=str
+)
+def test_a_worker_that_dies_costs_a_second_try_and_only_what_always_kills_is_given_up(
+    tmp_path: Path, count: int, once: tuple[int, ...], deadly: tuple[int, ...]
+) -> None:
+    rows = list(range(100, 100 + count))
+    task = partial(double, folder=tmp_path, once=once, deadly=deadly)
+    found = list(run(rows, task, lambda why: why, LocalPool(2)))
+    assert sorted(number for number, _ in found) == list(range(count)), "each row once"
+    for number, result in found:
+        if 100 + number in deadly:
+            assert "its worker process died twice" in result
+        else:
+            assert result == str(2 * (100 + number))
+    assert len(list(tmp_path.iterdir())) == len(once + deadly)
+
+
+def test_workers_that_die_before_they_are_given_more_are_replaced(tmp_path: Path) -> None:
+    pool = LocalPool(2)
+    found = run(list(range(100, 140)), partial(double, folder=tmp_path), lambda why: why, pool)
+    done = [next(found)]
+    for worker in multiprocessing.active_children():
+        worker.kill()  # once one is gone, the pool itself ends the others
+        worker.join()
+    with pytest.raises(BrokenExecutor):
+        pool.executor().submit(double, [1], tmp_path).result()
+    done += found
+    assert dict(done) == {n: str(2 * (100 + n)) for n in range(40)}
+
+
+def test_a_worker_of_another_version_or_none_that_lives_ends_the_batch(tmp_path: Path) -> None:
+    row = Row("a", "a", "a.toml", "a.toml", Settings())
+    orders = Orders(tmp_path, (), Formats(False, False), resume=False, version="0.0.0")
+    with pytest.raises(BatchError, match=r"another bushfit[\s\S]*0\.0\.0"):
+        list(run([row], partial(work, orders=orders), failed, LocalPool(1)))
+    with pytest.raises(BatchError, match="no worker process starts"):
+        list(run(list(range(100)), die, lambda why: why, LocalPool(2)))
+
+
+def die(rows: Sequence[int]) -> list[str]:
+    """Die, also over nothing."""
+    os.kill(os.getpid(), signal.SIGKILL)
+    return []

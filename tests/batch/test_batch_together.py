@@ -92,7 +92,7 @@ def test_capability_is_that_of_fixed_limits_and_of_a_process_that_is_not_steady(
     assert "capability: mu: Pp = " in (made / "said").read_text(encoding="utf-8")
 
 
-def test_few_bushings_tell_little_and_say_so(made: Path) -> None:
+def test_few_bushings_tell_little_and_subgroups_make_charts(made: Path) -> None:
     done = fitted(made, "part_0[0-4]/bushing.toml", "-o", "few")
     assert "5 bushings cannot tell whether it is above 1.33; about" in done.stderr
     found = json.loads((made / "few/batch.json").read_text(encoding="utf-8"))
@@ -100,9 +100,6 @@ def test_few_bushings_tell_little_and_say_so(made: Path) -> None:
     assert found["least_told"] > 20
     page = (made / "few/index.html").read_text(encoding="utf-8")
     assert "limits of 5 bushings are provisional" in page
-
-
-def test_subgroups_make_charts_of_mean_and_range(made: Path) -> None:
     rows = [f"part_{number:02}/bushing.toml,shift {number // 3}\n" for number in range(COUNT)]
     (made / "shifts.csv").write_text("campaign,subgroup\n" + "".join(rows))
     fitted(made, "shifts.csv", "-o", "shifts")
@@ -125,13 +122,19 @@ def process_of(values: Array, *stated: float) -> Process:
     return process(values, values * math.nan, np.zeros(values.size, dtype=bool), (low, high), [], 1)
 
 
-def test_drift_is_that_of_the_textbooks() -> None:
+def test_drift_and_the_interval_of_cpk_are_those_of_the_textbooks() -> None:
     values = np.random.default_rng(0).normal(size=40) + np.linspace(0.0, 1.0, 40)
     found, slope = process_of(values)["drift"], stats.theilslopes(values, np.arange(40.0))
     assert found
     assert found[0] == pytest.approx(39 * slope.slope)
     assert list(found[1:3]) == pytest.approx([39 * slope.low_slope, 39 * slope.high_slope], rel=0.05)
     assert found[3] == pytest.approx(stats.kendalltau(np.arange(40), values).pvalue, rel=0.1)
+    random, held = np.random.default_rng(2), 0
+    for values in random.normal(size=(500, 20)):
+        nearest = process_of(values, -4.0, 5.0)["nearest"]
+        assert nearest
+        held += nearest[1] <= 4.0 / 3.0 <= nearest[2]
+    assert 0.92 <= held / 500 <= 0.985
 
 
 @pytest.mark.parametrize("count", [5, 10, 30])
@@ -144,12 +147,3 @@ def test_a_bushing_that_differs_by_chance_is_told_in_one_batch_of_twenty_at_most
         chance = np.array([robust_z(each, errors)[1] for each, errors in zip(values, own, strict=True)])
         told += min(holm(chance.ravel().tolist())) < LEVEL
     assert told <= stats.binom.ppf(0.999, batches, LEVEL)
-
-
-def test_the_interval_of_cpk_holds_it_as_often_as_it_says() -> None:
-    random, held = np.random.default_rng(2), 0
-    for values in random.normal(size=(500, 20)):
-        nearest = process_of(values, -4.0, 5.0)["nearest"]
-        assert nearest
-        held += nearest[1] <= 4.0 / 3.0 <= nearest[2]
-    assert 0.92 <= held / 500 <= 0.985

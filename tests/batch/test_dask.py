@@ -52,12 +52,12 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, Processes]]:
 
 
 def interrupted(shop: Path, address: str, victim: subprocess.Popen[bytes]) -> tuple[int, bytes, bytes]:
-    """Exit status and outputs of a batch of forty, of whose cluster a process is killed in mid-run."""
+    """Exit status and outputs of a batch of twenty, of whose cluster a process is killed in mid-run."""
     arguments = command("cluster", "--scheduler", address, "--json", "-q")
     running = subprocess.Popen(arguments, cwd=shop, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     wait_for(running, shop / "cluster", 5)
-    print(f"killed with {kept(shop / 'cluster')} of 40 rows kept")
-    assert 5 <= kept(shop / "cluster") < 40
+    print(f"killed with {kept(shop / 'cluster')} of 20 rows kept")
+    assert 5 <= kept(shop / "cluster") < 20
     victim.send_signal(signal.SIGKILL)
     out, err = running.communicate(timeout=120)
     return running.returncode, out, err
@@ -66,18 +66,18 @@ def interrupted(shop: Path, address: str, victim: subprocess.Popen[bytes]) -> tu
 def test_a_lost_worker_loses_nothing(typed: Callable[..., Any], shop: Path, cluster: tuple[str, Processes]) -> None:
     """What comes out is what the local pool makes, byte for byte."""
     address, (_, victim, other) = cluster
-    list_many(shop, 40)
+    list_many(shop, 20)
     assert typed("batch", "many.csv", "-o", "local", "-q", "--no-plots").returncode == 0
     status, out, err = interrupted(shop, address, victim)
     assert status == 0, err.decode()
-    assert (json.loads(out)["done"], json.loads(out)["failed"]) == (40, [])
+    assert (json.loads(out)["done"], json.loads(out)["failed"]) == (20, [])
     assert other.poll() is None
     assert tree(shop / "cluster") == tree(shop / "local")
 
 
 def test_a_scheduler_that_is_lost_is_one_error_and_the_work_is_kept(shop: Path, cluster: tuple[str, Processes]) -> None:
     address, (scheduler, *_) = cluster
-    list_many(shop, 40)
+    list_many(shop, 20)
     status, _, err = interrupted(shop, address, scheduler)
     assert status == 2
     assert b"--resume" in err

@@ -48,8 +48,9 @@ BUSHFIT = (
     "from bushfit.fitting.data import Data\n"
     "from bushfit.fitting.procedures import fit_static\n"
     "from bushfit.geometry import Bushing, Direction\n"
-    "from bushfit.reading.loops import read_loop",
-    "loop = read_loop(file, Direction.AXIAL)\n"
+    "from bushfit.reading.loops import read_loop\n"
+    "from bushfit.reading.stated import LoopFile",
+    "loop = read_loop(file, Direction.AXIAL, LoopFile(file='loop.csv'))\n"
     "bushing = Bushing('CMP 15 961', 0.010, 0.018, 0.034)\n"
     "result = fit_static(Data.of(Campaign('c', file, bushing, (loop,))))\n"
     "found = dict(result.model.values)",

@@ -1,27 +1,25 @@
-"""Campaign files: what they say arrives in SI with the tests they name, and what they may not say has its one error.
+"""Campaign files: what they say arrives in SI with the tests they name, in the order in which these were made.
 
-Most of what can be wrong with a campaign stands in cli/spoiled_rows.py, with the command that says it.
+Most of what can be wrong with a campaign stands in cli/spoiled_campaigns.py, with the command that says it.
 """
 
 from __future__ import annotations
 
-import contextlib
 import math
 import pickle
-import tomllib
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.campaign.naming import folder_name
-from bushfit.campaign.toml import read_toml
+from bushfit.campaign.session import Visit, session
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, UnitError
-from bushfit.geometry import Bushing, Direction
+from bushfit.fitting.data import Data
+from bushfit.geometry import Bushing, Direction, Specimen, unit_strain
+from bushfit.reading.tablefile import folder_name
 
 BUSHING = """
 [bushing]
@@ -55,27 +53,16 @@ def folder(tmp_path: Path) -> Path:
 
 
 def campaign_from(text: str, folder: Path) -> Campaign:
-    (folder / "campaign.toml").write_text(text)
+    (folder / "campaign.toml").write_text(text, encoding="utf-8")
     return load_campaign(folder / "campaign.toml")
 
 
-def test_a_plain_campaign(folder: Path) -> None:
-    campaign = campaign_from(BUSHING + TESTS, folder)
-    assert campaign.name == "CMP 15 961"
-    assert campaign.bushing == Bushing("CMP 15 961", 0.010, 0.018, 0.034)
-    tests = [(test.name, test.direction) for test in (*campaign.loops, *campaign.sweeps)]
-    assert tests == [("loop", Direction.AXIAL), ("sweep", Direction.RADIAL)]
-    assert campaign.loops[0].source is not None
-    assert campaign.loops[0].source.file == Path("loop.csv")
-    assert (campaign.fit.parameters, campaign.predict.frequencies, campaign.simulate) == ({}, None, None)
-
-
-def test_what_a_campaign_says_of_its_files(folder: Path) -> None:
+def test_what_a_campaign_says_of_its_files_their_names_and_limits(folder: Path) -> None:
     (folder / "loop.csv").write_text(LOOP.replace("force [N]", "Kraft").replace("time [s]", "x [s]"))
-    campaign = campaign_from(
-        """
+    said = """
 name = "of files"
 bushing = { name = "b", inner_radius = "1 cm", outer_radius = "18 mm", length = "34 mm" }
+sweeps = [{ file = "sweep.csv", direction = "axial", amplitude = "peak-to-peak", noise = "1 %" }]
 [[loops]]
 file = "loop.csv"
 direction = "axial"
@@ -84,25 +71,20 @@ units = { force = "kN" }
 noise = "0.5 %"
 frequency = "0.1 Hz"
 waveform = "sine"
-[[sweeps]]
-file = "sweep.csv"
-direction = "axial"
-amplitude = "peak-to-peak"
-noise = "1 %"
-""",
-        folder,
-    )
+"""
+    campaign = campaign_from(said, folder)
     assert campaign.name == "of files"
     assert campaign.loops[0].noise == 0.005
     assert campaign.loops[0].force.max() == pytest.approx(1000.0, rel=1e-2)
     assert campaign.sweeps[0].amplitude[0] == pytest.approx(0.05e-3)
-
-
-def test_names_of_tests_differ(folder: Path) -> None:
+    (folder / "loop.csv").write_text(LOOP)
     (folder / "more").mkdir()
     (folder / "more/loop.csv").write_text(LOOP)
     campaign = campaign_from(BUSHING + TESTS + '[[loops]]\nfile = "more/loop.csv"\ndirection = "axial"\n', folder)
     assert [loop.name for loop in campaign.loops] == ["loop.csv", "more/loop.csv"]
+    # A least modulus of 0 says that it is not negative; a logarithm has no 0.
+    limits = campaign_from(SIMULATE + '[fit.mu]\nmin = "0 MPa"\nmax = "1e6 MPa"', folder).fit.parameters["mu"]
+    assert (limits.min, limits.max) == (1e3, 1e9)
 
 
 def test_settings_arrive_in_si(folder: Path) -> None:
@@ -110,16 +92,10 @@ def test_settings_arrive_in_si(folder: Path) -> None:
 [fit]
 dynamic_amplitudes = ["0.1 mm", "0.5 deg"]
 residuals = "magnitude_loss_factor"
-[fit.mu]
-value = "1.09 MPa"
-min = "0.1 MPa"
-vary = false
-[fit.m]
-max = "0.2 MPa s^alpha"
-[fit.eps_half]
-value = "1.3 %"
-[fit."inertia.mass"]
-value = "100 g"
+mu = { value = "1.09 MPa", min = "0.1 MPa", vary = false }
+m = { max = "0.2 MPa s^alpha" }
+eps_half = { value = "1.3 %" }
+"inertia.mass" = { value = "100 g" }
 [predict]
 frequencies = { start = "5 Hz", stop = "155 Hz", step = "10 Hz" }
 directions = ["axial", "torsion"]
@@ -130,7 +106,7 @@ noise = "0.5 %"
 loops = [{ direction = "axial", amplitude = "1 mm", frequency = "0.1 Hz" }]
 sweeps = [{ direction = "torsion", amplitudes = ["1 deg"], frequencies = ["5 Hz"] }]
 """
-    campaign = campaign_from(BUSHING + settings, folder)
+    campaign = campaign_from("\ufeff" + BUSHING + settings, folder)
     fit, predict, simulate = campaign.fit, campaign.predict, campaign.simulate
     assert (fit.parameters["mu"].value, fit.parameters["mu"].min, fit.parameters["mu"].vary) == (1.09e6, 1e5, False)
     assert fit.parameters["m"].max == 2e5
@@ -145,12 +121,6 @@ sweeps = [{ direction = "torsion", amplitudes = ["1 deg"], frequencies = ["5 Hz"
     assert simulate.effects == {"inertia": {"mass": 0.1}, "delay": {"tau": 5e-5}}
     assert (simulate.noise, simulate.gain_error, simulate.loops[0].cycles) == (0.005, 0.0, 3)
     assert simulate.sweeps[0].amplitudes == pytest.approx((math.radians(1),))
-
-
-def test_a_limit_beyond_what_a_parameter_can_have_is_moved_there(folder: Path) -> None:
-    """A least modulus of 0 says that it is not negative; a logarithm has no 0."""
-    limits = campaign_from(SIMULATE + '[fit.mu]\nmin = "0 MPa"\nmax = "1e6 MPa"', folder).fit.parameters["mu"]
-    assert (limits.min, limits.max) == (1e3, 1e9)
 
 
 @pytest.mark.parametrize(
@@ -174,53 +144,6 @@ def test_what_is_wrong_has_one_clear_error_which_travels_between_processes(
     assert str(pickle.loads(pickle.dumps(caught.value))) == message
 
 
-VALUES = st.recursive(
-    st.sampled_from(['"1 mm"', '"5 Hz"', "1", "-1.5", "nan", "true", '"axial"', '"loop.csv"', "1979-05-27", '"1 MPa"']),
-    lambda inner: (
-        st.lists(inner, max_size=3).map(lambda parts: f"[{', '.join(parts)}]")
-        | st.dictionaries(
-            st.sampled_from(["mu", "value", "direction", "file", "start", "stop", "step"]), inner, max_size=3
-        ).map(lambda table: "{" + ", ".join(f"{key} = {value}" for key, value in table.items()) + "}")
-    ),
-    max_leaves=6,
-)
-KEYS = ["mu", "frequencies", "directions", "parameters", "effects", "loops", "sweeps", "file", "residuals"]
-
-
-@given(st.sampled_from(["fit", "predict", "simulate", "loops", "sweeps"]), st.sampled_from(KEYS), VALUES)
-def test_any_value_is_understood_or_a_clear_error(
-    tmp_path_factory: pytest.TempPathFactory, table: str, key: str, value: Any
-) -> None:
-    header = f"[[{table}]]" if table in ("loops", "sweeps") else f"[{table}]"
-    with contextlib.suppress(BushfitError):
-        campaign_from(f"{BUSHING}\n{header}\n{key} = {value}\n", tmp_path_factory.getbasetemp())
-
-
-@dataclass(frozen=True)
-class Schema:
-    name: str
-    count: int = 1
-
-
-def read(folder: Path, content: str) -> Schema:
-    (folder / "x.toml").write_bytes(content.encode())
-    return read_toml(folder / "x.toml", Schema, what="a list", largest=1000)
-
-
-@pytest.mark.parametrize("mark", ["", "\ufeff"])
-def test_any_toml_becomes_the_dataclass_asked_for(mark: str, tmp_path: Path) -> None:
-    assert read(tmp_path, f'{mark}name = "Büchse"\r\ncount = 2\r\n') == Schema("Büchse", 2)
-    with pytest.raises(CampaignError, match=r"too large[\s\S]*at most 1000 bytes[\s\S]*give a list, not a measurement"):
-        read(tmp_path, f'name = "{"x" * 1000}"')
-
-
-def test_keys_of_fifteen_parts_are_still_read(tmp_path: Path) -> None:
-    deep = ".".join("abcdefghijklmno") + " = 1"
-    assert tomllib.loads(deep)
-    with pytest.raises(CampaignError, match="a key is missing"):
-        read(tmp_path, deep)
-
-
 @given(st.text(max_size=300))
 @example("con")
 @example("Aux .txt")
@@ -232,3 +155,55 @@ def test_a_name_is_one_folder_on_every_system(name: str) -> None:
     assert 0 < len(folder.encode("utf-8", "surrogatepass")) < 250
     assert not set(folder) & set('/\\:*?"<>|\n')
     assert folder.partition(".")[0].upper() not in {"CON", "PRN", "AUX", "NUL", "COM1", "LPT9"}
+
+
+RUBBER = Bushing("CMP 15 961", 0.010, 0.018, 0.034)
+COUPON = Specimen("DMA", "modulus")
+
+
+def test_turns_strains_and_rests_of_a_session() -> None:
+    loop = Visit(Direction.AXIAL, np.array([1e-3]), 300.0)
+    sweep = Visit(Direction.AXIAL, np.array([1e-4, 5e-4, 2e-4]))
+    first, second = session(RUBBER, [loop, sweep])
+    assert first.temperature == 300.0
+    assert second.temperature is None
+    np.testing.assert_allclose(first.turn, [0.0])
+    np.testing.assert_allclose(second.turn, [1 / 3, 2 / 3, 1.0])
+    np.testing.assert_allclose(first.strained, [0.0])
+    np.testing.assert_allclose(second.strained, 3 * [1e-3 * unit_strain(RUBBER, Direction.AXIAL)])
+    up_and_down = np.array([1.0, 2.0, 4.0, 4.1, 2.0, 2.1, 1.0, 2.0]) * 1e-4
+    (found,) = session(RUBBER, [Visit(Direction.AXIAL, up_and_down)])
+    strain = up_and_down * unit_strain(RUBBER, Direction.AXIAL)
+    np.testing.assert_allclose(found.left, [0.0, 0.0, 0.0, 0.0, strain[3], strain[3], strain[5], strain[3]])
+    np.testing.assert_allclose(7.0 * found.rested[4:], [1.0, 2.0, 1.0, 4.0])
+    coupon, mount = Visit(COUPON, np.array([0.5, 0.1])), Visit(Direction.RADIAL, np.array([1e-4, 1e-4, 1e-4]))
+    of_coupon, of_mount = session(RUBBER, [coupon, mount])
+    np.testing.assert_allclose(of_coupon.turn, [0.0, 1.0])
+    np.testing.assert_allclose(of_mount.turn, [0.0, 0.5, 1.0])
+    np.testing.assert_allclose(of_coupon.strained, [0.0, 0.5 * unit_strain(None, COUPON)])
+    assert of_mount.strained[2] < 0.1
+
+
+def write(folder: Path, order: tuple[str, str]) -> Path:
+    """A campaign of two sweeps, one with a temperature in a column, one with it stated."""
+    rows = "frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]"
+    lines = [f"{f},0.1,{500 + f},0.1" for f in (5, 15, 25)]
+    (folder / "cold.csv").write_text("\n".join([rows, *lines]))
+    warm = [f"{line},{30 + i}" for i, line in enumerate(lines)]
+    (folder / "warm.csv").write_text("\n".join([f"{rows},temperature [degC]", *warm]))
+    text = 'bushing = { name = "b", inner_radius = "10 mm", outer_radius = "18 mm", length = "34 mm" }\n'
+    text += f'[[sweeps]]\nfile = "cold.csv"\ndirection = "axial"\ntemperature = "20 degC"\n{order[0]}\n'
+    text += f'[[sweeps]]\nfile = "warm.csv"\ndirection = "axial"\n{order[1]}\n'
+    (folder / "campaign.toml").write_text(text)
+    return folder / "campaign.toml"
+
+
+@pytest.mark.parametrize(("order", "first"), [(("", ""), "cold"), (("order = 2", "order = 1"), "warm")])
+def test_a_campaign_gives_temperatures_and_order(tmp_path: Path, order: tuple[str, str], first: str) -> None:
+    data = Data.of(load_campaign(write(tmp_path, order)))
+    under = {sweep.name: sweep.circumstances for sweep in data.sweeps}
+    assert under["cold"].temperature == pytest.approx(293.15)
+    np.testing.assert_allclose(under["warm"].temperature, [303.15, 304.15, 305.15])
+    assert under[first].turn[0] == 0.0
+    part = data.sweeps[1].at_amplitudes([1e-4]).circumstances
+    np.testing.assert_array_equal(part.turn, under["warm"].turn)

@@ -12,7 +12,7 @@ import numpy as np
 from spoiled_campaigns import IN_CAMPAIGN, IN_MORE, WHOLE_CAMPAIGNS
 from spoiled_models import IN_MODEL, IN_PREDICTED, WHOLE_MODELS
 from spoiled_tables import IN_LOOP, IN_RESONANCE, IN_SWEEP
-from spoiled_usage import LIMITS, USAGE
+from spoiled_usage import LIMITS, MANIFESTS, USAGE
 
 CAMPAIGN = """\
 [bushing]
@@ -133,23 +133,17 @@ def shaker() -> list[str]:
 
 
 FILES = {
-    "campaign.toml": CAMPAIGN,
-    "more.toml": CAMPAIGN + MORE,
-    "model.json": json.dumps(MODEL, indent=1),
-    "loop.csv": "\n".join(loop()) + "\n",
-    "sweep.csv": "\n".join(sweep()) + "\n",
+    "campaign.toml": CAMPAIGN, "more.toml": CAMPAIGN + MORE, "model.json": json.dumps(MODEL, indent=1),
+    "loop.csv": "\n".join(loop()) + "\n", "sweep.csv": "\n".join(sweep()) + "\n",
     "shaker.csv": "\n".join(shaker()) + "\n",
-}
+}  # fmt: skip
 READING = ("fit-static", "fit-dynamic", "fit", "diagnose", "run", "plan")
 TAKING_MODELS = (
-    ("predict", "model.json"),
-    ("compare", "model.json", "campaign.toml"),
-    ("simulate", "model.json"),
-    ("plan", "model.json"),
-    ("diagnose", "campaign.toml", "--model", "model.json"),
+    ("predict", "model.json"), ("compare", "model.json", "campaign.toml"), ("simulate", "model.json"),
+    ("plan", "model.json"), ("diagnose", "campaign.toml", "--model", "model.json"),
     ("fit-static", "campaign.toml", "--dynamic", "model.json"),
     ("fit-dynamic", "campaign.toml", "--static", "model.json"),
-)
+)  # fmt: skip
 #: The formats that are written without a compiler.
 EXPORT = ("export", "model.json", *(f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx")))
 
@@ -216,12 +210,14 @@ def tables() -> Iterator[Spoiled]:
 
 
 def typed() -> Iterator[Spoiled]:
-    """Command lines, and limits of a batch."""
+    """Command lines, and limits and manifests of a batch."""
     for command, *says in USAGE:
         yield Spoiled(command, tuple(command.split("|")), tuple(says))
     for text, *says in LIMITS:
         command = ("batch", "campaign*.toml", "--limits", "judge.toml")
         yield Spoiled(f"limits: {text}", command, tuple(says), {"judge.toml": text + "\n"})
+    for name, text, *says in MANIFESTS:
+        yield Spoiled(f"{name}: {text}", ("batch", name), (name, *says), {name: text})
 
 
 ROWS = [*campaigns(), *models(), *typed(), *tables()]

@@ -1,26 +1,27 @@
-"""What all commands hold to: files, exit statuses, what goes to which stream, help that is short and works."""
+"""What all commands hold to: files, statuses, streams, help, the Tab key, how far long work is, and a Ctrl-C."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
+import os
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
-from io import StringIO
+import time
 from pathlib import Path
 
 import click
 import pytest
-from rich.console import Console
+from click.testing import CliRunner
 from shell import CAMPAIGN, GEOMETRY, Run, names
+from spoiled import FILES, MODEL
 
-from bushfit.cli import cli
-from bushfit.cli.common import Options
-from bushfit.cli.show import new_table, tell_tests
-from bushfit.model.result import Misfit
-from bushfit.report.contents import Formats
+from bushfit.cli import cli, common, main
 
 COMMANDS = cli.list_commands(click.Context(cli))
 #: Lines of the longest help on a terminal of 80 columns.
@@ -31,18 +32,12 @@ EXAMPLES = re.compile(r"^  Examples?:\n((?:    .*\n)+)\Z", re.MULTILINE)
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("fit-static", CAMPAIGN),
-        ("fit-dynamic", CAMPAIGN),
-        ("fit", CAMPAIGN),
-        ("run", CAMPAIGN),
-        ("predict", "model/model.json"),
-        ("compare", "model", "model/model.json"),
-        ("simulate", "model/model.json"),
-        ("plan", "model/model.json", "--hours", "1.5"),
-        ("export", "model/model.json", "--format", "abaqus"),
+        ("fit-static", CAMPAIGN), ("fit-dynamic", CAMPAIGN), ("fit", CAMPAIGN), ("run", CAMPAIGN),
+        ("predict", "model/model.json"), ("compare", "model", "model/model.json"), ("simulate", "model/model.json"),
+        ("plan", "model/model.json", "--hours", "1.5"), ("export", "model/model.json", "--format", "abaqus"),
     ],
     ids=lambda arguments: arguments[0],
-)
+)  # fmt: skip
 def test_json_alone_on_standard_output_and_quiet_is_quiet(
     bushfit: Run, tmp_path: Path, arguments: tuple[str, ...]
 ) -> None:
@@ -77,14 +72,13 @@ def test_results_are_not_replaced_unasked(bushfit: Run, tmp_path: Path, argument
     assert (tmp_path / file).read_bytes() != b"mine"
 
 
-def test_a_missed_limit_is_status_1_with_the_results_written(bushfit: Run, tmp_path: Path) -> None:
+def test_a_missed_limit_is_status_1_and_results_go_to_a_folder_of_the_campaign(
+    bushfit: Run, tmp_path: Path, work: Path, typed: Run
+) -> None:
     missed = bushfit("fit", CAMPAIGN, "-o", tmp_path / "x", "--no-plots", "--max-nrmse", "1e-4", status=1)
     assert "is above --max-nrmse 0.0001" in missed.stderr
     assert "model.json" in names(tmp_path / "x")
     bushfit("fit", CAMPAIGN, "-o", tmp_path / "y", "--no-plots", "--max-nrmse", "5 %")
-
-
-def test_results_go_to_a_folder_of_the_campaign_by_default(work: Path, typed: Run, tmp_path: Path) -> None:
     typed("fit-static", work / CAMPAIGN, "--no-plots")
     assert (tmp_path / "results" / "CMP 15 961" / "static.json").exists()
 
@@ -140,26 +134,188 @@ def test_a_help_is_short_and_says_what_is_written(typed: Run, command: str) -> N
 def test_examples_of_the_help_work(typed: Run, root: Path, tmp_path: Path, command: str) -> None:
     for name in ("configs", "data"):
         shutil.copytree(root / name, tmp_path / name)
-    found = EXAMPLES.search(typed(command, "-h").stdout)
+    told = typed(command, "-h").stdout
+    found, plain = EXAMPLES.search(told), ["--no-plots"] * ("--no-plots" in told)
     assert found, "an example at the end"
     for line in found[1].splitlines():
         program, *arguments = shlex.split(line)
         assert (program, arguments[0]) == ("bushfit", command)
-        assert typed(*arguments).stderr, "something is told"
+        assert typed(*arguments, *plain).stderr, "something is told"
 
 
-def test_long_names_in_a_table_wrap_and_lose_no_letter() -> None:
-    table = new_table("t", "test", "place", "points", "NRMSE", names=2)
-    table.add_row("tf_015p 18.4 degC", "DMA, second specimen", "14", "7.7")
-    told = StringIO()
-    Console(file=told, width=40).print(table)
-    assert "…" not in told.getvalue()
-    for word in ("tf_015p", "degC", "second", "specimen", "points", "NRMSE", "7.7"):
-        assert word in told.getvalue()
+MISTAKES = {"plain,peak_to_peak:sweep_axial", "plain,peak_to_peak:sweep_radial"}
+PLACES = {"plain,axial", "plain,radial", "plain,torsion"}
+ASKED = [
+    ("fit-", {"plain,fit-static", "plain,fit-dynamic"}), ("fit|x.toml|--prof", {"plain,--profile"}),
+    ("fit|x.toml|--loss|", {"plain,linear", "plain,soft_l1"}), ("export|m.json|--format|na", {"plain,nastran"}),
+    ("run|conf", {"file,conf"}), ("run|x.toml|-o|res", {"dir,res"}), ("init|x.csv|--direction|ra", {"plain,radial"}),
+    ("fit|configs/epdm_70.toml|--direction|", {*PLACES, "plain,DMA", "plain,DMA 2", "plain,mount"}),
+    ("fit|configs/lost.toml|--direction|", PLACES), ("fit|half.toml|--direction|", PLACES),
+    ("fit|README.md|--effect|interf", {"plain,interface_slip"}),
+    ("diagnose|configs/cmp_15961.toml|--adopt|peak_to", MISTAKES), ("diagnose|--without|inerti", {"plain,inertia"}),
+    ("plan|x.toml|--rivals|delay,iner", {"plain,delay,inertia"}),
+    ("compare|x.toml|--families|sliders+kra", {"plain,sliders+kraus"}), ("schema|mod", {"plain,model"}),
+    ("inspect|configs/cmp_15961.toml|--thou", {"plain,--thousands"}),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(("count", "said"), [(9, "and 1 more test, which is"), (10, "and 2 more tests, which are")])
-def test_tests_left_out_are_counted(count: int, said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    tests = [Misfit(f"t{n}", "axial", True, None, None, None, 5, 0.01, 1.0, 0.0) for n in range(count)]
-    tell_tests(Options(None, False, False, False, Formats(), False), tests, [])
-    assert said in capsys.readouterr().err
+def asking(*words: str) -> dict[str, str]:
+    """What a shell puts into the environment, the cursor behind the last word."""
+    line = ["bushfit", *words]
+    return {"_BUSHFIT_COMPLETE": "bash_complete", "COMP_WORDS": " ".join(line), "COMP_CWORD": str(len(line) - 1)}
+
+
+@pytest.mark.parametrize(("words", "offered"), ASKED, ids=[words for words, _ in ASKED])
+def test_tab_offers(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, offered: set[str]) -> None:
+    (tmp_path / "half.toml").write_text("specimens = [1, {}]\nloops = 3\n")  # as while it is written
+    words = words.replace("half.toml", str(tmp_path / "half.toml"))
+    monkeypatch.chdir(root)
+    done = CliRunner().invoke(cli, prog_name="bushfit", env=asking(*words.split("|")))
+    assert (done.exit_code, set(done.stdout.split("\n")) - {""}, done.stderr) == (0, offered, "")
+
+
+def test_the_installed_command_answers_a_shell() -> None:
+    program = str(Path(sys.executable).with_name("bushfit"))
+    env = {**os.environ, **asking("simu")}
+    assert subprocess.run([program], env=env, capture_output=True, check=True).stdout == b"plain,simulate\n"
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
+def test_the_line_on_the_page_is_what_each_shell_takes(root: Path, shell: str) -> None:
+    assert f"{shell}_source" in (root / "configs/README.md").read_text(encoding="utf-8")
+    done = CliRunner().invoke(cli, prog_name="bushfit", env={"_BUSHFIT_COMPLETE": f"{shell}_source"})
+    assert f"{shell}_complete" in done.stdout
+
+
+PREDICT = ("predict", "model.json", "-o", "x", "--no-plots", "--json", "-q")
+BATCH = ("batch", "campaign.toml", "more.toml", "-o", "x", "--jobs", "1", "--no-plots", "--json", "-q")
+BUSHFIT = (sys.executable, "-m", "bushfit")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    for name, content in FILES.items():
+        Path(name).write_text(content)
+    return tmp_path
+
+
+def assert_one_line(status: int, err: bytes) -> None:
+    assert status == 2, err
+    assert err.startswith(b"bushfit: "), err
+    assert err.count(b"\n") == 1, err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        PREDICT, pytest.param(BATCH, marks=pytest.mark.slow), ("--help",), ("schema", "model", "-q"),
+    ],
+    ids=lambda it: it[0],
+)  # fmt: skip
+def test_a_full_device(arguments: tuple[str, ...], folder: Path) -> None:
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run([*BUSHFIT, *arguments], stdout=full, stderr=subprocess.PIPE, check=False)
+    assert_one_line(done.returncode, done.stderr)
+    assert b"standard output cannot be written: No space left on device" in done.stderr
+    assert not list(folder.glob("x/*.*")), "the rows of a batch alone are kept, for --resume"
+
+
+def test_a_pipe_that_nobody_reads(folder: Path) -> None:
+    """Nothing is written where the result cannot be printed; what people are told besides is not needed."""
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run([*BUSHFIT, *PREDICT], stdout=write, stderr=subprocess.PIPE, check=False)
+    assert_one_line(done.returncode, done.stderr)
+    assert not (folder / "x").exists()
+    done = subprocess.run([*BUSHFIT, *PREDICT[:-2]], stdout=subprocess.PIPE, stderr=write, check=False)
+    assert done.returncode == 0
+    assert (folder / "x" / "axial.csv").exists()
+    missed = subprocess.run([*BUSHFIT, "predict", "lost.json"], stdout=subprocess.PIPE, stderr=write, check=False)
+    os.close(write)
+    assert missed.returncode == 2
+
+
+def test_json_is_utf8_in_any_code_page_and_no_text_steers_the_terminal(folder: Path) -> None:
+    """The name of the bushing is in no code page; a warning would clear the screen, and turn the line around."""
+    said = "\x1b[2J\x9b2J\u202ecleared"
+    model = MODEL | {"warnings": [said], "bushing": MODEL["bushing"] | {"name": "衬套"}}
+    (folder / "model.json").write_text(json.dumps(model), encoding="utf-8")
+    settings = {**os.environ, "PYTHONIOENCODING": "cp1252"}
+    command = [*BUSHFIT, "simulate", "model.json", "-o", "x", "--json"]
+    done = subprocess.run(command, capture_output=True, env=settings, check=False)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout.decode("utf-8"))["truth"]["bushing"]["name"] == "衬套"
+    done = subprocess.run([*BUSHFIT, *PREDICT[:2], "-o", "y", "--no-plots"], capture_output=True, check=False)
+    assert done.returncode == 0
+    assert b"warning: \\x1b[2J\\x9b2J\\u202ecleared" in done.stderr
+    assert not any(sign in done.stderr.decode() for sign in "\x1b\x9b\u202e")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
+@pytest.mark.parametrize("after", [0.1, 0.5])
+def test_an_early_ctrl_c(after: float, folder: Path) -> None:
+    """From the first line of bushfit on, which here says that it has begun."""
+    code = (
+        "import signal, sys; sys.argv = ['bushfit', 'run', 'campaign.toml']\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # what runs in the background ignores it
+        "print(flush=True)\n"
+        "from bushfit.__main__ import main; main()"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
+        assert run.stdout
+        run.stdout.readline()
+        time.sleep(after)
+        run.send_signal(signal.SIGINT)
+        err = run.communicate()[1]
+    assert_one_line(run.returncode, err.lstrip(b"\n"))
+    assert err.endswith(b"bushfit: aborted\n")
+    assert not (folder / "results").exists()
+
+
+SIMULATE = ("simulate", "model/model.json")
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def said(work: Path, monkeypatch: pytest.MonkeyPatch, heard: io.StringIO, *words: object) -> str:
+    monkeypatch.chdir(work)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setattr("sys.argv", ["bushfit", *map(str, words)])
+    with (
+        contextlib.redirect_stderr(heard),
+        contextlib.redirect_stdout(io.StringIO()),
+        pytest.raises(SystemExit) as left,
+    ):
+        main()
+    assert left.value.code == 0, heard.getvalue()
+    return heard.getvalue()
+
+
+def test_a_terminal_is_shown_how_far_it_is(work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(common, "_PATIENCE", 0.0)
+    told = said(work, monkeypatch, Terminal(), *SIMULATE, "-o", tmp_path / "x")
+    assert "sweeps simulated" in told
+    assert "0 of 2" in told
+    assert told.endswith(f"truth.json to {tmp_path / 'x'}\n"), "what was shown is gone, and the result stands"
+    profiled = said(work, monkeypatch, Terminal(), "fit", CAMPAIGN, "--profile", "--no-plots", "-o", tmp_path / "fit")
+    assert re.search(r"[0-5] of 5", profiled)
+
+
+@pytest.mark.parametrize(
+    ("heard", "patience", "more"),
+    [(io.StringIO, 0.0, ()), (Terminal, 0.0, ("--quiet",)), (Terminal, 60.0, ())],
+    ids=["no terminal", "quiet", "quick"],
+)
+def test_nobody_else_is(
+    work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, heard: type, patience: float, more: tuple[str, ...]
+) -> None:
+    monkeypatch.setattr(common, "_PATIENCE", patience)
+    told = said(work, monkeypatch, heard(), *SIMULATE, *more, "-o", tmp_path / "x")
+    assert "simulated " not in told
+    assert "\x1b[?25" not in told, "the cursor is left alone"

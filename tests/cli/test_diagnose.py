@@ -53,15 +53,12 @@ def found(work: Path, done: Done) -> Path:
     return work / "found"
 
 
-def test_files_and_streams(done: Done, found: Path) -> None:
+def test_the_document_names_the_effect_with_its_size_and_the_gap_before_and_after(done: Done, found: Path) -> None:
     assert names(found) == TABLES
     assert done.stdout == (found / "diagnosis.json").read_text(encoding="utf-8")
     for words in ("case 001: named", "inertia", "95 %", "data fitted", "held out", "where", "next test:", "wrote "):
         assert words in done.stderr
     assert "all but sure: moving mass between bushing and load cell (inertia)\n" in done.stderr
-
-
-def test_the_document_names_the_effect_with_its_size_and_the_gap_before_and_after(found: Path) -> None:
     written = document(found / "diagnosis.json")
     assert written["schema"] == "bushfit/diagnosis/3"
     assert written["verdict"] == "named"
@@ -85,7 +82,7 @@ def test_the_document_names_the_effect_with_its_size_and_the_gap_before_and_afte
     assert usable["held_out"] is True
 
 
-def test_every_residual_is_in_the_table(found: Path) -> None:
+def test_every_residual_and_every_candidate_is_in_a_table(found: Path) -> None:
     """Their mean squares are the gaps that the document states, but for what a loop's rows tell of the next."""
     table = pd.read_csv(found / "gap.csv")
     gap = document(found / "diagnosis.json")["gap"]["calibration"]
@@ -97,9 +94,6 @@ def test_every_residual_is_in_the_table(found: Path) -> None:
         assert values == pytest.approx(gap[when], rel=0.02)  # a loop's rows share its gain
     assert table[table.kind == "sweep"].groupby("test").size().to_dict() == {"sweep_axial": 144, "sweep_radial": 144}
     assert set(table[table.kind == "loop"].test) == {"loop_axial_1", "loop_axial_2"}
-
-
-def test_every_candidate_is_in_the_table(found: Path) -> None:
     table = pd.read_csv(found / "candidates.csv")
     asked = {name for name, effect in at_places(("axial", "radial")).items() if effect.after in (None, *BASE)}
     mistakes = table.effect.str.partition(":")[0].isin(MISTAKES)
@@ -183,19 +177,16 @@ def test_it_is_told_with_its_line_and_nothing_is_mended(bushfit: Run, work: Path
     assert candidates.loc[LABEL, ["level", "why"]].tolist() == ["record", "closes the gap"]
 
 
-def test_adopted_it_is_mended_aloud(bushfit: Run, work: Path) -> None:
+def test_a_line_in_the_campaign_or_adopted_aloud_puts_it_right(bushfit: Run, work: Path) -> None:
     done = bushfit("diagnose", DOUBLED, "--adopt", LABEL, "-o", "adopted", "--no-plots")
     assert f"mended by --adopt {LABEL}" in " ".join(done.stderr.split())
-    assert document(work / "adopted/diagnosis.json")["verdict"] == "consistent"
     assert any("mended by" in line for line in document(work / "adopted/model.json")["warnings"])
-
-
-def test_the_line_in_the_campaign_puts_it_right(bushfit: Run, work: Path) -> None:
-    text = (work / DOUBLED).read_text()
     line = 'file = "sweep_axial.csv"'
-    (work / "doubled/mended.toml").write_text(text.replace(line, f'{line}\namplitude = "peak-to-peak"'))
-    done = bushfit("diagnose", "doubled/mended.toml", "--json", "--no-plots", "-o", "mended")
-    assert json.loads(done.stdout)["verdict"] == "consistent"
+    text = (work / DOUBLED).read_text().replace(line, f'{line}\namplitude = "peak-to-peak"')
+    (work / "doubled/mended.toml").write_text(text)
+    bushfit("diagnose", "doubled/mended.toml", "--no-plots", "-o", "mended")
+    for folder in ("adopted", "mended"):
+        assert document(work / folder / "diagnosis.json")["verdict"] == "consistent"
 
 
 def test_run_uses_the_tests_as_they_are_and_warns(bushfit: Run, work: Path) -> None:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from shell import GEOMETRY, Run, document, refused, values
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.campaign.written import toml_value
+from bushfit.campaign.toml import toml_value
 
 FILES = ("loop_axial_1.csv", "sweep_axial.csv", "sweep_radial.csv")
 
@@ -29,36 +29,38 @@ def tests(root: Path, tmp_path: Path) -> list[Path]:
     return [tmp_path / "lab/my tests" / name for name in FILES]
 
 
-def test_the_campaign_loads_and_fits(typed: Run, tests: list[Path], tmp_path: Path, table_1: dict) -> None:
-    typed("init", *tests, *GEOMETRY, "--name", 'Bushing "7"', "-o", "lab/campaign")
+def test_the_campaign_loads_and_fits_and_its_geometry_is_echoed(
+    typed: Run, tests: list[Path], tmp_path: Path, table_1: dict
+) -> None:
+    sizes = ("--inner-diameter", "20 mm", "--outer-diameter", "3.6 cm", "--length", "34 mm")
+    done = typed("init", *tests, *sizes, "--name", 'Bushing "7"', "-o", "lab/campaign")
+    assert "rubber from 20 to 36 mm in diameter, 8 mm thick, 34 mm long" in done.stderr
+    assert "loop_axial_1.csv: loop, axial; cycles: 3, taken as steady; frequency: 0.1 Hz, a sine; " in done.stderr
+    assert "sweep_axial.csv: sweep, axial; frequencies: 16, from 5 to 155 Hz; amplitudes: " in done.stderr
     written = tomllib.loads((tmp_path / "lab/campaign/campaign.toml").read_text(encoding="utf-8"))
     assert [test["file"] for test in written["loops"] + written["sweeps"]] == [f"../my tests/{name}" for name in FILES]
     campaign = load_campaign(tmp_path / "lab/campaign/campaign.toml")
-    assert campaign.bushing.name == 'Bushing "7"'
+    bushing = campaign.bushing
+    assert (bushing.name, bushing.inner_radius, bushing.outer_radius) == ('Bushing "7"', 0.01, 0.018)
     assert [str(sweep.direction) for sweep in campaign.sweeps] == ["axial", "radial"]
     fitted = values(typed("fit", "lab/campaign/campaign.toml", "-o", "fit", "--no-plots", "--json"))
     assert fitted == pytest.approx(table_1, rel=0.02)
 
 
-def test_diameters_are_halved_and_the_geometry_is_echoed(typed: Run, tests: list[Path], tmp_path: Path) -> None:
-    sizes = ("--inner-diameter", "20 mm", "--outer-diameter", "3.6 cm", "--length", "34 mm")
-    done = typed("init", *tests, *sizes, "-o", "x", "--name", "B")
-    assert "B: rubber from 20 to 36 mm in diameter, 8 mm thick, 34 mm long" in done.stderr
-    assert "loop_axial_1.csv: loop, axial; cycles: 3, taken as steady; frequency: 0.1 Hz, a sine; " in done.stderr
-    assert "sweep_axial.csv: sweep, axial; frequencies: 16, from 5 to 155 Hz; amplitudes: " in done.stderr
-    bushing = load_campaign(tmp_path / "x/campaign.toml").bushing
-    assert (bushing.inner_radius, bushing.outer_radius) == (0.01, 0.018)
-
-
-def test_where_it_is_written(typed: Run, tests: list[Path], tmp_path: Path) -> None:
+def test_where_it_is_written_and_that_the_next_line_can_be_pasted(
+    typed: Run, tests: list[Path], tmp_path: Path
+) -> None:
     done = typed("init", *tests, *GEOMETRY, "-o", "lab/my.toml", "--json")
     text = (tmp_path / "lab/my.toml").read_text(encoding="utf-8")
     assert json.loads(done.stdout)["campaign"] == text
     assert tomllib.loads(text)["bushing"]["name"] == "my tests"
     assert tomllib.loads(text)["loops"][0]["file"] == "my tests/loop_axial_1.csv"
     assert "next: bushfit run lab/my.toml" in done.stderr
-    typed("init", *tests, *GEOMETRY)
-    assert (tmp_path / "results/my tests/campaign.toml").exists()
+    done = typed("init", *tests, *GEOMETRY)
+    (line,) = (line for line in done.stderr.splitlines() if line.startswith("next: bushfit run "))
+    _, *words = shlex.split(line.removeprefix("next: "))
+    assert words == ["run", str(Path("results/my tests/campaign.toml"))]
+    assert (tmp_path / words[1]).exists()
 
 
 def change(file: Path, **renamed: str) -> Path:
@@ -142,21 +144,8 @@ def test_a_force_that_counts_the_other_way_is_turned_and_said(typed: Run, tests:
     done = typed("init", tests[0], *GEOMETRY, "-o", "x")
     assert "the load cell counts the other way" in done.stderr
     assert "force_sign = -1" in (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
-    assert load_campaign(tmp_path / "x/campaign.toml").loops
-
-
-def test_coupons_alone_make_a_campaign_without_a_bushing(typed: Run, tmp_path: Path) -> None:
-    for symbol in ("E", "G"):
-        rows = "\n".join(f"{f},{a},{1 + f / 1e3},0.1" for a in (0.1, 1) for f in range(5, 60, 5))
-        text = f"Frequency [Hz],Strain [%],Storage Modulus {symbol}' [MPa],tan delta [-]\n{rows}\n"
-        (tmp_path / f"{symbol}.csv").write_text(text, encoding="utf-8")
-    for options, names in (((), ("bar", "coupon")), (("--specimen", "DMA"), ("DMA", "DMA_2"))):
-        typed("init", tmp_path / "E.csv", tmp_path / "G.csv", *options, "-o", f"{names[0]}.toml")
-        campaign = load_campaign(tmp_path / f"{names[0]}.toml")
-        assert [(one.name, one.strain) for one in campaign.specimens] == list(
-            zip(names, ("tension", "engineering"), strict=True)
-        )
-        assert [sweep.direction for sweep in campaign.sweeps] == list(campaign.specimens)
+    (loop,) = load_campaign(tmp_path / "x/campaign.toml").loops
+    assert loop.force[loop.displacement.argmax()] > 0.0
 
 
 @pytest.mark.parametrize(
@@ -194,14 +183,6 @@ def test_any_text_is_written_as_toml(text: str) -> None:
     assert tomllib.loads(f"x = {toml_value(text)}") == {"x": text}
 
 
-def test_the_next_line_can_be_pasted_whatever_the_name(typed: Run, tests: list[Path], tmp_path: Path) -> None:
-    done = typed("init", *tests, *GEOMETRY, "--name", "My bushing")
-    (line,) = (line for line in done.stderr.splitlines() if line.startswith("next: bushfit run "))
-    _, *words = shlex.split(line.removeprefix("next: "))
-    assert words == ["run", str(Path("results/My bushing/campaign.toml"))]
-    typed(*words, "-o", "run", "--no-plots")
-
-
 class Person(io.StringIO):
     """Somebody at a terminal, who types these lines and then leaves."""
 
@@ -217,7 +198,7 @@ def answering(monkeypatch: pytest.MonkeyPatch, *lines: str) -> Person:
 
 #: Of a loop without time and a sweep without units: wrong answers among the right ones.
 ANSWERS = [
-    *("My B", "0.1", "0.1 Hz", "sine", "up", "axial"),
+    *("My B", "0.1", "0.1 Hz", "sine", "up", "axial", "500 N axial"),
     *("Kx", "K", "Hz", "N", "mm", "N/mm", "radial", "peak-to-peak"),
     *("20", "20 mm", "18 mm", "34 mm", "20 mm", "36 mm", "34 mm"),
 ]
@@ -250,6 +231,7 @@ def test_at_a_terminal_what_lacks_is_asked_for(
         0.018,
     )
     assert [str(test.direction) for test in (*campaign.loops, *campaign.sweeps)] == ["axial", "radial"]
+    assert campaign.path.read_text(encoding="utf-8").count('preload = "500 N axial"') == 2, "asked for once"
     assert campaign.sweeps[0].amplitude.max() == pytest.approx(0.25e-3)
     assert campaign.loops[0].time[-1] == pytest.approx(30.0, rel=0.01)
 
@@ -273,7 +255,12 @@ def test_programs_are_asked_nothing(
 
 
 def test_a_command_that_says_all_is_asked_nothing(
-    typed: Run, tests: list[Path], monkeypatch: pytest.MonkeyPatch
+    typed: Run, tests: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answering(monkeypatch)
-    typed("init", *tests, *GEOMETRY, "--amplitude", "zero-to-peak", "-o", "x")
+    all_said = (*tests, *GEOMETRY, "--amplitude", "zero-to-peak")
+    typed("init", *all_said, "--preload", "none", "-o", "x")
+    answering(monkeypatch, "")
+    typed("init", *all_said, "-o", "y")
+    campaigns = [(folder / "campaign.toml").read_text(encoding="utf-8") for folder in (tmp_path / "x", tmp_path / "y")]
+    assert [text.count('preload = "none"') for text in campaigns] == [len(tests), 0], "Enter leaves a preload open"

@@ -32,13 +32,15 @@ def test_files_are_told_and_the_campaign_s_text_can_be_pasted(typed: Run, root: 
         assert words in done.stderr
 
 
-def test_json_holds_everything(typed: Run, root: Path) -> None:
+def test_json_holds_everything_and_many_files_make_several_pictures(typed: Run, root: Path, tmp_path: Path) -> None:
     written = json.loads(typed("inspect", *(root / file for file in CLEAN), "--json", "--no-plots").stdout)
     loop, sweep = written["files"]
     assert (loop["kind"], sweep["kind"]) == ("loop", "sweep")
     assert [column["role"] for column in loop["columns"]] == ["time", "displacement", "force"]
     assert loop["odd"] == []
     assert "[[loops]]" in written["campaign"]
+    typed("inspect", *[root / CLEAN[1]] * 6, "-o", "x")
+    assert names(tmp_path / "x") == {"inspect.png", "inspect_2.png"}
 
 
 def test_bad_files_are_told_in_the_order_given_the_last_as_the_error(typed: Run, root: Path, tmp_path: Path) -> None:
@@ -50,11 +52,6 @@ def test_bad_files_are_told_in_the_order_given_the_last_as_the_error(typed: Run,
     assert places == sorted(places)
     refused(done, tmp_path / "x", "the columns do not make a test")
     assert "[[loops]]" in done.stdout
-
-
-def test_many_files_make_several_pictures(typed: Run, root: Path, tmp_path: Path) -> None:
-    typed("inspect", *[root / CLEAN[1]] * 6, "-o", "x")
-    assert names(tmp_path / "x") == {"inspect.png", "inspect_2.png"}
 
 
 def test_a_sheet_of_a_workbook(typed: Run, root: Path, tmp_path: Path) -> None:
@@ -137,18 +134,9 @@ def test_how_amplitudes_are_counted_is_said(
     assert unsaid not in done.stderr
 
 
-def test_the_text_holds_in_a_campaign_in_any_folder(typed: Run, root: Path, tmp_path: Path) -> None:
-    (tmp_path / "lab").mkdir()
-    (tmp_path / "lab/axial.csv").write_bytes((root / CLEAN[0]).read_bytes())
-    done = typed("inspect", "lab/axial.csv", "--no-plots")
-    assert done.stdout.startswith("# files by their full path")
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "elsewhere/campaign.toml").write_text(BUSHING + done.stdout, encoding="utf-8")
-    (loop,) = load_campaign(tmp_path / "elsewhere/campaign.toml").loops
-    assert loop.time.size == 2001
-
-
-def test_a_column_is_named_where_it_stands(typed: Run, tmp_path: Path) -> None:
+def test_a_column_is_named_where_it_stands_and_the_text_holds_in_any_folder(
+    typed: Run, tmp_path: Path, root: Path
+) -> None:
     files = sweeps(tmp_path, *(f"f [Hz],{level} [mm],stiffness [N/mm],eta" for level in ("Pegel SS", "amplitude")))
     done = typed("inspect", *files, "--no-plots", "--column", "amplitude=Pegel SS [mm]")
     one, other = tomllib.loads(done.stdout)["sweeps"]
@@ -161,6 +149,14 @@ def test_a_column_is_named_where_it_stands(typed: Run, tmp_path: Path) -> None:
     done = typed("inspect", *files, "--no-plots", "--column", "amplitude=Pegel SS", "--unit", "amplitude=um")
     one, other = tomllib.loads(done.stdout)["sweeps"]
     assert (one["units"], "units" in other) == ({"amplitude": "um"}, False)
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab/axial.csv").write_bytes((root / CLEAN[0]).read_bytes())
+    done = typed("inspect", "lab/axial.csv", "--no-plots")
+    assert done.stdout.startswith("# files by their full path")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere/campaign.toml").write_text(BUSHING + done.stdout, encoding="utf-8")
+    (loop,) = load_campaign(tmp_path / "elsewhere/campaign.toml").loops
+    assert loop.time.size == 2001
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import cache
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -20,15 +22,10 @@ from bushfit.model.file import load_result, to_document
 from bushfit.schemas import schema
 
 SPECIMENS = """
-[[specimens]]
-name = "Dumbbell"
-kind = "modulus"
-[[specimens]]
-name = "Quad"
-kind = "shear"
-area = "500 mm^2"
-thickness = "6 mm"
-elements = 4
+specimens = [
+  { name = "Dumbbell", kind = "modulus" },
+  { name = "Quad", kind = "shear", area = "500 mm^2", thickness = "6 mm", elements = 4 },
+]
 """
 RIG = rig("0.4 %", 'displacement_noise = "0.05 %"')
 COLOURED = rig("0.4 %", 'displacement_noise = "0.05 %"', 'force_correlation = "90 %"')
@@ -60,7 +57,7 @@ SHAPES: dict[str, tuple[str, ...]] = {
     "one loop in torsion": (MOUNT + RIG + LOOP.format("torsion", "2 deg", "0.1 Hz"),),
     "amplitudes at one frequency": (MOUNT + RIG + ONE_FREQUENCY,),
     "coupons alone": ('name = "Sheet"\n' + SPECIMENS + RIG + COUPONS,),
-    "coupons beside a bushing": (MOUNT + SPECIMENS + RIG + LOOPS + SWEEPS["axial"] + COUPONS,),
+    "coupons beside a bushing": (SPECIMENS + MOUNT + RIG + LOOPS + SWEEPS["axial"] + COUPONS,),
     "all directions": (MOUNT + RIG + LOOPS + "".join(SWEEPS.values()),),
     "radial alone": (MOUNT + RIG + LOOP.format("radial", "0.3 mm", "0.1 Hz") + SWEEPS["radial"],),
     "a resonance": (MOUNT + RIG + LOOPS + SHAKEN.format(RISING),),
@@ -69,15 +66,9 @@ SHAPES: dict[str, tuple[str, ...]] = {
 }
 #: Commands that write a model, and its name in their folder.
 WRITERS = {
-    "fit-static": "static",
-    "fit-dynamic": "dynamic",
-    "fit": "model",
-    "fit --profile": "model",
-    "fit --effect inertia": "model",
-    "diagnose": "model",
-    "run": "model",
-    "batch": "model",
-}
+    "fit-static": "static", "fit-dynamic": "dynamic", "fit": "model", "fit --profile": "model",
+    "fit --effect inertia": "model", "diagnose": "model", "run": "model", "batch": "model",
+}  # fmt: skip
 #: Formats of export for a bushing, and for specimens alone.
 FORMATS = ("nastran", "nastran --dialect optistruct", "abaqus", "adams", "csv", "xlsx", "fmu")
 TABLES = ("csv", "xlsx")
@@ -86,27 +77,21 @@ TABLES = ("csv", "xlsx")
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """The folder with the campaign of a shape, simulated once."""
-    made: dict[str, Path] = {}
 
-    def of(shape: str) -> Path:
-        if shape not in made:
-            made[shape] = simulated(tmp_path_factory.mktemp("shape"), shape)
-        return made[shape]
+    @cache
+    def simulated(shape: str) -> Path:
+        folder, (text, *hidden) = tmp_path_factory.mktemp("shape"), SHAPES[shape]
+        (folder / "rig.toml").write_text(text, encoding="utf-8")
+        typing(folder)("simulate", "rig.toml", *hidden, "-o", "tests", "--no-plots")
+        tests = folder / "tests"
+        if shape == "a resonance":
+            reduced(tests)
+        if shape == "described":
+            bent(tests / "sweep_axial.csv")
+            bent(tests / "sweep_radial.csv")
+        return tests
 
-    return of
-
-
-def simulated(folder: Path, shape: str) -> Path:
-    text, *hidden = SHAPES[shape]
-    (folder / "rig.toml").write_text(text, encoding="utf-8")
-    typing(folder)("simulate", "rig.toml", *hidden, "-o", "tests", "--no-plots")
-    tests = folder / "tests"
-    if shape == "a resonance":
-        reduced(tests)
-    if shape == "described":
-        bent(tests / "sweep_axial.csv")
-        bent(tests / "sweep_radial.csv")
-    return tests
+    return simulated
 
 
 def reduced(tests: Path) -> None:
@@ -149,8 +134,8 @@ def is_model(file: Path) -> bool:
     return str(read(file).get("schema")).startswith("bushfit/model/")
 
 
-def taken(tests: Path, model: Path, folder: Path, formats: Sequence[str], *, whole: bool) -> None:
-    """A model taken by every command that reads one; a part of them unless `whole`."""
+def taken(tests: Path, model: Path, folder: Path, more: str) -> None:
+    """A model taken by commands that read one; with `more`, by this one too, and in every format."""
     document = read(model)
     assert list(Draft202012Validator(schema("model")).iter_errors(document)) == []
     again = json.loads(json.dumps(to_document(load_result(model))))
@@ -160,42 +145,37 @@ def taken(tests: Path, model: Path, folder: Path, formats: Sequence[str], *, who
     well("predict", model, "-o", "predicted", *plain)
     well("compare", model, tests / "truth.json", model, "-o", "compared", *plain)
     well("report", model.parent, "-o", "page", *plain)
-    if whole:
+    if more:
         arms = ["--arms"] if "springpot" in document["effects"] else []
         well("predict", model, "--campaign", tests / "campaign.toml", *arms, "-o", "predicted", *plain)
-        well("plan", model, "--hours", "1", "-o", "planned", *plain)
-        well("diagnose", tests / "campaign.toml", "--model", model, "-o", "anew", *plain)
+        own = (model, "--hours", "1") if more == "plan" else (tests / "campaign.toml", "--model", model)
+        well(more, *own, "-o", more, *plain)
     bushing = document["bushing"] is not None
     if bushing:
         well("simulate", model, "-o", "simulated", *plain)
-    for form in formats if bushing else [each for each in formats if each in TABLES]:
+    for form in (FORMATS if more else ("nastran", "csv")) if bushing else TABLES:
         well("export", model, "--format", *shlex.split(form), "-o", "exported", *plain)
 
 
-@pytest.mark.parametrize(
-    ("shape", "writer"),
-    [
-        ("coloured loops", "fit"),
-        ("one loop in torsion", "run"),
-        ("amplitudes at one frequency", "fit"),
-        ("coupons alone", "fit"),
-    ],
-)
+#: Shape, command, and which of the commands that take longest takes what it wrote, in every format. Slow: all shapes by
+#: `run`, which writes a model of every kind, and each by one of the others.
+CASES = [
+    *((shape, "fit", "") for shape in ("coloured loops", "amplitudes at one frequency", "coupons alone")),
+    ("one loop in torsion", "run", ""),
+    *(
+        pytest.param(shape, *how, marks=pytest.mark.slow)
+        for shape, other, more in zip(
+            SHAPES, cycle(sorted({*WRITERS} - {"run"})), cycle(("plan", "diagnose")), strict=False
+        )
+        for how in (("run", more), (other, ""))
+    ),
+]
+
+
+@pytest.mark.parametrize(("shape", "writer", "more"), CASES)
 def test_what_a_command_writes_is_read_by_those_that_take_it(
-    campaign: Callable[[str], Path], tmp_path: Path, shape: str, writer: str
+    campaign: Callable[[str], Path], tmp_path: Path, shape: str, writer: str, more: str
 ) -> None:
     tests = campaign(shape)
     for model in written(tests, writer, tmp_path):
-        taken(tests, model, tmp_path, ("nastran", "csv"), whole=False)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("writer", WRITERS)
-@pytest.mark.parametrize("shape", SHAPES)
-def test_every_shape_of_campaign_by_every_command(
-    campaign: Callable[[str], Path], tmp_path: Path, shape: str, writer: str
-) -> None:
-    """The model that `run` writes is taken by every command, in every format; those of the others by most."""
-    tests, whole = campaign(shape), writer == "run"
-    for model in written(tests, writer, tmp_path):
-        taken(tests, model, tmp_path, FORMATS if whole else FORMATS[:1], whole=whole and model.stem == WRITERS[writer])
+        taken(tests, model, tmp_path, more if model.stem == WRITERS[writer] else "")

@@ -1,16 +1,23 @@
-"""simulate as typed: a campaign that the fits take, the same for the same seed."""
+"""simulate and reduce as typed: a campaign that the fits take, and what a laboratory records made into one."""
 
 from __future__ import annotations
 
+import json
 import shlex
+import shutil
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
-from shell import Run, document, names, typing, values
+from shell import BUSHING, Run, document, names, refused, typing, values
 
 from bushfit.campaign.campaign import load_campaign
+from bushfit.geometry import Direction
 from bushfit.model.file import from_document
+from bushfit.model.model import Model
+from bushfit.reading.stated import SweepFile
+from bushfit.reading.sweeps import read_sweep
 
 
 def test_simulate_writes_a_campaign_that_run_takes(bushfit: Run, tmp_path: Path) -> None:
@@ -23,43 +30,28 @@ def test_simulate_writes_a_campaign_that_run_takes(bushfit: Run, tmp_path: Path)
     fitted = values(bushfit("fit", tmp_path / "one/campaign.toml", "-o", tmp_path / "fit", "--no-plots", "--json"))
     truth = document(tmp_path / "one/truth.json")["parameters"]
     assert fitted == pytest.approx({name: truth[name]["value"] for name in fitted}, rel=0.06)
+    bushfit("simulate", "model/model.json", "--effect", "stiffness_factor.radial=1.1", "-o", tmp_path / "sim")
+    assert document(tmp_path / "sim/truth.json")["parameters"]["stiffness_factor.radial"]["value"] == 1.1
 
 
 SPECIMENS = """
-[[specimens]]
-name = "DMA"
-kind = "modulus"
-
-[[specimens]]
-name = "mount"
-kind = "shear"
-area = "772 mm^2"
-thickness = "6 mm"
-elements = 2
-
+specimens = [
+  { name = "DMA", kind = "modulus" },
+  { name = "mount", kind = "shear", area = "772 mm^2", thickness = "6 mm", elements = 2 },
+]
 [simulate]
 seed = 3
 repeats = 2
 noise = "0.5 %"
 gain_error = "0.2 %"
-
-[simulate.parameters]
-mu = "1.09 MPa"
-m = "0.2 MPa*s^alpha"
-alpha = 0.24
-sigma_fmax = "14.6 kPa"
-eps_half = 0.013
-
-[simulate.effects.stiffness_factor]
-mount = 1.1
-
+parameters = { mu = "1.09 MPa", m = "0.2 MPa*s^alpha", alpha = 0.24, sigma_fmax = "14.6 kPa", eps_half = 0.013 }
+effects.stiffness_factor.mount = 1.1
 [[simulate.sweeps]]
 specimen = "DMA"
 amplitudes = ["0.1 %", "0.2 %", "0.5 %", "1 %", "2 %", "5 %", "10 %"]
 frequencies = ["1 Hz", "10 Hz", "100 Hz"]
 stepped = "amplitude"
 reached = "2 %"
-
 [[simulate.resonances]]
 specimen = "mount"
 mass = "250 g"
@@ -92,6 +84,107 @@ def test_simulated_specimens_are_reduced_and_fitted_as_the_campaign_says(typed: 
     assert found == pytest.approx({name: truth["parameters"][name]["value"] for name in found}, rel=0.2)
 
 
-def test_a_stiffness_factor_can_be_hidden_in_any_place(bushfit: Run, tmp_path: Path) -> None:
-    bushfit("simulate", "model/model.json", "--effect", "stiffness_factor.radial=1.1", "-o", tmp_path / "sim")
-    assert document(tmp_path / "sim/truth.json")["parameters"]["stiffness_factor.radial"]["value"] == 1.1
+RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
+RESONANCE = "data/measured/epdm_70/shaker_1g_573g.csv"
+MASS = ("--mass", "0.573 kg", "--mass-added", "14.8 g")
+
+
+def test_a_raw_record_becomes_a_sweep_that_fits(
+    typed: Run, root: Path, tmp_path: Path, paper_model: Model, table_1: dict[str, float]
+) -> None:
+    done = typed("reduce", root / RECORD, "-o", "x", "--json", "--cycles", "4")
+    assert names(tmp_path / "x") == {"sweep.csv", "reduce.png"}
+    assert "15 points found" in done.stderr
+    document, table = json.loads(done.stdout), pd.read_csv(tmp_path / "x/sweep.csv")
+    assert document["direction"] == "axial"
+    assert list(table) == list(document["points"])
+    assert list(table)[:3] == ["frequency [Hz]", "amplitude [mm]", "amplitude reached [mm]"]
+    assert (table["force distortion [-]"] > 0.005).all()
+    assert (table["cycles used"] >= 4).all()
+    sweep = read_sweep(tmp_path / "x/sweep.csv", Direction.AXIAL, SweepFile(file="sweep.csv"))
+    off = sweep.stiffness / paper_model.stiffness(Direction.AXIAL, sweep.frequency, sweep.amplitude_reached) - 1.0
+    print(f"raw record with noise: |K| and phase of 15 points within {abs(off).max():.1e}")
+    assert abs(off).max() < 3e-3
+    assert len(set(sweep.amplitude)) == 3
+
+    shutil.copy(root / "data/cmp_15961/loop_axial_1.csv", tmp_path / "x")
+    snippet = done.stderr.partition("the way there):")[2]
+    loop = '[[loops]]\nfile = "loop_axial_1.csv"\ndirection = "axial"\n'
+    (tmp_path / "x/campaign.toml").write_text(BUSHING + loop + snippet, encoding="utf-8")
+    fitted = typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json")
+    for name, entry in json.loads(fitted.stdout)["parameters"].items():
+        off = entry["value"] / table_1[name] - 1.0
+        print(f"{name}: {100 * off:+.2f} %, {off * table_1[name] / entry['stderr']:+.1f} standard errors")
+        assert abs(off) < 0.03
+        assert abs(off) * table_1[name] < 3.0 * entry["stderr"]
+
+
+def halves(root: Path, folder: Path, *names: str) -> list[Path]:
+    lines = (root / RECORD).read_text(encoding="utf-8").splitlines(keepends=True)
+    middle = len(lines) // 2
+    for name, part in zip(names, (lines[1:middle], lines[middle:]), strict=True):
+        (folder / name).write_text("".join([lines[0], *part]), encoding="utf-8")
+    return [folder / name for name in names]
+
+
+@pytest.mark.parametrize(
+    ("files", "said"),
+    [
+        (("first.csv", "second.csv"), "state it: --direction axial"),
+        (("axial.csv", "radial.csv"), "reduce each direction by itself"),
+    ],
+)
+def test_a_direction_is_never_guessed(
+    typed: Run, root: Path, tmp_path: Path, files: tuple[str, ...], said: str
+) -> None:
+    refused(typed("reduce", *halves(root, tmp_path, *files), "-o", "x", status=2), tmp_path / "x", said)
+    if files[0] == "first.csv":
+        typed("reduce", *files, "-o", "x", "--direction", "axial", "--no-plots")
+        table = pd.read_csv(tmp_path / "x/sweep.csv")
+        assert set(table["history"]) == {"first", "second"}, "several files make one sweep"
+        assert 14 <= len(table) <= 15, "one step may be cut in two"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--force-sign", "-1"), "the force falls where the displacement rises"),
+        (("--levels", "0.1 deg"), "--levels"),
+        (("--cycles", "40"), "no steady sine was found"),
+    ],
+)
+def test_options_that_do_not_fit(typed: Run, root: Path, tmp_path: Path, options: tuple[str, str], said: str) -> None:
+    refused(typed("reduce", root / RECORD, "-o", "x", *options, status=2), tmp_path / "x", said)
+
+
+def test_a_measured_test_becomes_a_sweep(typed: Run, root: Path, tmp_path: Path) -> None:
+    done = typed("reduce", root / RESONANCE, *MASS, "--direction", "axial", "-o", "x", "--json", "-v")
+    assert names(tmp_path / "x") == {"sweep.csv", "reduce.png"}
+    document = json.loads(done.stdout)
+    assert (document["mass_kg"], document["resonance_Hz"]) == pytest.approx((0.5878, 230.465))
+    assert len([line for line in done.stderr.splitlines() if line.split()[1:2] == ["1"]]) == 100, "a line a point"
+    assert "100 points of 2000 rows; resonance at 230.5 Hz, |T| 8.03" in done.stderr
+    table = pd.read_csv(tmp_path / "x/sweep.csv")
+    columns = ["frequency [Hz]", "amplitude [mm]", "stiffness [N/mm]", "loss factor [-]", "relative error [-]"]
+    assert list(table)[:5] == columns == list(document["points"])[:5]
+    assert table["stiffness [N/mm]"].between(1200, 1600).all()
+    assert (table["relative error [-]"] < 0.2).all()
+    assert table["amplitude [mm]"].max() == pytest.approx(0.0396, rel=0.01)
+    assert table["frequency [Hz]"].is_monotonic_increasing
+
+
+def test_other_words_for_the_same_test(typed: Run, root: Path, tmp_path: Path) -> None:
+    """As a transmissibility in a German file, with its base stated, and phases that count the other way."""
+    raw = pd.read_csv(root / RESONANCE)
+    ratio = raw["mass_accel_ms2"] / raw["base_accel_ms2"]
+    phase = np.degrees(raw["base_phase_rad"] - raw["mass_phase_rad"])
+    table = pd.DataFrame(
+        {"Frequenz [Hz]": raw["freq_hz"], "Transmissibilität [-]": ratio, "Phasenwinkel [Grad]": phase}
+    )
+    table.to_csv(tmp_path / "axial.csv", sep=";", decimal=",", index=False)
+    typed("reduce", root / RESONANCE, *MASS, "--direction", "axial", "-o", "x", "--no-plots")
+    done = typed("reduce", "axial.csv", "--mass", "0.5878 kg", "--base-acceleration", "1 g", "-o", "y", "--no-plots")
+    assert "count the other way" in done.stderr
+    one, other = (pd.read_csv(tmp_path / name / "sweep.csv") for name in ("x", "y"))
+    assert np.allclose(one["stiffness [N/mm]"], other["stiffness [N/mm]"], rtol=1e-3)
+    assert np.allclose(one["amplitude [mm]"], other["amplitude [mm]"], rtol=0.15)  # the shaker missed 1 g by as much

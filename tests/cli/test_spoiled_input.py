@@ -1,18 +1,24 @@
-"""Spoiled input of every kind, to every command: exit status 2, one error that says what and where, nothing written."""
+"""Spoiled input of every kind, to every command: status 2, one error that says what and where, nothing written, and
+no more memory or time than a command may take."""
 
 from __future__ import annotations
 
 import errno
+import json
 import re
 import subprocess
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from bombs import BOMBS
 from commandline import Done, call
-from spoiled import FILES, ROWS, Spoiled
+from shell import refused
+from spoiled import CAMPAIGN, FILES, ROWS, Spoiled
 
 from bushfit.cli import cli
-from bushfit.report import disk
+from bushfit.report import folder as results
 
 ERROR = re.compile(r"^(bushfit: error: |Error: )", re.MULTILINE)
 
@@ -54,7 +60,7 @@ def test_a_disk_that_fills_up_after_the_work(command: str, folder: Path, monkeyp
     def full(files: list[int]) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(disk, "flush", full)
+    monkeypatch.setattr(results, "flush", full)
     row = Spoiled(
         command, (command, "model.json", "--json", "-q"), ("x: the results cannot be written", "free some space")
     )
@@ -66,3 +72,74 @@ def test_a_disk_that_fills_up_after_the_work(command: str, folder: Path, monkeyp
 def test_every_command_is_among_them() -> None:
     commands = {row.command[0] for row in ROWS}
     assert set(cli.commands or cli.list_commands(None)) <= commands  # type: ignore[arg-type]
+
+
+#: Address space [bytes] and processor time [s] of a command: a fit of the paper's campaign takes a third of each.
+LIMITS = (1_500_000_000, 30)
+FIRST, *REST = BOMBS
+
+
+def bounded(folder: Path, *arguments: str, times: int = 1) -> Done:
+    """A command in a process of its own that the system lets have so much, its time so many times, and no more; its
+    processes as well."""
+    if sys.platform == "win32":
+        pytest.skip("Windows bounds no process")
+    code = (
+        f"import resource, sys; memory, seconds = {LIMITS[0]}, {times * LIMITS[1]}\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (memory, memory))\n"
+        "resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))\n"
+        f"sys.argv = {['bushfit', *arguments]}\n"
+        "from bushfit.__main__ import main; main()"
+    )
+    command = [sys.executable, "-W", "error", "-c", code]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, encoding="utf-8")
+    return Done(done.returncode, done.stdout, done.stderr)
+
+
+@pytest.fixture
+def bombed(tmp_path: Path) -> Path:
+    for name, content in FILES.items():
+        (tmp_path / name).write_text(content)
+    (tmp_path / "book.toml").write_text(CAMPAIGN.replace("loop.csv", "book.xlsx"))
+    return tmp_path
+
+
+@pytest.mark.parametrize("bomb", [FIRST, *(pytest.param(bomb, marks=pytest.mark.slow) for bomb in REST)])
+def test_workbooks_that_would_fill_the_machine(bomb: str, bombed: Path) -> None:
+    (bombed / "book.xlsx").write_bytes(BOMBS[bomb])
+    refused(
+        bounded(bombed, "fit", "book.toml", "-o", "x"), bombed / "x", "book.xlsx: the workbook is too large", "save the"
+    )
+
+
+def test_300_mb_of_zeros_behind_a_table(bombed: Path) -> None:
+    with (bombed / "loop.csv").open("r+b") as stream:
+        stream.write(FILES["loop.csv"].encode() * 20)
+        stream.truncate(300_000_000)
+    refused(bounded(bombed, "fit", "campaign.toml", "-o", "x"), bombed / "x", "this is not text", "found: byte 0x00")
+
+
+@pytest.fixture
+def long_runs(bombed: Path) -> Path:
+    """Two runs of 12,000 points: what grew with the square of them took 1.2 GB for each matrix."""
+    rng = np.random.default_rng(1)
+    frequency, level = np.tile(np.linspace(1.0, 200.0, 12_000), 2), np.repeat([0.1, 0.2], 12_000)
+    reached = level * np.exp(0.001 * rng.standard_normal(level.size))
+    stiffness = 500.0 + 0.6 * frequency + rng.standard_normal(level.size)
+    columns = (frequency, reached, stiffness, 0.1 + 0.002 * rng.standard_normal(level.size))
+    rows = [",".join(f"{value:.6g}" for value in row) for row in zip(*columns, strict=True)]
+    (bombed / "sweep.csv").write_text("\n".join([FILES["sweep.csv"].partition("\n")[0], *rows]))
+    return bombed
+
+
+def test_a_fit_to_runs_of_12_000_points(long_runs: Path) -> None:
+    done = bounded(long_runs, "fit-dynamic", "campaign.toml", "--static", "model.json", "-o", "x", "--no-plots")
+    assert done.returncode == 0, done.stderr
+    assert json.loads((long_runs / "x" / "dynamic.json").read_text())["fit"]["points"] == 2 * 12_000
+
+
+@pytest.mark.slow
+def test_a_diagnosis_of_runs_of_12_000_points(long_runs: Path) -> None:
+    done = bounded(long_runs, "diagnose", "campaign.toml", "-o", "x", "--no-plots", times=2)
+    assert done.returncode == 0, done.stderr
+    assert "24000 points are diagnosed as 200 means over narrow bands" in done.stderr

@@ -25,12 +25,9 @@ GEOMETRY = ("--inner-diameter", "20 mm", "--outer-diameter", "36 mm", "--length"
 FREQUENCIES = tuple(float(f) for f in range(5, 156, 15))
 AMPLITUDES = (5e-5, 1e-4, 2e-4, 5e-4)
 INFO = [
-    ["Prüfbericht", ""],
-    ["Kunde", "Muster AG"],
-    ["Prüftemperatur", "23 °C"],
-    ["Datum", "2024-05-03"],
+    ["Prüfbericht", ""], ["Kunde", "Muster AG"], ["Prüftemperatur", "23 °C"], ["Datum", "2024-05-03"],
     ["Hinweis", "Werte nach 3 Vorzyklen"],
-]
+]  # fmt: skip
 
 
 def write_visit(folder: Path, truth: Model) -> None:
@@ -58,6 +55,10 @@ def write_visit(folder: Path, truth: Model) -> None:
     head = "Prüfer: 3\nVorkraft: 0,9 kN\n\nZeit;Axialweg;Axialkraft\ns;mm;kN\n"
     (folder / "Hysterese 0,1Hz.csv").write_text(head + "\n".join(rows) + "\n", encoding="cp1252")
     (folder / "Notizen.txt").write_text("Mittwoch: Buchse eingebaut.\nDonnerstag: fertig.\n", encoding="utf-8")
+    (folder / "Bild.png").write_bytes(b"\x89PNG")
+    (folder / "alt.xlsx").write_bytes(b"PK\x03\x04 not a workbook")
+    (folder / ".hidden.csv").write_text("x", encoding="utf-8")
+    (folder / "2023").mkdir()
 
 
 def long(sweep: Sweep) -> pd.DataFrame:
@@ -99,7 +100,7 @@ def visited(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 def test_a_visit_makes_a_campaign_that_fits(
-    typed: Run, visited: Path, tmp_path: Path, table_1: dict[str, float]
+    typed: Run, visited: Path, tmp_path: Path, table_1: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A workbook with an info sheet, four CSVs named by amplitude, a wide table, an MTS export, a German loop."""
     done = typed("init", visited, *GEOMETRY, "-o", "x")
@@ -112,8 +113,15 @@ def test_a_visit_makes_a_campaign_that_fits(
         "from the lines above the table: preload 0.9 kN, operator 3",
         "Buchse 7.xlsx, sheet Info: the columns do not make a test",
         "Notizen.txt: there is only one column",
+        "Bild.png: no table, by its ending",
+        "alt.xlsx: ",
+        "2023: a folder",
     ):
         assert words in done.stderr, done.stderr
+    assert "hidden" not in done.stderr
+    text = (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
+    entry = next(test for test in tomllib.loads(text)["sweeps"] if test.get("sheet") == "axial")
+    assert (entry["temperature"], entry["date"]) == ("23 °C", "2024-05-03")
     campaign = load_campaign(tmp_path / "x/campaign.toml")
     assert len({sweep.name for sweep in campaign.sweeps}) == len(campaign.sweeps) == 8
     assert sorted(len(sweep.frequency) for sweep in campaign.sweeps) == [11, 11, 11, 11, 44, 44, 44, 44]
@@ -122,28 +130,62 @@ def test_a_visit_makes_a_campaign_that_fits(
     for sweep in radial:
         assert np.unique(sweep.amplitude) == pytest.approx(AMPLITUDES)
         assert np.unique(sweep.frequency) == pytest.approx(FREQUENCIES)
-    fitted = values(typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json"))
-    assert fitted == pytest.approx(table_1, rel=0.04)
+    monkeypatch.setenv("COLUMNS", "50")
+    done = typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json")
+    assert values(done) == pytest.approx(table_1, rel=0.04)
+    assert "and 1 more test, which is met better" in " ".join(done.stderr.split())
+    assert "…" not in done.stderr, "long names wrap"
 
 
-def test_what_no_name_says_is_one_question(typed: Run, visited: Path, tmp_path: Path) -> None:
-    (tmp_path / "axial.csv").write_bytes(next(visited.glob("Dyn_*.csv")).read_bytes())
-    done = typed("init", "axial.csv", *GEOMETRY, "-o", "x", status=2)
-    refused(done, tmp_path / "x", "nothing says at which amplitude this was tested")
+@pytest.mark.parametrize(("name", "said"), [("axial", ""), ("axial_18mm_1mm", "18 mm and 1 mm")])
+def test_what_no_name_says_is_one_question(typed: Run, visited: Path, tmp_path: Path, name: str, said: str) -> None:
+    (tmp_path / f"{name}.csv").write_bytes(next(visited.glob("Dyn_*.csv")).read_bytes())
+    done = typed("init", f"{name}.csv", *GEOMETRY, "-o", "x", status=2)
+    refused(done, tmp_path / "x", "nothing says at which amplitude this was tested", said)
     assert "--at-amplitude" in done.stderr.partition("try: ")[2]
-    typed("init", "axial.csv", *GEOMETRY, "-o", "x", "--at-amplitude", "0.05 mm")
+    typed("init", f"{name}.csv", *GEOMETRY, "-o", "x", "--at-amplitude", "0.05 mm")
 
 
-def test_a_raw_history_in_a_folder_is_left_out_with_the_way_on(
-    typed: Run, root: Path, visited: Path, tmp_path: Path
+@pytest.mark.parametrize(
+    ("file", "said"),
+    [
+        ("cmp_15961_raw/stepped_sine_axial.csv", "a raw stepped-sine history"),
+        ("measured/epdm_70/shaker_1g_573g.csv", "this is a resonance test, not a sweep"),
+    ],
+)
+def test_what_has_to_be_reduced_is_left_out_with_the_way_on(
+    typed: Run, root: Path, visited: Path, tmp_path: Path, file: str, said: str
 ) -> None:
     (tmp_path / "lab").mkdir()
-    for file in (root / "data/cmp_15961_raw/stepped_sine_axial.csv", *visited.glob("Dyn_*0,1*.csv")):
-        (tmp_path / "lab" / file.name).write_bytes(file.read_bytes())
+    for each in (root / "data" / file, *visited.glob("Dyn_*0,1*.csv")):
+        (tmp_path / "lab" / each.name).write_bytes(each.read_bytes())
     done = typed("init", "lab", *GEOMETRY, "--json")
     (told,) = json.loads(done.stdout)["left_out"]
-    assert "stepped_sine_axial.csv: a raw stepped-sine history; bushfit reduce lab/stepped_sine_axial.csv" in told
+    name = file.rpartition("/")[2]
+    assert f"{name}: {said}; bushfit reduce lab/{name}" in told
     assert "results/lab" in done.stderr
+
+
+def test_folders_and_workbooks_without_a_test_are_refused_and_a_test_with_a_fault_is_not_left_out(
+    typed: Run, visited: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab/photo.png").write_bytes(b"\x89PNG")
+    said = "no file of this folder holds a test"
+    refused(typed("init", "lab", *GEOMETRY, "-o", "x", status=2), tmp_path / "x", said, "photo.png: no table")
+    sheets = pd.read_excel(visited / "Buchse 7.xlsx", sheet_name=None, engine="openpyxl")
+    with pd.ExcelWriter(tmp_path / "notes.xlsx") as book:
+        for name in ("Info", "more"):
+            sheets["Info"].to_excel(book, sheet_name=name, index=False)
+    done = typed("init", "notes.xlsx", *GEOMETRY, "-o", "x", status=2)
+    refused(done, tmp_path / "x", "no sheet holds such a table")
+    with pd.ExcelWriter(tmp_path / "both.xlsx") as book:
+        sheets["axial"].to_excel(book, sheet_name="axial", index=False)
+        sheets["radial"].rename(columns={"Amplitude [mm]": "Amplitude"}).to_excel(
+            book, sheet_name="radial", index=False
+        )
+    done = typed("init", "both.xlsx", *GEOMETRY, "-o", "x", status=2)
+    refused(done, tmp_path / "x", 'sheet "radial"', "the amplitude has no unit")
 
 
 def coupon(model: Model, file: Path, strain: float) -> None:
@@ -179,4 +221,4 @@ def test_a_block_in_shear_is_a_specimen_with_its_sizes(typed: Run, tmp_path: Pat
     assert (body.area, body.thickness, body.elements) == (7.72e-4, 6e-3, 2)
     assert "needs --area and --thickness" in typed("init", "mount_10Hz.csv", *sizes[:2], "-o", "y", status=2).stderr
     (sweep,) = tomllib.loads(typed("inspect", "mount_10Hz.csv", *sizes, "--no-plots").stdout)["sweeps"]
-    assert sweep["specimen"] == "mount"
+    assert (sweep["specimen"], sweep["at_frequency"]) == ("mount", "10 Hz")

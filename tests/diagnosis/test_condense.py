@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from rigged import LEVELS, cut
-from tries import some
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import RigSettings
@@ -80,15 +79,6 @@ def test_means_are_as_sharp_as_their_points() -> None:
     assert set(sweep.sweep.amplitude) == set(LEVELS)
 
 
-def test_repeats_share_their_bands_and_rows_keep_their_turn() -> None:
-    sweep = condensed(data_of(swept(PAPER)))[0].sweeps[0].sweep
-    for level in LEVELS:
-        one, other = (sweep.frequency[(sweep.amplitude == level) & (sweep.repeat == number)] for number in (1, 2))
-        np.testing.assert_allclose(one, other, rtol=1e-12)
-    by_turn = np.lexsort((sweep.frequency, sweep.repeat, sweep.amplitude))
-    np.testing.assert_array_equal(by_turn, np.arange(sweep.frequency.size))
-
-
 def test_short_runs_beside_long_ones_stay_points_and_rows_without_weight_count_nowhere() -> None:
     data = data_of(swept(PAPER), replace(swept(PAPER, points=30), name="short"), replace(swept(PAPER), name="off"))
     long, short, off = data.sweeps
@@ -144,17 +134,6 @@ def test_means_lie_on_the_curve(sweep: Sweep, largest: float) -> None:
         assert made.frequency.tolist() == [10.0] * 100 + [100.0] * 100
 
 
-@pytest.mark.parametrize("stated", ["campaign", "file"])
-def test_stated_noise_falls_with_the_points_of_a_band(stated: str) -> None:
-    sweep = swept(PAPER, repeats=1)
-    if stated == "campaign":
-        sweep = replace(sweep, noise=SCATTER)
-    else:
-        sweep = replace(sweep, relative_error=np.full(sweep.frequency.size, SCATTER))
-    banded = condensed(data_of(sweep))[0].sweeps[0]
-    assert banded.relative_noise == pytest.approx(SCATTER / np.sqrt(POINTS / 100), rel=0.02)
-
-
 def test_lines_keep_their_own_noise_beside_means() -> None:
     """A short level in a long sweep, and a short sweep beside one: 1 % stays 1 %, stated or found."""
     few = swept(PAPER, points=30, repeats=1, seed=5)
@@ -180,13 +159,11 @@ def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told() -> None:
     assert low < 2e-4 < high
 
 
-@pytest.mark.parametrize("seeds", some((1, 7), {1}))
 @pytest.mark.parametrize("beside", [False, True], ids=["alone", "beside a short one"])
-def test_a_clean_long_sweep_is_consistent(seeds: int, beside: bool) -> None:
+def test_a_clean_long_sweep_is_consistent(beside: bool) -> None:
     """The noise is white and of the fit's own kind, which proves half."""
-    for seed in range(seeds):
-        short = [replace(swept(PAPER, 30, 1, 100 + seed), name="short")] * beside
-        assert diagnose(data_of(swept(PAPER, seed=seed), *short)).verdict == "consistent"
+    short = [replace(swept(PAPER, 30, 1, 100), name="short")] * beside
+    assert diagnose(data_of(swept(PAPER), *short)).verdict == "consistent"
 
 
 def test_means_that_a_robust_fit_leaves_out_are_told() -> None:

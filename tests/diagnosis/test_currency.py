@@ -1,4 +1,4 @@
-"""The evidence of groups of columns is that of integrals done outright, in any units and order."""
+"""The evidence of groups of columns is that of integrals done outright."""
 
 from __future__ import annotations
 
@@ -75,17 +75,13 @@ def over_nodes(of: Ledger, values: Sequence[float], *, wide: bool = False) -> fl
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_errors_of_the_rig_and_parameters_are_integrated_over(seed: int) -> None:
+def test_worth_is_that_of_the_covariance_in_full(seed: int) -> None:
+    """Of the rig and the parameters; and beside them of columns that move together, and of those of which one is
+    chosen, over all sizes and nodes."""
     of = ledger(seed)
     plain = [restricted(of, covariance(of, node)) for node in of.rig.nodes]
     assert of.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
     assert of.log_evidence_wide == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_groups_are_worth_what_their_covariance_is(seed: int) -> None:
-    """Of columns that move together, and of those of which one is chosen, over all sizes and nodes."""
-    of = ledger(seed)
     for group, worth in zip(of.groups, of.worths, strict=True):
         if group.sense:
             continue
@@ -120,57 +116,6 @@ def test_an_amount_is_integrated_over_its_sense(sense: int) -> None:
     assert of.worths[0].log_evidence == pytest.approx(np.log(whole) + power + NODES[0].log_weight, abs=1e-4)
 
 
-def worth(of: Ledger) -> Array:
-    """All that it says."""
-    said = [(each.log_evidence - of.log_evidence, each.size, each.likeliest) for each in of.worths]
-    return np.array([(of.log_evidence_wide - of.log_evidence, of.chance, 0.0), *said])
-
-
-@given(SEEDS)
-def test_the_order_of_tests_does_not_matter(seed: int) -> None:
-    of = ledger(seed)
-    order = np.random.default_rng(seed).permutation(of.residual.size)
-    place = np.argsort(order)
-    turned = replace(
-        of,
-        residual=of.residual[order],
-        jacobian=of.jacobian[:, order],
-        rig=RigErrors(
-            [replace(block, rows=place[block.rows]) for block in reversed(of.rig.blocks)], of.rig.nodes[::-1]
-        ),
-        groups=[replace(group, columns=group.columns[:, order]) for group in of.groups],
-    )
-    assert worth(turned) == pytest.approx(worth(of), rel=1e-6, abs=1e-7)
-
-
-@given(SEEDS, st.floats(1e-4, 1e4))
-def test_units_do_not_matter(seed: int, factor: float) -> None:
-    """Of parameters, whatever is known of them, and of amounts of which one is chosen."""
-    of = ledger(seed)
-    scaled = np.array([factor, 1.0, factor])
-    groups = [
-        each if each.together else replace(each, columns=factor * each.columns, unit=factor * each.unit)
-        for each in of.groups
-    ]
-    other = replace(of, jacobian=scaled[:, None] * of.jacobian, precision=scaled**2 * of.precision, groups=groups)
-    assert worth(other) == pytest.approx(worth(of), rel=1e-5, abs=1e-6)
-
-
-@given(SEEDS)
-def test_what_shares_no_error_may_as_well_be_two_blocks(seed: int) -> None:
-    of = ledger(seed)
-    first, second = of.rig.blocks[0], of.rig.blocks[1]
-    whole = Block(
-        np.concatenate((first.rows, second.rows)),
-        np.block([[first.columns, np.zeros((3, 4))], [np.zeros((1, 3)), second.columns]]),
-        np.concatenate((first.kinds, second.kinds)),
-        scatters=True,
-    )
-    split = [first, replace(second, scatters=True)]
-    one, other = (worth(replace(of, rig=replace(of.rig, blocks=blocks))) for blocks in ([whole], split))
-    assert one == pytest.approx(other, rel=1e-6, abs=1e-7)
-
-
 @given(SEEDS)
 def test_what_does_nothing_leaves_the_evidence_as_it_is(seed: int) -> None:
     """Columns of nothing, or of what the parameters do too, or that the tests hardly see."""
@@ -181,14 +126,6 @@ def test_what_does_nothing_leaves_the_evidence_as_it_is(seed: int) -> None:
     groups += [replace(of.groups[3], unit=np.zeros(2)), Group(nothing, np.ones(2), together=False, sense=1)]
     for each in replace(of, groups=groups).worths:
         assert each.log_evidence == pytest.approx(of.log_evidence, abs=1e-5)
-
-
-@given(SEEDS)
-def test_a_parameter_twice_is_as_good_as_once(seed: int) -> None:
-    of = ledger(seed)
-    twice = replace(of, jacobian=np.vstack((of.jacobian[:1], of.jacobian)), precision=np.append(0.0, of.precision))
-    worths, same = ([each.log_evidence - one.log_evidence for each in one.worths] for one in (twice, of))
-    assert worths == pytest.approx(same, abs=1e-4)
 
 
 def test_the_size_is_that_of_what_was_put_there() -> None:

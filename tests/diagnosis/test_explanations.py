@@ -1,4 +1,7 @@
-"""What explains a gap proposes itself: effects by sensitivity, places by their rows, curves by their covariance."""
+"""What explains a gap proposes itself: effects by sensitivity, places by their rows, curves by their covariance.
+
+Scores of effects are what a linear refit would gain.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,13 @@ from typing import cast
 
 import numpy as np
 import pytest
-from asking import INERTIA, no_loops, no_repeats, no_sweeps
-from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_strong, off
+from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_strong, no_loops, no_repeats, no_sweeps, off
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.currency import Ledger
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
-from bushfit.diagnosis.propose import sensitivity
+from bushfit.diagnosis.propose import proposals, scores, sensitivity
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects import BASE, LIBRARY, effect_named
 from bushfit.effects.contract import Array, Values
@@ -61,16 +63,6 @@ def test_the_place_that_went_wrong_is_the_likeliest(
     found = best(evidence, places(evidence))
     assert (found.kind, found.family) == ("place", kind)
     assert found.name == words
-
-
-def test_a_place_touches_its_own_rows_alone(bare: Evidence) -> None:
-    (columns,) = [each.columns for each in places(bare) if each.name == "the axial level 0.2 mm"]
-    sweep = parted(bare.data_sets)[1][0]
-    touched = np.tile(sweep.amplitude == LEVELS[1], 2)
-    rows = columns[:, bare.place[sweep]]
-    assert columns.shape[0] == 4  # gain and phase, each with a slope
-    assert np.array_equal(np.any(rows != 0.0, axis=0), touched)
-    assert np.count_nonzero(columns) == np.count_nonzero(rows)
 
 
 @pytest.mark.parametrize(
@@ -130,14 +122,6 @@ def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare
     assert (temperature.score, temperature.visible) == (0.0, False)
 
 
-def test_what_belongs_to_another_direction_has_no_sensitivity_there(measured: Measured, fitted: Fitted) -> None:
-    plain = fitted(measured(INERTIA, SHARED))
-    effect = effect_named("stiffness_factor.radial")
-    _, (column,) = sensitivity(plain.model, plain.data_sets, effect)
-    there = {(str(data_set.direction), bool(np.any(column[place]))) for data_set, place in plain.place.items()}
-    assert there == {("axial", False), ("radial", True)}
-
-
 class Gapped:
     """A test that answers the stiffness of a stop, and nothing finite where its gap is wide."""
 
@@ -164,3 +148,32 @@ def test_an_effect_is_visible_where_any_of_its_shapes_is(bare: Evidence) -> None
     against = replace(bare, solution=replace(bare.solution, residual=-bare.residual))
     for evidence in (bare, against):
         assert all(each.proposal.visible for each in effects(evidence, (), ()) if each.name == "second_springpot")
+
+
+def test_scores_are_those_of_a_linear_refit(bare: Evidence) -> None:
+    """Chi-square of the residual regressed on the model's Jacobian, less that on Jacobian and column."""
+    random = np.random.default_rng(0)
+    residual, own = random.standard_normal(bare.residual.size), bare.solution.jacobian
+    evidence = replace(bare, solution=replace(bare.solution, residual=residual))
+    columns = random.standard_normal((3, residual.size)) * np.array([[1e-3], [1.0], [1e3]])
+    before = np.linalg.lstsq(own.T, residual, rcond=None)[1]
+    for column, gain, amount, seen in zip(columns, *scores(evidence, columns), strict=True):
+        answer, after, *_ = np.linalg.lstsq(np.vstack((own, column)).T, residual, rcond=None)
+        assert seen
+        assert gain == pytest.approx(float((before - after)[0]), rel=1e-6)
+        assert amount == pytest.approx(-answer[-1], rel=1e-6)
+
+
+def test_columns_that_the_model_absorbs_are_not_seen(bare: Evidence) -> None:
+    own = bare.solution.jacobian
+    for found in scores(bare, np.vstack((own[:1], own[0] + own[2], np.zeros(own.shape[1])))):
+        assert not found.any()
+
+
+def test_two_powers_that_would_follow_any_law_between_them_are_not_looked_for_together(bare: Evidence) -> None:
+    """Stiffening with the square and with the fourth power of amplitude: one of them is asked of each model."""
+    powers = {"strain_stiffening", "fifth_power_stiffening"}
+    assert powers <= {proposal.name for proposal in proposals(bare, (), ())}
+    for power in powers:
+        solution = replace(bare.solution, model=bare.model.with_effect(power))
+        assert not powers & {proposal.name for proposal in proposals(replace(bare, solution=solution), (), ())}

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from asking import no_sweeps
-from rigged import LEVELS, SHARED, Fitted, Measured
+from rigged import LEVELS, SHARED, Fitted, Measured, no_sweeps
 from scipy.special import logsumexp
 
 from bushfit.campaign.schema import RigSettings

@@ -8,15 +8,12 @@ import mpmath
 import numpy as np
 import pytest
 
-from bushfit.effects import History
 from bushfit.effects.friction import (
     _strokes,
     harmonic_shape,
     harmonic_slope,
     mean_stress_decay,
     modulus,
-    stress,
-    stress_sensitivities,
 )
 
 VALUES = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
@@ -64,51 +61,6 @@ def test_limits_of_small_and_large_strain() -> None:
     large = harmonic_shape(np.array([1e9, 1e6]))
     assert large.imag[0] * 1e9 == pytest.approx(2.0 / np.pi, rel=1e-6)  # a square wave of height sigma_fmax
     assert np.all(np.isfinite(large))
-
-
-def walk(strain: np.ndarray, sigma: float, eps_half: float) -> np.ndarray:
-    """Eq. 5 as it is written, from rest, sample by sample."""
-    stress_now, turn, turn_stress, sense, out = 0.0, 0.0, 0.0, 0.0, []
-    previous = 0.0
-    for e in strain:
-        move = np.sign(e - previous)
-        if move and move != sense:
-            turn, turn_stress, sense = previous, stress_now, move
-        if sense:
-            denominator = eps_half * (1.0 - sense * turn_stress / sigma) + sense * (e - turn)
-            stress_now = turn_stress + (e - turn) * (sigma - sense * turn_stress) / denominator
-        out.append(stress_now)
-        previous = e
-    return np.array(out)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_stress_from_rest_is_eq_5(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    strain = np.cumsum(np.repeat(rng.normal(size=60), 7)) * 2e-3
-    strain[100:110] = strain[100]  # a stretch at rest
-    found = stress(VALUES, History(strain, 1e-3, periodic=False, frequency=1.0))
-    expected = walk(strain, *VALUES.values())
-    assert np.max(np.abs(found - expected)) < 1e-12 * VALUES["sigma_fmax"]
-
-
-def test_sensitivities_along_a_loop() -> None:
-    cycle = 0.03 * np.sin(2.0 * np.pi * np.arange(512) / 512) + 0.01 * np.sin(6.0 * np.pi * np.arange(512) / 512)
-    for history in (History.steady(cycle, 1.0), History(cycle, 1e-3, periodic=False, frequency=1.0)):
-        slopes = stress_sensitivities(VALUES, history)
-        for name, value in VALUES.items():
-            step = 1e-6 * value
-            high, low = (stress({**VALUES, name: value + sign * step}, history) for sign in (1, -1))
-            error = np.max(np.abs(slopes[name] - (high - low) / (2.0 * step))) * value
-            assert error < 1e-7 * VALUES["sigma_fmax"]
-
-
-def test_a_motion_that_never_turns_rubs_once() -> None:
-    ramp = np.linspace(0.0, 1.0, 50)
-    found = stress(VALUES, History(ramp, 1e-3, periodic=False, frequency=1.0))
-    np.testing.assert_allclose(found, VALUES["sigma_fmax"] * ramp / (VALUES["eps_half"] + ramp), rtol=1e-13)
-    still = stress(VALUES, History.steady(np.full(16, 0.3), 1.0))
-    assert np.array_equal(still, np.zeros(16))
 
 
 @pytest.mark.parametrize("x", [1e-3, 0.3, 1.0, 20.0])

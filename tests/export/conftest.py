@@ -41,12 +41,13 @@ def order(known: pd.DataFrame, paper_model: Model) -> Order:
 
 @pytest.fixture(scope="session")
 def named(order: Order) -> Callable[[str], Order]:
-    """The same of a bushing, and from a file, of any name."""
+    """The same of its axial direction, of a bushing and from a file of any name."""
 
     def called(name: str) -> Order:
         assert order.result.model.bushing is not None
         model = replace(order.result.model, bushing=replace(order.result.model.bushing, name=name))
-        return replace(order, result=Result(model), source=Source(Path(name.replace("\0", "") or "x"), HASH))
+        source = Source(Path(name.replace("\0", "") or "x"), HASH)
+        return replace(order, result=Result(model), source=source, predictions=order.predictions[:1])
 
     return called
 
@@ -64,9 +65,3 @@ def paper(exported: Exported, tmp_path_factory: pytest.TempPathFactory) -> Runni
     ((name, content),) = exported.files.items()
     (folder / name).write_bytes(content)
     return Running(folder / name, folder / "open")
-
-
-@pytest.fixture(scope="session")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder for other FMUs."""
-    return tmp_path_factory.mktemp("others")

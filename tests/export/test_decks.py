@@ -14,9 +14,8 @@ from readers import HASH, Curves, abaqus_options, by_abaqus, by_optistruct, by_p
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.export import abaqus, adams, nastran
-from bushfit.export.contract import Exported, Order
+from bushfit.export.contract import MM_T_S_N, Exported, Order, UnitSystem
 from bushfit.export.deck import DOFS, levels
-from bushfit.export.systems import MM_T_S_N, UnitSystem
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -26,7 +25,7 @@ from bushfit.prediction.stiffness import predict
 MODEL = 2e-4
 #: What the five digits of a deck leave of a value, and ten of what a table goes over.
 DIGITS, ALONG = 5e-5, 2e-9
-SYSTEMS = ["mm t s N", "m kg s N", "mm kg ms kN", "in lbf*s^2/in s lbf"]
+SYSTEMS = ["N, s, t, mm", "m kg s N", "mm kg ms kN", "in lbf*s^2/in s lbf"]
 
 
 def read(name: str, order: Order, folder: Path) -> tuple[Exported, Curves]:
@@ -48,7 +47,7 @@ def test_every_value_of_the_grid_is_read_back(
 ) -> None:
     """In whatever units, turned back into SI by factors that are typed here."""
     newton, metre, second = {
-        "mm t s N": (1.0, 1e3, 1.0),
+        "N, s, t, mm": (1.0, 1e3, 1.0),
         "m kg s N": (1.0, 1.0, 1.0),
         "mm kg ms kN": (1e-3, 1e3, 1e3),
         "in lbf*s^2/in s lbf": (1.0 / 4.4482216152605, 1.0 / 0.0254, 1.0),

@@ -1,19 +1,25 @@
-"""CSV files and the workbook, read back by pandas and openpyxl over the whole grid."""
+"""CSV files and the workbook, read back over the whole grid; no name does harm in any format."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from readers import abaqus_options, bulk_cards, by_abaqus, by_pynastran, teimorbit
 
-from bushfit.export.contract import Order
-from bushfit.export.systems import UnitSystem
+from bushfit.export import abaqus, adams, nastran
+from bushfit.export.contract import Order, UnitSystem
 from bushfit.geometry import Direction, Specimen
 from bushfit.prediction.stiffness import Band, predict
+from bushfit.reading.tablefile import to_xlsx
 from bushfit.report import spreadsheets
 from bushfit.report.tables import wide_table
 
@@ -60,7 +66,7 @@ def test_long_and_wide_tables_hold_the_whole_grid(kind: str, order: Order, known
     assert worst < MODEL
 
 
-def test_parameters_and_provenance(order: Order, table_1: dict[str, float]) -> None:
+def test_parameters_provenance_and_units_asked_for(order: Order, table_1: dict[str, float]) -> None:
     tables = sheets(spreadsheets.xlsx(order).files["bushing.xlsx"])
     parameters = tables["parameters"]
     assert dict(zip(parameters["parameter"], parameters["value"], strict=True)) == table_1
@@ -69,9 +75,6 @@ def test_parameters_and_provenance(order: Order, table_1: dict[str, float]) -> N
     assert provenance["model, sha256"] == order.source.sha256
     assert provenance["bushing"] == "CMP 15 961"
     assert provenance["length [m]"] == "0.034"
-
-
-def test_units_asked_for_are_in_header_and_value(order: Order) -> None:
     table = sheets(spreadsheets.xlsx(replace(order, units=UnitSystem.parse("m kg s N"))).files["bushing.xlsx"])
     exact = np.abs(order.result.model.stiffness("torsion", 5.0, order.predictions[2].amplitude[0]))
     assert table["torsion"]["stiffness [N*m/rad]"][0] == pytest.approx(exact, rel=1e-12)
@@ -79,7 +82,7 @@ def test_units_asked_for_are_in_header_and_value(order: Order) -> None:
     assert table["axial"]["stiffness [N/m]"][0] == pytest.approx(order.predictions[0].stiffness.value[0])
 
 
-def test_specimens_have_tables_whatever_they_are_called(order: Order) -> None:
+def test_specimens_have_tables_and_points_that_a_grid_lacks_are_empty(order: Order) -> None:
     bodies = [
         predict(order.result, Specimen(name, "modulus"), [5.0], [0.01]) for name in ("parameters", "axial", "x", "x")
     ]
@@ -90,9 +93,6 @@ def test_specimens_have_tables_whatever_they_are_called(order: Order) -> None:
     assert sum("modulus [MPa]" in table for table in tables.values()) == 4
     assert "parameter" in tables["parameters"]
     assert len(spreadsheets.csv(replace(order, predictions=tuple(bodies))).files) == 2 * 4 + 2
-
-
-def test_points_that_a_grid_lacks_are_empty(order: Order) -> None:
     prediction = order.predictions[0]
     kept = np.arange(prediction.frequency.size) != 3
 
@@ -104,3 +104,87 @@ def test_points_that_a_grid_lacks_are_empty(order: Order) -> None:
     table = wide_table(holes)
     assert table.isna().sum().sum() == 2
     assert np.isnan(table.iloc[3, 1])
+
+
+#: Names that break out of what is not escaped: line ends, comment marks, cards, keywords, formulas, markup, quotes.
+#: Halves of characters are in no name: files with them are refused, and pandas beside pyarrow holds no such text.
+NASTY = [
+    "a\nPBUSH          1       K     1.0\n$", "a\r\n*STEP\n** ", "a\u2028[DAMPING]\x85FX_DAMPING = 1",
+    "=cmd|' /C calc'!A0", "+1+1", "@SUM(A1)", "<b>&\"'</b>", "pyNastran: version=nx " * 9, "$ pyNastran: punch=False",
+    "http://x.y/" + "z" * 300, "\x00 \x1b[2J", "Büchse 套管", "   ",
+]  # fmt: skip
+
+
+def nasty(function: Callable) -> Callable:
+    for name in NASTY:
+        function = example(name=name)(function)
+    return given(name=st.text(min_size=1, max_size=60))(function)
+
+
+@pytest.fixture(scope="module")
+def plain(named: Callable[[str], Order], tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
+    """What readers find where the name is harmless."""
+    return found(named("plain"), tmp_path_factory.mktemp("plain"))
+
+
+def found(order: Order, folder: Path) -> dict[str, object]:
+    texts = {
+        name: content.decode("ascii")
+        for export in (nastran.export, abaqus.export, adams.export)
+        for name, content in export(order).files.items()
+    }
+    for text in texts.values():
+        assert not set(text) - {chr(code) for code in range(0x20, 0x7F)} - {"\n"}
+        assert max(map(len, text.splitlines())) <= 80 or "CONNECTOR" in text
+    (folder / "bushing.bdf").write_text(texts["bushing.bdf"], encoding="ascii")
+    return {
+        "cards": bulk_cards(texts["bushing.bdf"]),
+        "nastran": {key: k.tolist() for key, (_, k) in by_pynastran(folder / "bushing.bdf").items()},
+        "options": [(keyword, values) for keyword, values, _ in abaqus_options(texts["bushing.inp"])],
+        "abaqus": {key: k.tolist() for key, (_, k) in by_abaqus(texts["bushing.inp"]).items()},
+        "adams": {
+            block: (pairs, *map(list, rest)) for block, (pairs, *rest) in listed(texts["bushing_ride.bus"]).items()
+        },
+    }
+
+
+def listed(text: str) -> dict:
+    return {block: (pairs, names, table.tolist()) for block, (pairs, names, table) in teimorbit(text).items()}
+
+
+@nasty
+def test_decks_hold_the_same_under_any_name(
+    name: str, named: Callable[[str], Order], plain: dict[str, object], tmp_path: Path
+) -> None:
+    assert found(named(name), tmp_path) == plain
+
+
+@nasty
+def test_a_workbook_runs_nothing(name: str, named: Callable[[str], Order]) -> None:
+    """Read by openpyxl, which tells a formula ("f") from a text ("s"); numbers are whole."""
+    order = named(name)
+    book = openpyxl.load_workbook(io.BytesIO(spreadsheets.xlsx(order).files["bushing.xlsx"]))
+    cells = [cell for sheet in book for row in sheet.iter_rows() for cell in row]
+    assert {cell.data_type for cell in cells} <= {"s", "n"}
+    assert not any(cell.hyperlink for cell in cells)
+    if name.isprintable() and name.strip() == name:
+        assert name in {cell.value for cell in book["provenance"]["B"]}
+
+
+@nasty
+def test_sheets_have_names_that_excel_takes(name: str) -> None:
+    """At most 31 characters, none of []:*?/\\, no apostrophe at an end, not History, and each once, capitals aside."""
+    import pandas as pd
+
+    table = pd.DataFrame({name: [1.5, np.nan, np.inf], "text": [name, None, ""]})
+    book = openpyxl.load_workbook(
+        io.BytesIO(to_xlsx({name: table, f"{name} ": table, name.upper() + "'": table, "History": table}))
+    )
+    assert len({title.lower() for title in book.sheetnames}) == 4
+    for title in book.sheetnames:
+        assert 0 < len(title) <= 31
+        assert not set(title) & set("[]:*?/\\")
+        assert title.strip("'") == title
+        assert title.lower() != "history"
+    first = book.worksheets[0]
+    assert [cell.value for cell in first["A"]][1:] == [1.5, None, None]

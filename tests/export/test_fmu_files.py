@@ -102,27 +102,27 @@ def test_the_same_model_gives_the_same_bytes_and_another_its_own_guid(paper_mode
     assert ET.fromstring(stiffer["modelDescription.xml"]).get("guid") != own
 
 
-def test_names_with_quotes_and_markup_come_through(paper_model: Model, opened: Path) -> None:
+def test_names_with_quotes_and_markup_come_through(paper_model: Model, tmp_path: Path) -> None:
     assert paper_model.bushing
     bushing = replace(paper_model.bushing, name='"A" & <b>\'\x07é</b> ]]>')
     mount = Specimen('<mount> "&1"', "shear", area=1e-3, thickness=5e-3)
     model = Model(bushing, paper_model.effects, paper_model.values)
     wanted = order_of(model, (Direction.AXIAL, mount), specimens=(mount,))
-    file = written(wanted, opened)
+    file = written(wanted, tmp_path)
     assert file.name == "bushfit_a_b_b.fmu"
     assert validate_fmu(str(file)) == []
-    running = Running(file, opened / "named")
+    running = Running(file, tmp_path / "named")
     assert running.description.modelName == '"A" & <b>\'_é</b> ]]>'
     assert running.inputs == ["displacement.axial", 'displacement.<mount> "&1"']
     force = running.run(1e-4 * np.linspace(0.0, 1.0, 11)[:, None] * np.ones(2), 1e-3)
     assert np.all(np.diff(force, axis=0) > 0.0)
     coupon = Specimen("DMA", "modulus")
     alone = order_of(Model(None, paper_model.effects, paper_model.values), (coupon,), specimens=(coupon,))
-    running = Running(written(alone, opened), opened / "coupon")
+    running = Running(written(alone, tmp_path), tmp_path / "coupon")
     assert (running.inputs, running.outputs) == (["strain.DMA"], ["stress.DMA"])
 
 
-def test_instances_do_not_see_each_other_and_reset_forgets(paper: Running) -> None:
+def test_instances_do_not_see_each_other_and_a_state_is_taken_up_again(paper: Running) -> None:
     motion = 2e-4 * wandering(300, 1e-3, seed=3)[:, None] * np.array([1.0, 1.0, 50.0])
     expected = paper.run(motion, 1e-3)
     first, second = (paper.begun(paper.instance()) for _ in range(2))
@@ -134,9 +134,6 @@ def test_instances_do_not_see_each_other_and_reset_forgets(paper: Running) -> No
     for each in (first, second):
         each.terminate()
         each.freeInstance()
-
-
-def test_a_state_is_taken_up_again_through_bytes_too(paper: Running) -> None:
     motion = 2e-4 * wandering(300, 1e-3, seed=4)[:, None] * np.array([1.0, 1.0, 50.0])
     made = paper.begun(paper.instance())
     paper.follow(made, motion[:150], 1e-3)
@@ -155,7 +152,9 @@ def test_a_state_is_taken_up_again_through_bytes_too(paper: Running) -> None:
     other.freeInstance()
 
 
-def test_wrong_calls_are_refused(paper: Running, capfd: pytest.CaptureFixture[str]) -> None:
+def test_wrong_calls_are_refused_and_output_before_the_first_step_is_that_of_the_input(
+    paper: Running, capfd: pytest.CaptureFixture[str], paper_model: Model
+) -> None:
     with pytest.raises(Exception, match="instantiate"):
         paper.instance(guid="{00000000-0000-0000-0000-000000000000}")
     made = paper.begun(paper.instance())
@@ -168,9 +167,6 @@ def test_wrong_calls_are_refused(paper: Running, capfd: pytest.CaptureFixture[st
         made.getReal([10_000])
     assert made.getReal([paper.reference["mu"]]) == [1.09e6]
     made.freeInstance()
-
-
-def test_output_before_the_first_step_is_that_of_the_input(paper: Running, paper_model: Model) -> None:
     made = paper.instance()
     made.enterInitializationMode()
     made.setReal([paper.reference["displacement.axial"]], [1e-4])
@@ -190,16 +186,13 @@ def test_effects_without_a_law_in_time_are_refused(paper_model: Model, name: str
     assert refused.value.place == name
 
 
-def test_effects_of_the_rig_are_left_out(paper_model: Model) -> None:
+def test_effects_of_the_rig_are_left_out_and_what_is_held_is_said_with_its_error(paper_model: Model) -> None:
     plain, *others = (
         [value.name for value in in_time(order_of(model, (Direction.AXIAL,))).values]
         for model in (paper_model, *(paper_model.with_effect(name) for name in OF_THE_RIG))
     )
     assert dict(zip(OF_THE_RIG, others, strict=True)) == dict.fromkeys(OF_THE_RIG, plain)
-
-
-def test_what_is_held_or_left_out_is_said_with_its_error(paper_model: Model) -> None:
-    """m (e0/0.01)^-q, held at the geometric middle of 0.1 and 0.5 mm: the whole error is that of the springpot."""
+    # m (e0/0.01)^-q, held at the geometric middle of 0.1 and 0.5 mm: the whole error is that of the springpot.
     model = paper_model.with_effect("coupled_breakdown", {"coupled_breakdown.q": 0.3})
     found = in_time(order_of(model, (Direction.AXIAL,)))
     (line,) = (line for line in found.losses if "coupled_breakdown" in line)

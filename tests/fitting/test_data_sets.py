@@ -1,7 +1,8 @@
-"""Residuals of loops and sweeps in units of noise: white where the model is right, with the derivatives of theirs."""
+"""Residuals of loops and sweeps in units of noise, white where the model is right; and which tests count in a fit."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,8 +10,10 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import RigSettings
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data
+from bushfit.campaign.schema import FitSettings, RigSettings
+from bushfit.errors import FitError
+from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data
 from bushfit.fitting.noise import SweepNoise
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
@@ -88,14 +91,6 @@ def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep: SweepData) 
 def test_the_right_model_of_a_sweep_leaves_no_residual(sweep: SweepData, paper_model: Model) -> None:
     assert np.max(np.abs(sweep.residual(paper_model))) < 1e-10
     assert np.max(sweep.relative(paper_model)) < 1e-12
-    assert sweep.size == sweep.residual(paper_model).size == 2 * sweep.frequency.size
-
-
-def test_blocks_are_found_in_scrambled_rows(sweep: SweepData) -> None:
-    assert np.diff(np.append(sweep.block_starts, sweep.frequency.size)).tolist() == list(BLOCKS.values())
-    np.testing.assert_array_equal(sweep.measured, sweep.sweep.stiffness[sweep.order])
-    for begin, count in zip(sweep.block_starts, BLOCKS.values(), strict=True):
-        assert np.all(np.diff(sweep.frequency[begin : begin + count]) > 0.0)
 
 
 @pytest.mark.parametrize("kind", ["complex", "magnitude_loss_factor", "loop", "loop of correlated rows"])
@@ -180,3 +175,57 @@ def test_a_gain_error_of_the_rig_pulls_no_fit(rig: Rig, paper_model: Model) -> N
     print("mean gain asked for, less 1:", np.mean(asked))
     assert abs(np.mean(asked)) < 1e-3
     assert np.linalg.norm(column) == pytest.approx(1.0 / 5e-3, rel=0.15)  # no loop tells a gain better than its rig
+
+
+def test_repeats_of_a_loop_share_the_error_of_its_gain(campaign: Campaign) -> None:
+    """So their mean is no surer of it than one of them: each counts as more unsure by the root of their number."""
+    (loop,) = campaign.loops
+    faster = replace(loop, name="faster", time=loop.time / 2.0)
+    again = [replace(loop, name=f"again_{number}", displacement=1.01 * loop.displacement) for number in range(3)]
+    found = Data.of(replace(campaign, loops=(loop, *again, faster), rig=RigSettings(gain_error=5e-3))).loops
+    np.testing.assert_allclose([each.gain_error for each in found], [1e-2] * 4 + [5e-3])
+
+
+def test_only_tests_of_the_same_points_contradict_one_another(measured: Data) -> None:
+    """Dense sweeps that follow one another do not, nor do tests at other temperatures; the same ones 15 % apart do."""
+    sweep, frequency = measured.sweeps[0].sweep, np.geomspace(20.0, 200.0, 4000)
+    low, high = (
+        Sweep(name, Direction.AXIAL, part, np.full(part.size, 1e-4), 1e6 * part**0.1 * (1.0 + 0.1j))
+        for name, part in (("low", frequency[:2000]), ("high", frequency[2000:]))
+    )
+    other = replace(sweep, name="other", stiffness=1.15 * sweep.stiffness)
+    warm, cold = replace(other, temperature=313.15), replace(sweep, temperature=296.15)
+    loop = measured.loops[0].test
+    hot = replace(loop, name="hot", force=1.15 * loop.force, temperature=313.15)
+    for tests in ([low, high], [cold, warm]):
+        assert [one.contradiction for one in sweep_data(tests)] == [None, None]
+    assert [one.contradiction for one in loop_data([replace(loop, temperature=296.15), hot])] == [None, None]
+    for _, one in (sweep_data([sweep, other]), loop_data([loop, replace(hot, temperature=None)])):
+        assert one.contradiction is not None
+        assert re.search(r"lies 1[5-7] % apart", one.contradiction)
+
+
+def test_dynamic_amplitudes_choose_the_levels(measured: Data) -> None:
+    assert set(measured.smallest_sweep.amplitude) == {1e-4}
+    other = replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(2e-4, 5e-4)))
+    assert set(Data.of(other).smallest_sweep.amplitude) == {2e-4, 5e-4}
+    absent = Data.of(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
+    with pytest.raises(FitError, match="no sweep at these amplitudes"):
+        _ = absent.smallest_sweep
+
+
+def test_a_direction_without_tests_is_refused_with_those_there_are(measured: Data) -> None:
+    with pytest.raises(FitError, match=r"no test in the directions[\s\S]*axial, radial[\s\S]*torsion"):
+        measured.chosen([Direction.TORSION])
+    with pytest.raises(FitError, match="there is nothing to fit"):
+        Data.of(replace(measured.campaign, loops=(), sweeps=())).chosen(None)
+
+
+def test_magnitudes_in_coarse_steps_are_told(campaign: Campaign) -> None:
+    """In steps of 50 N/mm they are few, in steps of 0.05 N/mm they are as many as the points."""
+    sweep = campaign.sweeps[0]
+    size, turn = np.abs(sweep.stiffness), sweep.stiffness / np.abs(sweep.stiffness)
+    for step, told in ((5e4, True), (50.0, False)):
+        (data_set,) = sweep_data([replace(sweep, stiffness=np.round(size / step) * step * turn)])
+        lines = [note for note in data_set.notes if "are rounded" in note]
+        assert bool(lines) == told

@@ -1,15 +1,22 @@
-"""What the fits must hold: the truth found from ideal and from noisy tests, whatever the start, with honest errors."""
+"""What the fits must hold: the truth found from ideal and from noisy tests, whatever the start; and 95 % means 95 %.
+
+Intervals and bands against the truth, over simulated campaigns that differ in noise; and the errors that all repeats of
+a level share, told from what a fit leaves.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from tries import SEEDS
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import (
+    UNSTATED,
     FitSettings,
     ParameterSetting,
     RigSettings,
@@ -17,14 +24,15 @@ from bushfit.campaign.schema import (
     SimulatedSweep,
     SimulateSettings,
 )
-from bushfit.effects import BASE
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
+from bushfit.fitting.levels import level_errors
 from bushfit.fitting.procedures import STATIC, fit_dynamic, fit_joint, fit_static, fit_two_step
-from bushfit.geometry import Bushing, Direction
+from bushfit.fitting.solve import solve
+from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
-from bushfit.simulation.measured import simulate
+from bushfit.prediction.stiffness import Band, predict
 
 Rig = Callable[..., Campaign]
 BAND = tuple(float(f) for f in range(5, 156, 10))
@@ -72,10 +80,10 @@ def test_the_mean_over_seeds_is_the_truth(rig: Rig, models: dict[str, Model], na
 
 
 @pytest.mark.slow
-def test_two_step_errors_are_those_of_300_campaigns(rig: Rig) -> None:
+def test_two_step_errors_are_those_of_many_campaigns(rig: Rig) -> None:
     """Standard errors that carry each step's error into the other, against the scatter they predict."""
     values, stated = [], []
-    for seed in range(300):
+    for seed in range(SEEDS):
         campaign = replace(rig(seed), rig=RigSettings(gain_error=0.0))
         result = fit_two_step(Data.of(campaign)).result
         order = [result.covariance.names.index(n) for n in FIVE]
@@ -87,8 +95,8 @@ def test_two_step_errors_are_those_of_300_campaigns(rig: Rig) -> None:
     correlation = [m / np.sqrt(np.outer(np.diag(m), np.diag(m))) for m in (scatter, mean)]
     print(f"two-step, scatter over stated error: {dict(zip(FIVE, ratio.round(3), strict=True))}")
     print(f"two-step, worst correlation off by {np.max(np.abs(correlation[0] - correlation[1])):.3f}")
-    np.testing.assert_allclose(ratio, 1.0, atol=0.12)
-    chance = 3.0 * (1.0 - correlation[1] ** 2) / np.sqrt(300)  # of a correlation over so many campaigns
+    np.testing.assert_allclose(ratio, 1.0, atol=3.0 / np.sqrt(2.0 * SEEDS))
+    chance = 3.0 * (1.0 - correlation[1] ** 2) / np.sqrt(SEEDS)  # of a correlation over so many campaigns
     assert np.all(np.abs(correlation[0] - correlation[1]) <= chance + 0.02)
 
 
@@ -135,13 +143,6 @@ def test_the_first_pass_leaves_the_springpot_out_and_says_what_this_does(measure
         change = 100.0 * (settled[name] / static.model.values[name] - 1.0)
         assert f"{name} by {change:+.1f} %" in note
     assert static.model.values["sigma_fmax"] > 1.3 * settled["sigma_fmax"]
-
-
-def test_a_loop_alone_says_what_a_typical_springpot_would_change(measured: Data) -> None:
-    alone = Data.of(replace(measured.campaign, sweeps=()))
-    note = fit_static(alone).warnings[0]
-    assert "typical filled rubber" in note
-    assert "sigma_fmax by -" in note
 
 
 def test_a_known_springpot_is_held_and_nothing_is_left_out(measured: Data, table_1: dict[str, float]) -> None:
@@ -194,50 +195,155 @@ def test_missing_tests_are_said(measured: Data, result: Result) -> None:
         fit_dynamic(Data.of(replace(measured.campaign, sweeps=())), result)
 
 
-def test_correlations_stay_within_one_where_nothing_is_determined(rig: Rig) -> None:
-    campaign = rig(1, loops=(SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),), sweeps=())
-    pairs = fit_joint(Data.of(campaign)).covariance.correlations()
-    assert pairs
-    assert max(abs(value) for _, _, value in pairs) <= 1.0 + 1e-9
-
-
-def test_tests_that_never_reach_eps_half_have_a_fit_that_says_so(rig: Rig, paper_model: Model) -> None:
-    """Sweeps that end at five thousandths of eps_half: chi-square is flat for decades, and the fit ends."""
-    sweep = SimulatedSweep(Direction.AXIAL, (1e-6, 2.5e-6), (5.0, 15.0, 45.0, 100.0, 155.0))
-    for seed in range(3):
-        result = fit_joint(Data.of(rig(seed, loops=(), sweeps=(sweep,))))
-        assert result.quality is not None
-        assert result.quality.reduced_chi_square < 2.0
-        assert result.model.values["alpha"] == pytest.approx(paper_model.values["alpha"], rel=0.2)
-        said = " ".join(result.warnings)
-        assert "sigma_fmax" in said
-        assert "eps_half" in said
-        assert "was stopped" not in said
-
-
 @pytest.mark.parametrize(
     ("seed", "m", "alpha", "sigma_fmax", "eps_half", "noise"),
     [
         (14, 1.2e5, 0.16, 3.6e4, 0.062, 0.0092),
-        (31, 1.8e5, 0.055, 3.2e4, 0.016, 0.01),
         (69, 2.8e4, 0.22, 6.3e4, 0.04, 0.0052),
         (35, 7.0e3, 0.20, 8.0e4, 0.083, 0.0014),
     ],
 )
 def test_a_value_extrapolated_beyond_its_bounds_is_moved_back(
-    bushing: Bushing, seed: int, m: float, alpha: float, sigma_fmax: float, eps_half: float, noise: float
+    rig: Rig, paper_model: Model, seed: int, m: float, alpha: float, sigma_fmax: float, eps_half: float, noise: float
 ) -> None:
     """A springpot that a noisy sweep of one level hardly shows: the passes extrapolate to an alpha below the least."""
-    values = {"mu": 1.09e6, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half}
-    truth = Model(bushing, BASE, values)
-    plan = SimulateSettings(
-        seed=seed,
-        repeats=2,
-        noise=noise,
-        force_noise=0.003,
-        loops=(SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),),
-        sweeps=(SimulatedSweep(Direction.AXIAL, (1e-4,), (5.0, 25.0, 75.0, 155.0)),),
-    )
-    found = fit_two_step(Data.of(simulate(truth, plan).campaign()))
+    truth = paper_model.with_values({"m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half})
+    loops = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),)
+    sweeps = (SimulatedSweep(Direction.AXIAL, (1e-4,), (5.0, 25.0, 75.0, 155.0)),)
+    plan = SimulateSettings(repeats=2, noise=noise, force_noise=0.003, loops=loops, sweeps=sweeps)
+    found = fit_two_step(Data.of(rig(seed, truth, settings=plan)))
     low, high = truth.parameters["alpha"].bounds
     assert all(low <= values["alpha"] <= high for values in found.passes)
+
+
+#: Three standard errors of a share of 95 % over that many campaigns.
+CHANCE = 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+
+#: How many times as wide intervals have to be to hold all five parameters at once: the normal quantile of 1 % over that
+#: of 5 % (Bonferroni).
+AT_ONCE = 1.3
+
+
+def covered(result: Result, truth: Mapping[str, float]) -> list[bool]:
+    """Whether each parameter's interval holds the truth."""
+    limits = [result.interval(name) or (np.nan, np.nan) for name in FIVE]
+    return [low <= truth[name] <= high for name, (low, high) in zip(FIVE, limits, strict=True)]
+
+
+def bands_covered(result: Result, truth: Model) -> np.ndarray:
+    """Share of the points of which each band holds the truth, (direction, quantity), at points that were not fitted:
+    between and beyond the amplitudes and frequencies of the tests, and in the radial direction."""
+    top = 1e-3 * truth.bushing.unit_strain(Direction.AXIAL)
+    shares = []
+    for direction in (Direction.AXIAL, Direction.RADIAL):
+        amplitudes = np.array([0.05, 0.3, 0.8]) * top / truth.bushing.unit_strain(direction)
+        found = predict(result, direction, [1.0, 40.0, 250.0], amplitudes)
+        stiffness = truth.stiffness(direction, found.frequency, found.amplitude)
+        pairs: list[tuple[Band, np.ndarray]] = [
+            (found.stiffness, np.abs(stiffness)),
+            (found.loss_factor, stiffness.imag / stiffness.real),
+            (found.storage_stiffness, stiffness.real),
+            (found.loss_stiffness, stiffness.imag),
+        ]
+        shares.append([np.mean((band.low <= true) & (true <= band.high)) for band, true in pairs])
+    return np.array(shares)
+
+
+def coverage(rig: Rig, truth: Model, seeds: int, **noise: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Per seed whether each parameter's interval, (seeds, 5), and the share of each band, hold the truth."""
+    exact = RigSettings(gain_error=0.0, phase_error=0.0)  # as it is simulated: no calibration is off
+    results = [fit_joint(Data.of(replace(rig(seed, truth, **noise), rig=exact))) for seed in range(seeds)]
+    inside = np.array([covered(result, truth.values) for result in results])
+    return inside, np.array([bands_covered(result, truth) for result in results])
+
+
+def told(shares: np.ndarray) -> str:
+    """A mean share with its 95 % interval, from the shares of each campaign, (seeds, ...)."""
+    by_seed = shares.reshape(len(shares), -1).mean(axis=1)
+    return f"{by_seed.mean():.3f} +- {1.96 * by_seed.std() / np.sqrt(len(by_seed)):.3f}"
+
+
+@pytest.mark.parametrize(
+    ("name", "noise", "seeds"),
+    [
+        ("paper", {"force_correlation": 0.98}, 20),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (
+                *(("paper", {"force_correlation": correlation}, SEEDS // 2) for correlation in (0.0, 0.9, 0.98)),
+                *((name, {}, SEEDS) for name in ("paper", "soft and long", "stiff and thin", "strongly filled")),
+                *((name, {"shared": True}, SEEDS) for name in ("paper", "stiff and thin")),
+            )
+        ),
+    ],
+)
+def test_95_percent_intervals_and_bands_cover(
+    rig: Rig, paper_model: Model, other_models: dict[str, Model], name: str, noise: dict[str, Any], seeds: int
+) -> None:
+    """Also where the noise of a loop is correlated from row to row."""
+    inside, banded = coverage(rig, {"paper": paper_model, **other_models}[name], seeds, **noise)
+    each, bands = np.mean(inside, axis=0), np.mean(banded, axis=0)
+    print(
+        f"{name}, {noise}, {seeds} seeds: {told(inside)} of all intervals hold the truth, {told(banded)} of all bands"
+    )
+    print(f"  of each parameter {each.round(3)}; axial and radial |K|, loss factor, K', K'': {bands.round(3).tolist()}")
+    widest = 0.02 * np.sqrt(300 / seeds) if seeds > 20 else 0.10
+    assert abs(np.mean(inside) - 0.95) <= widest
+    assert abs(np.mean(banded) - 0.95) <= widest
+    if seeds == SEEDS:
+        assert np.all(np.abs(each - 0.95) <= CHANCE)
+        assert np.all(np.abs(bands - 0.95) <= CHANCE)
+
+
+@pytest.mark.parametrize("seeds", [12, pytest.param(SEEDS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("stated", [False, True])
+def test_95_percent_intervals_cover_where_the_gain_of_a_loop_is_off(
+    rig: Rig, paper_model: Model, seeds: int, stated: bool
+) -> None:
+    """By 0.5 %, as each run and level of the sweeps, whether [rig] states it or nothing does; and all five at once."""
+    inside, wide = [], []
+    for seed in range(seeds):
+        campaign = rig(seed, gain_error=5e-3, level_gain_error=5e-3)
+        result = fit_joint(Data.of(replace(campaign, rig=RigSettings(gain_error=5e-3) if stated else UNSTATED)))
+        inside.append(covered(result, paper_model.values))
+        ends = np.log([result.interval(name) or (np.nan, np.nan) for name in FIVE])
+        off = np.log([paper_model.values[name] for name in FIVE]) - ends.mean(axis=1)
+        wide.append(np.all(np.abs(off) <= AT_ONCE * np.ptp(ends, axis=1) / 2.0))
+    print(
+        f"stated {stated}, {seeds} seeds: {told(np.array(inside))} of the intervals hold the truth, "
+        f"all five at once {np.all(inside, axis=1).mean():.3f}, {AT_ONCE} times as wide {np.mean(wide):.3f}"
+    )
+    chance = 1.0 if seeds == SEEDS else np.sqrt(SEEDS / seeds)
+    least, most = (0.93, 0.97) if stated else (0.90, 1.0)
+    assert least - chance * CHANCE / 2.0 <= np.mean(inside) <= most + chance * CHANCE / 2.0
+    assert np.mean(wide) >= 0.95 - chance * CHANCE
+
+
+BOTH = ["axial", "radial"]
+
+
+def off_by_level(campaign: Campaign, error: float, seed: int) -> Campaign:
+    """A simulated campaign whose levels are each off in gain and phase, all their repeats alike."""
+    random, sweeps = np.random.default_rng([seed, 5]), []
+    for sweep in campaign.sweeps:
+        levels, place = np.unique(sweep.amplitude, return_inverse=True)
+        gain, phase = error * random.standard_normal((2, levels.size))
+        sweeps.append(replace(sweep, stiffness=sweep.stiffness * np.exp(gain + 1j * phase)[place]))
+    return replace(campaign, sweeps=tuple(sweeps))
+
+
+@pytest.mark.parametrize("error", [0.0, 5e-3])
+def test_errors_of_levels_are_told(rig: Rig, paper_model: Model, error: float) -> None:
+    found, matters, freedom = [], [], []
+    for seed in range(30):
+        data = Data.of(off_by_level(rig(seed), error, seed))
+        solution = solve(paper_model, data.chosen(BOTH), FIVE)
+        told = level_errors(data.chosen(BOTH), solution.residual, solution.jacobian, (1.0, 1.0))
+        found.append(np.square(told.error))
+        matters.append(told.matters)
+        freedom.append(told.freedom)
+    size = np.sqrt(np.mean(found, axis=0))
+    np.testing.assert_allclose(size, error, rtol=0.25, atol=1e-3)
+    assert np.mean(matters) >= 0.95 if error else np.mean(matters) <= 0.05
+    print(f"degrees of freedom {min(freedom)} to {max(freedom)}")
+    assert not error or 2 <= min(freedom) <= max(freedom) < 6  # six levels, less what the parameters take

@@ -16,11 +16,10 @@ from bushfit.fitting.drive import drive_of
 from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.outliers import outlier_limit
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static
-from bushfit.fitting.robust import outlier_warnings
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
-from bushfit.model.result import Outlier, Result
+from bushfit.model.result import Result
 from bushfit.reading.measurement import Loop, Sweep
 
 Rig = Callable[..., Campaign]
@@ -152,17 +151,6 @@ def test_outliers_are_listed_by_file_and_row_and_told(rig: Rig) -> None:
     assert any("--loss soft_l1" in line and "rows 5, 71" in line for line in linear.warnings)
     assert any("left out of the fit" in line and "row 124" in line for line in soft.warnings)
     assert from_document(to_document(soft)).outliers == soft.outliers
-
-
-def test_an_outlier_of_the_displacement_is_said_to_be_left_out_whatever_the_loss() -> None:
-    both = [Outlier("loop", None, row, column, 9.0) for row, column in ((7, "force"), (9, "displacement"))]
-    followed, left = outlier_warnings(both, robust=False)
-    assert followed.startswith("1 point lies")
-    assert "follows them: loop, force row 7; --loss soft_l1" in followed
-    assert left.endswith("left out of the fit: loop, displacement row 9")
-    (line,) = outlier_warnings(both, robust=True)
-    assert "2 points lie" in line
-    assert "follows" not in line
 
 
 @pytest.mark.parametrize(("factor", "missed"), [(0.7, 0), (1.1, 2)])

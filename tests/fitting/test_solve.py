@@ -14,7 +14,7 @@ from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE, with_base
 from bushfit.errors import FitError
-from bushfit.fitting.coordinates import Bounds, Coordinates, at_bound, jacobian, residual, starting_point
+from bushfit.fitting.coordinates import Bounds, Coordinates, at_bound, residual, starting_point
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
@@ -54,28 +54,6 @@ def axial(measured: Data) -> list[DataSet]:
 @pytest.fixture
 def data_sets(rig: Callable[..., Campaign]) -> list[DataSet]:
     return Data.of(rig(1)).data_sets
-
-
-def test_coordinates_lead_there_and_back(paper_model: Model) -> None:
-    model = paper_model.with_effect("inertia", {"inertia.mass": 0.02})
-    coordinates = Coordinates.of(model, ["mu", "alpha", "inertia.mass"])
-    point = coordinates.point(model.values)
-    there = coordinates.values(point)
-    assert there == pytest.approx({name: model.values[name] for name in coordinates.names}, rel=1e-12)
-    step = 1e-6
-    moved = np.array([list(coordinates.values(point + step * axis).values()) for axis in np.eye(3)]) - np.array(
-        list(there.values())
-    )
-    np.testing.assert_allclose(np.diag(moved) / step, coordinates.slopes(model.values), rtol=1e-5)
-
-
-def test_the_jacobian_is_that_of_the_residual(axial: list[DataSet], paper_model: Model) -> None:
-    coordinates = Coordinates.of(paper_model, FIVE)
-    point, slopes = coordinates.point(paper_model.values), jacobian(paper_model, axial, FIVE)
-    for step, found in zip(1e-5 * np.eye(5), slopes, strict=True):
-        ends = [paper_model.with_values(coordinates.values(point + sign * step)) for sign in (1.0, -1.0)]
-        high, low = (residual(model, axial) for model in ends)
-        np.testing.assert_allclose(found, (high - low) / 2e-5, atol=1e-5 * np.abs(found).max())
 
 
 def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(axial: list[DataSet], paper_model: Model) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import bombs
 
@@ -18,15 +19,16 @@ from bushfit.inspection.gathering import gather
 from bushfit.jobs.compare import Compare
 from bushfit.jobs.plan import PlanTests
 from bushfit.jobs.predict import Predict
-from bushfit.jobs.report import report as reported
 from bushfit.model.file import load_result, to_document
+from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.resonance import read_resonance
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
-from bushfit.reading.words import RESONANCE_COLUMNS
 from bushfit.report.contents import pages_of
 from bushfit.report.folder import to_json
+from bushfit.report.page import folder_contents
 
 CORPUS = Path(__file__).with_name("corpus")
 #: The files of a folder of results, by their names.
@@ -47,10 +49,11 @@ def readers(folder: Path, data: bytes) -> None:
     """A measured table, as a loop, as a sweep, as a resonance test, and as `inspect` takes it: of a coupon, too."""
     file = folder / "table.csv"
     file.write_bytes(data)
-    for read in (read_loop, read_sweep):
+    readers: Any = {read_loop: LoopFile(file=file.name), read_sweep: SweepFile(file=file.name)}
+    for read, test in readers.items():
         for place in (Direction.AXIAL, COUPON):
             with clear_errors():
-                read(file, place)
+                read(file, place, test)
     with clear_errors():
         read_resonance(Table.open(file, RESONANCE_COLUMNS), Direction.AXIAL, 1.0)
     look_into(file)
@@ -98,7 +101,7 @@ def workbook(folder: Path, data: bytes) -> None:
     file = folder / "table.xlsx"
     file.write_bytes(bombs.workbook(data.split(b"\n====\n"), texts=TEXTS))
     with clear_errors():
-        read_sweep(file, Direction.AXIAL)
+        read_sweep(file, Direction.AXIAL, SweepFile(file=file.name))
     look_into(file)
 
 
@@ -110,7 +113,7 @@ def report(folder: Path, data: bytes) -> None:
     file.write_bytes(content)
     try:
         with clear_errors():
-            pages_of(reported(folder))
+            pages_of(folder_contents(folder))
         if file.suffix == ".json":
             with clear_errors():
                 job = Compare()

@@ -13,8 +13,8 @@ from bushfit.geometry import Direction
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.record import Inspected
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.reading.tablefile import to_csv
+from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 
 NOISE = {
     "good": {"noise": 1e-3, "force_noise": 5e-4, "displacement_noise": 1e-4},
@@ -24,7 +24,7 @@ NOISE = {
     },
 }
 #: Clean campaigns: of a commit, and of all.
-SEEDS = [4, pytest.param(25, marks=pytest.mark.slow)]
+SEEDS = [4, pytest.param(12, marks=pytest.mark.slow)]
 
 
 def plan(**settings: float) -> SimulateSettings:

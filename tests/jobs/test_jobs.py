@@ -9,11 +9,9 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
-from bushfit.fitting.data import Data
 from bushfit.geometry import Bushing, Direction
-from bushfit.jobs import fits
 from bushfit.jobs.compare import Compare, Entry
-from bushfit.jobs.fits import Fit
+from bushfit.jobs.fits import kinds_of_test
 from bushfit.jobs.grid import common_grid, default_grid
 from bushfit.jobs.predict import Predict
 from bushfit.model.covariance import Covariance
@@ -22,18 +20,10 @@ from bushfit.model.result import Range, Result
 from bushfit.report.contents import Kinds
 
 
-def test_warnings_of_a_resonance_are_those_of_the_prediction(campaign: Campaign) -> None:
-    result = Fit().run(Data.of(campaign)).result
-    warnings = Predict(mass=0.2, base_acceleration=0.1).run(result, campaign).document["warnings"]
-    assert any(line.startswith("axial, resonance of 0.2 kg: predicted at strains") for line in warnings)
-    assert len(set(warnings)) == len(warnings)
-
-
 def test_a_campaign_has_the_kinds_of_test_that_it_lists(campaign: Campaign) -> None:
-    assert fits.kinds_of_test(campaign, ()) == ("loops", "sweeps")
-    assert fits.kinds_of_test(replace(campaign, loops=()), ("temperature",)) == ("sweeps",)
+    assert kinds_of_test(replace(campaign, loops=()), ("temperature",)) == ("sweeps",)
     warm = replace(campaign, sweeps=tuple(replace(sweep, temperature=300.0) for sweep in campaign.sweeps))
-    assert fits.kinds_of_test(warm, ("temperature",)) == ("loops", "sweeps", "master_curve", "shift_factors")
+    assert kinds_of_test(warm, ("temperature",)) == ("loops", "sweeps", "master_curve", "shift_factors")
 
 
 def test_a_prediction_is_over_what_was_asked_for_before_what_the_campaign_says(
@@ -70,7 +60,9 @@ def test_the_grid_lies_within_what_all_were_fitted_at(paper_model: Model, other_
     assert (frequency.min(), frequency.max(), amplitude.min(), amplitude.max()) == pytest.approx((6, 9, 1.2e-4, 1.8e-4))
 
 
-def test_a_place_beyond_what_one_was_fitted_at_is_warned_of_by_its_label(paper_model: Model) -> None:
+def test_what_lies_beyond_one_is_warned_of_and_another_shape_is_compared_at_the_same_displacement(
+    paper_model: Model,
+) -> None:
     entries = [
         Entry("one", "one.json", fitted(paper_model, (5.0, 155.0), (1e-4, 1e-3))),
         Entry("two", "two.json", fitted(paper_model, (200.0, 300.0), (1e-4, 1e-3))),
@@ -78,9 +70,6 @@ def test_a_place_beyond_what_one_was_fitted_at_is_warned_of_by_its_label(paper_m
     found = Compare().run(entries)
     assert any(line.startswith("B: axial: predicted at frequencies of 5 to 155 Hz") for line in found.warnings)
     assert not any(line.startswith("A: axial: predicted") for line in found.warnings)
-
-
-def test_a_bushing_of_another_shape_is_compared_at_the_same_displacement(paper_model: Model) -> None:
     longer = replace(paper_model, bushing=Bushing("longer", 0.010, 0.018, 0.068))
     entries = [Entry(m.name, m.name, fitted(m, (1.0, 155.0), (1e-4, 1e-3))) for m in (paper_model, longer)]
     (pair,) = Compare().run(entries).comparisons

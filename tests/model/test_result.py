@@ -1,15 +1,20 @@
-"""Results: the covariance of a fit, and 95 % intervals as wide as an estimated variance needs."""
+"""Results: covariance and intervals; and model files: what is written comes back, and older ones are read."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import t
 
+from bushfit.effects import Level
+from bushfit.errors import ModelError
 from bushfit.model.covariance import Z95, Covariance
-from bushfit.model.file import to_document
+from bushfit.model.file import SCHEMAS, from_document, load_result, model_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 
@@ -52,3 +57,57 @@ def test_intervals_stay_within_what_is_possible(paper_model: Model) -> None:
     for name in FIVE:
         assert open_ended.interval(name) == paper_model.parameters[name].bounds
     json.dumps(to_document(open_ended), allow_nan=False)
+
+
+@pytest.fixture
+def document(result: Result) -> dict[str, Any]:
+    return json.loads(json.dumps(to_document(result), allow_nan=False))  # type: ignore[no-any-return]
+
+
+def test_there_and_back(result: Result, document: dict[str, Any]) -> None:
+    back = from_document(document)
+    for key in ("model", "fitted", "quality", "measured", "warnings"):
+        assert getattr(back, key) == getattr(result, key)
+    np.testing.assert_array_equal(back.covariance.matrix, result.covariance.matrix)
+    np.testing.assert_array_equal(back.covariance.spread, result.covariance.spread)
+    assert {**to_document(back), "provenance": None} == {**document, "provenance": None}
+
+
+def test_what_is_left_out_where_it_is_not_so(result: Result, document: dict[str, Any]) -> None:
+    """Effects that may be the rig's, a shape that is not the paper's; directions are not in older files."""
+    bushing = replace(result.model.bushing, shape="calibrated")  # type: ignore[type-var]
+    model = replace(result.model.with_effect("clearance"), bushing=bushing)
+    more = json.loads(json.dumps(to_document(replace(result, model=model, unresolved=("clearance",)))))
+    assert (more["unresolved"], more["bushing"]["shape"]) == (["clearance"], "calibrated")
+    assert (from_document(more).unresolved, from_document(more).model.bushing) == (("clearance",), bushing)
+    del document["fit"]["directions"]
+    assert result.measured is not None
+    assert from_document(document).measured == replace(result.measured, directions=())
+
+
+def test_a_model_alone_is_a_result(paper_model: Model, tmp_path: Path) -> None:
+    file = tmp_path / "m.json"
+    file.write_text(json.dumps({"schema": SCHEMAS[0], **model_document(paper_model)}))
+    result = load_result(file)
+    assert result.model == paper_model
+    assert result.quality is None
+    assert result.interval("mu") is None
+
+
+def test_the_radial_factor_of_older_files_is_read(document: dict[str, Any]) -> None:
+    """An effect that was called radial_factor, with an excess over 1, is a stiffness factor of the radial direction."""
+    entry = {"value": 0.05, "unit": "1", "vary": True, "profile95": [0.04, None]}
+    document["effects"].append("radial_factor")
+    document["parameters"]["radial_factor.excess"] = entry
+    document["covariance"] = {"names": ["radial_factor.excess"], "matrix": [[1e-4]], "spread": []}
+    result = from_document(document)
+    assert result.model.values["stiffness_factor.radial"] == pytest.approx(1.05)
+    assert result.covariance.stderr("stiffness_factor.radial") == pytest.approx(0.01)
+    assert result.profile["stiffness_factor.radial"] == (pytest.approx(1.04), None)
+    plain = result.model.without(Level.COMPONENT)
+    for direction, factor in (("radial", 1.05), ("axial", 1.0)):
+        ratio = result.model.stiffness(direction, 50.0, 1e-4) / plain.stiffness(direction, 50.0, 1e-4)
+        assert abs(ratio) == pytest.approx(factor)
+    document["parameters"]["radial_factor.factor"] = document["parameters"].pop("radial_factor.excess")
+    with pytest.raises(ModelError, match=r"stiffness_factor\.radial"):
+        from_document(document)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.campaign.compound import Compound
+from bushfit.campaign.quantities import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
@@ -22,13 +22,19 @@ from bushfit.jobs.plan import PlanTests
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.planning.candidates import candidates, minutes
 from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, Points, Programme, Test, Wanted, motions
-from bushfit.planning.criterion import Budget, Criterion, View, best_runs, distances, noncentrality_of
-from bushfit.planning.guess import guess
-from bushfit.planning.knowledge import noise_of, of_campaign, of_result
-from bushfit.planning.offer import FOUND, RIVALS_APART
-from bushfit.planning.order import Drifting, ordered
+from bushfit.planning.criterion import (
+    Budget,
+    Criterion,
+    Drifting,
+    View,
+    best_runs,
+    distances,
+    noncentrality_of,
+    ordered,
+)
+from bushfit.planning.knowledge import guess, noise_of, of_campaign, of_result
+from bushfit.planning.offer import FOUND, RIVALS_APART, candidates, minutes
 from bushfit.planning.plan import plan
 from bushfit.planning.sensitivity import Grid, relative_slopes
 from bushfit.simulation.measured import simulate
@@ -222,7 +228,9 @@ def test_a_drift_counts_as_its_noncentrality_says(known: Knowledge) -> None:
         assert gains[i, j] == pytest.approx(grown, abs=1e-12)
 
 
-def test_a_plan_is_better_than_the_standard_programme_and_no_blinder(planned: Plan) -> None:
+def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_those_known(
+    planned: Plan, known: Knowledge
+) -> None:
     """At equal hours: errors of the stiffness at most 70 %, every effect found as small, and a drift no worse."""
     better, worst = mean_error(planned.planned) / mean_error(planned.standard), amounts_found(planned)
     print(f"stiffness {better:.2f}", max(worst.items(), key=lambda item: item[1]), len(worst))
@@ -235,10 +243,7 @@ def test_a_plan_is_better_than_the_standard_programme_and_no_blinder(planned: Pl
         tests = [test for test in planned.planned.tests if test.direction is place]
         assert tests[0] == tests[-1], "a session begins and ends with one test in each direction"
 
-
-def test_errors_before_any_test_are_those_of_what_is_known(known: Knowledge, planned: Plan) -> None:
-    """Of |K|, relative, and of the loss factor at the points that are wanted, by central differences."""
-
+    # Of |K|, relative, and of the loss factor at the points that are wanted, by central differences.
     def wanted_of(name: str, factor: float) -> Array:
         model = known.model.with_values({name: factor * known.model.values[name]})
         k = np.concatenate([model.stiffness(each.place, each.frequency, each.amplitude) for each in POINTS])
@@ -247,14 +252,6 @@ def test_errors_before_any_test_are_those_of_what_is_known(known: Knowledge, pla
     slopes = np.array([(wanted_of(name, 1.0 + 1e-4) - wanted_of(name, 1.0 - 1e-4)) / 2e-4 for name in known.names])
     expected = np.sqrt(np.einsum("kcn,kl,lcn->cn", slopes, np.linalg.inv(known.precision), slopes))
     np.testing.assert_allclose([planned.before.stiffness, planned.before.loss], expected, rtol=1e-3)
-
-
-def test_half_of_the_rows_of_a_loop_tell_half(campaign: Campaign) -> None:
-    """Whatever its sampling, the noise of a force is that of as many rows as planned loops have."""
-    (loop,) = campaign.loops
-    thin = replace(loop, **{key: getattr(loop, key)[::2] for key in ("time", "displacement", "force")})
-    whole, half = (noise_of(Data.of(replace(campaign, loops=(each,)))).force for each in (loop, thin))
-    assert half == pytest.approx(np.sqrt(2.0) * whole, rel=0.05)
 
 
 @pytest.mark.parametrize("hours", [0.9, 2.5])
@@ -319,11 +316,6 @@ def test_no_test_is_beyond_the_rig(known: Knowledge, limit: str, most: float) ->
     assert {*found} != {*candidates(known, wanted("predictions", 4.0))}
 
 
-def test_a_rig_that_can_make_no_test_is_told(known: Knowledge) -> None:
-    with pytest.raises(ModelError, match="the rig can make no test"):
-        plan(known, wanted("predictions", 4.0, max_force=1e-3))
-
-
 def test_an_amount_that_is_found_is_found_in_nine_of_ten_cases() -> None:
     """Of normal numbers about FOUND, nine of ten lie beyond what one of twenty about 0 does."""
     drawn = np.random.default_rng(3).standard_normal(200_000)
@@ -331,11 +323,20 @@ def test_an_amount_that_is_found_is_found_in_nine_of_ten_cases() -> None:
     assert np.mean(np.abs(drawn + FOUND) > limit) == pytest.approx(0.9, abs=0.004)
 
 
-def test_values_given_by_hand_are_taken_as_right_within_a_factor(paper_model: Model) -> None:
+def test_what_is_given_by_hand_half_of_the_rows_and_a_rig_that_can_make_no_test(
+    paper_model: Model, known: Knowledge, campaign: Campaign
+) -> None:
     knowledge = of_result(Result(paper_model))
     assert knowledge.names == tuple(paper_model.parameters)
     np.testing.assert_allclose(knowledge.covariance, 0.25 * np.eye(5))
     assert "a factor of 2.7" in knowledge.source
+    with pytest.raises(ModelError, match="the rig can make no test"):
+        plan(known, wanted("predictions", 4.0, max_force=1e-3))
+    # Whatever its sampling, the noise of a force is that of as many rows as planned loops have.
+    (loop,) = campaign.loops
+    thin = replace(loop, **{key: getattr(loop, key)[::2] for key in ("time", "displacement", "force")})
+    whole, half = (noise_of(Data.of(replace(campaign, loops=(each,)))).force for each in (loop, thin))
+    assert half == pytest.approx(np.sqrt(2.0) * whole, rel=0.05)
 
 
 def test_what_tests_leave_open_a_thousand_times_over_stops_no_plan(paper_model: Model) -> None:

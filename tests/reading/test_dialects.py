@@ -1,8 +1,10 @@
-"""Every dialect reads to the same numbers, and its errors name line and column."""
+"""Every dialect reads to the same numbers; headers, their role, unit and counting; numbers as tables write them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +14,153 @@ from machines import MACHINES
 from bushfit import units
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction, Specimen
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Heading, Vocabulary
+from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Floats, Loop, Sweep
+from bushfit.reading.numerals import Numerals
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
+from bushfit.reading.table import Table
+
+LOOPS, SWEEPS = Vocabulary(LOOP_COLUMNS, {}), Vocabulary(SWEEP_COLUMNS, {})
+
+
+@pytest.mark.parametrize(
+    ("vocabulary", "header", "heading"),
+    [
+        (LOOPS, "Prüfkraft [kN]", Heading("force", "kN")), (LOOPS, "PRUEFKRAFT in N", Heading("force", "N")),
+        (LOOPS, "F / kN", Heading("force", "kN")), (LOOPS, "Axial displacement_mm", Heading("displacement", "mm")),
+        (LOOPS, "力\uff08N\uff09", Heading("force", "N")), (LOOPS, "f [Hz]", None), (LOOPS, "force of habit", None),
+        (LOOPS, "x" * 201, None), (SWEEPS, "f [Hz]", Heading("frequency", "Hz")), (SWEEPS, "F [N]", None),
+        (Vocabulary(LOOP_COLUMNS, {"force": "Kanal 3"}), "kanal_3 [N]", Heading("force", "N")),
+        (Vocabulary(LOOP_COLUMNS, {"force": "Kanal 3"}), "force [N]", None),
+    ],
+)  # fmt: skip
+def test_what_a_header_says_of_its_column(vocabulary: Vocabulary, header: str, heading: Heading | None) -> None:
+    assert vocabulary.heading(header) == heading
+
+
+PEAK_TO_PEAK = [
+    "Amplitude pk-pk [mm]", "amplitude (p-p) (mm)", "Amplitude peak-to-peak [mm]", "amplitude_pp_mm",
+    "Displacement p-p [mm]", "double amplitude [mm]", "Doppelamplitude [mm]", "Schwingbreite in mm",
+    "Amplitude Spitze-Spitze [mm]", "Amplitude Sp-Sp (mm)", "Amplitude Sp.-Sp. [mm]",
+    "Amplitude crête à crête [mm]", "Amplitude crete-a-crete [mm]",
+    "Amplitud pico a pico [mm]", "Amplitude [mm p-p]", "Amplitude SS [mm]", "Amplitude s-s (mm)",
+    "Amplitude Spitze zu Spitze / mm", "Amplitude [mm SS]", "Amplitude [mmpp]", "Weg [mmp-p]", "Weg SS in mm",
+    "Schwingweite [mm]", "2A [mm]", "total amplitude [mm]", "displacement range [mm]", "amplitude totale [mm]",
+    "Amplitude c-à-c [mm]", "Amplitud pico-pico (mm)",
+]  # fmt: skip
+ZERO_TO_PEAK = ["Amplitude 0-p [mm]", "Amplitude zero-to-peak (mm)"]
+
+
+def amplitudes(folder: Path, header: str, columns: Mapping[str, str] | None = None, **stated: str) -> np.ndarray:
+    """Those that a sweep has under a header, over those of the file: 1, or 0.5 where they count peak-to-peak."""
+    file = folder / "sweep.csv"
+    file.write_text(DIALECTS["plain sweep"].text().replace("amplitude [mm]", header), encoding="utf-8")
+    found = read_sweep(file, Direction.AXIAL, SweepFile(file=file.name, columns=columns, **stated))  # type: ignore[arg-type]
+    return found.amplitude / (expected("sweep")[1] * 1e-3)
+
+
+@pytest.mark.parametrize("header", [*PEAK_TO_PEAK, *ZERO_TO_PEAK])
+def test_a_header_says_how_amplitudes_count(header: str, tmp_path: Path) -> None:
+    doubled = header in PEAK_TO_PEAK
+    assert set(amplitudes(tmp_path, header)) == {0.5 if doubled else 1.0}
+    with pytest.raises(MeasurementError, match="header and campaign count amplitudes differently"):
+        amplitudes(tmp_path, header, amplitude="zero-to-peak" if doubled else "peak-to-peak")
+
+
+@pytest.mark.parametrize(
+    ("header", "named", "counted"),
+    [
+        ("Amplitude SS [mm]", "Amplitude SS", 0.5), ("Pegel p-p [mm]", "Pegel p-p [mm]", 0.5),
+        ("Pegel [mm pp]", "Pegel", 0.5), ("Schwingbreite [mm]", "Schwingbreite", 0.5),
+        ("Doppelamplitude [mm] ", "Doppelamplitude [mm]", 0.5), ("Pegel 0-p [mm]", "Pegel 0-p", 1.0),
+        ("range [mm]", "range", 1.0), ("Stress level [mm]", "Stress level", 1.0),
+    ],
+)  # fmt: skip
+def test_a_header_that_is_named_says_it_too(header: str, named: str, counted: float, tmp_path: Path) -> None:
+    assert set(amplitudes(tmp_path, header, {"amplitude": named})) == {counted}
+
+
+@pytest.mark.parametrize(
+    ("header", "index"),
+    [
+        ("f [Hz],A [mm],K [N/mm],tan d", 2), ("f [Hz],A [mm],Stiffness K [N/mm],tan d", 2),
+        ("f,A,K,tan d\nHz,mm,N/mm,-", 2), ("f [Hz],K [N/mm],A [mm],K* [N/mm],tan d", 3),
+        ("f [Hz],A [mm],K,tan d", None), ("f [Hz],A [mm],K [degC],tan d", None),
+    ],
+)  # fmt: skip
+def test_the_symbol_of_a_stiffness_is_one_by_its_unit(header: str, index: int | None, tmp_path: Path) -> None:
+    file = tmp_path / "sweep.csv"
+    row = ",".join(["1.5"] * (header.partition("\n")[0].count(",") + 1))
+    file.write_text("\n".join([header, *[row] * 3]))
+    column = Table.open(file, SWEEP_COLUMNS).roles.get("stiffness")
+    assert (column and column.index) == index
+
+
+@pytest.mark.parametrize(
+    ("text", "stated", "line", "headers"),
+    [
+        ("time,force\ntime,displacement,force\n1,2,3\n", {}, 2, ("time", "displacement", "force")),
+        ("time,force\nZeit,Kraft\n1,2\n", {"header_line": 1}, 1, ("time", "force")),
+        ("time;force,x\n1;2,3\n", {"delimiter": "comma"}, 1, ("time;force", "x")),
+        ("x,y\n1,2\n2,3\n3,4\n", {}, 1, ("x", "y")),
+    ],
+)
+def test_the_header_names_most_columns_unless_it_is_stated(
+    text: str, stated: dict[str, Any], line: int, headers: tuple[str, ...], tmp_path: Path
+) -> None:
+    (tmp_path / "loop.csv").write_text(text)
+    found = Table.open(tmp_path / "loop.csv", LOOP_COLUMNS, stated=FileFormat(**stated)).layout
+    assert (found.header_line, found.headers) == (line, headers)
+
+
+@pytest.mark.parametrize(
+    ("decimal", "thousands", "text", "number"),
+    [
+        (".", None, "-1.5e3", -1500.0), (".", None, "\u22122.5", -2.5), (".", None, "1,5", None),
+        (".", None, "1.", 1.0), (",", None, ",5", 0.5), (",", ".", "1.234.567,8", 1234567.8),
+        (",", ".", "1.23,4", None), (".", "'", "1\u2019234", 1234.0), (",", " ", "1\u202f234,5", 1234.5),
+        (".", ",", "0,123", None), (".", None, "\u0661", None), (".", None, "nan", None),
+        (".", None, "1" * 401, None),
+    ],
+)  # fmt: skip
+def test_a_cell_is_a_number_in_its_way_or_none(
+    decimal: str, thousands: str | None, text: str, number: float | None
+) -> None:
+    assert Numerals(decimal, thousands).value(text) == number
+
+
+UNCLEAR: dict[str, tuple[str, dict[str, str], float | None]] = {
+    "a thousand or a bit more than one": ("1.234;1.234;2.345", {}, None),
+    "the same, decimal point stated": ("1.234;1.234;2.345", {"decimal": "."}, 2.345),
+    "the same, decimal comma stated": ("1.234;1.234;2.345", {"decimal": ","}, 2345.0),
+    "the same, nothing parts thousands": ("1.234;1.234;2.345", {"thousands": "none"}, 2.345),
+    "commas": ("1,234;1,234;2,345", {}, None),
+    "commas, thousands stated": ("1,234;1,234;2,345", {"thousands": ","}, 2345.0),
+    "settled by another column": ("1.234;0.5;2.345", {}, 2.345),
+    "settled by four digits": ("1.234;1234.567;2.345", {}, 2.345),
+    "settled by both marks": ("1.234,5;1.234;2.345", {}, 2345.0),
+    "settled by an exponent": ("1.234;1.234e3;2.345", {}, 2.345),
+    "settled by a group too many": ("1.234.567;1.234;2.345", {}, 2345.0),
+}
+
+
+@pytest.mark.parametrize("case", UNCLEAR)
+def test_what_can_be_read_in_two_ways_is_refused(case: str, tmp_path: Path) -> None:
+    """Ten rows alike but for their first digit: only the row given can tell what its points and commas mean."""
+    cells, stated, force = UNCLEAR[case]
+    rows = [f"{n}.001;{n}.002;{n}.003" if "." in cells else f"{n},001;{n},002;{n},003" for n in range(2, 12)]
+    file = tmp_path / "loop.csv"
+    file.write_text("\n".join(["time [s];displacement [mm];force [N]", cells, *rows]))
+    table = Table.open(file, LOOP_COLUMNS, stated=FileFormat(**stated))  # type: ignore[arg-type]
+    wanted = {"force": table.column("force", "N")}
+    if force is None:
+        with pytest.raises(MeasurementError, match=r"two ways[\s\S]*decimal = "):
+            table.read(wanted, fewest_rows=1)
+    else:
+        assert table.read(wanted, fewest_rows=1)["force"][0] == force
 
 
 def written(dialect: Dialect, folder: Path) -> Path:
@@ -25,8 +171,9 @@ def written(dialect: Dialect, folder: Path) -> Path:
 
 def by_bushfit(file: Path) -> Loop | Sweep:
     if file.stem == "loop":
-        return read_loop(file, Direction.AXIAL)
-    return read_sweep(file, Direction.AXIAL if file.stem == "sweep" else Specimen("DMA", "modulus"))
+        return read_loop(file, Direction.AXIAL, LoopFile(file=file.name))
+    place = Direction.AXIAL if file.stem == "sweep" else Specimen("DMA", "modulus")
+    return read_sweep(file, place, SweepFile(file=file.name))
 
 
 ALL = {**DIALECTS, **MACHINES}

@@ -21,34 +21,30 @@ def amplitudes(said: Labels, expected: str = "m") -> list[tuple[str, str | None]
 @pytest.mark.parametrize(
     ("name", "text", "convention"),
     [
-        ("Dyn_axial_A0,05mm", "0.05 mm", None),
-        ("axial 0p1mm", "0.1 mm", None),
-        ("+-2mm", "2 mm", "zero-to-peak"),
-        ("radial ±0,5 mm 10Hz", "0.5 mm", "zero-to-peak"),
-        ("2mm_pp", "2 mm", "peak-to-peak"),
-        ("2mmpp_radial", "2 mm", "peak-to-peak"),
-        ("ax_2mm p-p_10Hz", "2 mm", "peak-to-peak"),
-        ("A0.05mm_SS", "0.05 mm", "peak-to-peak"),
-        ("1mm 0-p", "1 mm", "zero-to-peak"),
-        ("100 um", "100 µm", None),
-        ("Amplitude_0.2mm_bushing_18mm", "0.2 mm", None),
-        ("CMP15961_2024-05-03_0.1mm", "0.1 mm", None),
-        ("03.05.2024 radial 0.1mm", "0.1 mm", None),
-        ("d20mm_L34mm_0.3mm", "0.3 mm", None),
-        ("abc18mm_1mm", "1 mm", None),
-        ("preload_1.5mm_0.2mm", "0.2 mm", None),
-        ("loop 1,0 mm 10mm_min", "1 mm", None),
-        ("5-155Hz_0.1mm", "0.1 mm", None),
+        ("Dyn_axial_A0,05mm", "0.05 mm", None), ("axial 0p1mm", "0.1 mm", None), ("+-2mm", "2 mm", "zero-to-peak"),
+        ("radial ±0,5 mm 10Hz", "0.5 mm", "zero-to-peak"), ("2mm_pp", "2 mm", "peak-to-peak"),
+        ("2mmpp_radial", "2 mm", "peak-to-peak"), ("ax_2mm p-p_10Hz", "2 mm", "peak-to-peak"),
+        ("A0.05mm_SS", "0.05 mm", "peak-to-peak"), ("1mm 0-p", "1 mm", "zero-to-peak"), ("100 um", "100 µm", None),
+        ("Amplitude_0.2mm_bushing_18mm", "0.2 mm", None), ("CMP15961_2024-05-03_0.1mm", "0.1 mm", None),
+        ("03.05.2024 radial 0.1mm", "0.1 mm", None), ("d20mm_L34mm_0.3mm", "0.3 mm", None),
+        ("abc18mm_1mm", "1 mm", None), ("preload_1.5mm_0.2mm", "0.2 mm", None),
+        ("loop 1,0 mm 10mm_min", "1 mm", None), ("5-155Hz_0.1mm", "0.1 mm", None),
     ],
-)
+)  # fmt: skip
 def test_the_amplitude_in_a_name(name: str, text: str, convention: str | None) -> None:
     assert amplitudes(labels_in_names(name)) == [(text, convention)]
 
 
-def test_no_amplitude_where_there_is_no_single_number_with_its_unit() -> None:
+def test_what_no_single_number_says_frequencies_strains_and_sheets() -> None:
     names = ["CMP15961", "2024-05-03", "20240503_12", "test 7", "axial_05mm", "0.1-1mm", "A0.05", "v2mm", "D 20 mm", ""]
     assert {name: amplitudes(labels_in_names(name)) for name in names} == {name: [] for name in names}
     assert amplitudes(labels_in_names("axial_18mm_bushing_1mm")) == [("18 mm", None), ("1 mm", None)]
+    assert amplitudes(labels_in_names("DMA_10Hz_0,05%"), "1") == [("0.05 %", None)]
+    assert amplitudes(labels_in_names("x_50mHz"), "Hz") == [("50 mHz", None)]
+    assert amplitudes(labels_in_names("5-155Hz"), "Hz") == []
+    said = labels_in_names("radial 0.3mm", "axial 0.1mm 20Hz")
+    assert (said.direction, amplitudes(said)) == (Direction.RADIAL, [("0.3 mm", None)])
+    assert amplitudes(said, "Hz") == [("20 Hz", None)]
 
 
 @pytest.mark.parametrize(
@@ -71,41 +67,19 @@ def test_what_else_a_name_says(name: str, keys: dict[str, object]) -> None:
     assert {key: value for key, value in vars(said).items() if value and key != "quantities"} == keys
 
 
-def test_frequencies_and_strains_and_a_sheet_before_its_file() -> None:
-    assert amplitudes(labels_in_names("DMA_10Hz_0,05%"), "1") == [("0.05 %", None)]
-    assert amplitudes(labels_in_names("x_50mHz"), "Hz") == [("50 mHz", None)]
-    assert amplitudes(labels_in_names("5-155Hz"), "Hz") == []
-    said = labels_in_names("radial 0.3mm", "axial 0.1mm 20Hz")
-    assert (said.direction, amplitudes(said)) == (Direction.RADIAL, [("0.3 mm", None)])
-    assert amplitudes(said, "Hz") == [("20 Hz", None)]
-
-
 @pytest.mark.parametrize(
     ("name", "direction"),
     [
-        ("sweep_axial_2", Direction.AXIAL),
-        ("bague_axiale", Direction.AXIAL),
-        ("Essais radiaux", Direction.RADIAL),
-        ("Verdrehung-3", Direction.TORSION),
-        ("TORSIÓN", Direction.TORSION),
-        ("axial_and_radial", None),
-        ("coaxial", None),
-        ("loop", None),
+        ("sweep_axial_2", Direction.AXIAL), ("bague_axiale", Direction.AXIAL), ("Essais radiaux", Direction.RADIAL),
+        ("Verdrehung-3", Direction.TORSION), ("TORSIÓN", Direction.TORSION), ("axial_and_radial", None),
+        ("coaxial", None), ("loop", None),
     ],
-)
+)  # fmt: skip
 def test_one_word_of_four_languages_settles_the_direction(name: str, direction: Direction | None) -> None:
     assert named_direction([name]) is direction
 
 
-def test_the_name_goes_before_the_headers_and_angles_before_both() -> None:
-    headers = ["Radialweg [mm]", "Kraft [N]"]
-    assert direction_of_file(Path("radial/axial_1.csv"), headers, turns=False) is Direction.AXIAL
-    assert direction_of_file(Path("axial/loop_1.csv"), headers, turns=False) is Direction.RADIAL
-    assert direction_of_file(Path("axial_1.csv"), headers, turns=True) is Direction.TORSION
-    assert direction_of_file(Path("loop_1.csv"), ["Weg [mm]"], turns=False) is None
-
-
-def test_lines_above_a_table() -> None:
+def test_lines_above_a_table_and_the_name_before_the_headers() -> None:
     lines = [
         "# Prüftemperatur: 23,5 °C",
         "Datum;2024-05-03",
@@ -124,6 +98,11 @@ def test_lines_above_a_table() -> None:
     assert (said.date, said.operator, said.preload, said.specimen_number) == ("2024-05-03", "3", "2 kN", "17")
     assert amplitudes(said) == [("0.2 mm", "peak-to-peak")]
     assert [each.text for each in said.of("Hz")] == ["10 Hz"]
+    headers = ["Radialweg [mm]", "Kraft [N]"]
+    assert direction_of_file(Path("radial/axial_1.csv"), headers, turns=False) is Direction.AXIAL
+    assert direction_of_file(Path("axial/loop_1.csv"), headers, turns=False) is Direction.RADIAL
+    assert direction_of_file(Path("axial_1.csv"), headers, turns=True) is Direction.TORSION
+    assert direction_of_file(Path("loop_1.csv"), ["Weg [mm]"], turns=False) is None
 
 
 @given(st.text())

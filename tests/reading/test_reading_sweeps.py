@@ -41,11 +41,14 @@ def test_sweeps_in_every_pair(columns: str, second: str, tmp_path: Path) -> None
     np.testing.assert_allclose(sweep.frequency, [5, 15, 25, 35])
 
 
-def test_repeats_are_numbered(tmp_path: Path) -> None:
+def test_repeats_and_errors_of_the_points_are_read(tmp_path: Path) -> None:
     doubled = "\n".join([SWEEP_HEADER, *SWEEP_ROWS, *SWEEP_ROWS])
     assert sweep_from(doubled, tmp_path).repeat.tolist() == [1] * 8 + [2] * 8
     stated = "\n".join([SWEEP_HEADER + ",repeat", *(f"{row},3" for row in SWEEP_ROWS)])
     assert set(sweep_from(stated, tmp_path).repeat) == {3}
+    stated = sweep_of(SWEEP_HEADER + ",relative error [%]", [f"{row},0.5" for row in SWEEP_ROWS], tmp_path)
+    np.testing.assert_allclose(stated.relative_error, 0.005)
+    assert sweep_from(SWEEP, tmp_path).relative_error is None
 
 
 #: |K|, loss factor, phase, K' and K'' of the same stiffness, rounded as files are.
@@ -61,14 +64,11 @@ ALL_PAIRS = "\n".join(
 )
 
 
-def test_columns_that_say_the_same_may_be_rounded_or_count_a_phase_the_other_way(tmp_path: Path) -> None:
+def test_columns_that_say_the_same_may_be_rounded_and_losses_be_negative(tmp_path: Path) -> None:
     stiffness = sweep_from(ALL_PAIRS, tmp_path).stiffness
     np.testing.assert_allclose(stiffness, 1e3 * np.array([600.0, 610.0, 620.0, 630.0]) * np.exp(0.11j), rtol=1e-3)
     assert np.array_equal(sweep_from(ALL_PAIRS.replace(",6.", ",-6."), tmp_path).stiffness, stiffness)
-
-
-def test_noise_or_a_late_channel_may_make_losses_negative(tmp_path: Path) -> None:
-    """A delay of 0.1 ms takes 0.1 rad at 155 Hz from a loss factor of 0.08."""
+    # A delay of 0.1 ms takes 0.1 rad at 155 Hz from a loss factor of 0.08.
     assert np.median(sweep_from(SWEEP.replace("0.1\n", "-0.002\n"), tmp_path).stiffness.imag) < 0.0
     frequency = np.linspace(5.0, 155.0, 16)
     loss = np.tan(np.arctan(0.08) - 2.0 * np.pi * frequency * 1e-4)
@@ -140,12 +140,6 @@ def test_strains_in_every_unit(unit: str, scale: float, tmp_path: Path) -> None:
     np.testing.assert_allclose(sweep_from(text, tmp_path, direction=DMA).amplitude, scale * np.array([0.011, 0.1, 1.1]))
 
 
-def test_the_moduli_of_a_bar_and_of_a_french_file(tmp_path: Path) -> None:
-    for storage, loss in (("E' (Pa)", 'E" (Pa)'), ("module de conservation / Pa", "module de perte / Pa")):
-        text = COUPON.replace("G_storage_pa", storage).replace("G_loss_pa", loss).replace("G_abs_pa", "x")
-        assert sweep_from(text, tmp_path, direction=DMA).stiffness[0] == pytest.approx(5.2e6 + 4e5j)
-
-
 def at_temperatures(*temperatures: float, unit: str = "degC") -> str:
     rows = [f"{f},0.1,{500 + f + t:.3f},0.1,{t}" for t in temperatures for f in (5, 15, 25)]
     return "\n".join([f"{SWEEP_HEADER},Temperature [{unit}]", *rows])
@@ -173,12 +167,6 @@ def test_the_temperature_of_a_file_is_its_condition_if_it_has_a_unit(
     source = sweep_from(at_temperatures(value, value).replace(" [degC]", unit), tmp_path).source
     assert source is not None
     assert source.conditions.get("temperature_degC") == (degrees and pytest.approx(degrees))
-
-
-def test_errors_of_the_points_are_read(tmp_path: Path) -> None:
-    stated = sweep_of(SWEEP_HEADER + ",relative error [%]", [f"{row},0.5" for row in SWEEP_ROWS], tmp_path)
-    np.testing.assert_allclose(stated.relative_error, 0.005)
-    assert sweep_from(SWEEP, tmp_path).relative_error is None
 
 
 @pytest.mark.parametrize(

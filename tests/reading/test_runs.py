@@ -81,12 +81,9 @@ def test_a_mass_on_a_mount_holds_neither_and_each_pass_is_a_run() -> None:
     assert np.array_equal(runs.amplitude, amplitude)
 
 
-def test_amplitudes_that_nothing_groups_are_their_own_levels() -> None:
+def test_amplitudes_that_nothing_groups_are_their_own_levels_and_one_that_falls_short_is_one_run() -> None:
     for amplitudes in (np.geomspace(1e-5, 1e-3, 40), [1e-4, 1.1e-4, 1.48e-4, 1.63e-4], [1e-4, 2e-4, 5e-4], [1e-4]):
         assert np.array_equal(nominal(np.array(amplitudes)), amplitudes)
-
-
-def test_a_frequency_sweep_that_falls_short_by_a_quarter_is_one_run() -> None:
     frequency = np.geomspace(0.01, 100.0, 28)
     runs = runs_of(frequency, 0.15 * frequency**-0.03, None)
     assert runs.stepped == "frequency"

@@ -1,4 +1,4 @@
-"""Wide tables: every form reads to the numbers of the long table; what does not fit together has one error."""
+"""Wide tables and resonance tests: every form of a file reads to the same numbers."""
 
 from __future__ import annotations
 
@@ -8,13 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import openpyxl
+import pandas as pd
 import pytest
 from texts import refused, sweep_from
 
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
+from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import Sweep
+from bushfit.reading.resonance import ResonanceTest, is_resonance, read_resonance
+from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
+from bushfit.reading.table import Table
+from bushfit.reduction.resonance import transmissibility
 
 FREQUENCIES = ("5", "15", "25", "35")
 AMPLITUDES = ("0,05", "0,1", "0,5")
@@ -123,22 +129,16 @@ def test_every_form_reads_from_a_workbook(form: str, tmp_path: Path) -> None:
     for row in csv.reader(FORMS[form], delimiter=";"):
         sheet.append([number(cell) if cell and cell.replace(",", "").isdecimal() else cell or None for cell in row])
     book.save(tmp_path / "book.xlsx")
-    check(read_sweep(tmp_path / "book.xlsx", Direction.AXIAL))
+    check(read_sweep(tmp_path / "book.xlsx", Direction.AXIAL, SweepFile(file="book.xlsx")))
 
 
-def test_amplitudes_peak_to_peak_are_halved(tmp_path: Path) -> None:
+def test_amplitudes_peak_to_peak_units_stated_and_repeats(tmp_path: Path) -> None:
     text = halves("f [Hz];" + each("K* {0} mm p-p [N/mm]") + ";" + each("tan delta {0} mm p-p"))
     check(sweep_from("\n".join(text), tmp_path), scale=0.5)
-
-
-def test_a_unit_that_no_header_has_can_be_stated(tmp_path: Path) -> None:
     text = halves("f [Hz];" + each("K* [N/mm] A={0}") + ";" + each("tan delta A={0}"))
     with pytest.raises(BushfitError, match="the amplitude has no unit"):
         sweep_from("\n".join(text), tmp_path)
     check(sweep_from("\n".join(text), tmp_path, units={"amplitude": "mm"}))
-
-
-def test_repeats_are_columns_of_one_amplitude(tmp_path: Path) -> None:
     again = [f"{a} mm" for a in ("0,1", "0,1", "0,5")]
     sweep = sweep_from("\n".join(["K* [N/mm]", *block(stiffness, again), "tan d", *block(loss, again)]), tmp_path)
     assert sorted(sweep.repeat) == [1] * 8 + [2] * 4
@@ -170,3 +170,67 @@ SPOILED = [
 def test_spoiled_wide_tables_have_one_clear_error(text: list[str], words: list[str], tmp_path: Path) -> None:
     with refused("sweep.csv", *words):
         sweep_from("\n".join(text), tmp_path)
+
+
+G = 9.80665
+FREQUENCY = np.linspace(50.0, 400.0, 60)
+RATIO = transmissibility(np.full(60, 1e6 * (1 + 0.1j)), 0.5, FREQUENCY)
+BASE = 2.0 + 0.01 * FREQUENCY
+MASS = BASE * np.abs(RATIO)
+ANGLE = np.angle(RATIO)
+
+
+def written(folder: Path, header: str, *columns: np.ndarray) -> Path:
+    """A file with frequencies and these columns; with decimal commas where semicolons part the header."""
+    table = pd.DataFrame(dict(enumerate((FREQUENCY, *columns))))
+    german = ";" in header
+    rows = table.to_csv(
+        header=False, index=False, float_format="%.9g", sep=";" if german else ",", decimal="," if german else "."
+    )
+    (folder / "shaker.csv").write_text(f"{header}\n{rows}", encoding="utf-8")
+    return folder / "shaker.csv"
+
+
+def read(file: Path, base_acceleration: float | None = None) -> ResonanceTest:
+    table = Table.open(file, RESONANCE_COLUMNS)
+    assert is_resonance(table)
+    return read_resonance(table, Direction.AXIAL, base_acceleration)
+
+
+IN_G = (BASE / G, MASS / G, np.degrees(ANGLE))
+REAL, IMAGINARY = MASS / G * np.cos(ANGLE), MASS / G * np.sin(ANGLE)
+FILES = {
+    "freq_hz,base_accel_ms2,base_phase_rad,mass_accel_ms2,mass_phase_rad": (BASE, 0.3 + 0 * BASE, MASS, 0.3 + ANGLE),
+    "Frequency [Hz],Base acceleration [g],Mass acceleration [g],Phase [deg]": IN_G,
+    "Frequency (Hz),Input Acc. (G),Output Acc. (G),Phase Angle (deg)": IN_G,
+    "Frequenz [Hz];Fußpunktbeschleunigung [g];Massenbeschleunigung [g];Phasenwinkel [Grad]": IN_G,
+    "fréquence [Hz],accélération de la base [m/s2],accélération de la masse [m/s2],déphasage [deg]": (
+        BASE,
+        MASS,
+        np.degrees(ANGLE),
+    ),
+    "f [Hz],|T| [-],phase [rad],base acceleration [m/s²]": (np.abs(RATIO), ANGLE, BASE),
+    "f [Hz],Re T,Im T,base acceleration [mm/s^2]": (RATIO.real, RATIO.imag, 1e3 * BASE),
+    "f [Hz],base accel real [g],base accel imag [g],mass accel real [g],mass accel imag [g]": (
+        BASE / G, 0 * BASE, REAL, IMAGINARY,
+    ),
+    "f [Hz],base acceleration pk-pk [g],mass acceleration pk-pk [g],phase [rad]": (2 * BASE / G, 2 * MASS / G, ANGLE),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("header", FILES)
+def test_one_test_in_many_files(tmp_path: Path, header: str) -> None:
+    test = read(written(tmp_path, header, *FILES[header]))
+    assert np.allclose(test.frequency, FREQUENCY)
+    assert np.allclose(test.transmissibility, RATIO, rtol=1e-6)
+    assert np.allclose(test.base_acceleration, BASE, rtol=1e-6)
+
+
+def test_rows_are_sorted_by_frequency(tmp_path: Path) -> None:
+    file = written(tmp_path, "f [Hz],|T|,phase [rad]", np.abs(RATIO), ANGLE)
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join([lines[0], *lines[:0:-1]]) + "\n")
+    test = read(file, 1.5)
+    assert np.allclose(test.frequency, FREQUENCY)
+    assert np.allclose(test.transmissibility, RATIO, rtol=1e-6)
+    assert set(test.base_acceleration) == {1.5}

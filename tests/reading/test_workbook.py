@@ -1,18 +1,17 @@
-"""Workbooks: the sheet that is meant, numbers as numbers, texts as texts, and what would fill the memory."""
+"""Workbooks, and tables in every form: what is meant, what fills the memory, and what a spreadsheet does not run."""
 
 from __future__ import annotations
 
-import io
 import sys
-import zipfile
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import bombs
 import numpy as np
 import openpyxl
+import pandas as pd
 import pytest
 import xlwt
 from dialects import HEADERS, NUMBERS, UNITS
@@ -21,11 +20,14 @@ from odf.table import Table, TableCell, TableRow
 from odf.text import P
 from texts import refused
 
-from bushfit.errors import MeasurementError
+from bushfit.errors import MeasurementError, OutputError
 from bushfit.geometry import Direction
-from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
+from bushfit.reading.tablefile import Form, defused, ending, to_bytes, to_csv
+from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 
 Sheets = dict[str, list[list[object]]]
 
@@ -52,7 +54,7 @@ def workbook(sheets: Sheets, folder: Path) -> Path:
 
 
 def forces(file: Path, **stated: Any) -> Any:
-    return read_loop(file, Direction.AXIAL, written=FileFormat(**stated)).force
+    return read_loop(file, Direction.AXIAL, LoopFile(file=file.name, **stated)).force
 
 
 FORCE = np.array([float(row[2]) for row in NUMBERS["loop"]])
@@ -111,12 +113,6 @@ def test_workbooks_of_other_formats_read_to_the_same_numbers(
     assert np.array_equal(forces(tmp_path / f"test.{write.__name__}"), FORCE)
 
 
-def test_a_sweep_and_a_loop_in_one_workbook(tmp_path: Path) -> None:
-    file = workbook({"Loop": table("loop", "french"), "Sweep": table("sweep", "spanish")}, tmp_path)
-    assert np.array_equal(read_sweep(file, Direction.AXIAL).frequency, [float(row[0]) for row in NUMBERS["sweep"]])
-    assert np.array_equal(forces(file, sheet="Loop"), FORCE)
-
-
 LOOP = table("loop")
 #: Sheets, the sheet that is stated, and what the error says.
 SPOILED: list[tuple[Sheets, str | None, list[str]]] = [
@@ -139,58 +135,11 @@ def test_spoiled_workbooks_have_one_clear_error(
         forces(workbook(sheets, tmp_path), sheet=sheet)
 
 
-def archive(parts: dict[str, bytes]) -> bytes:
-    file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed:
-        for name, content in parts.items():
-            packed.writestr(name, content)
-    return file.getvalue()
-
-
-HOSTILE: dict[str, Callable[[], bytes]] = {
-    "another archive": lambda: archive({"a.txt": b"x"}),
-    "cut off": lambda: bombs.workbook(["<row/>" * 9000])[:-300],
-    "old Office": lambda: b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600),
-    "bomb": lambda: archive({"xl/workbook.xml": b"", "xl/worksheets/sheet1.xml": bytes((1 << 30) + 1)}),
-    "no content": lambda: archive({"xl/workbook.xml": b"<a>"}),
-}
-
-
-@pytest.mark.parametrize("case", HOSTILE)
-def test_hostile_workbooks_are_refused(case: str, tmp_path: Path) -> None:
-    (tmp_path / "test.xlsx").write_bytes(HOSTILE[case]())
-    with pytest.raises(MeasurementError, match="workbook"):
-        forces(tmp_path / "test.xlsx")
-
-
-def test_a_sheet_that_is_not_asked_for_is_not_read(tmp_path: Path) -> None:
-    """Beside one that would fill the memory stands one that is used."""
-    rows = "".join(
-        "<row>" + "".join(f'<c t="str"><v>{cell}</v></c>' for cell in row) + "</row>"
-        for row in [["t [s]", "Weg [mm]", "Kraft [N]"], *NUMBERS["loop"]]
-    )
-    (tmp_path / "test.xlsx").write_bytes(bombs.workbook([bombs.far_apart(), rows]))
-    assert np.array_equal(forces(tmp_path / "test.xlsx", sheet="S2"), FORCE)
-    with pytest.raises(MeasurementError, match="the workbook is too large"):
-        forces(tmp_path / "test.xlsx")
-
-
-def test_cells_of_all_sheets_count_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Which are asked for one after the other, too."""
-    file = workbook({"A": table("loop"), "B": table("loop")}, tmp_path)
-    monkeypatch.setattr("bushfit.reading.workbook._MOST_CELLS", 300)
-    with pytest.raises(MeasurementError, match='more, with sheet "B"'):
-        forces(file)
-    assert np.array_equal(forces(file, sheet="A"), FORCE)
-    with pytest.raises(MeasurementError, match="at most 300 cells"):
-        forces(file, sheet="B")
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows bounds no process")
 @pytest.mark.slow
 def test_a_workbook_takes_so_much_time_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "test.xlsx").write_bytes(bombs.workbook([bombs.EMPTY * 5]))
-    monkeypatch.setattr("bushfit.reading.workbook._MOST_SECONDS", 1)
+    monkeypatch.setattr("bushfit.reading.parts._MOST_SECONDS", 1)
     with pytest.raises(MeasurementError, match="more than 1 s of work"):
         forces(tmp_path / "test.xlsx")
 
@@ -202,3 +151,71 @@ def test_formulas_whose_values_were_not_saved_are_said(cells: Callable[[str], ob
     with pytest.raises(MeasurementError, match="formulas whose values were not saved") as caught:
         forces(workbook({"Loop": rows}, tmp_path))
     assert "open it in a spreadsheet program and save it again" in str(caught.value)
+
+
+FORMS: tuple[Form, ...] = get_args(Form)
+PHASE = np.linspace(0.0, 12.0, 50)
+TABLE = pd.DataFrame(
+    {"x [mm], low": [1.0 / 3.0, np.nan, -1e-12], "n": [1, 2, 3], "=text": ["=1+1", "a; b, c", "Prüfling"]}
+)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("direction", list(Direction))
+def test_tests_are_read_back(form: Form, direction: Direction, tmp_path: Path) -> None:
+    loop = Loop("loop", direction, PHASE, 1e-3 * np.sin(PHASE), 50.0 * np.sin(PHASE + 0.2))
+    frequency, repeat = np.tile([5.0, 15.0, 25.0], 2), np.repeat([2, 7], 3)
+    sweep = Sweep("s", direction, frequency, np.full(6, 2e-4), 5e5 * np.exp(0.1j) * (1.0 + frequency / 100.0), repeat)
+    files = [tmp_path / f"{name}.{ending(form)}" for name in ("loop", "sweep")]
+    for file, table in zip(files, (raw_loop_table(loop), raw_sweep_table(sweep)), strict=True):
+        file.write_bytes(to_bytes(file.stem, table, form))
+    found = read_loop(files[0], direction, LoopFile(file=""))
+    swept = read_sweep(files[1], direction, SweepFile(file=""))
+    for column in ("time", "displacement", "force"):
+        written = getattr(loop, column)
+        np.testing.assert_allclose(getattr(found, column), written, rtol=1e-6, atol=1e-9 * np.abs(written).max())
+    assert np.array_equal(swept.frequency, frequency)
+    assert np.array_equal(swept.repeat, repeat)
+    np.testing.assert_allclose(swept.amplitude, sweep.amplitude, rtol=1e-6)
+    np.testing.assert_allclose(swept.stiffness, sweep.stiffness, rtol=1e-6)
+
+
+def test_cells_of_a_text_have_seven_digits_and_run_nothing() -> None:
+    table = pd.DataFrame({"x [mm]": [1.0 / 3.0, np.nan], "n": [-3, 4], "=run": ["\r=1+1", 'a "b", c']})
+    assert to_csv(table) == b'x [mm],n,\'=run\n0.3333333,-3,\' =1+1\n,4,"a ""b"", c"\n'
+    commas = to_bytes("t", TABLE, "decimal-comma")
+    assert commas.startswith(b"\xef\xbb\xbfx [mm], low;n;'=text\n0,3333333;1;'=1+1\n;2;\"a; b, c\"\n-1e-12;3;Pr")
+    assert [defused(text) for text in RUN] == [f"'{text}" for text in RUN]
+    assert [defused(text) for text in STAY] == STAY
+    assert (defused("a\r\nb"), defused("a\r\n=1")) == ("a b", "a =1")
+
+
+RUN = ["=1+1", "+cmd", "-2+3", "@SUM(A1)", "\t=1", "  =1", '=HYPERLINK("http://x")', "\uff1d1", '"=1', "%0A=1", "|x"]
+STAY = ["loop_axial_1", "0.1 mm", "a=b", "A-4", "", "'quoted'", "Prüfling 3"]
+
+
+def test_what_a_sheet_does_not_hold_is_refused_and_cells_of_all_sheets_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wide = pd.DataFrame(np.ones((1, 16_385)), columns=[f"c{n}" for n in range(16_385)])
+    assert to_bytes("t", wide, "csv")
+    with pytest.raises(OutputError, match="too large for a sheet"):
+        to_bytes("t", wide, "xlsx")
+    assert to_bytes("t", wide, "csv")
+    # Which are asked for one after the other, too.
+    file = workbook({"A": table("loop"), "B": table("loop")}, tmp_path)
+    monkeypatch.setattr("bushfit.reading.parts._MOST_CELLS", 300)
+    with pytest.raises(MeasurementError, match='more, with sheet "B"'):
+        forces(file)
+    assert np.array_equal(forces(file, sheet="A"), FORCE)
+    with pytest.raises(MeasurementError, match="at most 300 cells"):
+        forces(file, sheet="B")
+    # Beside one that would fill the memory stands one that is used.
+    rows = "".join(
+        "<row>" + "".join(f'<c t="str"><v>{cell}</v></c>' for cell in row) + "</row>"
+        for row in [["t [s]", "Weg [mm]", "Kraft [N]"], *NUMBERS["loop"]]
+    )
+    (tmp_path / "test.xlsx").write_bytes(bombs.workbook([bombs.far_apart(), rows]))
+    assert np.array_equal(forces(tmp_path / "test.xlsx", sheet="S2"), FORCE)
+    with pytest.raises(MeasurementError, match="the workbook is too large"):
+        forces(tmp_path / "test.xlsx")

@@ -15,10 +15,10 @@ from bushfit.effects.contract import Array
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
+from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import Source
 from bushfit.reading.resonance import ResonanceTest, read_resonance
 from bushfit.reading.table import Table
-from bushfit.reading.words import RESONANCE_COLUMNS
 from bushfit.reduction.resonance import (
     LARGEST_ERROR,
     MOST_POINTS,

@@ -17,6 +17,8 @@ from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop
+from bushfit.reading.stated import LoopFile
+from bushfit.reduction.harmonics import spread_rows
 from bushfit.reduction.result import Reduction
 from bushfit.reduction.steps import reduce
 from bushfit.report.tables import reduced_table
@@ -32,10 +34,15 @@ def clean(paper_model: Model) -> Loop:
     return stepped(paper_model, POINTS)
 
 
+def column(reduction: Reduction, name: str) -> Array:
+    """One quantity of all steps by its name in `Step`, (n,)."""
+    return np.array([getattr(step, name) for step in reduction.steps])
+
+
 def off_truth(reduction: Reduction, model: Model) -> Array:
     """ln of the stiffness over that of the closed form, at the frequencies and amplitudes reached, (steps,)."""
     reached = [(point.frequency, point.amplitude) for point in reduction.steps]
-    return np.log(reduction.array("stiffness") / settled(model, reduction.direction, reached, 2e-5))
+    return np.log(column(reduction, "stiffness") / settled(model, reduction.direction, reached, 2e-5))
 
 
 @pytest.mark.parametrize(
@@ -58,10 +65,10 @@ def test_every_step_has_the_stiffness_of_the_closed_form(
     assert off < limit
     assert any("rows a cycle" in line for line in reduction.warnings) == kind.startswith("coarse")
     frequency, amplitude = np.array(POINTS).T
-    np.testing.assert_allclose(reduction.array("frequency"), frequency, rtol=1e-6)
-    np.testing.assert_allclose(reduction.array("amplitude"), amplitude, rtol=2e-4)
-    assert np.unique(reduction.array("level")).size == 3
-    assert set(reduction.array("repeat")) == {1}
+    np.testing.assert_allclose(column(reduction, "frequency"), frequency, rtol=1e-6)
+    np.testing.assert_allclose(column(reduction, "amplitude"), amplitude, rtol=2e-4)
+    assert np.unique(column(reduction, "level")).size == 3
+    assert set(column(reduction, "repeat")) == {1}
     assert not any(skip.steady for skip in reduction.skipped)
 
 
@@ -70,8 +77,8 @@ def test_the_table_states_the_error_of_the_loss_factor_that_the_phase_has(clean:
     reduction = reduce([measured(clean, np.random.default_rng(0), 1e-3, drift=0.01)])
     table = reduced_table(reduction)
     delta = np.arctan(table["loss factor [-]"].to_numpy())
-    order = np.lexsort([reduction.array(key) for key in ("nominal_frequency", "repeat", "level")])
-    error = reduction.array("phase_error")[order]
+    order = np.lexsort([column(reduction, key) for key in ("nominal_frequency", "repeat", "level")])
+    error = column(reduction, "phase_error")[order]
     np.testing.assert_allclose(
         table["loss factor std error [-]"], (np.tan(delta + error) - np.tan(delta - error)) / 2.0, rtol=1e-3
     )
@@ -85,10 +92,10 @@ def test_stated_errors_are_those_made(clean: Loop, paper_model: Model, seeds: in
         reduction = reduce([measured(clean, np.random.default_rng(seed), 1e-3, drift=0.01)])
         assert len(reduction.steps) == len(POINTS)
         off = off_truth(reduction, paper_model)
-        gain.append(off.real / reduction.array("gain_error"))
-        phase.append(off.imag / reduction.array("phase_error"))
+        gain.append(off.real / column(reduction, "gain_error"))
+        phase.append(off.imag / column(reduction, "phase_error"))
     held = [float(np.mean(np.abs(errors) < 1.96)) for errors in (gain, phase)]
-    typical = float(np.median(reduction.array("gain_error")))
+    typical = float(np.median(column(reduction, "gain_error")))
     print(f"|K| within 1.96 standard errors: {held[0]:.1%}, phase {held[1]:.1%}, of {np.size(gain)} ({typical:.1e})")
     assert min(held) > 0.92
     assert max(held) < 0.98
@@ -118,9 +125,9 @@ def test_steps_that_run_into_one_another_are_told_apart() -> None:
     noise = 2e-3 * random.standard_normal((2, phase.size))
     motion, force = amplitude * np.sin(phase) + 1e-3 * noise[0], 5e5 * amplitude * np.sin(phase + 0.2) + 5e2 * noise[1]
     reduction = reduce([Loop("x", Direction.AXIAL, np.arange(phase.size) / rate, motion, force)])
-    np.testing.assert_allclose(reduction.array("frequency"), [154.0, 155.0, 155.0], rtol=2e-5)
-    np.testing.assert_allclose(reduction.array("amplitude"), [1e-3, 1e-3, 1.12e-3], rtol=1e-3)
-    np.testing.assert_allclose(reduction.array("stiffness"), 5e5 * np.exp(0.2j), rtol=1e-3)
+    np.testing.assert_allclose(column(reduction, "frequency"), [154.0, 155.0, 155.0], rtol=2e-5)
+    np.testing.assert_allclose(column(reduction, "amplitude"), [1e-3, 1e-3, 1.12e-3], rtol=1e-3)
+    np.testing.assert_allclose(column(reduction, "stiffness"), 5e5 * np.exp(0.2j), rtol=1e-3)
 
 
 #: How a controller brings the amplitude up, over the cycles since the start.
@@ -157,7 +164,7 @@ def test_whatever_controller_and_logger_do(controller: str, logger: str) -> None
     motion, force = channel(1.0, 2e-4), channel(stiffness, 120.0)
     reduction = reduce([Loop("x", Direction.AXIAL, np.arange(motion.size) / rate, motion, force)])
     assert [(round(step.frequency), float(f"{step.amplitude:.1g}")) for step in reduction.steps] == points
-    off = reduction.array("stiffness") / stiffness - 1.0
+    off = column(reduction, "stiffness") / stiffness - 1.0
     print(f"{controller}, {logger}: off by at most {np.abs(off).max():.1e}")
     assert np.abs(off).max() < 1e-3
 
@@ -180,8 +187,8 @@ def test_repeats_and_levels(paper_model: Model) -> None:
     first = stepped(paper_model, [(10.0, 0.97e-4), (30.0, 1.03e-4), (10.0, 1.0e-4), (30.0, 1.01e-4)])
     second = stepped(paper_model, [(10.0, 1.02e-4), (30.0, 0.98e-4)])
     reduction = reduce([first, second])
-    assert reduction.array("repeat").tolist() == [1, 1, 2, 2, 3, 3]
-    assert np.unique(reduction.array("level")).tolist() == [pytest.approx(reduction.array("amplitude").mean())]
+    assert column(reduction, "repeat").tolist() == [1, 1, 2, 2, 3, 3]
+    assert np.unique(column(reduction, "level")).tolist() == [pytest.approx(column(reduction, "amplitude").mean())]
     named = reduce([first, second], levels=(0.97e-4, 1.03e-4))
     assert np.unique(named.array("level")).tolist() == [0.97e-4, 1.03e-4]
     with pytest.raises(MeasurementError, match=r"none of the levels[\s\S]*0.097 mm at 10 Hz[\s\S]*30 % of 0.2 mm"):
@@ -237,7 +244,7 @@ def test_the_record_in_data_can_be_made_again(paper_model: Model, root: Path) ->
     ]
     clean = stepped(paper_model, points, step=4e-6, every=100, pause=0.15, cycles=12)
     made = measured(clean, random, noise=5e-4, drift=0.005)
-    kept = read_loop(root / "data/cmp_15961_raw/stepped_sine_axial.csv", Direction.AXIAL)
+    kept = read_loop(root / "data/cmp_15961_raw/stepped_sine_axial.csv", Direction.AXIAL, LoopFile(file=""))
     assert kept.time.size == made.time.size
     np.testing.assert_allclose(kept.displacement, made.displacement, atol=1.1e-8)
     np.testing.assert_allclose(kept.force, made.force, atol=0.02)
@@ -265,3 +272,9 @@ def test_any_sine_gives_its_stiffness(
     assert step.frequency == pytest.approx(frequency, rel=1e-6)
     assert step.amplitude == pytest.approx(amplitude, rel=1e-6)
     assert step.stiffness == pytest.approx(3e5 * np.exp(1j * lead), rel=1e-6)
+
+
+def test_rows_that_stand_for_all_keep_no_time_with_cycles() -> None:
+    chosen = spread_rows(1_000_000, 1000)
+    assert (chosen.size, bool(np.all(np.diff(chosen) > 0)), bool(chosen[-1] < 1_000_000)) == (1000, True, True)
+    assert np.abs(np.exp(2j * np.pi * chosen / 1000.0).mean()) < 0.1

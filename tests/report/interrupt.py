@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.errors import OutputError
-from bushfit.report import disk
 from bushfit.report import folder as output
 
 OLD = {name: b"old " + name.encode() for name in ("axial.csv", "model.json", "radial.csv")}
@@ -57,7 +56,7 @@ def interrupted(folder: Path, count: int, how: str) -> int:
                 raise OSError(28, "No space left on device")
 
         for name in ("exchange", "flush"):  # the C library's own, which Python does not announce
-            setattr(disk, name, announced(getattr(disk, name), fault))
+            setattr(output, name, announced(getattr(output, name), fault))
         sys.addaudithook(fault)
         try:
             output.write_files(folder, NEW, force=True)

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
+import tomllib
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,10 +18,12 @@ from bushfit.units import number
 if TYPE_CHECKING:
     import jinja2
 
-    from bushfit.report.contents import Documents, Tables
+    from bushfit.report.contents import Contents, Documents, Tables
 
 #: Where the templates are, with the style sheet and the script that go into every page.
 _TEMPLATES = Path(__file__).parent / "templates"
+#: What a warning means for who uses the numbers, by how it is told.
+_USES: Mapping[str, str] = tomllib.loads(Path(__file__).with_name("uses.toml").read_text(encoding="utf-8"))
 
 
 def report_page(documents: Documents, tables: Tables) -> str:
@@ -61,6 +66,11 @@ def filled(template: str, context: dict[str, Any]) -> str:
     return _environment().get_template(template).render(context)
 
 
+def use_of(warning: str) -> str:
+    """What a warning means for the use of the numbers, in one sentence."""
+    return next(use for pattern, use in _USES.items() if re.search(pattern, warning))
+
+
 def _hash(text: str) -> str:
     """A text as a content policy names it."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
@@ -69,8 +79,6 @@ def _hash(text: str) -> str:
 @cache
 def _environment() -> jinja2.Environment:
     import jinja2
-
-    from bushfit.report.page.uses import use_of
 
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_TEMPLATES),
@@ -83,3 +91,27 @@ def _environment() -> jinja2.Environment:
     environment.filters["use"] = use_of
     environment.filters["px"] = lambda pixels: f"{pixels:.1f}".removesuffix(".0")
     return environment
+
+
+def folder_contents(folder: Path, base: str = "") -> Contents:
+    """What stands in a folder, with its page: `report` of a result, `compare` of a comparison, `index` of a batch.
+
+    Args:
+        folder: as `bushfit run`, `diagnose`, a fit, `compare` or `batch` wrote it.
+        base: of a batch, what its links begin with, where the page is to stand elsewhere.
+
+    Raises:
+        ModelError: a folder of none of them, or a file in it that is not as bushfit writes it.
+    """
+    from bushfit.report.contents import Contents
+    from bushfit.report.page.comparison import read_comparison
+    from bushfit.report.page.index import is_batch, read_batch
+    from bushfit.report.page.readback import has_model, read_results
+
+    if is_batch(folder):
+        return read_batch(folder, base)
+    compared = (folder / "compare.json").exists()
+    found = read_comparison(folder).paged(compare=comparison_page) if compared else Contents()
+    if has_model(folder) or not compared:
+        found |= read_results(folder).paged(report=report_page)
+    return found

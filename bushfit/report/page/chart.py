@@ -138,23 +138,20 @@ class Axis:
         return [(float(self(math.tan(math.radians(angle)))), number(angle, 4)) for angle in degrees]
 
     def _round_values(self) -> list[float]:
-        values = self._decades() if self.log else []
+        values = list[float]()
+        if self.log:  # 1, 2 and 5 of each decade within, or the decades alone where these are too many
+            powers = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
+            every = [(digit, digit * 10.0**power) for power in powers for digit in (1, 2, 5)]
+            fine = [(digit, value) for digit, value in every if self.low <= value <= self.high]
+            whole = [value for digit, value in fine if digit == 1]
+            many = len(fine) > _MOST_TICKS
+            values = whole[:: math.ceil(len(whole) / _MOST_TICKS)] if many else [value for _, value in fine]
         if len(values) < 2:
             raw = (self.high - self.low) / 5  # as many ticks, or a few more
             power = 10.0 ** math.floor(math.log10(raw))
             step = power * next(digit for digit in (1, 2, 5, 10) if digit * power >= raw * 0.999)
             values = [step * count for count in range(math.ceil(self.low / step), math.floor(self.high / step) + 1)]
         return values
-
-    def _decades(self) -> list[float]:
-        """1, 2 and 5 of each decade within, or the decades alone where these are too many."""
-        powers = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
-        fine = [digit * 10.0**power for power in powers for digit in (1, 2, 5) if self._holds(digit * 10.0**power)]
-        whole = [10.0**power for power in powers if self._holds(10.0**power)]
-        return fine if len(fine) <= _MOST_TICKS else whole[:: math.ceil(len(whole) / _MOST_TICKS)]
-
-    def _holds(self, value: float) -> bool:
-        return self.low <= value <= self.high
 
     @property
     def described(self) -> str:
@@ -187,15 +184,13 @@ def chart(
     x = Axis.over(labels[0], (own for each in series for own in each.values(0)), _LEFT, right, log=log)
     ys = [*(own for each in series for own in each.values(1)), levels]
     y = Axis.over(labels[1], ys, top + _PANEL, top, least=least)
-    drawn = [
-        (
-            each,
-            stroke(x(each.line[0]), y(each.line[1])) if each.line else "",
-            outline(x(each.band[0]), y(each.band[1]), y(each.band[2])) if each.band else "",
-            _dots(x(each.points[0]), y(each.points[1])) if each.points else "",
-        )
-        for each in series
-    ]
+    drawn = []
+    for each in series:
+        line = stroke(x(each.line[0]), y(each.line[1])) if each.line else ""
+        band = outline(x(each.band[0]), y(each.band[1]), y(each.band[2])) if each.band else ""
+        at = zip(x(each.points[0]), y(each.points[1]), strict=True) if each.points else ()
+        # points are strokes of no length, which have round ends: a third of the bytes of circles
+        drawn.append((each, line, band, "".join(f"M{_pair(a, b)}h0" for a, b in at if math.isfinite(a + b))))
     size = {"width": _WIDTH, "height": top + _PANEL + _BELOW}
     axes = {"x": x, "y": y, "legend": legend, "drawn": drawn, "rules": rules, "dot": dot, "angles": angles}
     return Markup(filled("chart.html", {"title": title, "alt": alt, **size, **axes}))
@@ -233,11 +228,6 @@ def outline(x: Array, low: Array, high: Array) -> str:
     around = zip(np.concatenate([x[there], x[there][::-1]]), ends, strict=True)
     d = "L".join(f"{a:.1f} {b:.1f}" for a, b in around)
     return f"M{d}" if d else ""
-
-
-def _dots(x: Array, y: Array) -> str:
-    """Points as strokes of no length, which have round ends: a third of the bytes of circles."""
-    return "".join(f"M{_pair(a, b)}h0" for a, b in zip(x, y, strict=True) if math.isfinite(a + b))
 
 
 def _pair(x: float, y: float) -> str:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from markupsafe import Markup
 
 from bushfit.geometry import Bushing
@@ -51,6 +50,8 @@ def comparison_context(found: SideBySide) -> dict[str, Any]:
     places = found.places[: min(MOST_PLACES, _MOST_CURVES // curves)]
     shown = [found.sides(place) for place in places]
     entries = [_entry(entry) for entry in document["compared"]]
+    looks = dict(zip(names, colors(len(names)), strict=True))
+    most = max(_FEWEST, _MOST_POINTS // max(sum(len(panel.lines) for sides in shown for panel in sides.panels), 1))
     body = document["compared"][0]["bushing"]
     title = f"{others[0]} against {named}" if len(others) == 1 else f"{len(others)} results against {named}"
     return {
@@ -63,15 +64,13 @@ def comparison_context(found: SideBySide) -> dict[str, Any]:
         "sizes": [row for place in places for row in _sizes(found, place)],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*found.family_cells()],
-        "judged": len(others) + document["words"][0].startswith("use ")
-        if families
-        else 0,  # older files give no advice
+        "judged": families and len(others) + document["words"][0].startswith("use "),  # older files give no advice
         "most": MOST,
         "cells": parameter_cells,
         "chance": chance,
-        "places": _panels(shown, dict(zip(names, colors(len(names)), strict=True))),
+        "places": [PlacePanel(s.place, [_picture(s, panel, looks, most) for panel in s.panels], []) for s in shown],
         "left_places": len(found.places) - len(places),
-        "tabled": _tabled(found, places),
+        "tabled": [*_tabled(found, places)][: 2 * _ROWS],
         "files": _files(document["compared"]),
     }
 
@@ -106,13 +105,6 @@ def _sizes(found: SideBySide, place: str) -> Iterator[dict[str, Any]]:
         yield row
 
 
-def _panels(shown: Sequence[Sides], looks: dict[str, str]) -> list[PlacePanel]:
-    """Four pictures a place: stiffness and loss factor of all, and below how far they are off the first."""
-    curves = sum(len(panel.lines) for sides in shown for panel in sides.panels)
-    most = max(_FEWEST, _MOST_POINTS // max(curves, 1))
-    return [PlacePanel(s.place, [_picture(s, panel, looks, most) for panel in s.panels], []) for s in shown]
-
-
 def _picture(sides: Sides, panel: Panel, looks: dict[str, str], most: int) -> Markup:
     what, unit = split_header(panel.header)
     unit = (unit or "").removesuffix("-")
@@ -132,38 +124,29 @@ def _picture(sides: Sides, panel: Panel, looks: dict[str, str], most: int) -> Ma
     return chart(f"{sides.place}: {what}", labels, series, alt, log=log, rules=rules, least=panel.least)
 
 
-def _tabled(found: SideBySide, places: Sequence[str]) -> list[tuple[Any, ...]]:
-    """Values of the first and of each other at some corners of the grid, with the intervals of their differences."""
+def _tabled(found: SideBySide, places: Sequence[str]) -> Iterator[tuple[Any, ...]]:
+    """Values of the first and of each other at some corners of the grid, with the intervals of their differences.
+
+    Rows of cells: place, label, frequency, amplitude; then of stiffness and loss factor both values, their difference
+    with its interval, and whether it is more than chance at all points at once.
+    """
     tables = [(label, place, table) for place in places for label, table in found.at(place).items()]
     most = max(_ROWS // max(len(tables), 1), 1)
     amplitudes = min(most, _AMPLITUDES)
-    rows = (row for each in tables for row in _corners(*each, amplitudes, min(most // amplitudes, _FREQUENCIES)))
-    return list(rows)[: 2 * _ROWS]
-
-
-def _corners(
-    label: str, place: str, table: pd.DataFrame, amplitudes: int, frequencies: int
-) -> Iterator[tuple[Any, ...]]:
-    """Rows of cells: place, label, frequency, amplitude; then of stiffness and loss factor both values, their
-    difference with its interval, and whether it is more than chance at all points at once."""
-    heads = Heads.of(table)
-    ((_, length), (_, unit)) = (split_header(header) for header in heads[:2])
-    kinds = ((heads.stiffness, heads.relative, f" {unit}", 100.0, " %"), ("loss factor [-]", heads.loss, "", 1.0, ""))
-    for row in corners(table, heads.amplitude, amplitudes, frequencies):
-        cells = []
-        for what, difference, of, scale, percent in kinds:
-            value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))
-            shown, *ends = (signed(each, high - low) for each in (value, low, high))
-            sides = alike([row[f"{who} {what}"] for who in ("reference", "other")], 4)
-            sure = row[f"{difference}, sure"] == "yes"
-            cells.append((*(side + of for side in sides), shown + percent, " to ".join(ends), sure))
-        yield (
-            place,
-            label,
-            f"{number(row['frequency [Hz]'], 4)} Hz",
-            told(length or "", row[heads.amplitude]),
-            *cells,
-        )
+    for label, place, table in tables:
+        heads, loss = Heads.of(table), "loss factor [-]"
+        ((_, length), (_, unit)) = (split_header(header) for header in heads[:2])
+        kinds = ((heads.stiffness, heads.relative, f" {unit}", 100.0, " %"), (loss, heads.loss, "", 1.0, ""))
+        for row in corners(table, heads.amplitude, amplitudes, min(most // amplitudes, _FREQUENCIES)):
+            cells = []
+            for what, difference, of, scale, percent in kinds:
+                value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))
+                shown, *ends = (signed(each, high - low) for each in (value, low, high))
+                sides = alike([row[f"{who} {what}"] for who in ("reference", "other")], 4)
+                sure = row[f"{difference}, sure"] == "yes"
+                cells.append((*(side + of for side in sides), shown + percent, " to ".join(ends), sure))
+            at = f"{number(row['frequency [Hz]'], 4)} Hz", told(length or "", row[heads.amplitude])
+            yield place, label, *at, *cells
 
 
 def _files(compared: Sequence[ComparedEntry]) -> list[tuple[str, str]]:
@@ -173,6 +156,5 @@ def _files(compared: Sequence[ComparedEntry]) -> list[tuple[str, str]]:
         named = [(entry["source"], entry["sha256"] or ""), *((str(s.file), s.sha256) for s in entry["inputs"])]
         for each in named:
             found.setdefault(each, []).append(entry["label"])
-    return [
-        (f"{', '.join(dict.fromkeys(labels))}: {file}", sha256) for (file, sha256), labels in found.items() if sha256
-    ]
+    words_of = {file: f"{', '.join(dict.fromkeys(labels))}: {file[0]}" for file, labels in found.items()}
+    return [(words, sha256) for (_, sha256), words in words_of.items() if sha256]

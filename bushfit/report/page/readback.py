@@ -17,14 +17,15 @@ import numpy as np
 import pandas as pd
 
 from bushfit.diagnosis.document import DiagnosisFile
+from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction, Place
 from bushfit.model.document import CampaignTable, TestTable
 from bushfit.model.file import from_document, read_document, require_schema
 from bushfit.model.result import Result
 from bushfit.reading.files import read_utf8, view_bytes
+from bushfit.reading.parts import read_sheets
 from bushfit.reading.tablefile import for_each_distinct, in_a_line, undefused
-from bushfit.reading.workbook import read_sheets
 from bushfit.report.artifacts import place_names
 from bushfit.report.contents import Contents, Documents, Tables
 from bushfit.report.tables import TEXTS, required
@@ -41,6 +42,8 @@ _ODDS = {"schema": DIAGNOSES[0], "nothing": 0.0, "odds": []}
 _DOCUMENTS = (*MODELS, PLAIN, "diagnosis")
 #: Tables of a result beside those of the predictions, which are named after places.
 _TABLES = ("loops", "sweeps", "gap", "candidates")
+#: Powers of ten that are exact.
+_TENS = np.array([float(f"1e{power}") for power in range(23)])
 #: Size of a table that is read back at most [bytes]: ten times that of a loop as it is written.
 _LARGEST = 500_000_000
 
@@ -172,10 +175,24 @@ def canonical(table: pd.DataFrame) -> pd.DataFrame:
         values = table[name]
         if name in TEXTS:
             return for_each_distinct(values.astype(str), lambda value: in_a_line(str(value)))
-        numbers = values.to_numpy(dtype=float, na_value=np.nan)
-        return [float(f"{value:.7g}") for value in numbers.tolist()]
+        return _of_seven_digits(values.to_numpy(dtype=float, na_value=np.nan))
 
     return pd.DataFrame({str(name): column(name) for name in table.columns})
+
+
+def _of_seven_digits(values: Array) -> Array:
+    """What seven digits give back of numbers, (n,): by arithmetic, which is exact up to the 22nd power of ten, but for
+    the few that are larger, or nearly half way between two."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        places = 6.0 - np.floor(np.log10(np.abs(values)))
+        usual = np.abs(places) < _TENS.size
+        tens = _TENS[np.where(usual, np.abs(places), 0.0).astype(int)]
+        scaled = np.where(places < 0.0, values / tens, values * tens)
+        whole = np.rint(scaled)
+        sure = usual & (np.abs(np.abs(scaled - whole) - 0.5) > 1e-6) & (np.abs(whole) >= 1e6) & (np.abs(whole) <= 1e7)
+    found = np.where(places < 0.0, whole * tens, whole / tens)
+    found[~sure] = [float(f"{value:.7g}") for value in values[~sure].tolist()]
+    return found
 
 
 def read_table(folder: Path, name: str) -> pd.DataFrame | None:

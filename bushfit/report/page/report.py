@@ -2,24 +2,27 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from markupsafe import Markup
+from scipy.special import fdtri
 
 from bushfit.diagnosis.document import EffectEntry, GapEntry
 from bushfit.diagnosis.record import odds_in_words
-from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Place, Specimen
+from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Specimen
 from bushfit.model.document import TestTable
+from bushfit.model.model import FIVE
 from bushfit.model.result import Misfit, Result
 from bushfit.prediction.caveats import of_points, warnings_of
+from bushfit.report.page import filled
 from bushfit.report.page.chart import MOST_PLACES
-from bushfit.report.page.corner import corner
-from bushfit.report.page.gap import gap_panels
-from bushfit.report.page.loops import loop_panels
+from bushfit.report.page.gap import gap_panels, loop_panels
 from bushfit.report.page.readback import ReportData
 from bushfit.report.page.sweeps import amplitude_panels, cole_cole_panels, frequency_panels, sweeps_of
-from bushfit.report.parameters import interval_kind, parameter_rows
+from bushfit.report.parameters import Row, interval_kind, parameter_rows
 from bushfit.report.tables import DISPLAYS, IF_RIGS, columns_of, complete, numbers, spread
 from bushfit.units import alike, for_people, number, told
 
@@ -44,6 +47,14 @@ _STATED = {
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 #: Regions and tests that a page lists at most: the documents have all.
 MOST = 12
+#: Side of a cell, the way from one to the next, and the room left for the ends of intervals [pixels].
+_CELL, _PITCH, _LEFT, _TOP = 76.0, 80.0, 52.0, 26.0
+#: Half a cell is so many times an ellipse that touches both edges.
+_ROOM = 1.12
+#: Corners of an ellipse as it is drawn.
+_CORNERS = 48
+#: Way from the middle of a cell to the ends of an interval of well known errors, as a share of its side.
+_END = 0.5 * 1.96 / (2.45 * _ROOM)
 
 
 def report_context(found: ReportData) -> dict[str, Any]:
@@ -52,12 +63,14 @@ def report_context(found: ReportData) -> dict[str, Any]:
     gaps = [*_gaps(diagnosis["gap"])] if diagnosis else []
     report = campaign.report if campaign else {}
     every = sweeps_of(found)
+    bodies = [("Bushing", tube(result.model.bushing))] if result.model.bushing else []
+    bodies += [(f"Specimen {specimen}", _specimen(specimen)) for specimen in result.specimens]
     return {
         "name": campaign.name if campaign else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
         "head": {key.replace("_", " ").capitalize(): value for key, value in report.items()},
         "logo": campaign.logo if campaign else None,
-        "facts": [*_bodies(result), *conditions(test.conditions for test in tests)],
+        "facts": [*bodies, *conditions(test.conditions for test in tests)],
         "tests": [_tested(test, result.tests) for test in tests[:MOST]],
         "conditioned": any(test.conditions for test in tests),
         "more_tests": max(0, len(tests) - MOST),
@@ -82,7 +95,7 @@ def report_context(found: ReportData) -> dict[str, Any]:
         "places": frequency_panels(every),
         "payne": amplitude_panels(found),
         "cole_cole": cole_cole_panels(every),
-        "tabled": _tabled(found),
+        "tabled": [*_tabled(found)],
         "loops": loop_panels(found),
         "gap": gap_panels(found),
         "gaps": gaps,
@@ -113,17 +126,9 @@ def _of_tables(found: ReportData) -> Iterator[Iterator[str]]:
             yield of_points(found.result, place, grid, rigs, measured, None)
 
 
-def _bodies(result: Result) -> Iterator[tuple[str, str]]:
-    if bushing := result.model.bushing:
-        yield "Bushing", tube(bushing)
-    for specimen in result.specimens:
-        yield f"Specimen {specimen}", _specimen(specimen)
-
-
 def tube(bushing: Bushing) -> str:
-    inner, outer, length = (
-        number(1e3 * size, 4) for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length)
-    )
+    sizes = 2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length
+    inner, outer, length = (number(1e3 * size, 4) for size in sizes)
     formulas = "; radial formulas corrected by finite elements" if bushing.shape == "calibrated" else ""
     return f"rubber tube, inner diameter {inner} mm, outer diameter {outer} mm, length {length} mm{formulas}"
 
@@ -198,29 +203,30 @@ def _gaps(gap: GapEntry) -> Iterator[tuple[str, str, str]]:
         yield words, before, after
 
 
-def _tabled(found: ReportData) -> list[tuple[str, ...]]:
-    """Predicted values at some corners of the grid of each place, their bands, and what was measured there."""
+def _tabled(found: ReportData) -> Iterator[tuple[str, ...]]:
+    """Predicted values at some corners of the grid of each place, their bands, and what was measured there.
+
+    Rows of cells: place, unit, frequency, amplitude; |K| and loss angle, each with its band and as measured; loss
+    factor, K' and K''.
+    """
     places = [(found.tables[name], place) for name, place in found.places.items() if name in found.tables]
     frequencies = min(max(_ROWS // max(_AMPLITUDES * len(places), 1), 1), _FREQUENCIES)
-    return [row for table, place in places[:MOST_PLACES] for row in _corners(table, place, frequencies)]
-
-
-def _corners(table: pd.DataFrame, place: Place, frequencies: int) -> Iterator[tuple[str, ...]]:
-    """Rows of cells: place, unit, frequency, amplitude; |K| and loss angle, each with its band and as measured; loss
-    factor, K' and K''."""
-    amplitude, stiffness, _ = columns_of(place)
-    names, parts = (stiffness, "loss factor [-]"), (f"storage {stiffness}", f"loss {stiffness}")
-    band = [f"{name}, {end}" for name in names for end in ("low", "high")]
-    (length, _), _, (unit, _) = place.display
-    known = complete(table, "frequency [Hz]", amplitude, *names, *band, *parts)
-    for row in corners(known, amplitude, _AMPLITUDES, frequencies):
-        cells = [str(place), unit, f"{number(row['frequency [Hz]'], 4)} Hz", told(length, row[amplitude])]
+    for table, place in places[:MOST_PLACES]:
+        amplitude, stiffness, _ = columns_of(place)
+        names, parts = (stiffness, "loss factor [-]"), (f"storage {stiffness}", f"loss {stiffness}")
+        band = [f"{name}, {end}" for name in names for end in ("low", "high")]
+        (length, _), _, (unit, _) = place.display
+        known = complete(table, "frequency [Hz]", amplitude, *names, *band, *parts)
         kinds: tuple[tuple[str, int, Callable[[float], float]], ...] = ((names[0], 4, float), (names[1], 3, _degrees))
-        for name, digits, shown in kinds:
-            value, *ends = alike([shown(row[key]) for key in (name, f"{name}, low", f"{name}, high")], digits, least=2)
-            measured = row.get(f"measured {name}", np.nan)
-            cells += [value, " to ".join(ends), "" if np.isnan(measured) else alike([shown(measured)], digits)[0]]
-        yield *cells, *(alike([row[name]], 4)[0] for name in (names[1], *parts))
+        for row in corners(known, amplitude, _AMPLITUDES, frequencies):
+            cells = [str(place), unit, f"{number(row['frequency [Hz]'], 4)} Hz", told(length, row[amplitude])]
+            for name, digits, shown in kinds:
+                ends = [shown(row[key]) for key in (name, f"{name}, low", f"{name}, high")]
+                value, *ends_told = alike(ends, digits, least=2)
+                measured = row.get(f"measured {name}", np.nan)
+                cells += [value, " to ".join(ends_told)]
+                cells.append("" if np.isnan(measured) else alike([shown(measured)], digits)[0])
+            yield *cells, *(alike([row[name]], 4)[0] for name in (names[1], *parts))
 
 
 def _degrees(loss_factor: float) -> float:
@@ -246,3 +252,82 @@ def corners(table: pd.DataFrame, amplitude: str, amplitudes: int, frequencies: i
     for level in levels[spread(levels.size, amplitudes)]:
         mine = table[table[amplitude] == level].sort_values("frequency [Hz]").to_dict("records")
         yield from ({str(key): cell for key, cell in mine[at].items()} for at in spread(len(mine), frequencies))
+
+
+def corner(result: Result) -> Markup | None:
+    """Ellipses that hold two parameters at once with 95 %, in the coordinates of the fit; None of fewer than two.
+
+    Notes: a strictly positive parameter is fitted by its logarithm, in which the ellipse is one; its radius is
+    sqrt(2 F(0.95; 2, nu)) standard errors, nu the degrees of freedom of the errors (Satterthwaite).
+    """
+    rows = [row for row in parameter_rows(replace(result, profile={})) if row.name in FIVE]
+    known = [row.name for row in rows if row.error and result.covariance.stderr(row.name)]
+    if len(known) < 2:
+        return None
+    correlation = {frozenset(pair): size for *pair, size in result.covariance.correlations()}
+    cells, told = [], []
+    for down, low in enumerate(rows):
+        for across, left in enumerate(rows[:down]):
+            at = _LEFT + _PITCH * across, _TOP + _PITCH * down
+            if low.name in known and left.name in known:
+                size = correlation[frozenset((left.name, low.name))]
+                cells.append((*at, *_drawn(result, (left.name, low.name), size, *at), f"{size:+.2f}", abs(size) > 0.9))
+                told.append(f"{left.name}/{low.name} {size:+.2f}")
+            else:
+                cells.append((*at, "", "", "", False))
+    unknown = [f"{row.name}: {' '.join(words)}" for row in rows if (words := _untold(row, result))]
+    diagonal = []
+    for n, row in enumerate(rows):
+        lines = filter(None, (row.value, f"± {row.error}" if row.error else "", row.unit.replace("-", "")))
+        diagonal.append((_LEFT + _PITCH * n, _TOP + _PITCH * n, row.name, [*lines], _untold(row, result)))
+    alt = f"95 % confidence ellipses of pairs of parameters; correlations {', '.join(told)}"
+    context = {
+        "title": "Which values go together",
+        "alt": "; ".join([alt, *unknown]),
+        "width": _LEFT + _PITCH * len(FIVE),
+        "height": _TOP + _PITCH * len(rows) + 18.0,
+        "cells": cells,
+        "side": _CELL,
+        "pitch": _PITCH,
+        "diagonal": diagonal,
+        "ends": [*_ends(rows)],
+    }
+    return Markup(filled("corner.html", context))
+
+
+def _untold(row: Row, result: Result) -> Sequence[str]:
+    """In short lines what the tests do not tell of a parameter; none where they tell its value."""
+    if not row.error:
+        return row.state or "at least value", "no information"
+    value = result.model.values[row.name]  # noqa: PD011  # no frame
+    wide = result.covariance.half(row.name) >= abs(value)
+    return ("unknown by", "100 % or more") if wide else ()
+
+
+def _drawn(result: Result, pair: tuple[str, str], correlation: float, left: float, top: float) -> tuple[str, str]:
+    """The ellipse of a pair in its cell, and the 95 % intervals of either alone."""
+    covariance = result.covariance
+    chosen = np.array(covariance.names)[:, None] == np.array(pair)
+    radius = np.sqrt(2.0 * fdtri(2.0, covariance.freedom(chosen).min(), 0.95))
+    scale = _CELL / 2.0 / (_ROOM * radius)
+    angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
+    x, y = np.cos(angle), correlation * np.cos(angle) + np.sqrt(max(1.0 - correlation**2, 0.0)) * np.sin(angle)
+    middle = left + _CELL / 2.0, top + _CELL / 2.0
+    corners = zip(middle[0] + scale * radius * x, middle[1] - scale * radius * y, strict=True)
+    outline = "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in corners) + "Z"
+    half = [scale * covariance.half(name) / (covariance.stderr(name) or np.inf) for name in pair]
+    rules = [f"M{middle[0] + side * half[0]:.1f} {top:.1f}v{_CELL:.1f}" for side in (-1.0, 1.0)]
+    rules += [f"M{left:.1f} {middle[1] + side * half[1]:.1f}h{_CELL:.1f}" for side in (-1.0, 1.0)]
+    return outline, "".join(rules)
+
+
+def _ends(rows: Sequence[Row]) -> Iterator[tuple[float, float, str, str]]:
+    """Where the ends of the intervals stand beside the cells: below the columns, left of the rows."""
+    for n, row in enumerate(rows):
+        low, _, high = row.interval.partition(" to ")
+        place = _PITCH * n + _CELL / 2.0
+        for sign, end, anchor in ((-1.0, low, "start"), (1.0, high, "end")):
+            if n < len(rows) - 1:
+                yield _LEFT + place + 0.5 * sign * _CELL, _TOP + _PITCH * len(rows) + 10.0, end, anchor
+            if n:
+                yield _LEFT - 5.0, _TOP + place - _END * sign * _CELL + 4.0, end, "end"

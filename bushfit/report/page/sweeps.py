@@ -105,14 +105,9 @@ class Sweeps:
         labels = _four(self.place)[2], _four(self.place)[3]
         series = [
             Series(
-                curve.name,
-                color,
-                dashes,
-                (curve.model[3], curve.model[4]),
-                None,
-                (curve.measured[3], curve.measured[4]),
+                each.name, color, dashes, (each.model[3], each.model[4]), points=(each.measured[3], each.measured[4])
             )
-            for curve, color, dashes in self._looks()
+            for each, color, dashes in self._looks()
         ]
         words = self._in_words(4, labels[1], split_header(labels[0])[0])
         return chart(f"{self.place}: Cole-Cole", labels, series, words)
@@ -143,11 +138,23 @@ def _headers(place: Place, along: str) -> list[str]:
 
 
 def sweeps_of(found: ReportData) -> list[Sweeps]:
-    """The sweeps of every place of a page, with their curves."""
+    """The sweeps of every place of a page by what they step through, with their curves.
+
+    One line of a prediction at one temperature would be that of no test where these lie apart in it: a model that knows
+    temperatures is drawn as it has each test.
+    """
     most = max(_FEWEST, _MOST_POINTS // (MOST_LEVELS * min(len(found.places), MOST_PLACES) or 1))
-    places = [*found.measured("sweep")][:MOST_PLACES]
-    every = (_sweeps_at(found, name, place, rows, most) for name, place, rows in places)
-    return [sweeps for each in every for sweeps in each if sweeps.curves]
+    every = list[Sweeps]()
+    for name, place, rows in [*found.measured("sweep")][:MOST_PLACES]:
+        for stepped, along, held, mine in by_stepped(place, rows, found.tests):
+            mine = complete(mine, *_headers(place, along))
+            elsewhere = found.result.model.knows_temperature and _apart(_temperatures(found, mine))
+            predicted = None if stepped is None or elsewhere else found.tables.get(name)
+            levels = levels_of(found, mine, held)
+            chosen = [levels[at] for at in spread(len(levels), MOST_LEVELS)]
+            curves = [_curve(place, along, held, level, predicted, most) for level in chosen]
+            every.append(Sweeps(place, stepped, along, curves, len(levels) - len(curves)))
+    return [sweeps for sweeps in every if sweeps.curves]
 
 
 def frequency_panels(every: Sequence[Sweeps]) -> list[Panel]:
@@ -204,12 +211,9 @@ def _payne(found: ReportData, place: Place, rows: pd.DataFrame) -> Sweeps | None
 
 def _notes(sweeps: Sweeps) -> list[str]:
     """What a reader has to know of the pictures of some sweeps."""
-    notes = []
-    if sweeps.predicted:
-        notes.append("Lines with 95 % bands: prediction, without effects of the rig.")
-    else:
-        notes.append("Lines without bands: the model at the measured points.")
-    notes.append("Points: measured, mean of the repeats.")
+    predicted = "Lines with 95 % bands: prediction, without effects of the rig."
+    lines = predicted if sweeps.predicted else "Lines without bands: the model at the measured points."
+    notes = [lines, "Points: measured, mean of the repeats."]
     if any(curve.rigs is not None for curve in sweeps.curves):
         notes.append("Broken grey lines: the same if what was added is the rig's; the bands span both.")
     if sweeps.left_out:
@@ -217,22 +221,6 @@ def _notes(sweeps: Sweeps) -> list[str]:
     if most := max((curve.thinned for curve in sweeps.curves), default=0):
         notes.append(f"Of each curve at most {most} points, every n-th, are drawn.")
     return notes
-
-
-def _sweeps_at(found: ReportData, name: str, place: Place, rows: pd.DataFrame, most: int) -> Iterator[Sweeps]:
-    """The sweeps of a place by what they step through, of each curve at most so many points.
-
-    One line of a prediction at one temperature would be that of no test where these lie apart in it: a model that knows
-    temperatures is drawn as it has each test.
-    """
-    for stepped, along, held, mine in by_stepped(place, rows, found.tests):
-        mine = complete(mine, *_headers(place, along))
-        elsewhere = found.result.model.knows_temperature and _apart(_temperatures(found, mine))
-        predicted = None if stepped is None or elsewhere else found.tables.get(name)
-        levels = levels_of(found, mine, held)
-        chosen = [levels[at] for at in spread(len(levels), MOST_LEVELS)]
-        curves = [_curve(place, along, held, level, predicted, most) for level in chosen]
-        yield Sweeps(place, stepped, along, curves, len(levels) - len(curves))
 
 
 def levels_of(found: ReportData, rows: pd.DataFrame, held: str) -> list[Level]:
@@ -271,10 +259,15 @@ def _curve(place: Place, along: str, held: str, level: Level, predicted: pd.Data
     if held != "test":
         there = there.groupby(along, as_index=False)[headers[1:]].mean()
     points = numbers(there, *headers)[:, every_nth(len(there), most)]
-    known = None
+    names, line, band, rigs = _four(place), _parted(points[[0, 3, 4]]), None, None
     if predicted is not None and not isinstance(level.value, str):
-        known = _predicted(predicted, along, held, level.value, _four(place))
-    line, band, rigs = known or (_parted(points[[0, 3, 4]]), None, None)
+        other = [f"{name}, {IF_RIGS}" for name in names]
+        ends = [f"{name}, {end}" for name in names for end in ("low", "high")]
+        known = complete(predicted, along, held, *names, *ends)
+        near = known[np.abs(known[held] - level.value) < 0.02 * abs(level.value)].sort_values(along)
+        if not near.empty:
+            line, band = numbers(near, along, *names), numbers(near, *ends)
+            rigs = numbers(near, *other) if other[0] in near else None
     return _Curve(level.name, _parted(points[:3]), line, band, rigs, most if len(there) > most else 0)
 
 
@@ -299,17 +292,3 @@ def by_stepped(
     for stepped, names in kinds.items():
         along, held = (amplitude, frequency) if stepped == "amplitude" else (frequency, amplitude)
         yield stepped, along, held if stepped else "test", rows[rows["test"].isin(names)]
-
-
-def _predicted(
-    table: pd.DataFrame, along: str, held: str, level: float, names: Sequence[str]
-) -> tuple[Array, Array, Array | None] | None:
-    """The prediction at a level: x and the four; their band; and the four if they are the rig's; None where there is no
-    such prediction."""
-    rigs = [f"{name}, {IF_RIGS}" for name in names]
-    band = [f"{name}, {end}" for name in names for end in ("low", "high")]
-    known = complete(table, along, held, *names, *band)
-    near = known[np.abs(known[held] - level) < 0.02 * abs(level)].sort_values(along)
-    if near.empty:
-        return None
-    return numbers(near, along, *names), numbers(near, *band), numbers(near, *rigs) if rigs[0] in near else None

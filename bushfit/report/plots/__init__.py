@@ -12,17 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bushfit.report.plots import (  # noqa: F401
-        arms,
         batch,
-        comparison,
         fits,
         gap,
         inspection,
         master_curve,
         plan,
         prediction,
-        reduction,
-        resonance,
         style,
     )
 

@@ -1,4 +1,4 @@
-"""The picture of a batch: the scatter of each quantity over its bushings, limits drawn, the ones out of them named."""
+"""Pictures of many bushings: the scatter of a batch, its limits and who is out of them; and results side by side."""
 
 import math
 from collections.abc import Collection, Sequence
@@ -7,11 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from bushfit.effects.contract import Array
-from bushfit.reduction.scatter import scatter
+from bushfit.reduction.arrays import scatter
+from bushfit.report.compared import SideBySide
 from bushfit.report.plots import style
+from bushfit.report.tables import shortened
 from bushfit.units import number
 
 #: Colour of limits and of what is out of them.
@@ -32,6 +35,12 @@ _FURTHEST = 12.0
 _COLUMNS = 2
 #: Most panels of a picture: it is then a metre high.
 _MOST_PANELS = 40
+#: Width of a line [point].
+_STROKE = 1.3
+#: Dashes of the smallest and of the largest value that is held.
+_DASHES = ("-", (0, (4, 1.5)))
+#: Markers on a line, or fewer: they tell lines apart in grey print.
+_MARKS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +68,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
     The names of the bushings, (n,), stand along x too where they are few.
     """
     drawn = panels[:_MOST_PANELS]
-    along = [_short(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
+    along = [shortened(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
     lines = math.ceil(len(drawn) / _COLUMNS)
     height = style.ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * style.FRAME
     height += 0.12 * max(0, max(map(len, along), default=0) - 16)  # there is room for 16 letters as it is
@@ -82,13 +91,9 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
     beyond = "Triangles: further out than the panel reaches, the furthest by name and value."
     few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in drawn)
     more = f"The first {len(drawn)} of {len(panels)} quantities." * (len(panels) > len(drawn))
-    style.explain(figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more)
-    return figure
-
-
-def _short(name: str, letters: int) -> str:
-    """A name of at most so many letters."""
-    return name if len(name) <= letters else name[: letters - 1] + "…"
+    return style.explained(
+        figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more
+    )
 
 
 def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
@@ -103,15 +108,11 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     good_style = {**style.DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, 1500 / values.size))} if cloud else style.POINT
     if ends is not None and not cloud:
         axes.vlines(place + 1, *ends, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
-    for chosen, color, look, order in (
-        (~bad, _GOOD, good_style, 2),
-        (bad, _OUT, style.POINT if not cloud else style.DOT, 4),
-    ):
+    kinds = (~bad, _GOOD, good_style, 2), (bad, _OUT, style.DOT if cloud else style.POINT, 4)
+    for chosen, color, look, order in kinds:
         for marker, which in (("o", shown == values), ("^", shown < values), ("v", shown > values)):
-            x, y = place[chosen & which] + 1, shown[chosen & which]
-            axes.plot(
-                x, y, marker, color=color, zorder=order, rasterized=cloud, **(look if marker == "o" else style.POINT)
-            )
+            at, drawn = chosen & which, look if marker == "o" else style.POINT
+            axes.plot(place[at] + 1, shown[at], marker, color=color, zorder=order, rasterized=cloud, **drawn)
     axes.axhline(float(np.median(values)), color=style.GREY, lw=0.9, zorder=1)
     for limit in filter(math.isfinite, panel.allowed):
         axes.axhline(limit, color=_OUT, lw=0.9, ls=(0, (5, 2)), zorder=3)
@@ -123,8 +124,11 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     count = f": {len(panel.missed)} out" if panel.missed else ""
     axes.set_title(panel.title + count, fontsize=style.SMALL, loc="left", color=_OUT if count else style.INK, pad=3)
     _name(axes, panel, (low, high), names)
-    if cloud:
-        _histogram(axes, shown)
+    if cloud:  # how many bushings lie where, at the right edge
+        counts, edges = np.histogram(shown, bins=60, range=axes.get_ylim())
+        side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
+        side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)
+        side.set_axis_off()
 
 
 def _reach(values: Array, allowed: Sequence[float], ends: Array | None) -> tuple[float, float]:
@@ -159,7 +163,7 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
     taken: list[tuple[float, float, int, bool]] = []
     for k in sorted(beyond.union(panel.missed), key=order)[:_MOST_NAMED]:
         value = float(np.clip(panel.values[k], *reach))
-        text = _short(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in beyond else "")
+        text = shortened(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in beyond else "")
         place, above = (k + 0.5) / panel.values.size, value < (reach[0] + reach[1]) / 2.0
         half, line = 0.5 * _LETTER * len(text), 1
         center = min(max(place, half), 1.0 - half)
@@ -181,13 +185,40 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
             color=_OUT if k in panel.missed else style.GREY,
             family=style.fonts(),
             parse_math=False,
-            zorder=5,
+            zorder=1.5,
         )
 
 
-def _histogram(axes: Axes, values: Array) -> None:
-    """Draw how many bushings lie where, at the right edge."""
-    counts, edges = np.histogram(values, bins=60, range=axes.get_ylim())
-    side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
-    side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)
-    side.set_axis_off()
+def comparison_figure(found: SideBySide) -> Figure:
+    """All results at every place they are compared at: two rows of panels a place, the differences below the values.
+
+    Drawn over frequency at the smallest and the largest amplitude, or over amplitude where there is one frequency.
+    """
+    first, *others = found.names
+    shown = [found.sides(place) for place in found.places]
+    figure = style.new_figure(f"{', '.join(others)} against {first}", 2 * len(shown) * style.ROW)
+    grid = figure.subplots(2 * len(shown), 2, squeeze=False)
+    looks = dict(zip(found.names, style.styles(len(found.names), "loop"), strict=True))
+    for i, sides in enumerate(shown):
+        for axes, panel in zip(grid[2 * i : 2 * i + 2].flat, sides.panels, strict=True):
+            for line in panel.lines:
+                look, along = looks[line.label], {"ls": _DASHES[line.level], "lw": _STROKE, **style.POINT}
+                markers = {"marker": look.marker, "markevery": max(line.x.size // _MARKS, 1)}
+                axes.plot(line.x, line.value, color=look.color, **markers, **along)
+                # bands of several results lie on each other
+                axes.fill_between(line.x, line.low, line.high, color=look.color, alpha=0.18, lw=0)
+            shown_as = panel.header if panel.least else f"{sides.place} {panel.header}"
+            style.label_axes(axes, sides.along, shown_as, panel.lines[0].x)
+            if panel.least:
+                axes.axhline(0.0, color=looks[first].color, lw=_STROKE)
+                style.least_span(axes, panel.least)
+        marked = {"lw": _STROKE, **style.POINT}
+        lines = [Line2D([], [], color=look.color, marker=look.marker, **marked) for look in looks.values()]
+        dashes = [Line2D([], [], color=style.INK, lw=_STROKE, ls=dash) for dash in _DASHES[: len(sides.levels)]]
+        called = [f"{label}: {style.file_name(name)}" for label, name in found.names.items()]
+        style.legend(grid[2 * i, 1], lines, called, "", besides=dict(zip(sides.levels, dashes, strict=True)))
+    return style.explained(
+        figure,
+        "Shaded: 95 % bands. Lower panels: the band of each point by itself; "
+        "compare.json and the terminal say what holds at all points at once.",
+    )

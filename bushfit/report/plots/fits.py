@@ -21,13 +21,13 @@ from bushfit.report.plots.points import (
     Points,
     by_direction,
     by_kind,
+    curves_of,
     held_with,
     means,
-    outliers,
     over_sectors,
     phase_after_turn,
 )
-from bushfit.report.plots.prediction import FINE, draw, draw_unheld, points_note
+from bushfit.report.plots.prediction import FINE, draw, draw_curves, points_note
 from bushfit.units import for_people, told
 
 #: Height of a panel of residuals [cm].
@@ -48,8 +48,8 @@ def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> F
     figure = style.new_figure(title, (style.ROW + _STRIP) * len(kinds))
     grid = figure.subplots(2 * len(kinds), 2, squeeze=False, height_ratios=[style.ROW, _STRIP] * len(kinds))
     for (kind, mine), pair, strips in zip(kinds.items(), grid[::2], grid[1::2], strict=True):
-        if kind.stepped is None:
-            draw_unheld(pair, kind.place, model, mine)
+        if curves_of(mine, kind):
+            draw_curves(pair, kind, model, mine)
         else:
             points, held = means(mine), held_with(kind.axis)
             levels = np.unique(getattr(points, held))
@@ -58,8 +58,7 @@ def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> F
             draw(pair, kind.place, lines, points, kind.axis, levels)
         _draw_residuals(pair, strips, model, mine, kind)
     outlying = any((data_set.weights == 0.0).any() for data_set in data_sets)
-    style.explain(figure, "Lines: model.", points_note(data_sets), _RESIDUALS, _OUTLIERS * outlying)
-    return figure
+    return style.explained(figure, "Lines: model.", points_note(data_sets), _RESIDUALS, _OUTLIERS * outlying)
 
 
 def _draw_residuals(
@@ -74,12 +73,10 @@ def _draw_residuals(
             marker = style.DOT | {"color": look.color, "alpha": 0.8}
             strip.plot(x[place][at], residuals[place][at], look.marker, **marker)
         strip.sharex(panel)
-        style.label_axes(strip, panel.get_xlabel(), f"{name} residual\n/ noise")
         reach = np.concatenate(x)
+        style.label_axes(strip, panel.get_xlabel(), f"{name} residual\n/ noise", reach)
         if kind.axis == "amplitude" and reach.max() > 3.0 * reach.min():  # half a decade
             style.logarithmic(strip, reach)
-        else:
-            style.log_if_wide(strip, reach)
         panel.tick_params(labelbottom=False)
         panel.set_xlabel("")
         style.noise_band(strip)
@@ -89,11 +86,10 @@ def _draw_residuals(
 
 
 def _looks(data_sets: Sequence[SweepData], kind: Kind) -> Iterator[tuple[style.Style, int, Array]]:
-    """How the points of each level are drawn, or of each test where nothing was held: style, number of the test, which
-    of its points."""
-    if kind.stepped is None:
-        for place, look in enumerate(style.styles(len(data_sets), "loop")):
-            yield look._replace(marker="o"), place, data_sets[place].weights > 0.0
+    """How the points of each level are drawn, or of each curve: style, number of the test, which of its points."""
+    if curves := curves_of(data_sets, kind):
+        for curve, look in zip(curves, style.styles(len(curves), kind.palette), strict=True):
+            yield look._replace(marker="o"), curve.test, curve.points & (data_sets[curve.test].weights > 0.0)
         return
     held = held_with(kind.axis)
     levels = np.unique(np.concatenate([getattr(data_set.with_weight(), held) for data_set in data_sets]))
@@ -113,17 +109,24 @@ def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Fig
     grid = figure.subplots(len(directions), 2, squeeze=False, width_ratios=[1.15, 1.0])
     for (direction, mine), (loop_panel, phase_panel) in zip(directions.items(), grid, strict=True):
         _draw_loops(loop_panel, model, direction, mine)
-        _draw_over_phase(phase_panel, model, mine)
+        style.label_axes(phase_panel, "phase after the upper turn [deg]", "residual / noise")
+        for data_set, look in zip(mine, style.styles(len(mine), "loop"), strict=True):
+            rows, residual = _drawn_rows(data_set), data_set.misfit(model)
+            dots: dict[str, Any] = {"color": look.color, "alpha": 0.4, **style.DOT}
+            phase_panel.plot(phase_after_turn(data_set)[rows], residual[rows], ".", **dots)
+            middle, shares = over_sectors(data_set)
+            phase_panel.plot(middle, shares @ residual, color=look.color, ls=look.dashes, lw=1.4)
+        style.noise_band(phase_panel)
+        phase_panel.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
         loops_legend(phase_panel, mine, besides={"model": Line2D([], [], color=style.INK, lw=0.8)})
     note = _OUTLIERS if any(data_set.drive.outliers["force"].rows.size for data_set in data_sets) else ""
-    style.explain(
+    return style.explained(
         figure,
         "Left: measured force over the motion cleared of noise; black: model.",
         _RESIDUALS,
         f"Lines there: means over {360 // SECTORS} deg.",
         note,
     )
-    return figure
 
 
 def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[LoopData]) -> None:
@@ -140,19 +143,9 @@ def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[
         axes.plot(motion, factor * drive.force[rows], "o", color=look.color, alpha=0.5, **style.DOT)
         axes.plot(motion, modelled, color=style.INK, lw=0.8)
     for data_set in data_sets:
-        phase, force = outliers(data_set)
-        style.mark_outliers(axes, length * data_set.drive.displacement(phase), factor * force)
-
-
-def _draw_over_phase(axes: Axes, model: Model, data_sets: Sequence[LoopData]) -> None:
-    style.label_axes(axes, "phase after the upper turn [deg]", "residual / noise")
-    for data_set, look in zip(data_sets, style.styles(len(data_sets), "loop"), strict=True):
-        rows, residual = _drawn_rows(data_set), data_set.misfit(model)
-        axes.plot(phase_after_turn(data_set)[rows], residual[rows], ".", color=look.color, alpha=0.4, **style.DOT)
-        middle, shares = over_sectors(data_set)
-        axes.plot(middle, shares @ residual, color=look.color, ls=look.dashes, lw=1.4)
-    style.noise_band(axes)
-    axes.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
+        loop, rows = data_set.test, data_set.drive.outliers["force"].rows
+        phase = (loop.time[rows] - loop.time[0]) * data_set.drive.frequency
+        style.mark_outliers(axes, length * data_set.drive.displacement(phase), factor * loop.force[rows])
 
 
 def loops_legend(axes: Axes, data_sets: Sequence[LoopData], **words: Any) -> None:
@@ -164,14 +157,10 @@ def loops_legend(axes: Axes, data_sets: Sequence[LoopData], **words: Any) -> Non
 def loop_labels(data_sets: Sequence[LoopData]) -> list[str]:
     """Each loop of a direction by amplitude and frequency, and by file on a second line where that leaves twins."""
     unit, length = data_sets[0].direction.display.displacement
-    labels = [
-        f"{told(unit, length * data_set.amplitude[0])}, {told('Hz', data_set.frequency[0])}" for data_set in data_sets
-    ]
+    labels = [f"{told(unit, length * each.amplitude[0])}, {told('Hz', each.frequency[0])}" for each in data_sets]
     if len(set(labels)) == len(labels):
         return labels
-    return [
-        f"{label}\n{style.file_name(data_set.test.name)}" for label, data_set in zip(labels, data_sets, strict=True)
-    ]
+    return [f"{label}\n{style.file_name(each.test.name)}" for label, each in zip(labels, data_sets, strict=True)]
 
 
 def _model_lines(model: Model, direction: Place, points: Points, axis: Axis) -> Points:

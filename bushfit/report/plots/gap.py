@@ -20,8 +20,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import loop_labels, loops_legend
-from bushfit.report.plots.misfit import Map, Side, columns, side_of
-from bushfit.report.plots.points import SECTORS, Kind, by_direction, by_kind
+from bushfit.report.plots.points import SECTORS, Kind, Map, Side, by_direction, by_kind, columns, side_of
 from bushfit.report.plots.prediction import axis_label
 from bushfit.units import told
 
@@ -70,11 +69,14 @@ def gap_figure(
     rows = [(kind, part) for kind in sweeps for part in ("storage", "loss")]
     levels = [np.unique(sides[0].maps[kind].points.held).size for kind, _ in rows]
     heights = [min(max(_LEVEL * count, _LEAST_MAP), _LARGEST_MAP) for count in levels]
-    heights += [_loops_height(mine, len(sides)) for mine in loops.values()]
+    for labels in map(loop_labels, loops.values()):
+        entries = min(len(labels), style.MOST_NAMED + 1)  # one more says how many are not named
+        lines_of_legend = math.ceil(entries / _legend_columns(labels, len(sides))) * len(labels[0].splitlines())
+        heights.append(_LOOPS + style.LINE * max(0, lines_of_legend - _LEGEND_LINES))
     lines = textwrap.wrap(summary, 92)  # as many letters as the width of a figure holds
     figure = style.new_figure(title, sum(heights) + _SCALE * bool(rows) + style.LINE * (len(lines) + 2))
     body: SubFigure = figure.subfigures(1, 1, squeeze=False)[0, 0]
-    body.suptitle("\n".join(lines), fontsize=style.TEXT, color=style.INK, family=style.fonts(), parse_math=False)
+    body.suptitle("\n".join(lines), family=style.fonts(), parse_math=False, **style.NAMES)
     grid = body.subplots(len(heights), len(sides), squeeze=False, height_ratios=heights)
     if rows:
         edges, colors = _scale(sides)
@@ -86,16 +88,7 @@ def gap_figure(
     for row, (direction, mine) in zip(grid[len(rows) :], loops.items(), strict=True):
         _draw_loops(row, direction, mine, [side.loops[direction] for side in sides])
     _head(grid[0], sides)
-    style.explain(figure, *_words(sides[0]))
-    return figure
-
-
-def _loops_height(data_sets: Sequence[LoopData], sides: int) -> float:
-    """Height of the panels of one direction's loops with their legend [inch]."""
-    labels = loop_labels(data_sets)
-    entries = min(len(labels), style.MOST_NAMED + 1)  # one more says how many are not named
-    lines = math.ceil(entries / _legend_columns(labels, sides)) * len(labels[0].splitlines())
-    return _LOOPS + style.LINE * max(0, lines - _LEGEND_LINES)
+    return style.explained(figure, *_words(sides[0]))
 
 
 def _legend_columns(labels: Sequence[str], sides: int) -> int:
@@ -110,9 +103,8 @@ def _scale(sides: Sequence[Side]) -> tuple[Array, ScalarMappable]:
     Steps from a pale grey (within the noise) to dark, blue where the measurement is below the model and red above. They
     end where 2 % of the points are left beyond.
     """
-    values = np.abs(
-        np.concatenate([part for side in sides for drawn in side.maps.values() for part in (drawn.storage, drawn.loss)])
-    )
+    maps = [drawn for side in sides for drawn in side.maps.values()]
+    values = np.abs(np.concatenate([part for drawn in maps for part in (drawn.storage, drawn.loss)]))
     needed = int(np.searchsorted(_EDGES, np.quantile(values, 1.0 - _BEYOND))) + 1
     edges = np.array(_EDGES[: max(needed, 4)])  # with fewer, what lies within the noise would look like a find
     shades = np.linspace(0.12, 1.0, edges.size) / 2.0  # the first is just seen
@@ -132,12 +124,10 @@ def _draw_map(axes: Axes, kind: Kind, drawn: Map, part: str, colors: ScalarMappa
     for level in range(levels.size):
         at = row == level
         low[at], high[at] = _cells(along[at], logarithmic=even)
-    cells = np.stack(
-        [np.stack((x, row + y), axis=1) for x, y in ((low, -0.5), (high, -0.5), (high, 0.5), (low, 0.5))], axis=1
-    )
-    axes.add_collection(
-        PolyCollection(list(cells), array=values, norm=colors.norm, cmap=colors.cmap, ec="face", lw=0.2), autolim=False
-    )
+    corners = (low, -0.5), (high, -0.5), (high, 0.5), (low, 0.5)
+    cells = list(np.stack([np.stack((x, row + y), axis=1) for x, y in corners], axis=1))
+    look: dict[str, Any] = {"norm": colors.norm, "cmap": colors.cmap, "ec": "face", "lw": 0.2}
+    axes.add_collection(PolyCollection(cells, array=values, **look), autolim=False)
     below = values < -_BARRED
     inset = 0.3 * (high - low)[below]
     axes.hlines(row[below], low[below] + inset, high[below] - inset, color="white", lw=1.1)
@@ -194,9 +184,7 @@ def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
     height = legend.get_window_extent().height * 72.0 / row[0].figure.dpi if legend else 0.0
     for axes, side in zip(row, sides, strict=True):
         lines = [*textwrap.wrap(side.title, 80 // len(sides)), f"data fitted {side.gap:.2f} x noise"]
-        axes.set_title(
-            "\n".join(lines), fontsize=style.TEXT, color=style.INK, weight="bold", pad=height + 7.0, parse_math=False
-        )
+        axes.set_title("\n".join(lines), weight="bold", pad=height + 7.0, parse_math=False, **style.NAMES)
 
 
 def _draw_scale(figure: SubFigure, maps: Sequence[Axes], edges: Array, colors: ScalarMappable) -> None:

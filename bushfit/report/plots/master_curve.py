@@ -1,4 +1,4 @@
-"""Sweeps at several temperatures as one curve at 23 degC, and the shift factors that make them one."""
+"""Sweeps at several temperatures as one curve at 23 degC, their shift factors, and Maxwell arms for the springpot."""
 
 from collections.abc import Sequence
 
@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bushfit.fitting.master_curve import SHIFT, Shifted, law
+from bushfit.model.arms import Arms, part_modulus
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -18,6 +19,8 @@ from bushfit.units import CELSIUS, for_people, number
 _FINE = 200
 #: Ratio of amplitudes that count as one level.
 _NEAR = 1.3
+#: Factor by which the picture goes beyond the band, to show how arms end.
+_BEYOND = 4.0
 
 
 def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> Figure:
@@ -28,10 +31,11 @@ def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> F
     grid, levels = figure.subplots(len(places), 2, squeeze=False), []
     for place, (stiffness, loss) in zip(places, grid, strict=True):
         mine = [each for each in found if each.sweep.direction is place]
-        level = _level(mine)
-        levels.append(
-            f"{place} {number(level * place.display.displacement.factor, 3)} {place.display.displacement.name}"
-        )
+        reached = np.sort(np.concatenate([each.sweep.amplitude for each in mine]))
+        near = np.searchsorted(reached, _NEAR * reached) - np.arange(reached.size)
+        level = float(np.median(reached[near.argmax() :][: near.max()]))  # near it most points lie
+        moved, length = place.display.displacement
+        levels.append(f"{place} {number(level * length, 3)} {moved}")
         unit, factor = for_people(*place.display.stiffness, max(np.abs(each.reduced_stiffness).max() for each in mine))
         reach = np.concatenate([each.reduced_frequency for each in mine])
         frequency = np.geomspace(reach.min(), reach.max(), _FINE)
@@ -47,12 +51,11 @@ def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> F
         style.label_axes(stiffness, "reduced frequency f a_T [Hz]", f"{place}\n|{words(place)[2]}| [{unit}]")
         style.label_axes(loss, "reduced frequency f a_T [Hz]", "loss factor [-]")
         style.name_levels(loss, [f"{degree:g}" for degree in degrees], "temperature", [True] * len(degrees))
-    style.explain(
+    return style.explained(
         figure,
         f"Line: the model at 23 degC, {', '.join(levels)}. Points: measured at the temperatures beside [degC], brought",
         "to 23 degC by the model's shift factors, and by how its moduli change.",
     )
-    return figure
 
 
 def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -> Figure:
@@ -71,21 +74,42 @@ def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -
         axes.errorbar(kelvin - CELSIUS, points, Z95 * unsure, fmt="o", color=color, lw=0.8, **style.POINT)
     style.label_axes(factors, "temperature [degC]", "log10 a_T [-]")
     style.label_axes(off, "temperature [degC]", "log10 a_T, own less law [-]")
-    style.explain(
+    return style.explained(
         figure,
         f"Line: the law, with a shift of {number(result.model.values[SHIFT], 3)} 1/K at 23 degC, grey its 95 % band.",
         "Points: what each sweep asks for by itself, bars 95 %.",
     )
-    return figure
-
-
-def _level(found: Sequence[Shifted]) -> float:
-    """An amplitude near which most points lie [SI]."""
-    reached = np.sort(np.concatenate([each.sweep.amplitude for each in found]))
-    near = np.searchsorted(reached, _NEAR * reached) - np.arange(reached.size)
-    return float(np.median(reached[near.argmax() :][: near.max()]))
 
 
 def _degree(found: Shifted) -> float:
     """The temperature of a sweep to a degree [degC]."""
     return float(np.round(found.temperature - CELSIUS))
+
+
+def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
+    """Storage and loss modulus of each part and of its arms, and the relative error within the band."""
+    figure = style.new_figure(title, style.ROW)
+    moduli, errors = figure.subplots(1, 2)
+    low, high = arms[0].band
+    omega = 2.0 * np.pi * np.geomspace(low / _BEYOND, high * _BEYOND, 400)
+    frequency = omega / (2.0 * np.pi)
+    inside = (frequency >= low) & (frequency <= high)
+    wholes = [part_modulus(model, part.size, omega, part.under) for part in arms]
+    unit, factor = for_people("Pa", 1.0, max(float(np.abs(whole).max()) for whole in wholes))
+    looks = style.styles(len(arms), "loop")
+    for part, whole, look in zip(arms, wholes, looks, strict=True):
+        made = part.at(omega)
+        for share, dashes in ((np.real, "-"), (np.imag, (0, (5, 1.5)))):
+            moduli.plot(frequency, factor * share(whole), color=style.GREY, lw=2.6, alpha=0.45, ls=dashes)
+            moduli.plot(frequency, factor * share(made), color=look.color, lw=1.1, ls=dashes)
+        off = 100.0 * np.abs(made / whole - 1.0)[inside]
+        errors.plot(frequency[inside], off, color=look.color, lw=1.1)
+    style.label_axes(moduli, "frequency [Hz]", f"modulus [{unit}]", frequency)
+    style.label_axes(errors, "frequency [Hz]", "error of the modulus [%]", frequency)
+    moduli.axvspan(low, high, color="#ebebeb", lw=0, zorder=0)
+    errors.set_ylim(bottom=0.0)
+    return style.explained(
+        figure,
+        "Wide grey: the model; coloured: its arms; solid storage, dashed loss. Shaded: where the arms were fitted.",
+        *(f"{part.sentence}." for part in arms),
+    )

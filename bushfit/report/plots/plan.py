@@ -46,13 +46,12 @@ def plan_figure(plan: Plan) -> Figure:
     _name_sizes(grid[0, 1], sizes)
     _draw_errors(grid[-1, 0], plan, programmes)
     _draw_stiffness(grid[-1, 1], programmes)
-    style.explain(
+    return style.explained(
         figure,
         "Above: what each run of the rig measures; a line joins the points of a sweep. Below: relative standard errors "
         "of the parameters and of the stiffness at the points that are wanted, with what either programme would add to "
         "what is known now. All of it is computed from a model: nothing was tested.",
     )
-    return figure
 
 
 def _points(test: Test) -> Array:

@@ -15,7 +15,7 @@ from bushfit.prediction.stiffness import Band, Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
-from bushfit.report.plots.points import Axis, Points, held_with, means
+from bushfit.report.plots.points import Axis, Kind, Points, curves_of, held_with, means
 from bushfit.report.tables import IF_RIGS, spread, words
 from bushfit.units import for_people, told
 
@@ -92,7 +92,7 @@ def prediction_figure(
     drawn = [draw(pair, prediction.direction, lines, points, *row, rig, lines.if_rigs) for pair, row in pairs]
     laid = any(drawn)
     if free and model:
-        draw_unheld(grid[0], prediction.direction, model, free)
+        draw_curves(grid[0], Kind(prediction.direction, None), model, free)
     banded = np.any(lines.stiffness.high > lines.stiffness.low)
     shade = "; shaded: its 95 % band, where that is wider than the line" if banded else ""
     through = " Thin lines: the same with what belongs to the rig, as the points were measured." if laid and rig else ""
@@ -100,8 +100,7 @@ def prediction_figure(
         through += f" Double lines: the same {IF_RIGS}, and not the bushing's; the band spans both."
     if amplitudes.size > _MOST_AMPLITUDES:
         through += f" Over frequency some of the {amplitudes.size} amplitudes are drawn."
-    style.explain(figure, f"Lines: model{shade}.{through}", points_note(every) if laid or free else "", note)
-    return figure
+    return style.explained(figure, f"Lines: model{shade}.{through}", points_note(every) if laid or free else "", note)
 
 
 def _lines(levels: Array, held: Array, most: int) -> Array:
@@ -154,10 +153,9 @@ def draw(
                     axes.plot(x[at], factor * getattr(rig, kind).value[at], color=look.color, lw=_THIN)
                 axes.vlines(where[spots], point.low[spots], point.high[spots], color=look.color, lw=0.7, alpha=0.7)
                 axes.plot(where[spots], point.value[spots], look.marker, color=look.color, **style.POINT)
-        style.label_axes(axes, axis_label(direction, axis), name)
-        style.log_if_wide(axes, x)
+        style.label_axes(axes, axis_label(direction, axis), name, x)
         style.least_span(axes, 0.04 * line.high.max() if kind == "stiffness" else 0.01)  # flat curves shall look flat
-    unit, scale = scales[held]
+    unit, scale = for_people(*scales[held], float(levels.min()))  # one unit for all
     names_of_levels = [told(unit, scale * level) for level in levels]
     others = _other_lines(with_rig=laid and rig is not None, if_rigs=if_rigs is not None)
     style.name_levels(pair[-1], names_of_levels, held, [bool(spots.any()) for spots in marked], others)
@@ -202,21 +200,27 @@ def axis_label(place: Place, axis: Axis) -> str:
     return "frequency [Hz]" if axis == "frequency" else f"{words(place)[0]} [{place.display.displacement.name}]"
 
 
-def draw_unheld(pair: Sequence[Axes], place: Place, model: Model, data_sets: Sequence[SweepData]) -> None:
-    """Draw sweeps that held nothing over the frequency: points as measured, and the model at the same points."""
-    factor, names = pair_labels(place, max(float(np.abs(data_set.measured).max()) for data_set in data_sets))
-    looks = style.styles(len(data_sets), "loop")
-    kinds: tuple[tuple[Callable[[Array], Array], float], ...] = ((np.abs, factor), (loss_factor, 1.0))
-    for axes, name, (quantity, scale) in zip(pair, names, kinds, strict=True):
-        for data_set, look in zip(data_sets, looks, strict=True):
-            rising = np.argsort(data_set.frequency, kind="stable")
-            frequency, known = data_set.frequency[rising], _known(data_set)[rising]
-            measured, modelled = (scale * quantity(k)[rising] for k in (data_set.measured, data_set.stiffness(model)))
-            axes.plot(frequency[known], measured[known], "o", color=look.color, alpha=0.5, **style.DOT)
-            axes.plot(frequency, modelled, color=look.color, lw=_LINE)
-        style.label_axes(axes, "frequency [Hz]", name)
-    handles = [Line2D([], [], color=look.color, lw=_LINE) for look in looks]
-    style.legend(pair[-1], handles, [style.file_name(data_set.name) for data_set in data_sets], "test")
+def draw_curves(pair: Sequence[Axes], kind: Kind, model: Model, data_sets: Sequence[SweepData]) -> None:
+    """Draw the curves of sweeps whose levels tests do not share: points as measured, the model at the same points."""
+    factor, names = pair_labels(kind.place, max(float(np.abs(data_set.measured).max()) for data_set in data_sets))
+    scale = kind.place.display.displacement.factor if kind.axis == "amplitude" else 1.0
+    curves = curves_of(data_sets, kind)
+    looks = [look._replace(marker="o") for look in style.styles(len(curves), kind.palette)]
+    modelled = [data_set.stiffness(model) for data_set in data_sets]
+    quantities: tuple[tuple[Callable[[Array], Array], float], ...] = ((np.abs, factor), (loss_factor, 1.0))
+    for axes, name, (quantity, size) in zip(pair, names, quantities, strict=True):
+        for curve, look in zip(curves, looks, strict=True):
+            data_set, along = data_sets[curve.test], scale * getattr(data_sets[curve.test], kind.axis)
+            rising = np.argsort(along, kind="stable")
+            rising = rising[curve.points[rising]]
+            known = rising[_known(data_set)[rising]]
+            points = style.POINT if known.size <= FINE else style.DOT | {"alpha": 0.5}
+            axes.plot(along[known], size * quantity(data_set.measured)[known], "o", color=look.color, **points)
+            line = size * quantity(modelled[curve.test])[rising]
+            axes.plot(along[rising], line, color=look.color, ls=look.dashes, lw=_LINE)
+        style.label_axes(axes, axis_label(kind.place, kind.axis), name)
+    labels = [style.file_name(curve.name, 26) for curve in curves]
+    style.legend(pair[-1], [look.handle(True) for look in looks], labels, "test")
 
 
 def _known(data_set: SweepData) -> Array:

@@ -23,7 +23,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, ScalarFo
 from bushfit.effects.contract import Array
 from bushfit.errors import CONTROL, printable
 from bushfit.model.covariance import Z95
-from bushfit.report.tables import spread
+from bushfit.report.tables import shortened, spread
 
 #: Width of a figure [cm]: the text of a page of A4.
 _WIDTH = 16.0
@@ -112,8 +112,8 @@ def fonts() -> list[str]:
     return ["DejaVu Sans", *sorted({font.name for font in fontManager.ttflist} & _WIDER_FONTS)]
 
 
-def label_axes(axes: Axes, x_label: str, y_label: str) -> None:
-    """Give a panel its labels, ticks and a grid behind all that is drawn."""
+def label_axes(axes: Axes, x_label: str, y_label: str, x: Array | None = None) -> None:
+    """Give a panel its labels, ticks and a grid behind all that is drawn; logarithmic where its `x` span decades."""
     axes.set_xlabel(x_label, **NAMES)
     label_left(axes, y_label)
     axes.tick_params(labelsize=SMALL, colors=INK)
@@ -121,19 +121,15 @@ def label_axes(axes: Axes, x_label: str, y_label: str) -> None:
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))
+    if x is not None and x.max() > _LOG_RATIO * x.min():
+        logarithmic(axes, x)
 
 
 def label_left(axes: Axes, label: str, **place: Any) -> None:
     """Write what a panel shows at its left, in several lines where one would be longer than the panel is high."""
     whole = re.sub(r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), label)
     lines = [part for line in whole.splitlines() for part in textwrap.wrap(line, _LABEL_LETTERS)]
-    axes.set_ylabel("\n".join(lines), fontsize=TEXT, color=INK, family=fonts(), parse_math=False, **place)
-
-
-def log_if_wide(axes: Axes, values: Array) -> None:
-    """Make the x axis logarithmic where the values span decades."""
-    if values.max() > _LOG_RATIO * values.min():
-        logarithmic(axes, values)
+    axes.set_ylabel("\n".join(lines), family=fonts(), parse_math=False, **NAMES, **place)
 
 
 def logarithmic(axes: Axes, values: Array, along: Literal["x", "y"] = "x") -> None:
@@ -222,9 +218,7 @@ def file_name(name: str, letters: int = 20) -> str:
 
     Three columns of a legend with names of twenty letters fill the width of a figure.
     """
-    if len(name) > letters:
-        name = f"{name[: letters // 2 - 1]}…{name[-letters // 2 :]}"
-    return name.replace("$", r"\$")
+    return shortened(name, letters).replace("$", r"\$")
 
 
 def first_sentences(sentences: Sequence[str]) -> str:
@@ -236,10 +230,11 @@ def first_sentences(sentences: Sequence[str]) -> str:
     return ". ".join([*shown, *([f"And {more} more warnings, in the model file and the report"] if more > 0 else [])])
 
 
-def explain(figure: Figure, *sentences: str) -> None:
-    """Say below the panels what lines, shades and points are."""
+def explained(figure: Figure, *sentences: str) -> Figure:
+    """The figure, which says below its panels what lines, shades and points are."""
     text = textwrap.fill(" ".join(filter(None, sentences)), _NOTE_LETTERS)
     figure.supxlabel(text, x=0.01, ha="left", fontsize=SMALL, color=GREY, parse_math=False)
+    return figure
 
 
 def to_image(figure: Figure, form: str = "png") -> bytes:

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import base64
-import csv
 import json
 import re
 import shutil
 from collections.abc import Callable
 from html import unescape
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from commandline import call
 from hypothesis import given
-from hypothesis import strategies as st
 from reading_html import (
     LARGEST,
     NASTY,
     assert_harmless,
-    assert_page_or_error,
     drawn,
     loads,
     made_of,
@@ -35,9 +31,8 @@ from bushfit.campaign.campaign import load_campaign
 from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
 from bushfit.report.contents import Formats
-from bushfit.report.page import report_page
+from bushfit.report.page import report_page, use_of
 from bushfit.report.page.readback import read_results
-from bushfit.report.page.uses import _ELSE
 
 Results = Callable[[str], Path]
 
@@ -121,17 +116,8 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
     assert call(tmp_path, "report", "x", "-q").returncode == 0
     found = parsed(page_of(tmp_path / "x")).text
     conditions = ("22 °C", "150 N axial", "12 May 2025", "night shift", "A-7", "Fitted, not diagnosed")
-    stated = (
-        "Customer",
-        "Vehicle works",
-        "Part number",
-        "15 961",
-        "Drawing",
-        "D 7, issue C",
-        "Elasto Lab",
-        "20 May 2025",
-    )
-    for words in (*conditions, *stated):
+    stated = ("Customer", "Vehicle works", "Part number", "15 961", "Drawing", "D 7, issue C", "Elasto Lab")
+    for words in (*conditions, *stated, "20 May 2025"):
         assert words in found
     assert "bushfit fit c.toml --direction axial --direction radial --effect inertia" in found
     (shown,) = re.findall(r'<img src="data:image/png;base64,([^"]*)" alt="Logo of Elasto Lab"', page_of(tmp_path / "x"))
@@ -182,17 +168,6 @@ def test_parts_of_one_campaign_are_told_apart_by_name(root: Path, tmp_path: Path
     assert "part B-8, 5 Hz" in drawn(page, "axial: stiffness over amplitude")
     (maps,) = re.findall(r"<svg(?:(?!</svg>).)*?>axial: measured less model, %</text>.*?</svg>", page, re.DOTALL)
     assert {f">part {part}, 0.1 mm<" in maps for part in ("A-7", "B-8")} == {True}
-
-
-def test_loops_in_torsion_are_drawn(root: Path, tmp_path: Path) -> None:
-    """Their tables count rotation in deg, under the header that every direction has."""
-    tests = '[[simulate.loops]]\ndirection = "torsion"\namplitude = "1 deg"\nfrequency = "0.1 Hz"\n'
-    text = (root / "configs/table_1.toml").read_text(encoding="utf-8")
-    (tmp_path / "turned.toml").write_text(text + tests, encoding="utf-8")
-    for command in (("simulate", "turned.toml", "-o", "tests"), ("fit-static", "tests/campaign.toml", "-o", "fit")):
-        done = call(tmp_path, *command, "-q", "--no-plots")
-        assert done.returncode == 0, done.stderr
-    assert "rotation [deg]" in made_of(tmp_path / "fit")
 
 
 @pytest.mark.parametrize(
@@ -270,7 +245,7 @@ def test_ellipses_are_those_of_the_covariance(results: Results, measured: Path) 
 def test_every_warning_says_what_it_means_for_use(results: Results, measured: Path) -> None:
     told = [row for folder in (results("cmp_15961"), results("mystery_mount"), measured) for row in uses(folder)]
     assert len(told) > 10
-    assert _ELSE not in [use for _, use in told], "each is of a known kind"
+    assert use_of("of no known kind") not in [use for _, use in told], "each is of a known kind"
     means = dict(told)
     (open_,) = (use for warning, use in means.items() if warning.startswith("the tests leave sigma_fmax open"))
     assert "quote no more of this value" in open_
@@ -284,25 +259,18 @@ def uses(folder: Path) -> list[tuple[str, str]]:
     return [(unescape(warning), unescape(use)) for warning, use in found]
 
 
-def test_loss_angles_are_the_arc_tangents_of_the_loss_factors(results: Results) -> None:
+def test_loss_angles_and_maps_are_those_of_the_tables(results: Results) -> None:
     rows = re.findall(r'<td align="right" data-head="([^"]*)">([^<]*)</td>', page_of(results("cmp_15961")))
     angles, factors = (
         [float(cell) for head, cell in rows if head == key] for key in ("Loss angle [deg]", "Loss factor")
     )
     assert len(angles) == 12
     np.testing.assert_allclose(angles, np.degrees(np.arctan(factors)), atol=0.06)
-    levels = re.search(r"predicted here ([\d.]+) to ([\d.]+) dB", page_of(results("cmp_15961")))
-    assert levels
-    sizes = np.concatenate(
-        [pd.read_csv(results("cmp_15961") / f"{place}.csv")["stiffness [N/mm]"] for place in ("axial", "radial")]
-    )
-    np.testing.assert_allclose(
-        [float(end) for end in levels.groups()], 20 * np.log10([1e3 * sizes.min(), 1e3 * sizes.max()]), atol=0.06
-    )
-
-
-def test_maps_are_measured_less_model(results: Results) -> None:
-    """The mean of what is left of a direction, of the plain model and with the effect, as in words."""
+    ((low, high),) = re.findall(r"predicted here ([\d.]+) to ([\d.]+) dB", page_of(results("cmp_15961")))
+    tables = [pd.read_csv(results("cmp_15961") / f"{place}.csv") for place in ("axial", "radial")]
+    sizes = np.log10([1e3 * size for table in tables for size in table["stiffness [N/mm]"]])
+    assert (float(low), float(high)) == pytest.approx((20 * sizes.min(), 20 * sizes.max()), abs=0.06)
+    # The mean of what is left of a direction, of the plain model and with the effect, as in words.
     folder = results("mystery_mount")
     gap = pd.read_csv(folder / "gap.csv")
     radial = gap[(gap["direction"] == "radial") & (gap["kind"] == "sweep")]
@@ -355,39 +323,9 @@ def test_names_do_no_harm(root: Path, name: str) -> None:
     assert_harmless(page, parsed(report_page(contents.documents, plain)), name)
 
 
-@pytest.fixture(scope="module")
-def thinned(results: Results, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Results with one row in 40 of each table, so that a page of them takes no time."""
-    folder = tmp_path_factory.mktemp("thinned") / "x"
-    shutil.copytree(results("mystery_mount"), folder, ignore=shutil.ignore_patterns("report.html"))
-    for file in folder.glob("*.csv"):
-        header, *rows = file.read_text(encoding="utf-8").splitlines()
-        file.write_text("\n".join([header, *rows[::40]]) + "\n", encoding="utf-8")
-    return folder
-
-
-@given(st.data())
-def test_any_cell_may_be_spoiled(thinned: Path, tmp_path_factory: Any, data: st.DataObject) -> None:
-    folder = tmp_path_factory.mktemp("x") / "y"
-    shutil.copytree(thinned, folder)
-    file = folder / data.draw(st.sampled_from(["axial.csv", "sweeps.csv", "loops.csv", "gap.csv", "radial.csv"]))
-    lines = file.read_text(encoding="utf-8").splitlines()[: data.draw(st.sampled_from([1, 2, 40, None]))]
-    row = data.draw(st.integers(0, len(lines) - 1))
-    cells = next(csv.reader([lines[row]]))
-    column = data.draw(st.integers(0, len(cells) - 1))
-    cells[column] = data.draw(st.sampled_from(["", "nan", "inf", "-1", "0", "x", "1e300", "1e-300", "axial", "'=1"]))
-    lines[row] = ",".join(f'"{cell}"' for cell in cells)
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    assert_page_or_error(lambda: made_of(folder))
-
-
 def test_the_command(root: Path, tmp_path: Path) -> None:
     folder = root / "data/reports/mystery_mount"
     done = call(tmp_path, "report", folder, "-o", "page", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == {"pages": {"page/report.html": (tmp_path / "page/report.html").stat().st_size}}
     assert "wrote report.html to page" in done.stderr
-    assert call(tmp_path, "report", folder, "-o", "page").returncode == 2
-    first = (tmp_path / "page/report.html").read_bytes()
-    assert call(tmp_path, "report", folder, "-o", "page", "--force").returncode == 0
-    assert (tmp_path / "page/report.html").read_bytes() == first

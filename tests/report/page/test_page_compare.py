@@ -1,10 +1,11 @@
-"""The page of a comparison: the same from memory and from its file, whole, escaped, small, and true to the tables."""
+"""Pages of a comparison and of a batch: whole, escaped, small, and true to the tables; and charts, to the pixel."""
 
 from __future__ import annotations
 
 import json
+import math
 import re
-from collections.abc import Iterator
+import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,13 @@ import pytest
 from commandline import call
 from hypothesis import given
 from hypothesis import strategies as st
-from reading_html import LARGEST, NASTY, assert_harmless, assert_page_or_error, drawn, loads, parsed, spoiled
+from production import COUNT, LOSSY, SOFT
+from reading_html import LARGEST, NASTY, assert_harmless, drawn, loads, parsed, spoiled
 
-from bushfit.jobs.report import report
 from bushfit.report.contents import pages_of
-from bushfit.report.page import comparison_page
+from bushfit.report.page import comparison_page, folder_contents
+from bushfit.report.page.chart import Axis, Cells, Rule, Series, chart, maps
+from bushfit.report.page.index import index_page, read_batch
 
 NAMES = ["two", "families"]
 #: Keys of compare.json whose texts come from a user's files or names.
@@ -41,7 +44,7 @@ def documents(compared: Path) -> dict[str, Any]:
 @pytest.mark.parametrize("name", NAMES)
 def test_compare_writes_a_whole_page_and_its_folder_gives_the_same(compared: Path, name: str) -> None:
     page = (compared / name / "compare.html").read_text(encoding="utf-8")
-    assert pages_of(report(compared / name))["compare.html"].decode() == page
+    assert pages_of(folder_contents(compared / name))["compare.html"].decode() == page
     found = parsed(page)
     assert loads(page) == []
     assert len(page.encode()) < LARGEST
@@ -108,31 +111,136 @@ def test_many_results_at_many_places_stay_small_and_what_is_left_out_is_said(doc
     assert "more, in compare.json" in text
 
 
-def leaves(node: Any) -> Iterator[tuple[Any, Any]]:
-    """Every table or list of a document with each of its keys."""
-    for key in list(node) if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ():
-        yield node, key
-        yield from leaves(node[key])
-
-
-@given(
-    name=st.sampled_from(NAMES),
-    place=st.integers(0, 10**6),
-    value=st.sampled_from([None, "x", "", -1, 0, 1e300, True, (), "gone"]),
-)
-def test_any_value_may_be_spoiled(compared: Path, name: str, place: int, value: Any) -> None:
-    document = document_of(compared, name)
-    places = [each for each in leaves(document) if not isinstance(each[1], int) or each[1] < 3]
-    node, key = places[place % len(places)]
-    if value == "gone":
-        del node[key]
-    else:
-        node[key] = value
-    assert_page_or_error(lambda: page_of(document))
-
-
 def test_a_folder_with_a_model_too_has_both_pages(root: Path, documents: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "compare.json").write_text(json.dumps(documents["two"]))
     (tmp_path / "model.json").write_bytes((root / "data/reports/mystery_mount/model.json").read_bytes())
     done = call(tmp_path, "report", ".")
     assert "wrote compare.html, report.html to ." in done.stderr
+
+
+#: A batch that is diagnosed and reported takes ten seconds.
+SLOW = pytest.mark.slow
+
+
+@SLOW
+def test_a_batch_writes_its_page_and_the_folder_gives_the_same(batch: Path) -> None:
+    written = (batch / "index.html").read_bytes()
+    assert pages_of(read_batch(batch))["index.html"] == written
+    page = written.decode()
+    assert loads(page) == []
+    found = parsed(page)
+    for words in ("m: 4 bushings", "3 done, 1 failed", "=1+1 <b>", "mu [MPa]", "inertia", "Control charts"):
+        assert words in found.text
+    links = [value for tag, key, value in found.attributes if (tag, key) == ("a", "href")]
+    assert sorted(links) == [f"bushings/c{n}/report.html" for n in range(3)]
+    assert all((batch / link).is_file() for link in links)
+    summary = json.loads((batch / "batch.json").read_text(encoding="utf-8"))
+    mu = summary["quantities"]["mu [MPa]"]
+    assert mu["allowed"] == [1.2, None]
+    table = pd.read_csv(batch / "batch.csv")
+    assert mu["median"] == pytest.approx(table["mu [MPa]"].median())
+    out = table["mu [MPa]"] < 1.2
+    assert f"{int(out.sum())} out of limits" in page
+    rows = re.findall(r'<tr><th scope="row" align="left">(?:<a [^>]*>)?([^<]*)', page.partition('id="h-rows"')[2])
+    assert rows[0] == "=1+1 &lt;b&gt;", "what failed comes first"
+    assert len(rows) == 4
+
+
+@SLOW
+def test_report_makes_it_again_and_elsewhere_with_whole_links(batch: Path, tmp_path: Path) -> None:
+    done = call(tmp_path, "report", batch, "-o", "x")
+    assert done.returncode == 0, done.stderr
+    links = re.findall(r'href="([^"]*)"', (tmp_path / "x/index.html").read_text(encoding="utf-8"))
+    assert sorted(links) == [f"{batch.resolve().as_uri()}/bushings/c{n}/report.html" for n in range(3)]
+
+
+@SLOW
+def test_the_page_shows_each_curve_against_the_batch_and_who_differs(made: Path) -> None:
+    page = (made / "out/index.html").read_text(encoding="utf-8")
+    assert pages_of(read_batch(made / "out"))["index.html"].decode() == page
+    found = parsed(page)
+    assert loads(page) == []
+    alts = [value for tag, key, value in found.attributes if (tag, key) == ("svg", "aria-label")]
+    curves = [alt for alt in alts if alt.endswith(" % off the median")]
+    assert len(curves) == COUNT
+    numbers = [[float(word) for word in alt.split()[:3:2]] for alt in curves]
+    rows = re.findall(r'<tr><th scope="row" align="left"><a [^>]*>([^<]*)', page.partition('id="h-rows"')[2])
+    assert max(numbers[rows.index(f"part_{SOFT}")]) < -5.0 < 5.0 < max(numbers[rows.index(f"part_0{LOSSY}")])
+    assert {f"part_{SOFT}", f"part_0{LOSSY}"} < set(rows[:8]), "what differs is among those that come first"
+    assert any(alt.endswith("single curves: part_07, part_20") for alt in alts)
+    for words in ("2 bushings differ from the others", "SN 907", "moving range: mu [MPa]", "drifts", "Ppk = "):
+        assert words in found.text
+
+
+@SLOW
+def test_many_bushings_stay_small(made: Path) -> None:
+    contents = read_batch(made / "out")
+    table = contents.tables["batch"]()
+    random = np.random.default_rng(1)
+    ordered = {"mu [MPa]": random.normal(1.1, 0.05, 20_010), "order of test [-]": np.arange(1.0, 20_011.0)}
+    many = table.iloc[[*range(COUNT)] * 667].assign(**ordered).reset_index(drop=True)
+    many["limits"] = ["pass"] * 20_010
+    page = index_page(contents.documents, {"batch": many})
+    assert len(page.encode()) < LARGEST
+    assert re.search(r"Here are 2 of 2 that need a look and, evenly taken, (\d+) of the others", page)
+    assert "of 20010; batch.csv has all" in page
+
+
+positive = st.floats(1e-6, 1e6)
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@given(positive, positive, st.booleans())
+def test_ticks_are_round_few_and_within(one: float, other: float, log: bool) -> None:
+    axis = Axis.over("x", [np.array([one, other])], 0.0, 400.0, log=log)
+    assert axis.low <= min(one, other)
+    assert axis.high >= max(one, other)
+    assert 1 <= len(axis.ticks) <= 11
+    for pixel, words in axis.ticks:
+        assert -1e-6 <= pixel <= 400.0 + 1e-6
+        assert float(axis(float(words))) == pytest.approx(pixel, abs=0.4)
+
+
+@given(st.lists(positive, min_size=2, max_size=9, unique=True), st.booleans())
+def test_pixels_go_back_to_values(values: list[float], log: bool) -> None:
+    axis = Axis.over("x", [np.array(values)], 50.0, 450.0, log=log)
+    *ends, kind = axis.described.split()
+    low, high, first, last = map(float, ends)
+    share = (axis(np.array(values)) - first) / (last - first)
+    back = low * (high / low) ** share if kind == "log" else low + share * (high - low)
+    np.testing.assert_allclose(back, values, rtol=1e-5, atol=1e-6 * max(values))
+
+
+@given(st.text(st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufffe\uffff"), min_size=1))
+def test_texts_are_texts(words: str) -> None:
+    words, x = f"<{words}", np.linspace(1.0, 9.0, 5)
+    one = Series(words, "#123456", "6 2", (x, x**2), (x, x**2 - 1, x**2 + 1), (x, x**2))
+    drawn = ET.fromstring(chart("t & u", ("x [mm]", words), [one], words, rules=[Rule(5.0, "limit")]))
+    texts = [element.text for element in drawn.iter(f"{SVG}text")]
+    assert texts.count(words) == 2
+    assert {"t & u", "limit", "x [mm]"} <= set(texts)
+    (group,) = drawn.iter(f"{SVG}g")
+    assert [element.tag for element in group] == [f"{SVG}path"] * 3
+    if words == " ".join(words.split()):
+        assert drawn.get("aria-label") == group.get("data-series") == words
+
+
+def test_what_is_not_known_parts_a_line() -> None:
+    x, y = np.arange(5.0), np.array([1.0, 2.0, math.nan, 4.0, 5.0])
+    (d,) = re.findall(
+        'd="([^"]*)"[^>]*data-of="model"', chart("t", ("x", "y"), [Series("", "red", line=(x, y))], "alt")
+    )
+    assert re.sub("[-. 0-9]", "", d) == "MLML"
+    none = Series("", "red", line=(x[:0], y[:0]))
+    assert 'data-of="model"' not in chart("t", ("x", "y"), [none], "alt")
+
+
+def test_a_map_has_a_cell_a_value_and_bars_where_the_measurement_is_far_below() -> None:
+    before = np.array([[0.1, -3.0, 7.0], [math.nan, 0.0, -0.7]])
+    cells = Cells("storage", ("a", "b"), ("1", "x", "3 Hz"), (before, 0 * before))
+    drawn = maps("t", ("before", "after"), [cells], "alt")
+    paths = re.findall(r'd="([^"]*z)" fill="(#\w+)"', drawn)
+    assert sum(d.count("z") for d, _ in paths) == 10, "one of six was not measured, twice"
+    assert len({color for _, color in paths}) == 4
+    (bars,) = re.findall(r'd="(M[^"z]*)" stroke="#ffffff"', drawn)
+    assert bars.count("M") == 1

@@ -1,4 +1,4 @@
-"""Figures of predictions, fits, raw files, reductions and Maxwell arms, and what all figures share."""
+"""Figures of predictions, fits, raw files, reductions and Maxwell arms, of few levels and of many."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from figures import (
     AMPLITUDES,
@@ -32,7 +31,7 @@ from matplotlib.figure import Figure
 from stepped import stepped
 from tries import some
 
-from bushfit.fitting.data_sets import sweep_data
+from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.geometry import Direction
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.record import Inspected
@@ -41,38 +40,24 @@ from bushfit.model.arms import model_arms
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
 from bushfit.prediction.stiffness import predict
-from bushfit.reading.measurement import Sweep
-from bushfit.reduction.steps import reduce
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reduction.steps import Reduction, Step, reduce
 from bushfit.report.artifacts import prediction_contents
-from bushfit.report.plots.arms import arms_figure
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
-from bushfit.report.plots.inspection import inspection_figure
-from bushfit.report.plots.prediction import prediction_figure
-from bushfit.report.plots.reduction import reduction_figure
-from bushfit.report.plots.style import label_axes
+from bushfit.report.plots.gap import gap_figure
+from bushfit.report.plots.inspection import inspection_figure, reduction_figure
+from bushfit.report.plots.master_curve import arms_figure
+from bushfit.report.plots.prediction import fine_grid, prediction_figure
+from bushfit.report.plots.style import to_image
 
 
-@pytest.mark.parametrize(
-    "backend", some(["module://matplotlib_inline.backend_inline", "no such backend"], {"no such backend"})
-)
-def test_a_backend_that_is_not_installed_does_not_matter(root: Path, tmp_path: Path, backend: str) -> None:
-    """As a notebook sets it for every command that is run from a cell."""
+def test_a_backend_that_is_not_installed_does_not_matter(root: Path, tmp_path: Path) -> None:
+    """As a notebook sets its own for every command that is run from a cell."""
     command = "from bushfit.cli import main; main()"
     arguments = ("fit-static", root / "configs/cmp_15961.toml", "-o", tmp_path / "results")
-    environment = {**os.environ, "MPLBACKEND": backend}
+    environment = {**os.environ, "MPLBACKEND": "no such backend"}
     subprocess.run([sys.executable, "-c", command, *arguments], env=environment, check=True)
     assert (tmp_path / "results/loops.png").is_file()
-
-
-def test_the_name_of_a_panel_is_in_lines_no_higher_than_the_panel() -> None:
-    axes = Figure().add_subplot()
-    for label, parts in (
-        ("axial stiffness |K| [N/mm]", ["axial stiffness |K| [N/mm]"]),
-        ("torsion stiffness |K| [N m/deg]", ["torsion stiffness |K|", "[N\u00a0m/deg]"]),
-        ("DMA, second specimen modulus [MPa]", ["DMA, second specimen", "modulus [MPa]"]),
-    ):
-        label_axes(axes, "", label)
-        assert axes.get_ylabel().splitlines() == parts
 
 
 def test_sweeps_have_a_row_a_direction_and_residuals(paper_model: Model, swept: Swept) -> None:
@@ -112,14 +97,10 @@ def test_long_loops_are_drawn_thin(paper_model: Model, run_in: int, looped: Loop
     assert np.nanmax(step) < 0.1, "a stroke across the cycles that are left out"
 
 
-@pytest.fixture(scope="module")
-def seen(root: Path) -> list[Inspected]:
+def test_files_are_drawn_as_they_are_together_and_alone(root: Path) -> None:
     loops = ("cmp_15961/loop_axial_1.csv", "arm_bushing/loop_axial_2.csv")
     others = ("cmp_15961/sweep_radial.csv", "cmp_15961_raw/stepped_sine_axial.csv")
-    return [inspect(root / "data" / name, {}) for name in (*loops, *others)]
-
-
-def test_files_are_drawn_as_they_are_together_and_alone(seen: list[Inspected]) -> None:
+    seen = [inspect(root / "data" / name, {}) for name in (*loops, *others)]
     figure = whole(inspection_figure(seen))
     shown = {"time [s]", "displacement [mm]", "force [N]", "frequency [Hz]", "|K| [N/mm]", "loss factor [-]"}
     assert shown <= set(labels(figure))
@@ -128,45 +109,16 @@ def test_files_are_drawn_as_they_are_together_and_alone(seen: list[Inspected]) -
         whole(inspection_figure([one]))
 
 
-def test_files_of_one_direction_are_drawn_alike_and_pictures_say_which_they_are(root: Path) -> None:
-    """Loops to 1 and 2 mm in the same scales, with their folders where names repeat; others each in their own."""
-    names = ("practice/case_000", "arm_bushing")
-    every = [inspect(root / f"data/{name}/loop_axial_{number}.csv", {}) for name in names for number in (1, 2)]
-    for page, name in enumerate(names):
-        figure = inside(inspection_figure(every, 2 * page, 2))
-        loops = [axes for axes in figure.axes if axes.get_xlabel() == "displacement [mm]"]
-        assert figure.get_suptitle() == f"Test files as they are, {page + 1} of 2"
-        assert [title.split("/")[0] for title in titles(figure)] == [name.split("/")[-1]] * 2
-        for ends in ([axes.get_xlim() for axes in loops], [axes.get_ylim() for axes in loops]):
-            assert (ends[0] == ends[1]) is (page == 0)
-
-
-def test_what_is_not_as_it_was_recorded_is_said(root: Path, tmp_path: Path) -> None:
-    table = pd.read_csv(root / "data/cmp_15961/loop_axial_1.csv")
-    turned, timeless = tmp_path / "turned_axial.csv", tmp_path / "timeless_axial.csv"
-    table.assign(**{"force [N]": -table["force [N]"]}).to_csv(turned, index=False)
-    table.drop(columns="time [s]").to_csv(timeless, index=False)
-    sine = {"frequency": "0.1 Hz", "waveform": "sine"}
-    figure = inside(inspection_figure([inspect(turned, {}), inspect(timeless, sine)]))
-    first = "turned_axial.csv: loop, axial, force turned, 1 odd"
-    assert titles(figure) == [first, "timeless_axial.csv: loop, axial"]
-    assert {"time [s]", "time rebuilt [s]"} <= set(labels(figure))
-
-
-@pytest.mark.parametrize("direction", some(list(Direction), {Direction.TORSION}))
-def test_reduction(paper_model: Model, direction: Direction) -> None:
-    turns = direction.is_rotation
-    operating = [(f, a * (30.0 if turns else 1.0)) for a in (1e-4, 4e-4) for f in (10.0, 30.0)]
-    history = stepped(paper_model, operating, direction=direction)
+def test_reduction(paper_model: Model) -> None:
+    operating = [(f, 30.0 * a) for a in (1e-4, 4e-4) for f in (10.0, 30.0)]
+    history = stepped(paper_model, operating, direction=Direction.TORSION)
     reduction = reduce([history])
     figure = whole(reduction_figure(reduction, [history], "$ raw $.csv"))
-    unit, length = ("deg", 180.0 / np.pi) if turns else ("mm", 1e3)
     levels = sorted({step.level for step in reduction.steps})
-    assert legend(figure.axes[2]) == [f"{length * level:.4g} {unit}" for level in levels]
+    assert legend(figure.axes[2]) == [f"{np.degrees(level):.3g} deg" for level in levels]
     assert titles(figure) == [], "the title names one history"
-    stiffness = f"{direction} stiffness |K| [{'N m/rad' if turns else 'N/mm'}]"
-    moved = "rotation [deg]" if turns else "displacement [mm]"
-    assert {"time [s]", "frequency [Hz]", "noise [%]", "distortion [%]", stiffness, moved} <= set(labels(figure))
+    shown = {"time [s]", "frequency [Hz]", "noise [%]", "distortion [%]", "rotation [deg]"}
+    assert {*shown, "torsion stiffness |K| [N m/rad]"} <= set(labels(figure))
     drawn = np.concatenate([line.get_ydata() for line in points(figure.axes[2])])
     np.testing.assert_allclose(np.sort(drawn), np.sort([step.loss_factor for step in reduction.steps]))
 
@@ -186,7 +138,7 @@ def test_arms_are_drawn_over_what_they_stand_for(paper_model: Model) -> None:
     assert "in place of the springpot" in note(figure)
 
 
-def test_prediction_over_frequency_and_amplitude(paper_model: Model, swept: Swept) -> None:
+def test_prediction_over_frequency_and_amplitude_and_means_of_repeats(paper_model: Model, swept: Swept) -> None:
     prediction, curves = predicted(paper_model, Direction.AXIAL)
     figure = prediction_figure(prediction, [swept(paper_model)], "CMP 15 961", curves=curves, note="A word more.")
     shown = ("axial stiffness |K| [N/mm]", "axial loss factor [-]")
@@ -199,9 +151,6 @@ def test_prediction_over_frequency_and_amplitude(paper_model: Model, swept: Swep
     line = lines(figure.axes[0])[0]
     spot = np.flatnonzero(np.isclose(line.get_xdata(), 5.0))[0]
     assert line.get_ydata()[spot] == pytest.approx(591.0, rel=1e-3)
-
-
-def test_points_are_means_of_repeats_of_the_same_level_and_direction(paper_model: Model, swept: Swept) -> None:
     prediction, _ = predicted(paper_model, Direction.AXIAL, amplitudes=np.array([2e-4, 3e-4]))
     sweeps = [swept(paper_model), swept(paper_model, Direction.RADIAL)]
     axes = prediction_figure(prediction, sweeps, "").axes[0]
@@ -212,21 +161,6 @@ def test_points_are_means_of_repeats_of_the_same_level_and_direction(paper_model
     assert drawn.get_ydata()[FREQUENCIES == 55.0][0] == pytest.approx(middle, rel=1e-12)
     radial = predicted(paper_model, Direction.TORSION, amplitudes=TORSION)[0]
     assert "measured" not in note(prediction_figure(radial, sweeps, ""))
-
-
-def test_points_of_a_level_that_each_file_reached_a_little_differently_are_all_drawn(paper_model: Model) -> None:
-    levels = np.array([0.02, 0.05, 0.1, 0.2, 0.5, 1.0]) * 1e-3
-    files = [
-        Sweep(
-            f"{f:g} Hz", Direction.AXIAL, np.full(6, f), at, paper_model.stiffness("axial", f, at), stepped="amplitude"
-        )
-        for f, at in ((1.0, 0.98 * levels), (10.0, levels), (50.0, 1.02 * levels))
-    ]
-    prediction = predict(
-        Result(paper_model), Direction.AXIAL, *default_grid(Result(paper_model), Direction.AXIAL, files)
-    )
-    for axes in prediction_figure(prediction, sweep_data(files), "").axes:
-        assert sum(len(line.get_xdata()) for line in points(axes)) == 18
 
 
 def test_points_lie_on_lines_with_the_rig_and_the_bushing_stands_apart(paper_model: Model, swept: Swept) -> None:
@@ -268,20 +202,6 @@ def test_what_may_be_the_rigs_has_a_double_line_that_the_legend_names(paper_mode
     assert "Double lines: the same if it is the rig's" in note(figure)
 
 
-def test_one_amplitude_or_one_frequency_leaves_one_row_and_many_leave_six_and_four_lines(paper_model: Model) -> None:
-    for frequencies, amplitudes, along in (
-        (FREQUENCIES, AMPLITUDES[:1], "frequency [Hz]"),
-        (FREQUENCIES[:1], AMPLITUDES, "amplitude [mm]"),
-        (FREQUENCIES[:1], AMPLITUDES[:1], "frequency [Hz]"),
-    ):
-        prediction, curves = predicted(paper_model, Direction.RADIAL, frequencies, amplitudes)
-        figure = prediction_figure(prediction, [], "one", curves=curves)
-        assert [axes.get_xlabel() for axes in whole(figure).axes] == [along, along]
-    prediction, curves = predicted(paper_model, Direction.AXIAL, amplitudes=np.geomspace(1e-5, 1e-3, 20))
-    figure = prediction_figure(prediction, [], "many", curves=curves)
-    assert [len(lines(axes)) for axes in figure.axes] == [6, 6, 4, 4]
-
-
 def test_units_follow_direction_and_size(
     paper_model: Model, other_models: dict[str, Model], swept: Swept, looped: Looped
 ) -> None:
@@ -294,3 +214,109 @@ def test_units_follow_direction_and_size(
     assert "radial stiffness |K| [kN/mm]" in labels(prediction_figure(stiff, [], "stiff"))
     loops = labels(loops_figure(paper_model, [looped(paper_model, 0.1, direction=Direction.TORSION)], "torsion"))
     assert loops[:2] == ["rotation [deg]", "torsion moment [N m]"]
+
+
+#: A picture that is higher does not fit on three pages of A4 [inch].
+HIGHEST = 33.0
+LONG_NAME = "a file whose name tells all that is known of the test " * 3
+
+
+def checked(figure: Figure) -> Figure:
+    """The figure, once nothing leaves it and nothing in it is too small; warnings are errors while it is drawn."""
+    assert to_image(inside(figure))
+    width, height = figure.get_size_inches()
+    assert height < HIGHEST
+    for panel in (axes.get_position() for axes in figure.axes if not hasattr(axes, "_colorbar")):
+        assert panel.height * height > 0.5
+        assert panel.width * width > 1.2
+    return figure
+
+
+@pytest.mark.parametrize("count", some([8, 40], {40}))
+def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int) -> None:
+    """A line an amplitude, named by a legend as long as that can, else by a colour bar."""
+    data_sets = [swept(paper_model, amplitudes=np.geomspace(2e-5, 1e-3, count), repeats=1)]
+    figure = checked(sweeps_figure(paper_model, data_sets, "mount"))
+    assert figure.axes[2].get_xlabel() == "frequency [Hz]"
+    if count > 8:
+        names = [tick.get_text() for tick in figure.axes[-1].get_yticklabels()]
+        assert len(names) == 8
+        assert (names[0], names[-1], figure.axes[-1].get_title()) == ("0.02 mm", "1 mm", "amplitude")
+    else:
+        assert len(legend(figure.axes[1])) == count
+    checked(gap_figure(paper_model, paper_model, data_sets, "mount", ""))
+    prediction = predict(Result(paper_model), Direction.AXIAL, [5.0, 50.0], np.geomspace(2e-5, 1e-3, count))
+    curves = predict(Result(paper_model), Direction.AXIAL, *fine_grid(prediction))
+    checked(prediction_figure(prediction, data_sets, "mount", curves=curves))
+    seen = Inspected(Path(f"{LONG_NAME}.csv"), "sweep", Direction.AXIAL, {}, (), {}, (), {}, data_sets[0].sweep)
+    (left, right, *bar) = checked(inspection_figure([seen])).axes
+    assert len(points(left)) == count
+    assert len(bar) == (count > 8)
+    assert bar or len(legend(right)) == count
+
+
+def test_one_level_at_several_temperatures_is_a_curve_each(paper_model: Model) -> None:
+    """They are no repeats of one another: nothing is averaged over them, and each is named by its temperature."""
+    frequency, amplitude = np.geomspace(5.0, 150.0, 12), np.full(12, 1e-7)
+    sweeps = [
+        Sweep(f"{celsius}.csv", Direction.AXIAL, frequency, amplitude, factor * (1e6 + 1e5j) * np.ones(12),
+              stepped="frequency", temperature=273.15 + celsius)
+        for celsius, factor in ((40.0, 1.0), (-10.0, 3.0), (20.0, 2.0))
+    ]  # fmt: skip
+    figure = checked(sweeps_figure(paper_model, sweep_data(sweeps), "warm"))
+    assert legend(figure.axes[1]) == ["-10 degC, 0.1 um", "20 degC, 0.1 um", "40 degC, 0.1 um"]
+    stiffness = [line.get_ydata() for line in figure.axes[0].lines if line.get_marker() == "o"]
+    assert [np.unique(np.round(each)).size for each in stiffness] == [1, 1, 1]
+    assert np.array([np.mean(each) for each in stiffness]) == pytest.approx(np.array([3.0, 2.0, 1.0]) * abs(1e3 + 1e2j))
+
+
+@pytest.mark.parametrize("frequencies", some([(40.0,), tuple(np.geomspace(5.0, 150.0, 30))], {(40.0,)}))
+def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, ...]) -> None:
+    """Amplitudes across, logarithmic; a line and a row of the map for each frequency that was held."""
+    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(frequencies, np.geomspace(2e-5, 1e-3, 15)))
+    stiffness = paper_model.stiffness("axial", frequency, amplitude)
+    stiffness = stiffness * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(frequency.size))
+    sweep = Sweep("sweep.csv", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")
+    data_sets, result = sweep_data([sweep]), Result(paper_model)
+    figure = checked(sweeps_figure(paper_model, data_sets, "strain"))
+    assert figure.axes[2].get_xlabel() == "amplitude [mm]"
+    assert figure.axes[2].get_xscale() == "log"
+    assert len([line for line in figure.axes[0].lines if line.get_linestyle() != "None"]) == len(frequencies)
+    gap = checked(gap_figure(paper_model, paper_model, data_sets, "strain", ""))
+    assert gap.axes[1].get_xlabel() == "amplitude [mm]"
+    assert len(gap.axes[0].get_yticklabels()) == min(len(frequencies), 8), "each, or every third of 24 rows"
+    prediction = predict(result, Direction.AXIAL, *default_grid(result, Direction.AXIAL, [sweep]))
+    checked(prediction_figure(prediction, data_sets, "strain", model=paper_model))
+
+
+@pytest.mark.parametrize("count", some([2, 40], {40}))
+def test_many_loops(paper_model: Model, looped: Looped, count: int) -> None:
+    one = looped(paper_model, 1e-3, cycles=2).test
+    data_sets = loop_data(
+        [
+            Loop(f"loop {k}.csv", one.direction, one.time, scale * one.displacement, scale * one.force)
+            for k, scale in enumerate(np.linspace(0.5, 2.0, count))
+        ]
+    )
+    names = legend(checked(loops_figure(paper_model, data_sets, "mount")).axes[1])
+    assert names[-1] == "model"
+    assert len(names) == min(count, 8) + (count > 8) + 1
+    assert (f"and {count - 8} more" in names) is (count > 8)
+    for after in (paper_model, paper_model.with_values({"mu": 1.2 * paper_model.values["mu"]})):
+        checked(gap_figure(paper_model, after, data_sets, "mount", "mount"))
+
+
+@pytest.mark.parametrize(("levels", "histories"), [(8, 40), pytest.param(60, 2, marks=pytest.mark.slow)])
+def test_reduction_of_many_levels(levels: int, histories: int) -> None:
+    time = np.linspace(0.0, 2.0 * levels, 4000)
+    motion = 1e-3 * np.sin(20.0 * time)
+    records = [Loop(f"{LONG_NAME}{k}", Direction.AXIAL, time, motion, 1e6 * motion) for k in range(histories)]
+    steps = tuple(
+        Step(record.name, 2.0 * k, 2.0 * k + 1.0, 10, 12, 50.0, f, a, 1e6 + 1e5j, 3e-3, 3e-3, 0.01, 0.02, f, a)
+        for record in records
+        for k, a in enumerate(np.geomspace(1e-5, 1e-3, levels))
+        for f in (5.0, 50.0)
+    )
+    figure = checked(reduction_figure(Reduction(Direction.AXIAL, steps, ()), records, "raw.csv"))
+    (box,) = (axes for axes in figure.axes if axes.get_legend())
+    assert len(legend(box)) == min(levels, 8) + (levels > 8)

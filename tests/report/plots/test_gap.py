@@ -1,24 +1,25 @@
-"""The gap before and after: one scale, right signs and sizes, any set of tests, one column where nothing was added."""
+"""The gap before and after: one scale, right signs and sizes; and the picture of a batch says what is out of limits."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pytest
-from figures import Looped, Swept, legend, whole
+from figures import Looped, Swept, legend, note, points, titles, whole
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from tries import some
 
 from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
+from bushfit.report.plots.batch import Panel, batch_figure
 from bushfit.report.plots.gap import gap_figure
+from bushfit.report.plots.style import to_image
 
 Heavier = Callable[[float], Model]
 
@@ -84,7 +85,9 @@ def test_rows_are_directions_and_parts_columns_before_and_after(
     assert {text.get_text() for text in bar.texts} == {"measured\nbelow model", "measured\nabove model"}
 
 
-def test_one_symmetric_scale_for_all_maps(paper_model: Model, heavier: Heavier, campaign: list[DataSet]) -> None:
+def test_one_symmetric_scale_and_cells_that_are_measured_less_model_over_noise(
+    paper_model: Model, heavier: Heavier, campaign: list[DataSet], swept: Swept
+) -> None:
     figure = gap_figure(paper_model, heavier(0.1), campaign, "mount", "")
     coloured = [found for axes in maps(figure) for found in cells(axes)]
     assert len(coloured) == 8
@@ -97,9 +100,6 @@ def test_one_symmetric_scale_for_all_maps(paper_model: Model, heavier: Heavier, 
     assert above[0] > above[2], "red above"
     share = np.mean(np.abs(np.concatenate([values(axes) for axes in maps(figure)])) > norm.vmax)
     assert share <= 0.02
-
-
-def test_a_cell_is_measured_less_model_over_the_noise_of_the_mean(paper_model: Model, swept: Swept) -> None:
     data_set = swept(paper_model)
     harder = paper_model.with_values({name: 1.2 * paper_model.values[name] for name in ("mu", "m", "sigma_fmax")})
     axes = maps(gap_figure(harder, paper_model, [data_set], "", ""))
@@ -129,35 +129,6 @@ def test_loops_are_means_in_units_of_their_noise(paper_model: Model, looped: Loo
     assert legend(axes) == ["1 mm, 0.1 Hz"]
 
 
-def test_huge_gaps_of_loops_keep_what_is_small_readable(paper_model: Model, heavier: Heavier, looped: Looped) -> None:
-    wrong = paper_model.with_values({"mu": 2.0 * paper_model.values["mu"]})
-    figure = gap_figure(wrong, paper_model, [looped(paper_model, 1e-3)], "loop", "")
-    first, second = figure.axes
-    assert first.get_yscale() == second.get_yscale() == "symlog"
-    assert first.get_ylim() == second.get_ylim()
-
-
-def test_a_hole_stays_white(paper_model: Model, swept: Swept) -> None:
-    frequencies = np.delete(np.arange(5.0, 156.0, 10.0), 7)
-    (storage, *_) = maps(gap_figure(paper_model, paper_model, [swept(paper_model, frequencies=frequencies)], "", ""))
-    (found,) = cells(storage)
-    edges = np.array([path.get_extents().intervalx for path in found.get_paths()])
-    assert not np.any((edges[:, 0] < 75.0) & (edges[:, 1] > 75.0))
-    np.testing.assert_allclose(np.ptp(edges, axis=1), 10.0)
-
-
-@pytest.mark.parametrize("stiffer", some([1.05, 1.3, 3.0, 20.0], {1.3, 20.0}))
-def test_numbers_of_the_scale_stay_apart(paper_model: Model, swept: Swept, stiffer: float) -> None:
-    off = paper_model.with_values({"mu": paper_model.values["mu"] * stiffer})
-    figure = gap_figure(off, paper_model, [swept(paper_model)], "", "")
-    figure.draw_without_rendering()
-    bar = figure.axes[-1]
-    shown = [label for label in bar.get_xticklabels() if label.get_text()]
-    boxes = [label.get_window_extent() for label in shown]
-    assert all(right.x0 - left.x1 > 2.0 for left, right in pairwise(boxes))
-    assert shown[-1].get_text() == f"{bar.get_xticks()[-1]:g}", "where the scale ends"
-
-
 def test_a_mended_test_is_drawn_where_it_was_recorded(paper_model: Model, swept: Swept) -> None:
     """A radial sweep that was filed as axial: after, it is one of the radial direction, in the same row."""
     radial = swept(paper_model, Direction.RADIAL)
@@ -169,3 +140,58 @@ def test_a_mended_test_is_drawn_where_it_was_recorded(paper_model: Model, swept:
     assert after.startswith("if the record is mistaken")
     storage = maps(figure)[:2]
     assert np.abs(values(storage[0])).min() > 10.0 > 3.0 * np.sqrt(np.mean(np.square(values(storage[1]))))
+
+
+def panel(count: int) -> Panel:
+    values = np.random.default_rng(3).normal(1.0, 0.02, count)
+    values[[1, 4]] = 1.5, np.nan
+    if count > 100:
+        values[50] = 40.0
+    return Panel("mu [MPa]", values, (-np.inf, 1.2), [int(k) for k in np.flatnonzero(values > 1.2)])
+
+
+@pytest.mark.parametrize("count", [10, 20_000])
+def test_medians_limits_and_names(count: int) -> None:
+    one = panel(count)
+    names = [f"$name {n}" for n in range(count)]
+    panels = [one, Panel("alpha [-]", np.full(count, 0.24))]
+    figure = batch_figure(panels, "x", names)
+    assert to_image(figure) == to_image(batch_figure(panels, "x", names))
+    axes, other = figure.axes[:2]
+    heights = {float(line.get_ydata()[0]) for line in axes.lines if len(set(np.atleast_1d(line.get_ydata()))) == 1}
+    assert {float(np.nanmedian(one.values)), 1.2} <= heights
+    low, high = axes.get_ylim()
+    assert low < 1.0 < 1.2 < high
+    assert high < 2.0, "one far out must not squash the rest"
+    assert f"{len(one.missed)} out" in titles(figure)[0]
+    named = {text.get_text().partition(":")[0] for text in axes.texts}
+    assert named == {f"$name {k}" for k in one.missed}
+    assert sum(len(line.get_xdata()) for line in points(axes)) == count - 1, "each bushing that has a value, once"
+    assert other.get_ylim()[0] < 0.24 < other.get_ylim()[1]
+
+
+def test_triangles_have_a_name_and_the_value_that_the_panel_does_not_show() -> None:
+    values = np.array([1.0, 1.01, 0.99, 1.02, 0.98, 4012.0, 1.0, 30.0, 0.97, 20.0])
+    figure = batch_figure([Panel("mu [MPa]", values)], "x", [f"b{n}" for n in range(10)])
+    to_image(figure)
+    axes = figure.axes[0]
+    assert {text.get_text() for text in axes.texts} == {"b5: 4010", "b7: 30", "b9: 20"}
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2)), "names must not cover each other"
+
+
+def test_a_panel_shows_no_less_than_what_is_known() -> None:
+    rounding = 1e-8 * np.arange(6.0)
+    values, half = 0.010974926 + rounding, 2e-4
+    ends = np.stack((values - half, values + half))
+    names = [f"b{n}" for n in range(6)]
+    figure = batch_figure([Panel("a [-]", values, intervals=ends), Panel("b [-]", values)], "x", names)
+    to_image(figure)
+    known, unknown = figure.axes[:2]
+    assert np.ptp(known.get_ylim()) > 2.0 * half
+    bars = [line for found in known.collections for line in found.get_segments()]
+    np.testing.assert_allclose(np.array(bars)[:, :, 1].T, ends)
+    assert unknown.collections[:] == []
+    for axes in (known, unknown):
+        assert all(len(label.get_text()) < 9 for label in axes.get_yticklabels())
+    assert "95 % intervals" in note(figure)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -15,13 +14,12 @@ from typing_extensions import TypedDict
 
 from bushfit import __version__
 from bushfit.cli.common import Options
-from bushfit.cli.show import new_table
-from bushfit.report.contents import Formats
+from bushfit.cli.show import tell_table
 from bushfit.report.folder import check_free, to_json
 from bushfit.validation import plain
-from cards.card import Row, card, confusion
+from cards.card import Row, card
 from cards.families import CARD_SEEDS, FAMILIES, Family, tasks
-from cards.outcome import Outcome, Task
+from cards.outcome import Outcome
 from cards.scorecard import run
 
 #: What a score card writes.
@@ -39,18 +37,16 @@ class Scorecard(TypedDict):
         seed: of everything random.
         session: hours of the session that is planned, and simulated, where effects are left open; null for none.
         card: the measures of each family, with their targets.
-        confusion: of each family: by what was hidden, how often which verdict with which names was given.
         outcomes: every campaign.
     """
 
-    schema: Literal["bushfit/scorecard/2"]
+    schema: Literal["bushfit/scorecard/3"]
     version: str
     families: list[str]
     campaigns: int
     seed: int
     session: float | None
     card: dict[Family, list[Row]]
-    confusion: dict[Family, dict[str, dict[str, int]]]
     outcomes: list[Outcome]
 
 
@@ -75,47 +71,50 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
     """Judge `diagnose` on hidden campaigns of random bushings, and print how often it is right.
 
     The time-domain rig makes the data. Families: effects (every effect alone, pairs, none, and what the library lacks
-    or is made to lack), mistakes (in what a file says), awkward (clean, with the noise
-    and the plans of real rigs), faults (of rigs), outside (laws that the library never gains), library (effects of any
-    size). Laws of effects in time are shared with the fit, those of outside are not. The truth is sealed in files that
-    the workflow does not read, and opened afterwards.
+    or is made to lack), mistakes (in what a file says), awkward (clean, with the noise and the plans of real rigs),
+    faults (of rigs), outside (laws that the library never gains), library (effects of any size). Laws of effects in
+    time are shared with the fit, those of outside are not. The truth is sealed in files that the workflow does not
+    read, and opened afterwards.
 
-    A target is met where the whole 95 % interval of the rate lies within it; told odds are true where the interval of
-    the share right holds them. -o takes scorecard.json. Seeds from 77000 on are kept for cards that are shown; try and
-    tune with others.
+    A target is met where the whole 95 % interval of the rate lies within it. -o takes scorecard.json. Seeds from 77000
+    on are kept for cards that are shown; try and tune with others.
     """
-    options = Options(formats=Formats(pictures=False), **given)
+    options = Options(no_plots=True, **given)
     folder = options.output
     if keep and folder is None:
         raise click.UsageError("--keep needs a folder: -o/--output")
     if folder:
         check_free(folder, [SCORECARD], force=options.force)
     kept = folder / "campaigns" if folder and keep else None
-    outcomes = {
-        each: _made(options, tasks(campaigns, seed, each), jobs, kept, session)
-        for each in FAMILIES
-        if family in (each, "all")
-    }
+    outcomes = {}
+    for each in (name for name in FAMILIES if family in (name, "all")):
+        chosen = tasks(campaigns, seed, each)
+        with Progress(console=options.console, transient=True, disable=options.quiet) as progress:
+            bar = progress.add_task("hidden campaigns", total=len(chosen))
+            outcomes[each] = run(chosen, kept, jobs, lambda _, at=bar, told=progress: told.advance(at), session)
     cards = {name: card(found, name) for name, found in outcomes.items()}
     purpose = "kept for shown cards" if seed >= CARD_SEEDS else "for working"
     for name, rows in cards.items():
         title = f"score card: {len(outcomes[name])} hidden campaigns ({name}), seed {seed}, {purpose}"
-        table = new_table(title, "measure", "figure", "over", "target", "")
+        cells = []
         for row in rows:
             open_ = "too few to say" if row.target and row.over else ""
             met = open_ if row.met is None else ("met" if row.met else "missed")
-            table.add_row(row.measure, row.figure, str(row.over), row.target, met)
-        options.console.print(table)
-        _tell(options, confusion(outcomes[name]), outcomes[name])
+            cells.append((row.measure, row.figure, str(row.over), row.target, met))
+        tell_table(options, title, ("measure", "figure", "over", "target", ""), cells)
+        for test, count in Counter(outcome.decides for outcome in outcomes[name] if outcome.decides).most_common():
+            options.say(f"{count} x to be decided elsewhere: {test}")
+        for outcome in outcomes[name]:
+            if outcome.error:
+                options.say(f"failed: {outcome.task}: {outcome.error}")
     whole: Scorecard = {
-        "schema": "bushfit/scorecard/2",
+        "schema": "bushfit/scorecard/3",
         "version": __version__,
         "families": list(outcomes),
         "campaigns": campaigns,
         "seed": seed,
         "session": session,
         "card": cards,
-        "confusion": {name: {**confusion(found)} for name, found in outcomes.items()},
         "outcomes": [outcome for found in outcomes.values() for outcome in found],
     }
     document = plain(whole, Scorecard)
@@ -123,22 +122,3 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
         replace(options, force=True).write(folder, {SCORECARD: to_json(document)}, document)
     else:
         options.print_json(document)
-
-
-def _made(options: Options, chosen: list[Task], jobs: int, kept: Path | None, session: float | None) -> list[Outcome]:
-    """The outcomes of these tasks."""
-    with Progress(console=options.console, transient=True, disable=options.quiet) as progress:
-        bar = progress.add_task("hidden campaigns", total=len(chosen))
-        return run(chosen, kept, jobs, lambda _: progress.advance(bar), session)
-
-
-def _tell(options: Options, table: Mapping[str, Any], outcomes: list[Outcome]) -> None:
-    """What was said of each truth, and what failed."""
-    for truth, said in table.items():
-        answers = "; ".join(f"{count} x {words}" for words, count in said.most_common())
-        options.say(f"{truth}: {answers}")
-    for test, count in Counter(outcome.decides for outcome in outcomes if outcome.decides).most_common():
-        options.say(f"{count} x to be decided elsewhere: {test}")
-    for outcome in outcomes:
-        if outcome.error:
-            options.say(f"failed: {outcome.task}: {outcome.error}")

@@ -2,6 +2,8 @@
 
 Campaigns are written to disk as files; the workflow reads the campaign, never the sealed truth, which is opened
 afterwards. The same seed makes the same card.
+
+Does the planned session settle what a diagnosis left open? The virtual rig makes its tests of what is hidden.
 """
 
 import time
@@ -23,18 +25,21 @@ from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import effect_of
 from bushfit.effects.mistakes import mistake_named
-from bushfit.errors import MeasurementError
+from bushfit.errors import MeasurementError, ModelError
 from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
+from bushfit.jobs.plan import PlanTests
+from bushfit.planning.campaign import settings_of
+from bushfit.planning.contract import Noise, Test
+from bushfit.planning.offer import RIVALS_APART
 from bushfit.report.contents import Formats
 from bushfit.report.folder import write_files
 from bushfit.report.page.readback import read_results
 from bushfit.simulation.files import to_files
-from bushfit.simulation.measured import Simulated
+from bushfit.simulation.measured import Simulated, simulate
 from cards.families import RECIPES, campaign_of
 from cards.hidden import Sealed
 from cards.outcome import REFUSED, Outcome, Task
-from cards.settled import planned_session, with_session
 
 #: What of |K|, or of a parameter, is off where a mistake in the record matters.
 _MATTERS = 0.02
@@ -139,7 +144,6 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
     added = {name for name in task.hidden if name in result.model.effects}
     asked = [name for name in truth.values if effect_of(name) in added]
     intervals = {name: result.interval(name) for name in asked}
-    (_, odds), leader = next(zip(diagnosis.odds.told, diagnosis.odds.labels, strict=True), (("", 0.0), ""))
     covered = [ends[0] <= truth.values[name] <= ends[1] for name, ends in intervals.items() if ends is not None]
     return Outcome(
         task,
@@ -152,9 +156,6 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
         seconds,
         task.kind == "mistake" and _matters(diagnosis.before, truth),
         before=heldout["before"],
-        nothing=diagnosis.odds.nothing,
-        leader=leader,
-        odds=odds,
     )
 
 
@@ -163,3 +164,40 @@ def _matters(before: Evidence, truth: Sealed) -> bool:
     gap = largest_smooth_misfit(before)
     off = max(abs(before.model.values[name] / value - 1.0) for name, value in truth.values.items())
     return gap > Settings().tolerance and max(gap, off) > _MATTERS
+
+
+#: Highest frequency of the rig that makes the session, over that of the tests so far: what `diagnose` asks for at most.
+_FASTER = 2.0
+#: What is added to the seed of a campaign for the noise of its session.
+_OTHER_NOISE = 1
+
+
+def planned_session(campaign: Campaign, hours: float) -> tuple[Test, ...]:
+    """The tests that `bushfit plan --for rivals` chooses after a campaign; none where it says that none would tell."""
+    fastest = max(float(sweep.frequency.max()) for sweep in campaign.sweeps)
+    rig = replace(campaign.rig, max_frequency=_FASTER * fastest)
+    try:
+        found = PlanTests("rivals", hours).run(replace(campaign, rig=rig)).plan.planned
+    except ModelError:  # rivals of which the fit of either is no model: no test is planned for them
+        return ()
+    return found.tests if found.apart is not None and found.apart >= RIVALS_APART else ()
+
+
+def with_session(campaign: Campaign, hidden: Simulated, tests: Sequence[Test]) -> Campaign:
+    """A campaign with further tests of what is hidden in it, on the same rig.
+
+    What depends on the order of the tests is measured anew as a whole, all in one session.
+    """
+    before, further = hidden.plan, settings_of(tests, Noise())
+    loops, sweeps, anew = further.loops, further.sweeps, hidden.truth.knows_circumstances
+    if anew:
+        repeated = (replace(sweep, repeats=sweep.repeats or before.repeats) for sweep in before.sweeps)
+        loops, sweeps = (*before.loops, *loops), (*repeated, *sweeps)
+    seed = before.seed + _OTHER_NOISE
+    made = simulate(hidden.truth, replace(before, loops=loops, sweeps=sweeps, seed=seed)).campaign()
+    kept = replace(campaign, loops=(), sweeps=()) if anew else campaign
+    return replace(
+        campaign,
+        loops=(*kept.loops, *(replace(loop, name=f"planned_{loop.name}") for loop in made.loops)),
+        sweeps=(*kept.sweeps, *(replace(sweep, name=f"planned_{sweep.name}") for sweep in made.sweeps)),
+    )

@@ -69,7 +69,7 @@
       for (const panel of panels.filter((each) => each.dataset.place === name)) { panel.hidden = !on; }
     }));
   }
-  // Tables that are sorted by the heading that is clicked, and show the rows that hold what is typed.
+  // Tables that are sorted by the heading that is clicked, and show the rows that hold what is typed; as cards on a narrow screen.
   for (const table of document.querySelectorAll("table.sorted")) {
     const filter = document.createElement("label");
     const typed = document.createElement("input");
@@ -84,7 +84,9 @@
       for (const row of rows) { row.hidden = !words.every((word) => row.textContent.toLowerCase().includes(word)); }
       count.textContent = `${rows.filter((row) => !row.hidden).length} of ${rows.length}`;
     });
+    table.classList.add("cards");
     [...table.tHead.rows[0].cells].forEach((cell, column) => {
+      for (const row of table.tBodies[0].rows) { if (column) { row.cells[column].dataset.head = cell.textContent; } }
       const button = document.createElement("button");
       button.type = "button";
       button.append(...cell.childNodes);

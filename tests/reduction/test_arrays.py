@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from bushfit.reading.parallel import by_chunks
+from bushfit.reduction.arrays import by_chunks
 
 
 @pytest.mark.parametrize("cores", [1, 5])

@@ -1,19 +1,89 @@
-"""The tables [[loops]] and [[sweeps]] of a campaign file: a test's file, and what it does not say itself."""
+"""The tables [[loops]] and [[sweeps]] of a campaign file: a file, what it does not say itself, and what was tested."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from bushfit.campaign.quantities import Count, Frequency, Share, Temperature, motion, table, text
-from bushfit.errors import CampaignError
-from bushfit.geometry import Direction
-from bushfit.reading.headers import AmplitudeConvention
+from bushfit.errors import CampaignError, naming
+from bushfit.geometry import Direction, Place, Specimen
+from bushfit.reading.columns import Rows
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.measurement import Stepped, Waveform
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
-from bushfit.validation import Name, Text, converted, unknown_key
+from bushfit.reading.measurement import Floats, Source, Stepped, Waveform, rebuild_time
+from bushfit.units import CELSIUS
+from bushfit.validation import (
+    Count,
+    Frequency,
+    Name,
+    Share,
+    Temperature,
+    Text,
+    converted,
+    motion,
+    table,
+    text,
+    unknown_key,
+)
+
+#: Keys of a table that tell it.
+PLACE_KEYS = ("direction", "specimen")
+#: Lists of tests in [simulate].
+_LISTS = ("loops", "sweeps", "resonances")
+#: Takes the direction of a specimen for none.
+_SHEAR = converted(lambda raw, _: None if raw == "shear" else raw, {"enum": [*Direction, "shear"]})
+
+
+def place_tested(specimen: object, direction: object, specimens: Sequence[Specimen]) -> Place:
+    """The direction or the specimen that the two keys of a test mean.
+
+    Raises:
+        CampaignError: an unknown specimen, a bushing without a direction, or a specimen with one of the bushing's.
+    """
+    known = {specimen.name: specimen for specimen in specimens}
+    if specimen is None:
+        if isinstance(direction, str) and direction in [*Direction]:
+            return Direction(direction)
+        expected = "direction = " + " or ".join(f'"{choice}"' for choice in Direction)
+        hint = f'or specimen = "{next(iter(known))}"' if known else None
+        found = "none" if direction is None else str(direction)
+        raise CampaignError("a test without a direction", found=found, expected=expected, hint=hint)
+    if not isinstance(specimen, str) or specimen not in known:
+        raise CampaignError(
+            "this specimen is not in the campaign",
+            found=str(specimen),
+            expected="one of " + ", ".join(known) if known else "a [[specimens]] table with this name",
+        )
+    if direction not in (None, "shear"):
+        expected = 'direction = "shear", or none: a specimen is tested in one way only'
+        raise CampaignError("a specimen has no such direction", found=str(direction), expected=expected)
+    return known[specimen]
+
+
+def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
+    """A parsed [simulate] with the place itself for the keys that tell it; what is no table is left alone.
+
+    Raises:
+        CampaignError: as of `place_tested`.
+    """
+
+    def placed(test: Any, place: str) -> Any:
+        if not isinstance(test, dict):
+            return test
+        with naming(place=place):
+            direction = place_tested(test.get("specimen"), test.get("direction"), specimens)
+        return {**{key: value for key, value in test.items() if key not in PLACE_KEYS}, "direction": direction}
+
+    if not isinstance(tables, dict):
+        return tables
+    return {
+        key: [placed(test, f"{key} #{number}") for number, test in enumerate(table, 1)]
+        if key in _LISTS and isinstance(table, list)
+        else table
+        for key, table in tables.items()
+    }
 
 
 def _roles(known: Collection[str], what: str) -> BeforeValidator:
@@ -28,10 +98,6 @@ def _roles(known: Collection[str], what: str) -> BeforeValidator:
         return raw
 
     return table(check_keys, closed)
-
-
-#: Takes the direction of a specimen for none.
-_SHEAR = converted(lambda raw, _: None if raw == "shear" else raw, {"enum": [*Direction, "shear"]})
 
 
 @dataclass(frozen=True)
@@ -66,6 +132,17 @@ class TestFile(FileFormat):
     operator: Text | None = None
     specimen_number: Text | None = None
 
+    def source(self, sha256: str, temperature: float | None, notes: Iterable[str]) -> Source:
+        """The provenance of the test: its file, and the conditions that results carry on, a temperature [K] in degC."""
+        stated = {key: getattr(self, key) for key in ("order", "preload", "date", "operator", "specimen_number")}
+        degrees = None if temperature is None else round(temperature - CELSIUS, 6)
+        known = {key: each for key, each in {**stated, "temperature_degC": degrees}.items() if each is not None}
+        return Source(Path(self.file), sha256, known, tuple(notes))
+
+    def taken(self, *, shared: bool) -> Rows:
+        """The rows that make the test; others may be in the same file."""
+        return Rows(self.direction, self.specimen_number, self.rows, shared)
+
 
 @dataclass(frozen=True)
 class LoopFile(TestFile):
@@ -97,6 +174,12 @@ class LoopFile(TestFile):
                     hint='state waveform = "sine" beside it' if self.frequency and not self.rate else None,
                 )
             )
+
+    def clock(self, displacement: Floats) -> Floats:
+        """Time of each row [s], (n,), of a file without it; its motion is a triangle unless stated."""
+        return rebuild_time(
+            displacement, rate=self.rate, frequency=self.frequency, waveform=self.waveform or "triangle"
+        )
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,43 @@
+"""Work on long arrays: medians and scatter that few outliers move by much, and chunks on all cores."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+import numpy as np
+
+from bushfit.reading.measurement import Floats
+
+_Answer = TypeVar("_Answer")
+#: Standard deviation of normal scatter over the median of its absolute values, 1/Phi^-1(3/4).
+MEDIAN_TO_SIGMA = 1.482602218505602
+#: Entries of a chunk: 2 MiB of float64, which a core's cache holds.
+CHUNK = 1 << 18
+
+
+def scatter(values: Floats) -> tuple[float, float]:
+    """Median of values, (n,), and their standard deviation by the median absolute deviation."""
+    middle = float(np.median(values))
+    return middle, MEDIAN_TO_SIGMA * float(np.median(np.abs(values - middle)))
+
+
+def median(values: Floats, axis: int = 0) -> Floats:
+    """Median along an axis of values none of which is NaN: that of NumPy takes ten times as long over few."""
+    ordered = np.sort(values, axis=axis)
+    middle = ordered.shape[axis] // 2
+    low = middle - 1 + ordered.shape[axis] % 2
+    return np.asarray((ordered.take(low, axis) + ordered.take(middle, axis)) / 2.0)
+
+
+def by_chunks(work: Callable[[slice], _Answer], size: int, chunk: int = CHUNK) -> list[_Answer]:
+    """What `work` makes of each chunk of a long array, in order.
+
+    NumPy lets other threads run while it works on a chunk. The chunks of an array of `size` entries, and so the
+    numbers, are the same on any number of cores.
+    """
+    chunks = [slice(start, min(start + chunk, size)) for start in range(0, size, chunk)]
+    if len(chunks) < 2:
+        return [work(entries) for entries in chunks]
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        return list(threads.map(work, chunks))

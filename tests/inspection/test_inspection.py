@@ -1,0 +1,382 @@
+"""Files looked at: what is recognised, each fault told with its figures, and clean files that raise nothing."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from looking import NOISE, SEEDS, look, plan, without
+
+from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
+from bushfit.errors import BushfitError, FitError
+from bushfit.geometry import Direction, Specimen
+from bushfit.inspection.gathering import gather
+from bushfit.inspection.loops import look_at_loop
+from bushfit.inspection.opening import inspect
+from bushfit.inspection.record import file_text
+from bushfit.model.model import Model
+from bushfit.reading.loops import read_loop
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.names import Labels
+from bushfit.reading.stated import LoopFile
+from bushfit.simulation.files import raw_loop_table, raw_sweep_table
+from bushfit.simulation.measured import measure, simulate
+from bushfit.simulation.undisturbed import Undisturbed, undisturbed
+
+
+@pytest.fixture(scope="module")
+def clean(paper_model: Model) -> Undisturbed:
+    return undisturbed(paper_model, plan(), steps_per_cycle=256)
+
+
+@pytest.fixture
+def loop(clean: Undisturbed) -> Loop:
+    return measure(clean, plan(seed=1, force_noise=3e-3, displacement_noise=2e-4)).loops[0]
+
+
+@pytest.fixture
+def sweep(clean: Undisturbed) -> Sweep:
+    return measure(clean, plan(seed=1, noise=5e-3, gain_error=2e-3, phase_error=2e-3)).sweeps[0]
+
+
+CHANNELS = ("time", "displacement", "force")
+
+
+def test_loops_sines_and_triangles_are_described(loop: Loop, tmp_path: Path, paper_model: Model) -> None:
+    seen = look(tmp_path, replace(loop, force=loop.force + 20.0), "loop_axial_1mm_0.1Hz.csv")
+    assert (seen.kind, seen.direction) == ("loop", Direction.AXIAL)
+    assert [(column.role, column.unit) for column in seen.columns] == [
+        ("time", "s"), ("displacement", "mm"), ("force", "N"),
+    ]  # fmt: skip
+    assert seen.columns[1].high == pytest.approx(1.0, abs=2e-3)
+    facts = seen.facts
+    assert facts["cycles"].startswith("3")
+    assert facts["frequency"] == "0.1 Hz, a sine"
+    assert facts["sampling"] == "even, every 0.01 s, 1000 rows a cycle"
+    assert facts["amplitude"] == "1 mm zero-to-peak"
+    assert facts["mean force"].startswith("20")
+    assert facts["noise"].startswith("0.3 %")
+    assert seen.odd == ()
+    test = SimulatedLoop(Direction.TORSION, 0.02, 0.1, cycles=2, waveform="triangle")
+    made = measure(undisturbed(paper_model, SimulateSettings(loops=(test,))), SimulateSettings(force_noise=1e-3))
+    seen = look(tmp_path, made.loops[0], "x.csv")
+    assert seen.direction.is_rotation
+    assert seen.facts["frequency"] == "0.1 Hz, a triangle"
+    assert seen.facts["amplitude"].endswith("deg zero-to-peak")
+    assert seen.odd == ()
+
+
+def less(loop: Loop, rows: slice) -> Loop:
+    """Without some rows."""
+    return replace(loop, **{key: np.delete(getattr(loop, key), rows) for key in CHANNELS})
+
+
+def jumping(loop: Loop, *rows: int) -> Loop:
+    """With a force that jumps in some rows."""
+    return replace(loop, force=loop.force + np.where(np.isin(np.arange(loop.force.size), rows), 90.0, 0.0))
+
+
+def stuck(loop: Loop) -> Loop:
+    """With 30 rows that repeat one."""
+    rows = np.r_[0:400, [400] * 30, 430 : loop.time.size]
+    return replace(loop, displacement=loop.displacement[rows], force=loop.force[rows])
+
+
+LOOP_FAULTS: dict[str, Callable[[Loop], Loop]] = {
+    "the force is cut off at its top": lambda x: replace(x, force=np.minimum(x.force, 0.8 * x.force.max())),
+    "the displacement is cut off at its bottom": lambda x: replace(
+        x, displacement=np.maximum(x.displacement, 0.9 * x.displacement.min())
+    ),
+    "one cycle takes 170 min, as hardly any test does, unless axial.csv ran 60 times faster than stated": (
+        lambda x: replace(x, time=1000.0 * x.time)
+    ),
+    "the force drifts: its mean goes from": lambda x: replace(x, force=x.force + 3.0 * x.time / x.time[-1]),
+    "the displacement drifts": lambda x: replace(x, displacement=x.displacement + 2e-5 * x.time / x.time[-1]),
+    "the cycles are still settling: the force amplitude goes from": lambda x: replace(
+        x, force=x.force * (1.0 + 0.1 * np.exp(-x.time / 20.0))
+    ),
+    "the force has an outlier at data row 701": lambda x: jumping(x, 700),
+    " and 1 more": lambda x: jumping(x, 100, 700, 1300, 1900),
+    "1 gap in time, the first after data row 300: 0.31 s without a row": lambda x: less(x, slice(300, 330)),
+    "30 rows from data row 401 on repeat one displacement and force": stuck,
+    "before its steady cycles are left out": lambda x: replace(
+        x, displacement=x.displacement * np.where(x.time < 9.9, 0.6, 1.0)
+    ),
+    "the motion is off zero by 0.03 mm, 3 % of its amplitude": lambda x: replace(x, displacement=x.displacement + 3e-5),
+    "recorded about a mean displacement of 0.1 mm; the model knows no preload": lambda x: replace(
+        x, displacement=x.displacement + 1e-4
+    ),
+    "recorded about a mean force of 820 N; the model knows no preload": lambda x: replace(x, force=x.force + 820.0),
+    "the campaign needs force_sign = -1": lambda x: replace(x, force=-x.force),
+}
+
+
+@pytest.mark.parametrize("said", LOOP_FAULTS)
+def test_each_fault_of_a_loop_is_told(loop: Loop, tmp_path: Path, said: str) -> None:
+    odd = look(tmp_path, LOOP_FAULTS[said](loop)).odd
+    assert any(said in sentence for sentence in odd), odd
+    assert len(odd) <= 2
+
+
+def test_gaps_and_an_uneven_clock_are_described(loop: Loop, tmp_path: Path) -> None:
+    uneven = less(loop, slice(5, None, 10))
+    assert look(tmp_path, uneven).facts["sampling"].startswith("uneven, every 0.01 to 0.02 s, mostly 0.01 s")
+    seen = look(tmp_path, less(loop, slice(600, 1600)))
+    facts, odd = seen.facts, seen.odd
+    assert float(facts["amplitude"].split()[0]) == pytest.approx(1.0, rel=0.01)
+    assert abs(float(facts["mean displacement"].split()[0])) < 0.01
+    assert any("1 gap in time" in sentence for sentence in odd)
+    assert facts["frequency"] == "0.1 Hz, a sine"
+    assert any("rows are missing; of 30 s only 16 to 30 s are used" in sentence for sentence in odd)
+
+
+def test_a_loop_the_wrong_way_round_is_refused(loop: Loop, tmp_path: Path) -> None:
+    with pytest.raises(FitError, match="gives energy"):
+        look(tmp_path, replace(loop, force=np.roll(loop.force, 60)))
+
+
+def test_rows_of_a_sine_do_not_pass_for_a_triangle(root: Path, tmp_path: Path) -> None:
+    """A sine's file without time, of which a rate was stated."""
+    lines = (root / "data/arm_bushing/loop_axial_1.csv").read_text(encoding="utf-8").splitlines()
+    file = tmp_path / "loop.csv"
+    file.write_text("\n".join(line.partition(",")[2] for line in lines), encoding="utf-8")
+    triangle, sine = LoopFile(file="", rate=1.2e-4), LoopFile(file="", frequency=0.1, waveform="sine")
+    _, wrong = look_at_loop(read_loop(file, Direction.AXIAL, triangle), Labels())
+    _, right = look_at_loop(read_loop(file, Direction.AXIAL, sine), Labels())
+    assert any("as those of a sine" in line for line in wrong)
+    assert not any("as those of" in line for line in right)
+
+
+def spoiled(sweep: Sweep, rows: np.ndarray, factor: complex) -> Sweep:
+    return replace(sweep, stiffness=np.where(rows, factor, 1.0) * sweep.stiffness)
+
+
+def copied(sweep: Sweep) -> Sweep:
+    """The second repeat of the smallest level is the first one once more."""
+    first, second = ((sweep.amplitude == 1e-4) & (sweep.repeat == number) for number in (1, 2))
+    stiffness = sweep.stiffness.copy()
+    stiffness[second] = stiffness[first]
+    return replace(sweep, stiffness=stiffness)
+
+
+SWEEP_FAULTS: dict[str, Callable[[Sweep], Sweep]] = {
+    "16 rows repeat others digit by digit, the first of them at 5 Hz (data row 1)": copied,
+    "0.2 mm, repeat 1, lacks 45, 55 Hz, which most others have": lambda x: without(
+        x, (x.amplitude == 2e-4) & np.isin(x.frequency, (45.0, 55.0))
+    ),
+    "data row 21 (45 Hz, 0.1 mm, repeat 2) is +1": lambda x: spoiled(x, np.arange(x.repeat.size) == 20, 1.15),
+    "0.5 mm, repeat 3 lies +": lambda x: spoiled(x, (x.amplitude == 5e-4) & (x.repeat == 3), 1.08),
+    "|K| drifts by -4": lambda x: replace(x, stiffness=x.stiffness * (1.0 - 0.02 * x.repeat)),
+    "9 points with a loss factor below zero, the first at 155 Hz, 0.1 mm: is the force channel late?": (
+        lambda x: spoiled(x, x.frequency == 155.0, np.exp(-0.4j))
+    ),
+    "unless the phases of axial.csv are radians, not degrees (then, in the campaign: [[sweeps]] of axial": (
+        lambda x: replace(x, stiffness=np.abs(x.stiffness) * np.exp(1j * np.radians(np.angle(x.stiffness))))
+    ),
+    "unless the phases of axial.csv are 90 deg less the loss angle (then, in the campaign: [[sweeps]] of axial": (
+        lambda x: replace(x, stiffness=1j * np.conj(x.stiffness * np.exp(0.2j)))
+    ),
+}
+
+
+@pytest.mark.parametrize("said", SWEEP_FAULTS)
+def test_each_fault_of_a_sweep_is_told(sweep: Sweep, tmp_path: Path, said: str) -> None:
+    odd = look(tmp_path, SWEEP_FAULTS[said](sweep)).odd
+    assert any(said in sentence for sentence in odd), odd
+
+
+@pytest.mark.parametrize("order", ["by amplitude", "shuffled"])
+def test_repeats_that_nothing_tells_are_asked_for(sweep: Sweep, tmp_path: Path, order: str) -> None:
+    """A repeat lost and levels missed by up to 12 %: no rule groups them."""
+    table = raw_sweep_table(sweep).drop(columns="repeat").iloc[1:]
+    table["amplitude [mm]"] *= 1.0 + 0.12 * np.random.default_rng(1).uniform(-1.0, 1.0, len(table))
+    by_amplitude = table.sort_values(["frequency [Hz]", "amplitude [mm]"])
+    table = by_amplitude if order == "by amplitude" else table.sample(frac=1.0, random_state=1)
+    table.to_csv(tmp_path / "axial.csv", index=False)
+    odd = inspect(tmp_path / "axial.csv", {}).odd
+    assert any("if they are repeats, a column repeat with their numbers tells so" in sentence for sentence in odd)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("loop_axial_1mm_0.1Hz.csv", ()),
+        ("loop axial 1,0 mm 10mm_min.csv", ()),
+        ("axial_18mm_bushing_1mm.csv", ()),
+        ("loop_axial_2mm.csv", ("the name says 2 mm, the amplitude is 1 mm zero-to-peak: the name may count p",)),
+        ("loop_axial_0p5mm_0.2Hz.csv", ("the name says 0.5 mm, the amplitude", "the name says 0.2 Hz, the frequency")),
+    ],
+)
+def test_labels_are_held_against_the_content(loop: Loop, tmp_path: Path, name: str, said: tuple[str, ...]) -> None:
+    odd = look(tmp_path, loop, name).odd
+    assert len(odd) == len(said)
+    assert all(sentence.startswith(start) for sentence, start in zip(odd, said, strict=True))
+
+
+def test_label_of_a_sweep(sweep: Sweep, tmp_path: Path) -> None:
+    one = without(sweep, sweep.amplitude != 2e-4)
+    assert look(tmp_path, one, "sweep_axial_0.2mm.csv").odd == ()
+    (said,) = look(tmp_path, one, "sweep_axial_0.4mm.csv").odd
+    assert "the amplitude is 0.2 mm zero-to-peak: the name may count peak-to-peak" in said
+    assert look(tmp_path, one, "sweep_axial_0.4mm_pp.csv").odd == ()
+
+
+def held(sweep: Sweep, file: Path, level: float = 1e-4, drop: str = "amplitude [mm]") -> Path:
+    table = raw_sweep_table(sweep)[sweep.amplitude == level].drop(columns=drop)
+    table.to_csv(file, index=False)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("name", "stated", "entry", "amplitude"),
+    [
+        ("axial_A0,1mm", {}, {"at_amplitude": "0.1 mm"}, 1e-4),
+        ("axial_0.2mmpp_23C", {}, {"at_amplitude": "0.1 mm", "temperature": "23 degC"}, 1e-4),
+        ("axial_0.2mm", {"amplitude": "peak-to-peak"}, {"at_amplitude": "0.1 mm"}, 1e-4),
+        ("axial_0.2mmpp", {"amplitude": "zero-to-peak"}, {"at_amplitude": "0.2 mm"}, 2e-4),
+        ("axial_0.2mm", {"at_amplitude": "0.1 mm"}, {"at_amplitude": "0.1 mm"}, 1e-4),
+    ],
+)
+def test_an_amplitude_without_a_column_is_read_from_the_name_unless_stated(
+    sweep: Sweep, tmp_path: Path, name: str, stated: dict[str, str], entry: dict[str, str], amplitude: float
+) -> None:
+    seen = inspect(held(sweep, tmp_path / f"{name}.csv"), stated)
+    assert seen.entry == entry
+    assert seen.measured.amplitude[0] == pytest.approx(amplitude)
+    assert ("from its name" in seen.facts) == ("at_amplitude" not in stated)
+    assert (seen.assumed is not None) == (name == "axial_A0,1mm")
+    overruled = name == "axial_0.2mm" and "at_amplitude" in stated
+    assert bool(seen.odd) == overruled
+
+
+@pytest.mark.parametrize(
+    ("header", "cells", "name", "strain"),
+    [
+        ("G' [MPa],G'' [MPa]", "{0},0.2", "shear_0.1%", "engineering"),
+        ("E' [MPa],E'' [MPa]", "{0},0.2", "bar_0.1%", "tension"),
+        ("Strain [%],Storage Modulus E' [MPa],tan delta [-]", "0.1,{0},0.1", "x", "tension"),
+        ("Strain [%],E' [MPa],Phase angle [deg]", "0.1,{0},5.7", "x", "tension"),
+        ("E* 0.1 % [MPa],E* 1 % [MPa],tan delta 0.1 %,tan delta 1 %", "{0},0.8,0.1,0.2", "x", "tension"),
+        ("|G*| 0.1% [MPa],|G*| 1% [MPa],tan delta 0.1 %,tan delta 1 %", "{0},0.8,0.1,0.2", "x", "engineering"),
+    ],
+)
+def test_moduli_are_those_of_a_specimen(header: str, cells: str, name: str, strain: str, tmp_path: Path) -> None:
+    rows = "\n".join(f"{f},{cells.format(1.2 + f / 1e3)}" for f in range(5, 60, 5))
+    (tmp_path / f"{name}.csv").write_text(f"frequency [Hz],{header}\n{rows}\n", encoding="utf-8")
+    seen = inspect(tmp_path / f"{name}.csv", {"specimen": "DMA"})
+    assert seen.direction == Specimen("DMA", "modulus", strain=strain)
+    assert seen.entry == {"specimen": "DMA"} | ({"at_amplitude": "0.1 %"} if "%" in name else {})
+    assert "its strain is taken as" in seen.assumed
+    assert inspect(tmp_path / f"{name}.csv", {}).direction.name == ("bar" if strain == "tension" else "coupon")
+
+
+@pytest.mark.parametrize("text", ["0 mm", "-0.1 mm", "0.1", "0.1 N", "wide"])
+def test_an_amplitude_that_is_none_is_refused(sweep: Sweep, tmp_path: Path, text: str) -> None:
+    with pytest.raises(BushfitError, match=r"axial\.csv, at_amplitude: "):
+        inspect(held(sweep, tmp_path / "axial.csv"), {"at_amplitude": text})
+
+
+def test_a_temperature_is_stated_for_files_with_several(tmp_path: Path) -> None:
+    """Of files with one temperature in a column, with several, and without such a column."""
+    rows = pd.DataFrame(
+        [(f, 0.1, 600 + f, 0.1, t) for t in (10, 25) for f in range(5, 60, 5)],
+        columns=["f [Hz]", "amplitude [mm]", "K* [N/mm]", "tan delta", "temperature [degC]"],
+    )
+    files = {"axial_several": rows, "axial_one": rows[:11], "radial_none": rows[:11].drop(columns="temperature [degC]")}
+    for name, table in files.items():
+        table.to_csv(tmp_path / f"{name}.csv", index=False)
+
+    def entries() -> dict[str, object]:
+        sources, _ = gather([tmp_path], {"temperature": "25 degC"})
+        return {source.file.stem: source.inspect().entry for source in sources}
+
+    # it chooses rows of another file, and tells nothing of the one without
+    assert entries() == {"axial_several": {"temperature": "25 degC"}, "axial_one": {}, "radial_none": {}}
+    with pytest.raises(BushfitError, match=r"several temperatures(.|\n)*temperature = "):
+        inspect(tmp_path / "axial_several.csv", {})
+    (tmp_path / "axial_several.csv").unlink()
+    assert entries() == {"axial_one": {}, "radial_none": {"temperature": "25 degC"}}
+
+
+@pytest.mark.parametrize("rig", NOISE)
+@pytest.mark.parametrize("seeds", SEEDS)
+def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str, seeds: int) -> None:
+    """Nor do loops without time: rebuilt from a noisy motion it is uneven where the motion turns."""
+    raised, file = [], tmp_path / "untimed_axial.csv"
+    for seed in range(seeds):
+        made = measure(clean, plan(seed=seed, **NOISE[rig]))
+        seen = [look(tmp_path, test) for test in (*made.loops, *made.sweeps)]
+        for loop, waveform, frequency in zip(made.loops, ("sine", "triangle"), ("0.1 Hz", "0.2 Hz"), strict=True):
+            raw_loop_table(loop).iloc[:, 1:].to_csv(file, index=False)
+            seen.append(inspect(file, {"frequency": frequency, "waveform": waveform}))
+        raised += [f"seed {seed}, {one.file.name}: {sentence}" for one in seen for sentence in one.odd]
+    assert raised == []
+
+
+def test_gaps_in_a_motion_are_told_and_slow_loops_are_no_stepped_sine(
+    loop: Loop, tmp_path: Path, paper_model: Model
+) -> None:
+    table = raw_loop_table(loop).iloc[:, 1:].drop(index=range(500, 530))
+    table.to_csv(tmp_path / "axial.csv", index=False)
+    odd = inspect(tmp_path / "axial.csv", {"frequency": "0.1 Hz", "waveform": "sine"}).odd
+    assert any("1 gap in the motion, the first after data row 500: the displacement goes from " in line for line in odd)
+    planned = SimulatedLoop(Direction.AXIAL, 5e-4, cycles=4, frequencies=(0.1, 0.3))
+    (record,) = simulate(paper_model, SimulateSettings(loops=(planned,))).loops
+    seen = look(tmp_path, record)
+    assert seen.kind == "loop"
+    assert seen.facts["programme"].startswith("2 loops in one record: 0.5 mm at 0.1, 0.3 Hz")
+
+
+def test_the_data_of_the_repository_raise_only_what_is_there(root: Path) -> None:
+    """Two practice campaigns lag so much that loss factors fall below zero; nothing else is odd in a single file."""
+    sound = [*root.glob("data/cmp_15961*/*.csv"), *root.glob("data/arm_bushing/*.csv")]
+    practice = [*root.glob("data/practice/*/*.csv"), *root.glob("data/mystery_mount/*.csv")]
+    odd = {file: found for file in (*sound, *practice) if (found := inspect(file, {}).odd)}
+    assert len(sound) == 8
+    assert len(odd) <= 2
+    assert not set(odd) & set(sound)
+    assert all("loss factor below zero" in sentence for found in odd.values() for sentence in found)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "amplitudes", "said"),
+    [
+        (1.0, (1.0,), None),
+        (5.0, (1.0,), "a motion at 5 Hz is taken for a loop"),
+        (0.1, (0.2, 0.6, 1.0), None),
+    ],
+)
+def test_one_sine_is_a_loop_however_fast(
+    tmp_path: Path, frequency: float, amplitudes: tuple[float, ...], said: str | None
+) -> None:
+    time = np.arange(0.0, 5.0 * len(amplitudes), 0.005) / frequency
+    size = np.asarray(amplitudes)[np.minimum(time * frequency // 5, len(amplitudes) - 1).astype(int)]
+    phase = 2.0 * np.pi * frequency * time
+    noise = np.random.default_rng(3).standard_normal((2, time.size))
+    motion = 1e-3 * (size * np.sin(phase) + 1e-4 * noise[0])
+    force = 500.0 * (size * np.sin(phase + 0.1) + 1e-3 * noise[1])
+    seen = look(tmp_path, Loop("x", Direction.AXIAL, time, motion, force))
+    assert seen.kind == "loop"
+    told = [sentence for sentence in seen.odd if "taken for a loop" in sentence]
+    assert [sentence.startswith(said or "") for sentence in told] == [True] * bool(said)
+    assert all("bushfit reduce" in sentence for sentence in told)
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_a_programme_of_loops_is_described(paper_model: Model, tmp_path: Path, *, timed: bool) -> None:
+    planned = SimulatedLoop(Direction.AXIAL, cycles=5, amplitudes=(2e-4, 5e-4, 1e-3), frequency=0.1, pause=12.0)
+    (record,) = simulate(paper_model, SimulateSettings(seed=1, force_noise=3e-3, loops=(planned,))).loops
+    table = raw_loop_table(record)
+    (table if timed else table.iloc[:, 1:]).to_csv(tmp_path / "axial.csv", index=False)
+    seen = inspect(tmp_path / "axial.csv", {} if timed else {"frequency": "0.1 Hz", "waveform": "sine"})
+    said = "3 loops in one record: 0.2, 0.5, 1 mm at 0.1 Hz, 4 to 5 cycles used of each; 25 % of the rows left out"
+    assert seen.kind == "loop"
+    assert seen.facts["programme"] == said
+    assert seen.facts["loop 2"].startswith("0.5 mm at 0.1 Hz, a sine; ")
+    assert seen.facts["loop 2"].endswith("before its steady cycles are left out; 4 cycles are used")
+    assert tomllib.loads(file_text(seen, tmp_path))["loops"][0]["file"] == "axial.csv"
