@@ -91,17 +91,17 @@ def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_ampl
     assert table["frequency [Hz]"].tolist() == [10, 20, 30] * 2
     assert table["amplitude [mm]"].tolist() == [0.1] * 3 + [0.3] * 3
     amplitudes = ", ".join(f"{0.02 * n:.2f}" for n in range(1, 31)) + " mm"
-    options = ("--direction", "axial", "--amplitudes", amplitudes, "--no-plots", "-o", tmp_path / "x")
+    options = ("--direction", "axial", "--amplitudes", amplitudes, "--no-plots", "-o", tmp_path / "y")
     done = bushfit("predict", "model/model.json", *options)
     lines = [line.split() for line in done.stderr.splitlines() if line.split()[:1] == ["155"]]
     shown = [words[1] for words in lines]
     value, low, high = (float(lines[0][place].strip("()")) for place in (2, 3, 5))
-    first = pd.read_csv(tmp_path / "x/axial.csv").query("`frequency [Hz]` == 155").iloc[0]
+    first = pd.read_csv(tmp_path / "y/axial.csv").query("`frequency [Hz]` == 155").iloc[0]
     wanted = [first[f"stiffness [N/mm]{end}"] for end in ("", ", low", ", high")]
     assert (value, low, high) == pytest.approx(wanted, abs=0.051)
     assert len(shown) == 8
     assert (shown[0], shown[-1]) == ("0.02", "0.6")
-    assert len(pd.read_csv(tmp_path / "x/axial.csv")["amplitude [mm]"].unique()) == 30
+    assert len(pd.read_csv(tmp_path / "y/axial.csv")["amplitude [mm]"].unique()) == 30
 
 
 def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: Path, tmp_path: Path) -> None:
