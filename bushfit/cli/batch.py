@@ -125,10 +125,10 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
         rows = []
         for quantity, (middle, spread) in outcome.scatter.items():
             unit, factor = for_people(quantity.unit, 1.0, middle)
-            scattered = alike([spread * factor], 2)[0] if spread else ""  # one value tells of none
-            rows.append((quantity.name, alike([middle * factor], 4)[0], scattered, unit))
-        title = f"{plan.title}: {status['done']} bushing{'s' * (status['done'] > 1)}"
-        tell_table(options, title, ("quantity", "median", "robust std dev", "unit"), rows)
+            scatter = alike([spread * factor], 2)[0] if spread else ""  # one value tells of none
+            rows.append((quantity.name, alike([middle * factor], 4)[0], scatter, unit))
+        columns = ("quantity", "median", "robust std dev", "unit")
+        tell_table(options, f"{plan.title}: {status['done']} bushing{'s' * (status['done'] > 1)}", columns, rows)
     rate = status.total() / max(outcome.seconds, 1e-9)
     kept = f", {outcome.kept} of them from before" if outcome.kept else ""
     options.say(f"{status['done']} done{kept}, {status['failed']} failed; {outcome.seconds:.1f} s, {rate:.1f} a second")

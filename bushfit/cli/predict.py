@@ -97,12 +97,13 @@ def tell_predictions(options: Options, outcome: Predicted) -> None:
         place = str(prediction.direction)
         whose = "" if prediction.direction in outcome.result.specimens else f"{outcome.result.name}: "
         low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
-        corners = table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)]
-        rows = [[number(x, 6) for x in row[:2]] for row in corners.itertuples(index=False)]
-        for name, digits in zip(table.columns[2:4], (4, 3), strict=True):
-            bands = corners[[name, f"{name}, low", f"{name}, high"]].itertuples(index=False)
-            for row, (value, low, high) in zip(rows, bands, strict=True):
-                told, *ends = alike([value, low, high], digits)
-                row.append(f"{told} ({' to '.join(ends)})" if low < high else told)
+        rows = []
+        for _, row in table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].iterrows():
+            cells = [number(value, 6) for value in row.iloc[:2]]
+            for name, digits in zip(table.columns[2:4], (4, 3), strict=True):
+                band = row[f"{name}, low"], row[f"{name}, high"]
+                value, *ends = alike([row[name], *band], digits)
+                cells.append(f"{value} ({' to '.join(ends)})" if band[0] < band[1] else value)
+            rows.append(cells)
         tell_table(options, f"{whose}{place}, corners, with 95 % bands", list(table.columns[:4]), rows, names=2)
     options.warn(outcome.warnings)

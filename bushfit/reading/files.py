@@ -46,8 +46,8 @@ def view_bytes(
         if not file.exists():
             siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
             hint = did_you_mean(file.name, siblings) or "check the path for a typing error"
-            expected = "an existing file; a relative path counts from here, or from the file that names it"
-            raise kind("there is no such file", file=file, expected=expected, hint=hint)
+            expected = "a relative path counts from here, or from the folder of the file that names it"
+            raise kind("there is no such file", file=file, expected=f"an existing file; {expected}", hint=hint)
         if not file.is_file():
             found = "a folder" if file.is_dir() else "a device"
             raise kind("this is not a file", file=file, found=found, expected="a file")
