@@ -133,6 +133,7 @@ USAGE = [
 #: (a limit for a batch, what the error says ...)
 LIMITS = [
     *((f"{key} = {value}", f"judge.toml, {key}: this value is not understood", "found: ") for key in ("nrmse", "reduced_chi_square") for value in ("nan", "-0.1", "inf")),
+    ("nrmse = 2", "judge.toml, nrmse: this value is not understood", "less than 1"),
     ("[parameters.mi]\nmax = '1 MPa'", "judge.toml", "parameters", "mi", "unknown key"),
     ("[parameters.mu]\nmax = 1e6", "judge.toml, parameters.mu.max", "without a unit"),
     ("[parameters.mu]\nnominal = '1 MPa'", "make no limit", "tolerance"),
