@@ -9,7 +9,7 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.geometry import Place
 from bushfit.model.model import Model
-from bushfit.report.plots.points import Kind, Repeats, held_with, over_sectors
+from bushfit.report.plots.points import Kind, Repeats, curves_of, held_with, over_sectors
 
 #: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
 _MOST_ROWS = 24
@@ -20,7 +20,7 @@ class Map(NamedTuple):
 
     Args:
         points: the operating points, by what is stepped (the frequency where nothing is held) and by row: what is held,
-            or the number of the test; neighbouring values count as one where there are more than rows, (k,).
+            or the number of the curve; neighbouring values count as one where there are more than rows, (k,).
         storage: the real part of what is left, (k,).
         loss: the imaginary part, (k,).
         repeated: whether an operating point was measured more than once.
@@ -82,9 +82,12 @@ def _map(model: Model, kind: Kind, data_sets: Sequence[SweepData]) -> Map:
     """
     axes = kind.axis, held_with(kind.axis)
     along, held = (np.concatenate([getattr(data_set, name) for data_set in data_sets]) for name in axes)
+    if curves := curves_of(data_sets, kind):
+        own = [np.empty(data_set.frequency.size) for data_set in data_sets]
+        for number, curve in enumerate(curves, start=1):
+            own[curve.test][curve.points] = number
+        held = np.concatenate(own)
     repeated = bool(Repeats.at(along, held).count.max() > 1)
-    if kind.stepped is None:
-        held = np.repeat(np.arange(1.0, len(data_sets) + 1.0), [data_set.frequency.size for data_set in data_sets])
     row = map_rows(held)
     points = Repeats.at(along, row)
     merged = max(np.unique(held[row == level]).size for level in np.unique(row))
