@@ -20,7 +20,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import loop_labels, loops_legend
-from bushfit.report.plots.points import SECTORS, Kind, Map, Side, by_direction, by_kind, columns, side_of
+from bushfit.report.plots.points import SECTORS, Kind, Map, Side, by_direction, by_kind, columns, curves_of, side_of
 from bushfit.report.plots.prediction import axis_label
 from bushfit.units import told
 
@@ -167,9 +167,10 @@ def _cells(along: Array, *, logarithmic: bool) -> tuple[Array, Array]:
 
 def _label_maps(row: Sequence[Axes], kind: Kind, part: str, drawn: Map, sweeps: Sequence[SweepData]) -> None:
     unit, factor = ("Hz", 1.0) if kind.axis == "amplitude" else kind.place.display.displacement
-    names = [told(unit, factor * level) for level in np.unique(drawn.points.held)]
-    if kind.stepped is None and drawn.merged == 1:
-        names = [style.file_name(sweep.name) for sweep in sweeps]
+    levels = np.unique(drawn.points.held)
+    names = [told(unit, factor * level) for level in levels]
+    if curves := curves_of(sweeps, kind):  # of which a level is the number
+        names = [style.file_name(curves[round(level) - 1].name) for level in levels]
     for axes in row:
         axes.set_yticklabels([names[round(tick)] for tick in axes.get_yticks()])
         axes.tick_params(labelleft=axes is row[0], labelbottom=part == "loss")

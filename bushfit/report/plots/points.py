@@ -179,7 +179,7 @@ class Map(NamedTuple):
 
     Args:
         points: the operating points, by what is stepped (the frequency where nothing is held) and by row: what is held,
-            or the number of the test; neighbouring values count as one where there are more than rows, (k,).
+            or the number of the curve; neighbouring values count as one where there are more than rows, (k,).
         storage: the real part of what is left, (k,).
         loss: the imaginary part, (k,).
         repeated: whether an operating point was measured more than once.
@@ -246,8 +246,11 @@ def _map(model: Model, kind: Kind, data_sets: Sequence[SweepData]) -> Map:
     axes = kind.axis, held_with(kind.axis)
     along, held = (np.concatenate([getattr(data_set, name) for data_set in data_sets]) for name in axes)
     repeated = bool(Repeats.at(along, held).count.max() > 1)
-    if kind.stepped is None:
-        held = np.repeat(np.arange(1.0, len(data_sets) + 1.0), [data_set.frequency.size for data_set in data_sets])
+    if curves := curves_of(data_sets, kind):
+        own = [np.empty(data_set.frequency.size) for data_set in data_sets]
+        for number, curve in enumerate(curves, start=1):
+            own[curve.test][curve.points] = number
+        held = np.concatenate(own)
     row = map_rows(held)
     points = Repeats.at(along, row)
     merged = max(np.unique(held[row == level]).size for level in np.unique(row))

@@ -264,7 +264,10 @@ def test_one_level_at_several_temperatures_is_a_curve_each(paper_model: Model) -
         for celsius, factor in ((40.0, 1.0), (-10.0, 3.0), (20.0, 2.0))
     ]  # fmt: skip
     figure = checked(sweeps_figure(paper_model, sweep_data(sweeps), "warm"))
-    assert legend(figure.axes[1]) == ["-10 degC, 0.1 um", "20 degC, 0.1 um", "40 degC, 0.1 um"]
+    names = ["-10 degC, 0.1 um", "20 degC, 0.1 um", "40 degC, 0.1 um"]
+    assert legend(figure.axes[1]) == names
+    gap = checked(gap_figure(paper_model, paper_model, sweep_data(sweeps), "warm", ""))
+    assert [tick.get_text() for tick in gap.axes[0].get_yticklabels()] == names
     stiffness = [line.get_ydata() for line in figure.axes[0].lines if line.get_marker() == "o"]
     assert [np.unique(np.round(each)).size for each in stiffness] == [1, 1, 1]
     assert np.array([np.mean(each) for each in stiffness]) == pytest.approx(np.array([3.0, 2.0, 1.0]) * abs(1e3 + 1e2j))
