@@ -18,7 +18,6 @@ from ctypes import c_double, c_uint
 from pathlib import Path
 
 import fmpy
-import lmfit
 import numpy as np
 import pytest
 from cards.hidden import hidden_campaign
@@ -131,56 +130,6 @@ def test_joint_fit_against_bare_minpack(benchmark: BenchmarkFixture, data: Data,
         assert best[name] == pytest.approx(found.model.values[name], rel=1e-4)
     ours, theirs = seconds([lambda: fit_joint(data), bare], 40 if benchmark.enabled else 1)
     table.append((f"five-parameter fit, {1e3 * ours:.1f} ms, over bare MINPACK", f"{ours / theirs:.2f}", "<= 1.5"))
-
-
-def walked(strain: list[float], p: dict[str, float]) -> Iterator[float]:
-    """The friction stress of Eq. 5, sample by sample from rest, as one would type it in."""
-    last = turned_at = before = stress_there = 0.0
-    way = 1.0
-    for e in strain:
-        if (e - last) * way < 0.0:
-            way, turned_at, stress_there = -way, last, before
-        run, limit, half = e - turned_at, p["sigma_fmax"], p["eps_half"]
-        before = stress_there + run * (limit - way * stress_there) / (
-            half * (1.0 - way * stress_there / limit) + way * run
-        )
-        last = e
-        yield before
-
-
-def test_joint_fit_beside_a_script(benchmark: BenchmarkFixture, data: Data, table: Rows) -> None:
-    """lmfit as its manual begins, on the closed form and a loop of about 500 rows that is walked three times.
-
-    It knows of no noise, repeats or intervals, and weighs every row alike.
-    """
-    loop, sweep = data.campaign.loops[0], data.campaign.sweeps[0]
-    thin = slice(None, None, max(1, loop.time.size // 500))
-    motion, force, step = loop.displacement[thin], loop.force[thin], float(np.diff(loop.time[thin]).mean())
-    found = benchmark.pedantic(fit_joint, (data,), rounds=1)
-    bushing = found.model.bushing
-    per, factor = bushing.unit_strain(Direction.AXIAL), bushing.stiffness_per_modulus(Direction.AXIAL)
-    strain = per * np.tile(motion - motion.mean(), 3)
-
-    def off(tried: lmfit.Parameters) -> np.ndarray:
-        p = tried.valuesdict()
-        weights = np.cumprod(np.append(1.0, 1.0 - (1.0 + p["alpha"]) / np.arange(1, strain.size)))
-        stress = p["m"] * step ** -p["alpha"] * np.convolve(strain, weights)[: strain.size]
-        stress += 2.0 * p["mu"] * strain + np.fromiter(walked(strain.tolist(), p), float, strain.size)
-        looped = factor / (2.0 * per) * stress[-motion.size :] - (force - force.mean())
-        swept = bare_stiffness(found.model.with_values(p), sweep.frequency, sweep.amplitude) / sweep.stiffness - 1.0
-        return np.concatenate((looped / np.abs(force).max(), swept.real, swept.imag))
-
-    def script() -> dict[str, float]:
-        parameters = lmfit.Parameters()
-        for name, start in zip(FIVE, (0.8e6, 0.2e6, 0.3, 3e4, 1e-2), strict=True):
-            parameters.add(name, start, min=start / 30.0, max=1.0 if name == "alpha" else 30.0 * start)
-        return dict(lmfit.minimize(off, parameters).params.valuesdict())
-
-    apart = max(abs(value / found.model.values[name] - 1.0) for name, value in script().items())
-    assert apart < 0.25
-    ours, theirs = seconds([lambda: fit_joint(data), script], 9 if benchmark.enabled else 1)
-    figure = f"{ours / theirs:.2f}, apart {100.0 * apart:.1f} %"
-    table.append((f"five-parameter fit over a script of {1e3 * theirs:.0f} ms with lmfit", figure, ""))
 
 
 def command_seconds(*command: str) -> float:

@@ -89,6 +89,53 @@ def test_a_target_is_met_where_the_whole_interval_is_within_it() -> None:
         assert (row.over, row.target, row.met) == (count, "<= 1 %", met)
 
 
+@pytest.mark.parametrize(
+    ("leader", "outcome", "right"),
+    [
+        ("delay", said("named", truths=("delay",), kind="alone"), True),
+        ("viscous", said("named", truths=("delay",), kind="alone"), False),
+        ("viscous", said("named", truths=("maxwell",), kind="alone"), True),  # its limit
+        ("interface_slip", said("named", truths=("guide_friction",), kind="alone"), True),  # its twin
+        ("delay", said("named", truths=("delay", "inertia"), kind="two"), False),
+        ("inertia + delay", said("named", truths=("delay", "inertia"), kind="two"), True),
+        ("delay + something without a name", said("partly", truths=("delay",), kind="alone"), False),
+        ("delay", said("named", truths=("delay", "viscous")), True),
+        ("fault: 50 Hz in axial", said("unexplained", truths=("delay",)), None),
+        ("inertia + something without a name", said("partly", kind="law"), False),
+        ("errors of levels beyond the rig's class", said("unexplained", kind="awkward"), False),
+    ],
+)
+def test_the_likeliest_is_right_if_all_of_it_is(leader: str, outcome: Outcome, right: bool | None) -> None:
+    task = replace(outcome.task, outside="" if outcome.task.hidden else "recipe")
+    assert replace(outcome, task=task, leader=leader, odds=0.9).leader_right is right
+
+
+def test_told_odds_are_counted() -> None:
+    """Of 100 told with 60 %, 62 are right; of 100 told with 90 %, half; three that were all but sure say nothing."""
+    right, wrong = (said("named", truths=(name,), kind="alone", leader="delay") for name in ("delay", "inertia"))
+    counts = ((0.6, 62, 38), (0.9, 50, 50), (1.0, 3, 0))
+    outcomes = [
+        replace(each, odds=odds)
+        for odds, hits, others in counts
+        for each, count in ((right, hits), (wrong, others))
+        for _ in range(count)
+    ]
+    outcomes += [said("consistent", kind="alone", nothing=0.995, visible=0.004)] * 3
+    outcomes += [said("consistent", kind="alone", nothing=0.995)]
+    rows = rows_of(outcomes, "library")
+    told = [rows[f"the likeliest, told {words}: right"] for words in ("0.5 to 0.8", "0.8 to 0.97", "0.97 to 1")]
+    assert [(row.over, row.target, row.met) for row in told] == [
+        (100, "60 %", True),
+        (100, "90 %", False),
+        (3, "100 %", None),
+    ]
+    risks = [row.figure[:6] for measure, row in rows.items() if measure.endswith(": wrong")]
+    assert "told 0.8 and more, 51 % of answers: wrong" in rows
+    assert risks[-3:] == ["43.3 %", "48.5 %", "0.0 % "]
+    nothing = rows["nothing, told 0.99 and more: nothing to see"]
+    assert (nothing.figure[:6], nothing.over, nothing.met) == ("75.0 %", 4, False)
+
+
 def test_the_card_of_what_the_library_lacks() -> None:
     halved = said("described", ("unnamed",), kind="law", before=3.0, heldout=1.5)
     whole = said("unexplained", kind="law", before=3.0, heldout=3.0)

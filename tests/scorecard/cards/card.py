@@ -1,7 +1,8 @@
 """The rows of a score card: every target, measured, with the exact 95 % interval of each rate."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.stats import binomtest
@@ -17,6 +18,11 @@ _QUICK = (0.5, 4.0)
 _SHOWS = 1.2
 #: Share of |K| that a plain model leaves of an effect which counts as visible.
 _VISIBLE = 0.02
+#: Probabilities at which what is told is counted: less than an even chance leads no one, and from the last but one on a
+#: name is kept.
+_BINS = (0.5, 0.8, 0.97, 1.0)
+#: Probability of nothing from which on it is counted.
+_NOTHING = 0.99
 
 
 @dataclass(frozen=True)
@@ -43,7 +49,7 @@ def card(outcomes: Sequence[Outcome], family: Family) -> list[Row]:
     """Every target of a family, measured over the outcomes that did not fail."""
     good = [outcome for outcome in outcomes if not outcome.error]
     kinds = {kind: [outcome for outcome in good if outcome.task.kind == kind] for kind in KINDS[family]}
-    return [*_ROWS[family](good, *kinds.values()), *_of_sessions(good), _times(good)]
+    return [*_ROWS[family](good, *kinds.values()), *_of_odds(good), *_of_sessions(good), _times(good)]
 
 
 def _of_effects(
@@ -153,6 +159,27 @@ def _of_sessions(good: Sequence[Outcome]) -> list[Row]:
         _share("ambiguous, and no session would tell", [o.settled == "elsewhere" for o in left]),
         Row("level unresolved: a test without the bushing decides", str(len(told) - len(left)), len(told), "", None),
     ]
+
+
+def _of_odds(good: Sequence[Outcome]) -> list[Row]:
+    """Whether probabilities are true: the share right of all that were told with about the same, and the risk taken."""
+    sure = [not outcome.shows for outcome in good if outcome.nothing is not None and outcome.nothing >= _NOTHING]
+    told = [(o.odds, o.leader_right is True) for o in good if o.leader and o.leader_right is not None]
+    rows = []
+    for low, high in pairwise(_BINS):
+        own = [pair for pair in told if low <= pair[0] < high or pair[0] == high == _BINS[-1]]
+        row = _share(f"the likeliest, told {low:g} to {high:g}: right", [right for _, right in own])
+        if own:
+            ends = binomtest(sum(right for _, right in own), len(own)).proportion_ci()
+            mean = float(np.mean([odds for odds, _ in own]))
+            wide = ends.low <= low and high <= ends.high  # the interval says no more than the bin
+            row = replace(row, target=f"{100 * mean:.0f} %", met=None if wide else bool(ends.low <= mean <= ends.high))
+        rows.append(row)
+    for least in _BINS[:-1]:  # what a reader risks who takes no answer below these odds
+        taken = [not right for odds, right in told if odds >= least]
+        answered = f"{100 * len(taken) / max(len(told), 1):.0f} % of answers"
+        rows.append(_share(f"told {least:g} and more, {answered}: wrong", taken))
+    return [*rows, _share("nothing, told 0.99 and more: nothing to see", sure, low=0.99)]
 
 
 def _times(good: Sequence[Outcome]) -> Row:

@@ -76,8 +76,9 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
     time are shared with the fit, those of outside are not. The truth is sealed in files that the workflow does not
     read, and opened afterwards.
 
-    A target is met where the whole 95 % interval of the rate lies within it. -o takes scorecard.json. Seeds from 77000
-    on are kept for cards that are shown; try and tune with others.
+    A target is met where the whole 95 % interval of the rate lies within it; told odds are true where the interval of
+    the share right holds them. -o takes scorecard.json. Seeds from 77000 on are kept for cards that are shown; try and
+    tune with others.
     """
     options = Options(no_plots=True, **given)
     folder = options.output

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from bushfit.diagnosis.record import Settings
 from bushfit.effects import LIBRARY, twins_of
 from cards.hidden import Sealed
 
@@ -12,6 +13,8 @@ REFUSED = "refused"
 _LARGEST_SET = 3
 #: Verdicts under which every name stays in the model.
 _KEEPING = ("named", "partly")
+#: Kinds of campaigns in which nothing is hidden.
+CLEAN = ("clean", "awkward")
 
 #: What came of the planned session: one true name for each set, a wrong name, no name; or the plan knows of no test.
 Settled = Literal["rightly", "wrongly", "open", "elsewhere"]
@@ -55,6 +58,9 @@ class Outcome:
         before: gap on held-out data before, as `heldout`.
         settled: what came of the planned session, where effects of the library were left open and it was asked for.
         decides: the test on the rig that is asked for, where the virtual rig can make none that decides.
+        nothing: probability told of nothing; None where there is no diagnosis.
+        leader: what was told as likeliest, by the names of its parts; "" where nothing was.
+        odds: probability told of the leader, if anything is missing.
     """
 
     task: Task
@@ -70,6 +76,9 @@ class Outcome:
     before: float | None = None
     settled: Settled | None = None
     decides: str = ""
+    nothing: float | None = None
+    leader: str = ""
+    odds: float = 0.0
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -80,6 +89,27 @@ class Outcome:
     def seen(self) -> bool:
         """Whether anything was said to be missing at all."""
         return self.verdict != "consistent"
+
+    @property
+    def shows(self) -> bool:
+        """Whether there is more to see than the tolerance."""
+        if self.task.kind == "mistake":
+            return self.matters
+        return self.task.kind not in CLEAN and self.sealed is not None and self.sealed.visible > Settings().tolerance
+
+    @property
+    def leader_right(self) -> bool | None:
+        """Whether what was told as likeliest is so, all of it and nothing else; None where it tells of a place, or of
+        what has no name, and something is hidden that may be just that."""
+        parts = self.leader.split(" + ")
+        names = [part for part in parts if " " not in part]
+        if self.task.kind in CLEAN or any(not self._is_true(name, *twins_of(name)) for name in names):
+            return False
+        if len(names) < len(parts):
+            return None if self.task.outside or self.task.without else False
+        told = {alike for name in names for alike in twins_of(name)}
+        hidden = self.sealed.hidden if self.sealed and self.task.hidden else ()
+        return all({*twins_of(name), _limit(name)} & told for name in hidden)
 
     @property
     def left_open(self) -> bool:
