@@ -110,7 +110,7 @@ def test_effects_of_the_campaign_are_in_every_fit(coupons: Campaign, paper_model
         assert result.model.values["stiffness_factor.mount"] == pytest.approx(1.1, rel=0.01)
         assert result.specimens == (DMA, MOUNT)
     unknown = replace(data.campaign, fit=FitSettings(effects=("inertai",)))
-    with pytest.raises(ModelError, match=r"epdm.toml, \[fit\] effects: unknown effect[\s\S]*inertia\?"):
+    with pytest.raises(ModelError, match=r"epdm.toml, \[fit\] effects: unknown effect[\s\S]*\"inertia\"\?"):
         fit_joint(Data.of(unknown))
 
 

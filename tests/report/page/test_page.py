@@ -15,6 +15,7 @@ import pandas as pd
 import pytest
 from commandline import call
 from hypothesis import given
+from hypothesis import strategies as st
 from reading_html import (
     LARGEST,
     NASTY,
@@ -32,7 +33,7 @@ from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
 from bushfit.report.contents import Formats
 from bushfit.report.page import report_page, use_of
-from bushfit.report.page.readback import read_results
+from bushfit.report.page.readback import canonical, read_results
 
 Results = Callable[[str], Path]
 
@@ -329,3 +330,10 @@ def test_the_command(root: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == {"pages": {"page/report.html": (tmp_path / "page/report.html").stat().st_size}}
     assert "wrote report.html to page" in done.stderr
+
+
+@given(st.lists(st.floats() | st.floats(1e6, 1e7).map(lambda size: (round(size) + 0.5) / 1e9), min_size=1))
+def test_a_page_of_a_table_not_yet_written_has_the_digits_of_its_file(values: list[float]) -> None:
+    """Whether a number is large, small, half way between two of seven digits, or none."""
+    read_back = np.array([float(f"{value:.7g}") for value in values])
+    np.testing.assert_array_equal(canonical(pd.DataFrame({"force [N]": values}))["force [N]"], read_back)
