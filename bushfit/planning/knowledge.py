@@ -193,7 +193,7 @@ def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:
         if named.alternatives and not named.test and not named.alternatives[0].startswith("fault:"):
             others = [label.split(" + ") for label in named.alternatives]
             own = every if max(map(len, others)) > 1 else [named.name]
-            names = [name for name in dict.fromkeys(chain(own, *others)) if name in LIBRARY]
+            names = [name for name in dict.fromkeys(chain(own, *others)) if name.partition(".")[0] in LIBRARY]
             sets.append(tuple(name for name in names if not all(name in each for each in (own, *others))))
     return [names for names in sets if len(names) > 1]
 
