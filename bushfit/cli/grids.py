@@ -89,7 +89,8 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
             )
         parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.][^,]*)", text)
         if not parts or parts[1].count(":") not in (0, 2):
-            raise UnitError("these are no values with a unit", found=repr(text), expected=expected)
+            hint = "write the step, too: start:stop:step" if text.count(":") == 1 else None
+            raise UnitError("these are no values with a unit", found=repr(text), expected=expected, hint=hint)
         counted = ":" in parts[1]
         values = tuple(quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if counted else ","))
         if not counted and min(values) <= 0.0:

@@ -141,7 +141,8 @@ def _tell(options: Options, outcome: Planned) -> None:
     columns = ("of", "before", f"plan, {number(document['hours_planned'], 3)} h", standard)
     rows = {**document["parameters"], **{f"stiffness, {place}": row for place, row in document["stiffness"].items()}}
     rows |= {f"loss factor, {place} [0.01]": row for place, row in document["loss_factor"].items()}
-    tell_table(options, "standard errors [%]", columns, _percents(rows, ("before", "planned", "standard")))
+    title = "standard errors [%]: known before, by the plan, and by the standard programme of tests"
+    tell_table(options, title, columns, _percents(rows, ("before", "planned", "standard")))
     _tell_targets(options, document)
     _tell_effects(options, document)
     if rivals := document["rivals"]:

@@ -62,6 +62,7 @@ USAGE = [
     ("predict|campaign.toml", "campaign.toml: a fitted model is needed", "found: a campaign", "try: bushfit run campaign.toml makes one"),
     ("predict|loop.csv", "loop.csv: a fitted model is needed", "found: a test file", "try: bushfit init loop.csv ..., then bushfit run makes one"),
     ("predict|model.json|--campaign|loop.csv", "loop.csv: a campaign is needed", "try: bushfit init loop.csv"),
+    ("predict|model.json|--frequencies|10:100 Hz", "--frequencies: these are no values with a unit", "try: write the step, too: start:stop:step"),
     ("predict|model.json|--frequencies|5:155:10", "--frequencies: these are no values with a unit", 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'),
     ("predict|model.json|--frequencies|155:5:10 Hz", "--frequencies: start:stop:step does not count upward", 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'),
     ("predict|model.json|--amplitudes|1,5 mm", "--amplitudes: a comma between two digits may part numbers or be a decimal comma", 'write decimals with a point, "0.5", and numbers of a list apart, "1, 5"'),
