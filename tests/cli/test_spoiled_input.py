@@ -30,7 +30,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def lay_out(folder: Path, row: Spoiled) -> set[str]:
-    for name, content in (FILES | row.files).items():
+    """The files of a row and none that another row had; their names."""
+    files = FILES | row.files
+    for left in (path for path in folder.iterdir() if path.is_file() and path.name not in files):
+        left.unlink()
+    for name, content in files.items():
         if content is None:
             (folder / name).unlink(missing_ok=True)
         else:
