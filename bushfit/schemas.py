@@ -105,7 +105,7 @@ def _explained(made: dict[str, Any], kind: type) -> dict[str, Any]:
 
     properties: dict[str, Any] = made["properties"]
     told = _beside_keys(kind) if is_typeddict(kind) else {}
-    for each in (*getattr(kind, "__orig_bases__", ()), *reversed(kind.__mro__)):  # of a TypedDict the first alone
+    for each in reversed(kind.__mro__):
         told |= _arguments(inspect.cleandoc(each.__doc__ or ""))
     for key in properties.keys() & told.keys():
         properties[key] = {**properties[key], "description": told[key]}

@@ -13,39 +13,45 @@ from bushfit.report.process import Process
 
 
 class Found(TypedDict, total=False):
-    """What was found of one bushing of a batch.
+    """What was found of one bushing of a batch."""
 
-    Args:
-        campaign_name: of the campaign.
-        inputs: SHA-256 of the campaign, its tests and a model, by file.
-        verdict: of diagnose, where it was asked.
-        effects: that diagnose named.
-        alternatives: what the tests cannot tell the effects from.
-        warnings: what a user must know before using the numbers.
-        parameters: by name: value, least and largest of the 95 % interval, standard error, and the SI unit that all
-            four are in; null what is not known.
-        at_bound: parameters that came to rest on the least or largest value that they may have.
-        nrmse: root mean square difference of model and tests, relative; null where nothing was fitted.
-        reduced_chi_square: mean square residual in units of noise; null where nothing was fitted.
-        points: by operating point, then "stiffness" [N/m, or N m/rad, or Pa] and "loss factor" [1]: value, least and
-            largest of the 95 % band.
-        date: of the first test for which the campaign states one.
-        curve: |K| [N/m, N m/rad or Pa] by operating point, as the first sweep measured it at the level in its middle.
-    """
-
-    campaign_name: str
-    inputs: dict[str, str]
-    verdict: Verdict
-    effects: list[str]
-    alternatives: list[str]
-    warnings: list[str]
-    parameters: dict[str, list[float | str | None]]
-    at_bound: dict[str, End]
-    nrmse: float | None
-    reduced_chi_square: float | None
-    points: dict[str, dict[str, list[float | None]]]
-    date: str | None
-    curve: dict[str, float]
+    campaign_name: Annotated[str, Doc("of the campaign.")]
+    inputs: Annotated[dict[str, str], Doc("SHA-256 of the campaign, its tests and a model, by file.")]
+    verdict: Annotated[Verdict, Doc("of diagnose, where it was asked.")]
+    effects: Annotated[list[str], Doc("that diagnose named.")]
+    alternatives: Annotated[list[str], Doc("what the tests cannot tell the effects from.")]
+    warnings: Annotated[list[str], Doc("what a user must know before using the numbers.")]
+    parameters: Annotated[
+        dict[str, list[float | str | None]],
+        Doc(
+            "by name: value, least and largest of the 95 % interval, standard error, and the SI unit that all four "
+            "are in; null what is not known."
+        ),
+    ]
+    at_bound: Annotated[
+        dict[str, End],
+        Doc("parameters that came to rest on the least or largest value that they may have."),
+    ]
+    nrmse: Annotated[
+        float | None,
+        Doc("root mean square difference of model and tests, relative; null where nothing was fitted."),
+    ]
+    reduced_chi_square: Annotated[
+        float | None,
+        Doc("mean square residual in units of noise; null where nothing was fitted."),
+    ]
+    points: Annotated[
+        dict[str, dict[str, list[float | None]]],
+        Doc(
+            'by operating point, then "stiffness" [N/m, or N m/rad, or Pa] and "loss factor" [1]: value, least and '
+            "largest of the 95 % band."
+        ),
+    ]
+    date: Annotated[str | None, Doc("of the first test for which the campaign states one.")]
+    curve: Annotated[
+        dict[str, float],
+        Doc("|K| [N/m, N m/rad or Pa] by operating point, as the first sweep measured it at the level in its middle."),
+    ]
 
 
 class Record(Found):
@@ -81,7 +87,8 @@ class Control(TypedDict):
     median: Annotated[float, Doc("in the unit of the column.")]
     sigma: Annotated[float, Doc("robust standard deviation, in the unit of the column.")]
     allowed: Annotated[
-        list[float | None], Doc("least and largest, in the unit of the column; null where there is no limit.")
+        list[float | None],
+        Doc("least and largest, in the unit of the column; null where there is no limit."),
     ]
     process: Annotated[Process, Doc("what the order of test tells of it.")]
 

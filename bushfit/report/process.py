@@ -8,10 +8,11 @@ Notes:
 import math
 from collections import Counter
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 from scipy.special import chdtri, ndtr, stdtr
-from typing_extensions import TypedDict
+from typing_extensions import Doc, TypedDict
 
 from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95
@@ -36,40 +37,44 @@ _D3 = (0.853, 0.888, 0.880, 0.864, 0.848, 0.833, 0.820, 0.808, 0.797)
 
 
 class Capability(TypedDict):
-    """How well bushings keep within stated limits.
+    """How well bushings keep within stated limits."""
 
-    Args:
-        index: "Cpk" where the chart of 25 bushings or more is steady, else "Ppk"; null without a fixed limit.
-        spread: Cp or Pp, low and high of its 95 % interval; null with one limit.
-        nearest: Cpk or Ppk likewise (Bissell, Applied Statistics 39 (1990) 331).
-        capability: the same in words, and what it does not tell.
-    """
-
-    index: str | None
-    spread: tuple[float, float, float] | None
-    nearest: tuple[float, float, float] | None
-    capability: str
+    index: Annotated[
+        str | None,
+        Doc('"Cpk" where the chart of 25 bushings or more is steady, else "Ppk"; null without a fixed limit.'),
+    ]
+    spread: Annotated[
+        tuple[float, float, float] | None,
+        Doc("Cp or Pp, low and high of its 95 % interval; null with one limit."),
+    ]
+    nearest: Annotated[
+        tuple[float, float, float] | None,
+        Doc("Cpk or Ppk likewise (Bissell, Applied Statistics 39 (1990) 331)."),
+    ]
+    capability: Annotated[str, Doc("the same in words, and what it does not tell.")]
 
 
 class Process(Capability):
-    """What the order of test tells of a quantity, in the unit of its column.
+    """What the order of test tells of a quantity, in the unit of its column."""
 
-    Args:
-        size: bushings of a subgroup, whose means and ranges are charted; 1 where individuals and moving ranges are.
-        points: of which the limits are made, without bushings that differ.
-        control: mean, lower and upper control limit; null of fewer than five points, or of such as are all alike.
-        ranges: mean range and its upper control limit; null likewise.
-        beyond: points and ranges beyond these limits.
-        drift: change from the first bushing to the last, low and high of its 95 % interval (Theil and Sen), and its
-            probability by chance (Kendall) times the number of quantities; null likewise.
-    """
-
-    size: int
-    points: int
-    control: tuple[float, float, float] | None
-    ranges: tuple[float, float] | None
-    beyond: int
-    drift: tuple[float, float, float, float] | None
+    size: Annotated[
+        int,
+        Doc("bushings of a subgroup, whose means and ranges are charted; 1 where individuals and moving ranges are."),
+    ]
+    points: Annotated[int, Doc("of which the limits are made, without bushings that differ.")]
+    control: Annotated[
+        tuple[float, float, float] | None,
+        Doc("mean, lower and upper control limit; null of fewer than five points, or of such as are all alike."),
+    ]
+    ranges: Annotated[tuple[float, float] | None, Doc("mean range and its upper control limit; null likewise.")]
+    beyond: Annotated[int, Doc("points and ranges beyond these limits.")]
+    drift: Annotated[
+        tuple[float, float, float, float] | None,
+        Doc(
+            "change from the first bushing to the last, low and high of its 95 % interval (Theil and Sen), and its "
+            "probability by chance (Kendall) times the number of quantities; null likewise."
+        ),
+    ]
 
 
 def charted(values: Array, subgroups: Sequence[str]) -> tuple[Array, Array, int]:
