@@ -1,12 +1,11 @@
 """Unnamed: a smooth correction over log frequency and log strain for what no effect of the library explains.
 
 It is a share of the stiffness. Its data are values at some nodes; between these it is what a Gaussian process with a
-Matern 5/2 kernel makes of them (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, Eqs. 2.25, 2.26
-and 4.17). Beyond their range it fades to 0 within the size of what it corrects. Standard deviations at the nodes go
-over from node to node just as smoothly: errors of neighbours are nearly one, their covariance would add little.
+Matern 5/2 kernel makes of them, see `gaussian_process`. Beyond their range it fades to 0 within the size of what it
+corrects. Standard deviations at the nodes go over from node to node just as smoothly: errors of neighbours are nearly
+one, their covariance would add little.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,20 +25,11 @@ from bushfit.effects.contract import (
 )
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
+from bushfit.gaussian_process import condition, coordinates, in_lengths, matern
 from bushfit.validation import Name, Number
 
 #: The name in files and reports.
 NAME = "unnamed"
-#: Variance, relative to the kernel's, that keeps its matrix invertible; far below what tests show.
-_JITTER = 1e-8
-
-#: Nodes at most; chosen: all points of the paper's plan, and little time.
-MOST_NODES = 100
-#: Patterns over the nodes at most, and the variance of one, relative to the largest, that counts; chosen for time.
-_MOST, _LEAST_VARIANCE = 30, 1e-5
-#: Digits of places that tell them apart.
-_DIGITS = 6
-
 #: Length, in ln frequency and ln strain, over which a correction fades beyond its nodes: chosen, all but gone at a
 #: fourfold frequency, because nothing was measured there.
 _FADES = 0.5
@@ -47,41 +37,7 @@ _FADES = 0.5
 #: corrected where the tests end.
 _DEVIATIONS = 2.0
 
-#: Kelvin that count as a neper of frequency, beyond which the rubber is another one: of most, near room temperature,
-#: the time scale shifts by as much in 8 to 20 K.
-_KELVIN = 10.0
-
 Row = tuple[Number, ...]
-
-
-def kernel(one: Array, other: Array) -> Array:
-    """Matern 5/2 correlation of points in units of the kernel's lengths, (..., n, d) and (m, d) -> (..., n, m).
-
-    >>> kernel(np.zeros((1, 2)), np.array([[0.0, 0.0], [1.0, 0.0], [9.0, 0.0]])).round(3)
-    array([[1.   , 0.524, 0.   ]])
-    """
-    distance = np.sqrt(5.0) * np.linalg.norm(one[..., :, None, :] - other, axis=-1)
-    return (1.0 + distance + np.square(distance) / 3.0) * np.exp(-distance)
-
-
-def correlation(nodes: Array) -> Array:
-    """Correlation of nodes, in units of the kernel's lengths, (m, d) -> (m, m), invertible."""
-    return kernel(nodes, nodes) + _JITTER * np.eye(len(nodes))
-
-
-def in_lengths(points: Array, lengths: Sequence[float]) -> Array:
-    """ln f, ln e and temperature in units of the kernel's lengths, by `places_of`, (..., 2 or 3)."""
-    along, across = lengths
-    return points / (along, across, along)[: points.shape[-1]]
-
-
-def places_of(frequency: Array, strain: Array, temperature: Array | None = None) -> Array:
-    """Where a process of the stiffness stands: ln f [Hz], ln e, and the temperature [K] in units that change the time
-    scale as a neper of frequency does, where it is told apart; (..., 2 or 3)."""
-    axes = np.broadcast_arrays(
-        np.log(frequency), np.log(strain), *([] if temperature is None else [temperature / _KELVIN])
-    )
-    return np.stack(axes, axis=-1)
 
 
 @dataclass(frozen=True)
@@ -121,7 +77,7 @@ class Patch:
     def nodes(self) -> Array:
         """Places of the nodes, (m, 2 or 3)."""
         kelvin = np.array(self.temperature_K) if self.temperature_K else None
-        return places_of(np.array(self.frequency_Hz), np.array(self.strain), kelvin)
+        return coordinates(np.array(self.frequency_Hz), np.array(self.strain), kelvin)
 
 
 @dataclass(frozen=True)
@@ -186,17 +142,14 @@ class Unnamed:
             return nothing.astype(complex), np.full((2, *nothing.shape), self.beyond), nothing
         warm = REFERENCE if setting.under.temperature is None else setting.under.temperature
         kelvin = np.asarray(warm) if patch.temperature_K else None
-        points = places_of(omega / (2.0 * np.pi), strain, kelvin)
+        points = coordinates(omega / (2.0 * np.pi), strain, kelvin)
         inside = np.clip(points, patch.nodes.min(axis=0), patch.nodes.max(axis=0))
-        stays = kernel((points - inside) / _FADES, np.zeros((1, points.shape[-1])))[..., 0]
-        nodes = in_lengths(patch.nodes, self.lengths)
-        near = kernel(in_lengths(inside, self.lengths), nodes)
-        weight = near @ np.linalg.inv(correlation(nodes))
+        stays = matern((points - inside) / _FADES, np.zeros((1, points.shape[-1])))[..., 0]
+        weight, variance = condition(in_lengths(inside, self.lengths), in_lengths(patch.nodes, self.lengths))
         value = weight @ (np.array(patch.in_phase) + 1j * np.array(patch.in_quadrature))
-        open_to = np.square(self.size) * np.maximum(1.0 - np.sum(weight * near, axis=-1), 0.0)
         at_nodes = np.array([patch.in_phase_error, patch.in_quadrature_error])
         between = [np.clip(weight @ error, error.min(), error.max()) for error in at_nodes]
-        known = open_to + np.square(between)
+        known = np.square(self.size) * variance + np.square(between)
         variance = np.square(stays) * known + (1.0 - np.square(stays)) * np.square(self.beyond)
         return stays * value, np.sqrt(np.maximum(variance, 0.0)), stays
 
@@ -216,27 +169,6 @@ def first_harmonic(values: Values, below: ForceBelow, displacement: History, set
     force = below(displacement)
     share = _correction(setting, np.atleast_1d(displacement.omega), displacement.amplitude)
     return force + harmonic_response(share, displacement.with_value(force))
-
-
-def nodes_among(points: Array, most: int) -> Array:
-    """Some of the points, (n, 2), that lie farthest apart: their indices, at most so many, (m,)."""
-    chosen, distance = [0], np.full(len(points), np.inf)
-    while len(chosen) < most:
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-        if distance.max() <= 0.0:
-            break
-        chosen.append(int(np.argmax(distance)))
-    return np.array(chosen)
-
-
-def basis(places: Array, most: int = MOST_NODES) -> tuple[Array, Array]:
-    """Some places, in units of the kernel's lengths, (p, 2), to be nodes: all or those farthest apart, their indices,
-    (m,); and what independent amounts of unit variance make of the process at all places, (p, q)."""
-    distinct = np.unique(places.round(_DIGITS), axis=0, return_index=True)[1]
-    own = distinct if distinct.size <= most else distinct[nodes_among(places[distinct], most)]
-    size, vectors = np.linalg.eigh(correlation(places[own]))
-    kept = (size > _LEAST_VARIANCE * size[-1]) & (np.arange(size.size) >= size.size - _MOST)  # the largest last
-    return own, kernel(places, places[own]) @ vectors[:, kept] / np.sqrt(size[kept])
 
 
 EFFECT = Layer(

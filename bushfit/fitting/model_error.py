@@ -30,7 +30,7 @@ from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.effects.temperature import REFERENCE
-from bushfit.effects.unnamed import MOST_NODES, Patch, Unnamed, basis, in_lengths, places_of
+from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.errors import FitError
 from bushfit.fitting.common_error import CommonError, Joined, Seen
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Solution, anderson, coordinate_bounds
@@ -40,6 +40,7 @@ from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.robust import Estimate
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
+from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood, coordinates, in_lengths, patterns
 from bushfit.model.model import Model
 from bushfit.units import number
 
@@ -91,7 +92,7 @@ class _FittedTests:
     @cached_property
     def points(self) -> Array:
         """Place of each point, (p, 2 or 3)."""
-        return places_of(*self.conditions)
+        return coordinates(*self.conditions)
 
     @cached_property
     def conditions(self) -> list[Array]:
@@ -186,14 +187,16 @@ class _Prior:
     shapes: Array
 
     @classmethod
-    def of(cls, tests: _FittedTests, groups: _Groups, lengths: tuple[float, float], most: int = MOST_NODES) -> _Prior:
+    def of(
+        cls, tests: _FittedTests, groups: _Groups, lengths: tuple[float, float], most: int = MAXIMUM_NODES
+    ) -> _Prior:
         """The error at the points of some tests, by so many nodes at most."""
         nodes, shapes = [], []
         for group in groups:
             inside = np.flatnonzero(np.isin(tests.names, group))
-            own, near = basis(in_lengths(tests.points[inside], lengths), most=most)
-            here = np.zeros((near.shape[1], len(tests.points)))
-            here[:, inside] = near.T
+            own, near = patterns(in_lengths(tests.points[inside], lengths), most)
+            here = np.zeros((len(near), len(tests.points)))
+            here[:, inside] = near
             nodes.append(inside[own])
             shapes.append(here)
         return cls(groups, lengths, nodes, np.concatenate(shapes))
@@ -212,20 +215,14 @@ class _Error:
         return np.concatenate((self.prior.shapes, 1j * self.prior.shapes))
 
     @cached_property
-    def _spectrum(self) -> tuple[Array, Array]:
-        """l and b^2 of the notes, (2 q,) each."""
+    def _likelihood(self) -> RestrictedLikelihood:
         span, left = self.tests.left
-        columns = self.tests.made(self.shapes)
-        taken = columns @ span.T
-        values, vectors = np.linalg.eigh(columns @ columns.T - taken @ taken.T)
-        return np.maximum(values, 0.0), np.square(vectors.T @ (columns @ left))
+        return RestrictedLikelihood.of(self.tests.made(self.shapes), left, span)
 
     @cached_property
     def _gains(self) -> Array:
         """Of the logarithm of the restricted likelihood at each size, (sizes,)."""
-        values, along = self._spectrum
-        grown = 1.0 + np.square(_SIZES)[:, None] * values
-        return 0.5 * np.sum(np.square(_SIZES)[:, None] * along / grown - np.log(grown), axis=-1)
+        return self._likelihood.gains(_SIZES)
 
     @property
     def best(self) -> tuple[float, float]:
@@ -235,15 +232,13 @@ class _Error:
     @property
     def log_evidence(self) -> float:
         """Of the tests with it, all sizes as likely, over that without."""
-        return float(logsumexp(self._gains) - np.log(_SIZES.size))
+        return self._likelihood.log_evidence(_SIZES)
 
     def joined(self, data_sets: Sequence[DataSet]) -> Joined:
         """The tests, with weights of their own, and the error that they share."""
-        told = np.square(self.best[1]) * self._spectrum[0]
-        freedom = float(np.sum(np.square(told / (1.0 + told))))
         tests = replace(self.tests, data_sets=data_sets)
         error = CommonError(self.best[1] * tests.made(self.shapes), tests.seen)
-        return Joined(tuple(data_sets), error, max(freedom, 1.0))
+        return Joined(tuple(data_sets), error, self._likelihood.freedom(self.best[1]))
 
     def data(self, size: float) -> Unnamed:
         """The error, of a size, as the tests leave it."""
@@ -369,7 +364,7 @@ def _tried(tests: _FittedTests) -> list[_Error]:
     """Errors of all tests together, and of each direction by itself, of all lengths."""
     shared = dict.fromkeys([(tests.directions,), tuple((name,) for name in tests.directions)])
     pairs = product(shared, product(_LENGTHS, _LENGTHS))
-    return [_Error(tests, _Prior.of(tests, groups, lengths)) for groups, lengths in pairs]
+    return [_Error(tests, _Prior.of(tests, groups, lengths, MAXIMUM_NODES)) for groups, lengths in pairs]
 
 
 def model_error_warning(error: Unnamed) -> str:

@@ -16,7 +16,6 @@ from tries import SEEDS
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting
-from bushfit.effects.unnamed import places_of
 from bushfit.errors import FitError
 from bushfit.fitting.assess import Stage, covariance
 from bushfit.fitting.common_error import Joined
@@ -26,6 +25,7 @@ from bushfit.fitting.data_sets import log_slopes, reached
 from bushfit.fitting.model_error import with_model_error
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.robust import estimate
+from bushfit.gaussian_process import coordinates
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
@@ -214,7 +214,7 @@ def test_the_error_at_its_nodes_is_that_of_universal_kriging(rig: Rig, loops: bo
     assert error is not None
     assert isinstance(found.minimised, Joined)
     model, tests, (patch,) = found.solution.model, found.minimised.data_sets, error.patches
-    places = places_of(*reached(model.bushing, tests)) / error.lengths
+    places = coordinates(*reached(model.bushing, tests)) / error.lengths
     apart = np.sqrt(5.0) * np.linalg.norm(places[:, None] - places, axis=-1)
     kernel = error.size**2 * (1.0 + apart + apart**2 / 3.0) * np.exp(-apart)
     root = np.kron(np.eye(2), np.linalg.cholesky(kernel + 1e-10 * np.eye(len(kernel))))  # repeats are one place

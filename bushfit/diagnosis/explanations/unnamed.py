@@ -9,9 +9,9 @@ from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import Explanation
 from bushfit.effects.contract import Array
-from bushfit.effects.unnamed import nodes_among
 from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted
 from bushfit.fitting.loop_data import smooth_waves
+from bushfit.gaussian_process import spread_nodes
 from bushfit.reading.measurement import SAME_TEMPERATURE
 
 #: Lengths in ln frequency and ln strain over which a curve changes: smooth, and rough.
@@ -80,7 +80,7 @@ def _degrees(sweep: SweepData) -> int | None:
 def _features(points: Array) -> Array:
     """Patterns over points whose sum with independent amounts has unit variance and falls off with distance, (c, n)."""
     distinct, place = np.unique(points.round(6), axis=0, return_inverse=True)
-    some = distinct[nodes_among(distinct, _MOST_POINTS)]
+    some = distinct[spread_nodes(distinct, _MOST_POINTS)]
     values, vectors = np.linalg.eigh(_kernel(some, some))
     order = np.argsort(-values)[:_MOST_FEATURES]
     order = order[values[order] > _LEAST_VARIANCE * values.max()]
