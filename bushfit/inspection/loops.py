@@ -14,9 +14,10 @@ from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Findings, told_frequencies
 from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.names import Labels
-from bushfit.reduction.cycles import least_prominence, lone_outliers
-from bushfit.reduction.harmonics import cycle_harmonics, resolved_order
+from bushfit.reduction.cycles import lone_outliers
+from bushfit.reduction.harmonics import cycle_harmonics, resolved_order, series
 from bushfit.reduction.steps import reduce
+from bushfit.reduction.turning_points import least_prominence
 from bushfit.units import alike, for_people, number
 
 #: Usual steps of the clock that make a gap; chosen: a clock that stutters takes fewer.
@@ -43,6 +44,12 @@ _WORTH_TELLING = 2e-3
 _OFF_ZERO = 0.02
 #: Cycles that are looked at from either end of a loop; chosen: what settles shows in them.
 _MOST_END_CYCLES = 6
+#: Harmonics of a motion, but of a triangle, beyond which a line is a ripple; chosen: rigs' waveforms have fewer.
+_RIPPLE_ORDER = 20
+#: Share of the amplitude, and multiple of the median line, from which on a ripple is told; chosen: below it is noise.
+_LEAST_RIPPLE, _RIPPLE_LINE = 3e-4, 10.0
+#: Rows whose spectrum tells a line from noise.
+_FEWEST_RIPPLE_ROWS = 200
 #: [s] A cycle that takes longer is in doubt; chosen: quasi-static tests take minutes.
 _LONGEST_CYCLE = 3000.0
 
@@ -178,6 +185,7 @@ def look_at_loop(loop: Loop, labels: Labels) -> Findings:
         *odd_channels(loop),
         *drive.notes,
         *_changing(drive),
+        *_ripple(drive),
     ]
     if drive.frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
         mistakes = [mistake.in_words(drive.loop) for mistake in MISTAKES.values() if mistake.time < 1.0]
@@ -242,7 +250,9 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Fi
         )
         noise = f"noise {number(100 * drive.noise / drive.half_range, 2)} % of half the range, a row{drive.correlated}"
         facts[f"loop {place}"] = "; ".join(filter(None, (motion, noise, left_out)))
-        odd += [f"loop {place}: {note}" for note in (*drive.notes, *_changing(drive)) if note != left_out]
+        odd += [
+            f"loop {place}: {note}" for note in (*drive.notes, *_changing(drive), *_ripple(drive)) if note != left_out
+        ]
     facts["sampling"] = sampling(record) if record.timed else "no time in the file"
     return facts, odd
 
@@ -271,6 +281,36 @@ def _drifting(mean: Array, least: float, name: str, unit: Unit) -> Iterator[str]
     if abs(mean[-1] - mean[0]) > least:
         last, first = alike([unit.factor * mean[-1], unit.factor * mean[0]], 3, least=1)
         yield f"the {name} drifts: its mean goes from {first} to {last} {unit.name}"
+
+
+def _ripple(drive: Drive) -> Iterator[str]:
+    """Warn of a fast sine on the motion: hum, a hunting servo, a flickering sensor.
+
+    Notes:
+        The largest line in the spectrum of what the motion's slow harmonics leave, with a Hann window. White noise
+        makes lines up to about five times the median.
+    """
+    loop = drive.loop
+    steps = np.diff(loop.time)
+    if not loop.timed or steps.size < _FEWEST_RIPPLE_ROWS or np.ptp(steps) > 2.0 * _EVEN_CLOCK * np.median(steps):
+        return
+    phase = (loop.time - loop.time[0]) * drive.frequency
+    is_triangle = waveform(drive.coefficients) == "a triangle"
+    slow = drive.coefficients if is_triangle else drive.coefficients[: _RIPPLE_ORDER + 1]
+    rest = loop.displacement - series(slow, phase)
+    rest[drive.outliers["displacement"].rows] = 0.0
+    window = np.hanning(rest.size)
+    lines = np.abs(np.fft.rfft((rest - rest.mean()) * window)) * (2.0 / window.sum())
+    frequency = np.fft.rfftfreq(rest.size, float(np.mean(steps)))
+    lines[frequency < _RIPPLE_ORDER * drive.frequency] = 0.0
+    line = int(np.argmax(lines))
+    if lines[line] > max(_LEAST_RIPPLE * drive.amplitude, _RIPPLE_LINE * float(np.median(lines))):
+        unit, factor = loop.direction.display.displacement
+        yield (
+            f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
+            f"({number(100 * lines[line] / drive.amplitude, 2)} % of the amplitude) is on the motion: hum, or a "
+            "controller that hunts? The loop is the slow motion"
+        )
 
 
 def _changing(drive: Drive) -> Iterator[str]:

@@ -5,17 +5,15 @@ They are counted on the displacement, in arrays of all rows or of all cycles at 
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import comb, prod
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.reading.measurement import Complex, Floats
-from bushfit.reduction.arrays import CHUNK, MEDIAN_TO_SIGMA, scatter
+from bushfit.reduction.arrays import CHUNK, scatter
 from bushfit.reduction.harmonics import basis
-
-#: Rows of an array.
-Integers = NDArray[np.intp]
+from bushfit.reduction.turning_points import Integers, least_prominence, middle_crossings, motion_turns, stroke_middles
 
 #: Share of a cycle that its longest hole may take; chosen: a fundamental needs rows on all sides of it.
 HOLE = 0.34
@@ -56,13 +54,11 @@ class Cycles:
     @classmethod
     def of(cls, time: Floats, motion: Floats) -> "Cycles":
         """The cycles of a motion, at any frequency and of any amplitude that stands out of the noise."""
-        turns = turning_points(motion, least_prominence(motion))
+        turns = motion_turns(time, motion).motion
         if turns.size < 4:
             return cls(time, np.empty(0), np.empty(0, dtype=np.intp), np.empty(0))
         height = motion[turns]
-        middle = (height[1:] + height[:-1]) / 2.0
-        if middle.size > 4:  # the record cuts the first and the last stroke short
-            middle[[0, -1]] = 2.0 * middle[[1, -2]] - middle[[2, -3]]
+        middle = stroke_middles(height)
         upward = np.flatnonzero((height[:-1] < middle) & (middle < height[1:]))
         edges = middle_crossings(time, motion, turns, middle)[upward]
         peak, trough = height[upward[:-1] + 1], height[upward[:-1] + 2]
@@ -116,40 +112,6 @@ def change_after(time: Floats, motion: Floats, shift: float, rows: slice) -> Flo
     return np.abs(np.interp(time[rows] + shift, time, motion) - motion[rows])
 
 
-def middle_crossings(time: Floats, motion: Floats, turns: Integers, middle: Floats) -> Floats:
-    """Time at which each stroke from one turning point to the next crosses its middle [s], (strokes,)."""
-    sense, length = np.sign(np.diff(motion[turns])), np.diff(turns)
-    strokes = motion[turns[0] : turns[-1]]
-    before = (strokes - np.repeat(middle, length)) * np.repeat(sense, length) < 0.0
-    row = turns[:-1] + np.add.reduceat(before, turns[:-1] - turns[0], dtype=np.intp)
-    row = np.clip(row, turns[:-1] + 1, turns[1:])
-    rise = motion[row] - motion[row - 1]
-    part = np.clip((middle - motion[row - 1]) / np.where(rise == 0.0, 1.0, rise), 0.0, 1.0)
-    return time[row - 1] + part * (time[row] - time[row - 1])
-
-
-def least_prominence(values: Floats) -> float:
-    """How far a turning point of a channel has to stand out to be none of noise, in the units of the values.
-
-    Notes:
-        By 0.1 % of the range, by ten standard deviations of the noise (which goes half as far in 10^6 rows), and by
-        four steps of the analogue-to-digital converter, which flickers between two. The noise is that of sixth
-        differences, of which a sine of ten rows a cycle leaves 0.2 %, in the windows with the least motion.
-    """
-    change = np.abs(np.diff(values))
-    converter_step = float(change[change > 0.0].min(initial=np.inf))
-    least = 1e-3 * float(np.ptp(values))
-    rows, order = min(256, values.size), 6
-    if rows > order:
-        starts = np.linspace(0, values.size - rows, min(2000, values.size // rows)).astype(np.intp)
-        windows = np.lib.stride_tricks.sliding_window_view(values, rows)[starts]
-        differences = np.median(np.abs(np.diff(windows, order, axis=1)), axis=1)
-        # of white noise, the squared weights of such differences sum up to this binomial
-        noise = differences * (MEDIAN_TO_SIGMA / comb(2 * order, order) ** 0.5)
-        least = max(least, 10.0 * float(np.quantile(noise, 0.1)))
-    return max(least, 4.0 * converter_step if converter_step < least else 0.0)
-
-
 def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
     """Which rows of a channel, (n,), lie alone far off their neighbours, as faults of a record do, (n,).
 
@@ -175,37 +137,6 @@ def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
         reach = least * np.sqrt(gain / (1.0 + 34.0 / 36.0))
         outliers[start + 2 : start + 2 + stop] = np.abs(own[2:-2] - cubic) > np.ptp(near, axis=0) + reach
     return outliers
-
-
-def turning_points(values: Floats, least: float) -> Integers:
-    """Rows of the turning points that stand out by `least` or more, highs and lows in turn.
-
-    Notes:
-        Neighbouring turning points that are less than `least` apart are taken out in pairs, the closest first, many
-        pairs at a time. The extremes between which the values go up or down by more than that stay.
-    """
-    moved = np.concatenate(([0], 1 + np.flatnonzero(np.diff(values) != 0.0)))
-    sense = np.sign(np.diff(values[moved]))
-    inner = 1 + np.flatnonzero(sense[1:] != sense[:-1])
-    turns = np.concatenate((moved[:1], moved[inner], moved[1:][-1:]))
-    while turns.size > 2:
-        height = np.abs(np.diff(values[turns]))
-        padded = np.concatenate(([np.inf], height, [np.inf]))
-        close = (height < least) & (height <= padded[:-2]) & (height <= padded[2:])
-        if not close.any():
-            break
-        # of closest pairs that touch, every other one
-        index = np.arange(close.size)
-        start = np.maximum.accumulate(np.where(close & ~np.concatenate(([False], close[:-1])), index, -1))
-        close &= (index - start) % 2 == 0
-        at = np.flatnonzero(close)
-        gone = np.zeros(turns.size, dtype=bool)
-        gone[at] = gone[at + 1] = True
-        # an end has no partner: it goes alone
-        gone[1] &= not close[0]
-        gone[-2] &= not close[-1]
-        turns = turns[~gone]
-    return turns
 
 
 def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:

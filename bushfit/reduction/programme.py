@@ -15,14 +15,12 @@ from bushfit.reading.measurement import Floats, Loop, Part
 from bushfit.reading.stated import LoopFile
 from bushfit.reduction.cycles import (
     change_after,
-    least_prominence,
     lone_outliers,
-    middle_crossings,
     resumes_in_phase,
     stretches,
-    turning_points,
 )
 from bushfit.reduction.harmonics import cycle_harmonics
+from bushfit.reduction.turning_points import middle_crossings, motion_turns
 
 #: Rows that are enough to find the cycles.
 ENOUGH_ROWS = 200_000
@@ -118,8 +116,7 @@ def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_Span]:
     Raises:
         MeasurementError: there are cycles, but no two alike.
     """
-    least = least_prominence(motion)
-    turns = turning_points(motion, least)
+    turns, _, least = motion_turns(time, motion)
     if turns.size < 4:
         return []
     height = motion[turns]

@@ -1,0 +1,184 @@
+"""Turning points of a motion: those of noise and of a ripple on the motion are left out."""
+
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bushfit.reading.measurement import Floats
+from bushfit.reduction.arrays import MEDIAN_TO_SIGMA
+
+#: Rows of an array.
+Integers = NDArray[np.intp]
+
+#: Share of a record's range below which strokes may be a ripple; chosen: rigs miss their own amplitude by more.
+_RIPPLE = 0.02
+#: Share of a half cycle that a motion dwells at one value if small strokes are a test; chosen: above that of a sine.
+_DWELL = 0.3
+#: [ln] Difference of stroke and of duration up to which a half cycle comes again a cycle later.
+_SAME_HALF_CYCLE = 0.1
+#: Durations of its neighbours from which on a half cycle is a pause; chosen: saws are more even.
+_PAUSE = 2.5
+
+
+def turning_points(values: Floats, prominence: float) -> Integers:
+    """Rows of the highs and lows that stand out by `prominence` or more, highs and lows in turn, ends included.
+
+    Args:
+        values: of a channel, (n,).
+        prominence: smallest difference between neighbouring turning points, in the unit of the values.
+
+    Returns:
+        Row numbers, (turns,), increasing.
+    """
+    moved = np.concatenate(([0], 1 + np.flatnonzero(np.diff(values) != 0.0)))
+    return prominent_turns(values, _reversals(values, moved), prominence)
+
+
+def _reversals(values: Floats, rows: Integers) -> Integers:
+    """Those of some rows at which the values turn from one of them to the next, ends included."""
+    direction = np.sign(np.diff(values[rows]))
+    inner = 1 + np.flatnonzero(direction[1:] != direction[:-1])
+    return np.concatenate((rows[:1], rows[inner], rows[1:][-1:]))
+
+
+def prominent_turns(values: Floats, turns: Integers, prominence: float) -> Integers:
+    """The subset of turning points that stand out by `prominence` or more, highs and lows in turn.
+
+    Args:
+        values: of a channel, (n,).
+        turns: rows of turning points, highs and lows in turn, (turns,).
+        prominence: smallest difference between neighbouring turning points, in the unit of the values.
+
+    Returns:
+        Row numbers, (fewer turns,).
+
+    Notes:
+        Neighbouring turning points less than `prominence` apart are removed in pairs, the closest first, many pairs at
+        a time. The extremes between which the values rise or fall by more than that remain.
+    """
+    while turns.size > 2:
+        height = np.abs(np.diff(values[turns]))
+        padded = np.concatenate(([np.inf], height, [np.inf]))
+        close = (height < prominence) & (height <= padded[:-2]) & (height <= padded[2:])
+        if not close.any():
+            break
+        # of closest pairs that touch, every second one
+        index = np.arange(close.size)
+        start = np.maximum.accumulate(np.where(close & ~np.concatenate(([False], close[:-1])), index, -1))
+        close &= (index - start) % 2 == 0
+        pair = np.flatnonzero(close)
+        removed = np.zeros(turns.size, dtype=bool)
+        removed[pair] = removed[pair + 1] = True
+        # an end has no partner: it is removed alone
+        removed[1] &= not close[0]
+        removed[-2] &= not close[-1]
+        turns = turns[~removed]
+    return turns
+
+
+class MotionTurns(NamedTuple):
+    """Turning points of a motion, separated from those of a ripple that rides on it.
+
+    Args:
+        motion: rows of the turning points of the motion itself, (turns,).
+        ripple: rows of the turning points of the ripple, (ripple turns,); empty where there is none.
+        prominence: smallest stroke that is not noise [m or rad].
+    """
+
+    motion: Integers
+    ripple: Integers
+    prominence: float
+
+
+def motion_turns(time: Floats, motion: Floats) -> MotionTurns:
+    """Separate the turning points of a motion from those of a ripple on it: hum, a hunting servo, a flickering sensor.
+
+    Args:
+        time: of each row [s], or row numbers, (n,).
+        motion: displacement [m or rad], (n,).
+
+    Returns:
+        The turning points of both. Noise has none.
+
+    Notes:
+        Strokes below 2 % of the record's range are candidates: rigs miss their own amplitude by more. A record may well
+        hold a test of so small an amplitude besides larger ones, or about a preload. Such a test has its time for
+        itself; a ripple shares it with a larger motion. The half cycles of the larger motion, from one crossing of its
+        middle to the next, therefore decide. Where they come again a cycle later, the larger motion is the test. Else
+        small strokes are a ripple unless the motion dwells at one value for a good part of the half cycle (a sine is
+        within 2 % of its range of a peak for 18 % of the time). Where a half cycle is much longer than its neighbours,
+        it is a pause of the larger motion, and something else is tested meanwhile.
+    """
+    prominence = least_prominence(motion)
+    fine = turning_points(motion, prominence)
+    small = max(prominence, _RIPPLE * float(np.ptp(motion)))
+    coarse = prominent_turns(motion, fine, small)
+    if coarse.size < 2 or coarse.size == fine.size:
+        return MotionTurns(fine, fine[:0], prominence)
+    height = motion[coarse]
+    crossings = middle_crossings(time, motion, coarse, stroke_middles(height))
+    borders = np.concatenate(([time[0]], crossings, [time[-1]]))
+    half, row_time = np.searchsorted(crossings, time), np.gradient(time)
+    duration = np.maximum(np.diff(borders), float(row_time.min()))  # a record may begin at a crossing
+    dwell = np.bincount(half, row_time * (np.abs(motion - height[half]) < small), coarse.size) / duration
+    neighbour = np.maximum(np.append(duration[1:], 0.0), np.append(0.0, duration[:-1]))
+    rippled = _is_repeated(duration, height) | (dwell < _DWELL)
+    if rippled.size > 2:
+        rippled[[0, -1]] = rippled[[1, -2]]  # the record cuts the first and the last half cycle short
+    rippled &= duration < _PAUSE * neighbour
+    ripple = rippled[half[fine]] & ~np.isin(fine, coarse)
+    return MotionTurns(_reversals(motion, fine[~ripple]), fine[ripple], prominence)
+
+
+def _is_repeated(duration: Floats, height: Floats) -> NDArray[np.bool_]:
+    """Mask of the half cycles that come again a cycle later or earlier, by duration and by height, (halves,) each."""
+    again = np.abs(np.log(duration[2:] / duration[:-2])) < _SAME_HALF_CYCLE
+    again &= np.abs(height[2:] - height[:-2]) < _SAME_HALF_CYCLE * np.abs(height[1:-1] - height[:-2])
+    return np.append(again, [False] * 2) | np.append([False] * 2, again)
+
+
+def stroke_middles(height: Floats) -> Floats:
+    """Middle of each stroke between turning points of these heights, (turns,): (turns - 1,).
+
+    The record cuts the first and the last stroke short: their middles continue those of the others.
+    """
+    middle = (height[1:] + height[:-1]) / 2.0
+    if middle.size > 4:
+        middle[[0, -1]] = 2.0 * middle[[1, -2]] - middle[[2, -3]]
+    return middle
+
+
+def middle_crossings(time: Floats, motion: Floats, turns: Integers, middle: Floats) -> Floats:
+    """Time at which each stroke from one turning point to the next crosses its middle [s], (strokes,)."""
+    sense, length = np.sign(np.diff(motion[turns])), np.diff(turns)
+    strokes = motion[turns[0] : turns[-1]]
+    before = (strokes - np.repeat(middle, length)) * np.repeat(sense, length) < 0.0
+    row = turns[:-1] + np.add.reduceat(before, turns[:-1] - turns[0], dtype=np.intp)
+    row = np.clip(row, turns[:-1] + 1, turns[1:])
+    rise = motion[row] - motion[row - 1]
+    part = np.clip((middle - motion[row - 1]) / np.where(rise == 0.0, 1.0, rise), 0.0, 1.0)
+    return time[row - 1] + part * (time[row] - time[row - 1])
+
+
+def least_prominence(values: Floats) -> float:
+    """How far a turning point of a channel has to stand out to be none of noise, in the units of the values.
+
+    Notes:
+        By 0.1 % of the range, by ten standard deviations of the noise (which goes half as far in 10^6 rows), and by
+        four steps of the analogue-to-digital converter, which flickers between two. The noise is that of sixth
+        differences, of which a sine of ten rows a cycle leaves 0.2 %, in the windows with the least motion.
+    """
+    change = np.abs(np.diff(values))
+    converter_step = float(change[change > 0.0].min(initial=np.inf))
+    least = 1e-3 * float(np.ptp(values))
+    rows, order = min(256, values.size), 6
+    if rows > order:
+        starts = np.linspace(0, values.size - rows, min(2000, values.size // rows)).astype(np.intp)
+        windows = np.lib.stride_tricks.sliding_window_view(values, rows)[starts]
+        differences = np.median(np.abs(np.diff(windows, order, axis=1)), axis=1)
+        # of white noise, the squared weights of such differences sum up to this binomial
+        noise = differences * (MEDIAN_TO_SIGMA / comb(2 * order, order) ** 0.5)
+        least = max(least, 10.0 * float(np.quantile(noise, 0.1)))
+    return max(least, 4.0 * converter_step if converter_step < least else 0.0)
