@@ -26,7 +26,7 @@ from bushfit.units import number
 
 #: Laws of rate and of amplitude beside the paper's or in their place, of which families are made, each with each.
 _RATE = ("second_springpot", "fractional_zener", "maxwell")
-_AMPLITUDE = ("kraus", "sliders", "coupled_breakdown", "intrinsic_time")
+_AMPLITUDE = ("kraus", "sliders", "distributed_sliders", "coupled_breakdown", "intrinsic_time")
 #: Of all families that are known, those that are held out and shown beside the first: of these odds, and so many.
 _LIKELY, _MOST = 0.01, 5
 #: Share by which a held-out error has to differ for two families not to count as alike, sure or not; chosen: no use

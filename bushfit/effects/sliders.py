@@ -67,19 +67,33 @@ def stress(p: Values, history: History) -> Array:
         sense = turning.at_samples(np.sign(turning.strides))
         moved = 2.0 * _loaded(np.abs(turning.travel) / 2.0, low, high) - _loaded(history.amplitude, low, high)
         return p["sigma"] * sense * moved
-    spread = np.asarray(p["spread"])[..., None] * _PLACES
-    slip = np.atleast_1d(p["e_s"])[..., None] * np.exp(spread)  # (..., 1, sliders)
-    strides = turning.strides[..., None] / slip
-    top = np.minimum(history.amplitude[..., None] / slip, 1.0) if history.periodic else np.zeros((1, 1))
-    held = np.empty_like(strides)
-    held[..., 0, :] = top[..., 0, :]
+    slip = np.atleast_1d(p["e_s"])[..., None] * np.exp(np.asarray(p["spread"])[..., None] * _PLACES)
+    return p["sigma"] * parallel_elements(history, slip, np.full(slip.shape, 1.0 / _COUNT))
+
+
+def parallel_elements(history: History, yield_strain: Array, weights: Array) -> Array:
+    """Weighted sum of the stresses of Jenkins elements, each over its largest.
+
+    Args:
+        history: strain over time, (..., n).
+        yield_strain: strain at which each element yields, (..., 1, elements).
+        weights: of the elements, same shape.
+
+    Returns:
+        Sum over the elements of weight times a stress between -1 and 1, (..., n).
+    """
+    turning = history.turning
+    strides = turning.strides[..., None] / yield_strain
+    top = np.minimum(history.amplitude[..., None] / yield_strain, 1.0) if history.periodic else np.zeros((1, 1))
+    start = np.empty_like(strides)
+    start[..., 0, :] = top[..., 0, :]
     for piece in range(1, strides.shape[-2]):
-        held[..., piece, :] = np.clip(held[..., piece - 1, :] + strides[..., piece - 1, :], -1.0, 1.0)
+        start[..., piece, :] = np.clip(start[..., piece - 1, :] + strides[..., piece - 1, :], -1.0, 1.0)
     total = np.zeros(1)
-    for slider in range(_COUNT):  # one by one, as all at once do not fit into a processor's cache
-        start = turning.at_samples(held[..., slider])
-        total = total + np.clip(start + turning.travel / slip[..., slider], -1.0, 1.0)
-    return p["sigma"] * total / _COUNT
+    for element in range(yield_strain.shape[-1]):  # one by one: all at once do not fit into a processor's cache
+        moved = turning.at_samples(start[..., element]) + turning.travel / yield_strain[..., element]
+        total = total + weights[..., element] * np.clip(moved, -1.0, 1.0)
+    return total
 
 
 def in_place_of(p: Values) -> list[dict[str, float]]:

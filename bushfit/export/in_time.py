@@ -23,7 +23,7 @@ from bushfit.units import number
 TABLES = tomllib.loads(Path(__file__).with_name("fmu.toml").read_text(encoding="utf-8"))
 FIELDS: Mapping[str, list[str]] = TABLES["fields"]
 #: Of these fields, those that are 1 where a direction has no such effect; the others are 0.
-ONE = {"eps_half[0]", "eps_half[1]", "e_s", "spread", "scale", "factor", "preload"}
+ONE = {"eps_half[0]", "eps_half[1]", "e_s", "spread", "median", "deviation", "scale", "factor", "preload"}
 
 
 @dataclass(frozen=True)

@@ -110,11 +110,12 @@ def test_what_the_data_push_below_zero_rests_on_its_bound(measured: Measured) ->
 TRUTHS: dict[str, dict[str, float]] = {
     "kraus": {"delta": 6e5, "r": 0.15, "e_c": 8e-3, "n": 0.5},
     "sliders": {"sigma": 1.2e4, "e_s": 1.5e-2, "spread": 1.0},
+    "distributed_sliders": {"delta": 5e5, "e_s": 8e-3, "spread": 1.2},
     "fractional_zener": {"c": 0.3},
     "intrinsic_time": {"d": 3.0},
     "paper": {},
 }
-NAMES = ("kraus", "sliders", "fractional_zener", "intrinsic_time")
+NAMES = ("kraus", "sliders", "distributed_sliders", "fractional_zener", "intrinsic_time")
 
 
 def begun(model: Model, campaign: Campaign) -> tuple[Model, list[DataSet]]:
@@ -171,7 +172,7 @@ def test_the_interval_of_the_gain_is_that_of_noise(paper_model: Model) -> None:
 def test_known_families_are_each_law_of_rate_with_each_of_amplitude(paper_model: Model, campaign: Campaign) -> None:
     tests = Data.of(campaign).sweeps
     found = known_families(paper_model, tests)
-    assert len(found) == 4 * 5 - 1 - 1  # less the paper's own, and a second springpot on intrinsic time
+    assert len(found) == 4 * 6 - 1 - 1  # less the paper's own, and a second springpot on intrinsic time
     assert {"kraus", "maxwell", "fractional_zener+sliders", "second_springpot+coupled_breakdown"} < {*found}
     warm = [replace(sweep, sweep=replace(sweep.sweep, temperature=290.0 + 9.0 * i)) for i, sweep in enumerate(tests)]
     at_temperatures = known_families(paper_model, warm)

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.stats
 
-from bushfit.effects import BASE, LIBRARY, Effect, History, qualified, sliders
+from bushfit.effects import BASE, LIBRARY, Effect, History, distributed_sliders, qualified, sliders
 from bushfit.effects.contract import Circumstances
 from bushfit.effects.dead_zone import first_harmonic
 from bushfit.effects.temperature import log_shift
@@ -231,3 +232,16 @@ def test_sliders_are_the_mean_of_very_many(strain: float) -> None:
     each = ((t - 0.5 * np.sin(2.0 * t)) / np.pi + 4.0j / np.pi * r * (1.0 - r)) / slip
     found = sliders.modulus(SLIDERS, np.array([30.0]), np.array([strain]))
     np.testing.assert_allclose(found, 0.5 * SLIDERS["sigma"] * np.mean(each), rtol=1e-8)
+
+
+@pytest.mark.parametrize("strain", [1e-5, 2e-3, 0.01, 0.05, 1.0])
+def test_distributed_sliders_are_the_mean_of_very_many(strain: float) -> None:
+    """First harmonic of 100,000 equal springs with sliders, at strains far below, in and far above the distribution."""
+    probability = (np.arange(100_000) + 0.5) / 100_000
+    yield_strain = 0.01 * np.exp(0.9 * scipy.stats.norm.ppf(probability))
+    r = np.minimum(yield_strain / strain, 1.0)
+    t = np.arccos(1.0 - 2.0 * r)
+    modulus = (t - 0.5 * np.sin(2.0 * t)) / np.pi + 4.0j / np.pi * r * (1.0 - r)
+    values = {"delta": 5e5, "e_s": 0.01, "spread": 0.9}
+    result = distributed_sliders.modulus(values, np.array([30.0]), np.array([strain]))
+    np.testing.assert_allclose(result, 5e5 * np.mean(modulus), rtol=2e-4)

@@ -24,9 +24,9 @@ from bushfit.units import CELSIUS
 LARGEST = 0.01
 #: Effects that the model of every law has at their neutral values, to be set one by one.
 SETTABLE = [
-    "asymmetry", "strain_stiffening", "fifth_power_stiffening", "second_friction", "sliders", "strain_scale.radial",
-    "clearance", "interface_slip", "bump_stop", "one_sided_stop", "stiffness_factor.radial",
-    "preload_stiffening.radial", "sleeve_compliance", "sleeve_compliance.radial",
+    "asymmetry", "strain_stiffening", "fifth_power_stiffening", "second_friction", "sliders",
+    "distributed_sliders", "strain_scale.radial", "clearance", "interface_slip", "bump_stop", "one_sided_stop",
+    "stiffness_factor.radial", "preload_stiffening.radial", "sleeve_compliance", "sleeve_compliance.radial",
 ]  # fmt: skip
 #: Effects that Maxwell arms stand for, besides the springpot, at sizes that show.
 FADING = {

@@ -47,6 +47,22 @@ void set_step(Decay *decay, double step)
         decay->left[k] = decayed(step / arms[k].time, &decay->kept[k]);
 }
 
+static double limited(double x)
+{
+    return x > 1.0 ? 1.0 : x < -1.0 ? -1.0 : x;
+}
+
+/* Standard normal deviate of an element of the distributed sliders, and the strain at which it yields. */
+static double deviate(int k)
+{
+    return 4.5 * ((2.0 * k + 1.0) / ELEMENTS - 1.0);
+}
+
+static double yield_strain(const Direction *at, const double *value, int k)
+{
+    return value[at->median] * exponential(value[at->deviation] * deviate(k));
+}
+
 /* Friction, Eq. 5: u = u_s + sgn d v/(v + d), v = 1 - sgn u_s, d the way from the last turning point over eps_half. */
 static void rub(const Direction *at, const double *value, const Memory *was, Memory *is, double change)
 {
@@ -67,8 +83,23 @@ static void rub(const Direction *at, const double *value, const Memory *was, Mem
             double place = (2.0 * k + 1.0) / SLIDERS - 1.0;
             double slip = value[at->e_s] * exponential(value[at->spread] * place);
             double held = was->slider[k] + change / slip;
-            is->slider[k] = held > 1.0 ? 1.0 : held < -1.0 ? -1.0 : held;
+            is->slider[k] = limited(held);
         }
+    if (value[at->delta] > 0.0)
+        for (int k = 0; k < ELEMENTS; k++)
+            is->element[k] = limited(was->element[k] + change / yield_strain(at, value, k));
+}
+
+/* Mean strain of the springs with distributed sliders: the elements have normally distributed shares. */
+static double distributed(const Direction *at, const double *value, const Memory *is)
+{
+    double total = 0.0, shares = 0.0;
+    for (int k = 0; k < ELEMENTS; k++) {
+        double share = exponential(-0.5 * deviate(k) * deviate(k));
+        total += share * yield_strain(at, value, k) * is->element[k];
+        shares += share;
+    }
+    return total / shares;
 }
 
 /* Stress [Pa] at a strain, and the memory that it leaves. */
@@ -89,6 +120,8 @@ static double stress(
         total += value[at->sigma_fmax[k]] * is->friction[k];
     for (int k = 0; k < SLIDERS; k++)
         sliding += is->slider[k];
+    if (value[at->delta] > 0.0)
+        total += 2.0 * value[at->delta] * distributed(at, value, is);
     return total + value[at->sigma] * sliding / SLIDERS;
 }
 

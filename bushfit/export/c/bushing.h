@@ -3,7 +3,7 @@
 #define BUSHING_H
 #include "model.h"
 
-enum { FRICTIONS = 2, SLIDERS = 100 };
+enum { FRICTIONS = 2, SLIDERS = 100, ELEMENTS = 120 };
 
 /* Where on the list of values each quantity of one direction stands; 0 and 1 stand there too, for what it has not. */
 typedef struct {
@@ -12,6 +12,7 @@ typedef struct {
     int size[PARTS];                                       /* what the moduli of the arms of each part go with */
     int sigma_fmax[FRICTIONS], eps_half[FRICTIONS];        /* friction, Eq. 5 */
     int sigma, e_s, spread;                                /* springs with sliders */
+    int delta, median, deviation;                          /* springs with log-normally distributed sliders */
     int scale, play, slip, gap, stop, one_gap, one_stop;   /* layers, from the rubber outward */
     int factor, preload, give, own_give;
     double lever;                                          /* arm of the slip force: 1, or a radius in torsion [m] */
@@ -29,6 +30,7 @@ typedef struct {
     double sense, turn;                                    /* of the motion, and where it turned last */
     double turned[FRICTIONS], friction[FRICTIONS];         /* friction stress over sigma_fmax: there, and now */
     double slider[SLIDERS];                                /* stress of each over its largest */
+    double element[ELEMENTS];                              /* the same of the distributed ones */
 } Memory;
 
 /* What a time step leaves of the strain of each arm's spring, and what it keeps of a strain that grows meanwhile. */
