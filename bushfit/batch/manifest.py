@@ -199,24 +199,47 @@ def _csv_entries(path: Path) -> Iterator[Entry]:
     """The lines of a CSV manifest; a header names the columns."""
     text = read_utf8(path, CampaignError).decode("utf-8-sig")
     delimiter = max(",;\t", key=text.lstrip().partition("\n")[0].count)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
-    header = next((cells for line in reader if any(cells := [cell.strip() for cell in line])), [])
+    lines = _csv_lines(path, text, delimiter)
+    header = next((cells for _, line in lines if any(cells := [cell.strip() for cell in line])), [])
     known = [each.name for each in fields(Entry)]
     for column in header:
         if column not in known:
             error = unknown_key(column, known)
             error.file, error.place, error.hint = path, "header", error.hint or _OF_TESTS
             raise error
-    for cells in reader:
+        if header.count(column) > 1:
+            raise CampaignError(
+                f'two columns are called "{column}"', file=path, place="header", expected="each column once"
+            )
+    for place, cells in lines:
         filled = {key: cell.strip() for key, cell in zip(header, cells, strict=False) if cell.strip()}
         if not filled:
             continue
-        place = f"line {reader.line_num}"
         if len(cells) > len(header):
             raise CampaignError(
                 "more cells than columns", file=path, place=place, found=str(len(cells)), expected=str(len(header))
             )
         yield check_tables(filled, path, Entry, place=place)
+
+
+def _csv_lines(path: Path, text: str, delimiter: str) -> Iterator[tuple[str, list[str]]]:
+    """Place and cells of each line; raise a CampaignError where a quote swallows the lines after it."""
+    reader, line = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True), 0
+    try:
+        for cells in reader:
+            if reader.line_num > line + 1:
+                raise csv.Error("a quoted cell goes on in the next line")
+            line += 1
+            yield f"line {line}", cells
+    except csv.Error as error:
+        raise CampaignError(
+            "a quote is not closed",
+            file=path,
+            place=f"line {line + 1}",
+            found=str(error),
+            expected="one line for each bushing, and quotes in pairs",
+            hint="a quote that belongs to a name is written twice, in a cell in quotes",
+        ) from None
 
 
 def _expanded(entries: Iterable[Entry], base: Path, source: str) -> Iterator[Entry]:

@@ -17,7 +17,7 @@ from bushfit.batch.limits import Judge, Limits, Verdict, judge, read_limits
 from bushfit.batch.manifest import Manifest, Settings, read_manifest
 from bushfit.batch.quantities import at_point, parameter_quantities, parse_point
 from bushfit.batch.work import numbers_of
-from bushfit.errors import BatchError, ModelError, UnitError
+from bushfit.errors import BatchError, CampaignError, ModelError, UnitError
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -67,6 +67,27 @@ def test_a_pattern_takes_every_match_and_names_by_folder_where_files_share_a_nam
     inside = read(shop, '[[bushings]]\ncampaign = "bushings/b[0-2]/*.toml"\n[[bushings]]\ncampaign = "x.toml"\n')
     assert [row.name for row in inside.rows] == ["b0", "b1", "b2", "x"]
     assert inside.stem == "m"
+
+
+@pytest.mark.parametrize(
+    ("lines", "problem", "place"),
+    [
+        (('"a.toml,A', "b.toml,B", "c.toml,C"), "a quote is not closed", "line 2"),
+        (("a.toml,A", '"b.toml,B', 'c.toml",C'), "a quote is not closed", "line 3"),
+        (("a.toml,A", 'b.toml,"B" two'), "a quote is not closed", "line 3"),
+    ],
+)
+def test_a_quote_that_swallows_rows_is_an_error(
+    tmp_path: Path, lines: tuple[str, ...], problem: str, place: str
+) -> None:
+    with pytest.raises(CampaignError, match=problem) as error:
+        read(tmp_path, "\n".join(["campaign,name", *lines]), "m.csv")
+    assert error.value.place == place
+
+
+def test_two_columns_of_one_name_are_an_error(tmp_path: Path) -> None:
+    with pytest.raises(CampaignError, match='two columns are called "campaign"'):
+        read(tmp_path, "campaign,name,campaign\na.toml,A,b.toml\n", "m.csv")
 
 
 @given(st.lists(st.text(min_size=1), min_size=1, max_size=8))
