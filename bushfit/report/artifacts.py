@@ -10,7 +10,6 @@ import pandas as pd
 
 from bushfit.campaign.schema import SimulatedLoop
 from bushfit.diagnosis.record import Diagnosis
-from bushfit.effects import Level
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData
 from bushfit.fitting.master_curve import master_curve
@@ -19,8 +18,8 @@ from bushfit.model.arms import Arms
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.contract import Plan, Test, operating_points
-from bushfit.prediction.caveats import rig_effects, warnings_of
-from bushfit.prediction.stiffness import Prediction, predict
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.tablefile import folder_name
 from bushfit.report import plots, tables
 from bushfit.report.compared import SideBySide
@@ -36,14 +35,14 @@ _COLUMNS = (
 
 def fit_contents(result: Result, title: str, loops: Sequence[LoopData], sweeps: Sequence[SweepData]) -> Contents:
     """`loops` and `sweeps` of a fit, a table and a picture each; nothing where there are no such tests."""
-    found, model = Contents(), result.model
+    contents = Contents()
     if loops:
-        table = partial(tables.loops_table, model, loops)
-        found |= Contents.shown("loops", table, lambda: plots.fits.loops_figure(model, loops, title))
+        of_loops = cache(partial(tables.loops_table, result.model, loops))
+        contents |= Contents.shown("loops", of_loops, lambda: plots.fits.loops_figure(result, of_loops(), title))
     if sweeps:
-        table = partial(tables.sweeps_table, model, sweeps)
-        found |= Contents.shown("sweeps", table, lambda: plots.fits.sweeps_figure(model, sweeps, title))
-    return found
+        of_sweeps = cache(partial(tables.sweeps_table, result.model, sweeps))
+        contents |= Contents.shown("sweeps", of_sweeps, lambda: plots.fits.sweeps_figure(result, of_sweeps(), title))
+    return contents
 
 
 def temperature_contents(result: Result, title: str, sweeps: Sequence[SweepData]) -> Contents:
@@ -67,15 +66,11 @@ def prediction_contents(
     """A table and a picture of each prediction, named after its place, the measured points over the model."""
 
     def picture(prediction: Prediction) -> Any:
-        grid = plots.prediction.fine_grid(prediction)
-        curves = predict(result, prediction.direction, *grid)
-        rig = predict(result, prediction.direction, *grid, rig=True) if rig_effects(result) else None
-        bare = result.model.without(Level.INSTRUMENT)
         note = plots.style.first_sentences(warnings_of(result, [], (*prediction.warnings, *notes)))
         title = result.name if isinstance(prediction.direction, Direction) else str(prediction.direction)
-        return plots.prediction.prediction_figure(
-            prediction, measured, title, curves=curves, rig=rig, model=bare, note=note
-        )
+        sweeps = [sweep for sweep in measured if sweep.direction == prediction.direction]
+        table = tables.sweeps_table(result.model, sweeps) if sweeps else None
+        return plots.prediction.prediction_figure(result, prediction, table, title, note)
 
     names = place_names([prediction.direction for prediction in predictions])
     pairs = list(zip(names, predictions, strict=True))
@@ -111,15 +106,13 @@ def measured_contents(result: Result, fitted: Sequence[SweepData], left: Sequenc
 
 def diagnosis_contents(diagnosis: Diagnosis, title: str) -> Contents:
     """`gap` and `candidates` of a diagnosis, tables, and a picture of the gap."""
-    before, after, held = diagnosis.before, diagnosis.after, diagnosis.holdout
+    gap = cache(partial(tables.gap_table, diagnosis))
 
     def picture() -> Any:
-        words = f"{diagnosis.verdict}: {diagnosis.summary}"
-        words += f". Held out, {held.before:.2f} x noise before and {held.after:.2f} after" if held.parts else ""
-        return plots.gap.gap_figure(before.model, after.model, before.data_sets, title, words, mended=after.data_sets)
+        return plots.gap.gap_figure(gap(), diagnosis.result, diagnosis.to_document(), title)
 
     candidates = {"candidates": partial(tables.candidates_table, diagnosis)}
-    return Contents.shown("gap", partial(tables.gap_table, diagnosis), picture) | Contents(tables=candidates)
+    return Contents.shown("gap", gap, picture) | Contents(tables=candidates)
 
 
 def comparison_contents(document: Mapping[str, Any]) -> Contents:

@@ -30,7 +30,7 @@ _MEASURED = re.compile(
 #: Columns of all tables that hold texts; the others hold numbers.
 TEXTS = frozenset(
     (
-        *("loop", "sweep", "test", "kind", "direction", "fitted"),
+        *("loop", "sweep", "test", "kind", "direction", "fitted", "stepped", "part", "outlier"),
         *("effect", "level", "parameters", "why"),
         *("name", "campaign", "folder", "status", "error", "limits", "out of limits", "on the edge", "verdict"),
         *("named effects", "cannot be told from", "on a bound", "warnings", "campaign name", "subgroup", "differs in"),
@@ -146,21 +146,28 @@ def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> p
 
 
 def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
-    """Measured and modelled force of every loop, row by row (or by bin of phase where a loop is long)."""
+    """Measured and modelled force of every loop: a row per recorded row, or per bin of phase where a loop is long.
+
+    The residual is measured minus model, in units of the noise of one row. An outlier was left out of the fit.
+    """
 
     def rows(data_set: LoopData) -> pd.DataFrame:
         place, drive = data_set.direction, data_set.drive
         (_, length), (_, factor), _ = place.display
-        resisting = columns_of(place)[2]
+        force = columns_of(place)[2]
+        binned = drive.phase.size < data_set.test.force.size
+        outliers = np.empty(0) if binned else drive.outliers["force"].rows
         return pd.DataFrame(
             {
                 "loop": data_set.name,
                 "direction": str(place),
                 "time [s]": drive.phase / drive.frequency,
+                "frequency [Hz]": drive.frequency,
                 moved_of(place): drive.displacement(drive.phase) * length,
-                resisting: drive.force * factor,
-                f"model {resisting}": data_set.force(model) * factor,
-                "residual [noise]": data_set.shown(model),
+                force: drive.force * factor,
+                f"model {force}": data_set.force(model) * factor,
+                "residual [noise]": -data_set.shown(model),
+                "outlier": np.where(np.isin(np.arange(drive.phase.size), outliers), "yes", "no"),
             }
         )
 
@@ -168,15 +175,20 @@ def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
 
 
 def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
-    """Measured and modelled dynamic stiffness of every sweep, sorted by amplitude, repeat and frequency."""
+    """Measured and modelled dynamic stiffness of every sweep, sorted by amplitude, repeat and frequency.
+
+    Residuals are measured minus model, in units of noise. Temperature, part and stated error are columns only where a
+    test states them.
+    """
 
     def rows(data_set: SweepData) -> pd.DataFrame:
         place, modelled = data_set.direction, data_set.stiffness(model)
-        gain, phase = np.split(data_set.shown(model), 2)
+        gain, phase = np.split(-data_set.shown(model), 2)
         return pd.DataFrame(
             {
                 "sweep": data_set.sweep.name,
                 "direction": str(place),
+                **_stated(data_set),
                 "frequency [Hz]": data_set.frequency,
                 **_amplitudes(place, data_set.amplitude),
                 "repeat": data_set.repeat,
@@ -185,35 +197,49 @@ def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
                 "stiffness residual [noise]": gain,
                 "loss residual [noise]": phase,
                 "model over measured [-]": np.abs(modelled / data_set.measured),
-                "loss factor difference [-]": loss_factor(modelled) - loss_factor(data_set.measured),
+                "loss factor difference [-]": loss_factor(data_set.measured) - loss_factor(modelled),
+                "outlier": np.where(data_set.weights > 0.0, "no", "yes"),
             }
         )
 
     return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
 
 
-def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Every residual of a diagnosis, before and after, in units of noise and in %: a row per sweep point or loop row.
+def _stated(data_set: SweepData) -> dict[str, Any]:
+    """Columns with what a sweep steps through and with the conditions that its test states."""
+    sweep, conditions = data_set.sweep, data_set.source.conditions if data_set.source else {}
+    columns: dict[str, Any] = {"stepped": sweep.stepped or "neither"}
+    if sweep.temperature is not None:
+        columns["temperature [degC]"] = data_set.temperature - CELSIUS
+    if "specimen_number" in conditions:
+        columns["part"] = str(conditions["specimen_number"])
+    if sweep.relative_error is not None:
+        columns["stated error [-]"] = sweep.relative_error[data_set.order]
+    return columns
 
-    Where the test that belongs to the model after is another, a row says where it was recorded. The response of the
-    model to use stands beside what was measured.
+
+def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """Measured minus model before and after a diagnosis, in units of noise and in percent.
+
+    A row is a sweep point or a row of a loop, where it was recorded, also if the record was mistaken. Percent are of
+    |K| or of half the range of a loop's force. The response of the model to use stands beside the measured one.
     """
     before, after = diagnosis.before, diagnosis.after
 
-    def rows(data_set: DataSet, later: DataSet) -> pd.DataFrame:
+    def rows(data_set: DataSet, corrected: DataSet) -> pd.DataFrame:
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
+        columns |= _stated(data_set) if isinstance(data_set, SweepData) else {}
         columns |= data_set.columns()
-        for name, model, test in (("before", before.model, data_set), ("after", after.model, later)):
-            parts = zip(test.components, np.split(test.misfit(model), test.parts), strict=True)
-            columns |= {f"{part} {name} [noise]": values for part, values in parts}
-            off = zip(test.components, test.off(model), strict=True)
-            columns |= {f"{part} {name} [%]": 100.0 * values for part, values in off}
+        for name, model, test in (("before", before.model, data_set), ("after", after.model, corrected)):
+            in_noise, percent = np.split(-test.misfit(model), test.parts), -100.0 * test.off(model)
+            columns |= {f"{part} {name} [noise]": of for part, of in zip(test.components, in_noise, strict=True)}
+            columns |= {f"{part} {name} [%]": of for part, of in zip(test.components, percent, strict=True)}
         table: Any = loops_table if data_set.kind == "loop" else sweeps_table
-        shown = table(diagnosis.result.model, [data_set])
-        return pd.DataFrame(columns | {name: shown[name] for name in shown if _MEASURED.match(name)})
+        responses = table(diagnosis.result.model, [data_set])
+        return pd.DataFrame(columns | {name: responses[name] for name in responses if _MEASURED.match(name)})
 
-    both = zip(before.data_sets, after.data_sets, strict=True)
-    return pd.concat([rows(*pair) for pair in both], ignore_index=True)
+    pairs = zip(before.data_sets, after.data_sets, strict=True)
+    return pd.concat([rows(*pair) for pair in pairs], ignore_index=True)
 
 
 def master_curve_table(found: Sequence[Shifted]) -> pd.DataFrame:

@@ -139,7 +139,7 @@ def _map(part: str, levels: Sequence[Level], along: Array, ends: tuple[str, str,
     count = np.bincount(cell, minlength=size)
     sides = []
     for off in numbers(table, *(f"{part} {when} [%]" for when in ("before", "after"))):
-        sums = np.bincount(cell, -np.nan_to_num(off), minlength=size)
+        sums = np.bincount(cell, np.nan_to_num(off), minlength=size)
         sides.append(np.where(count > 0, sums / np.maximum(count, 1), np.nan).reshape(len(first), -1))
     same = np.array_equal(sides[0], sides[1], equal_nan=True)
     short = [shortened(levels[n].name, _LONGEST) for n in first]

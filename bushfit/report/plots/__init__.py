@@ -1,17 +1,19 @@
-"""Figures for reports: predictions as in the paper's Figs. 7 to 9, loops and sweeps with the model over them, and
-the gap between model and measurement before and after a diagnosis.
+"""Figures of results, one description for PNG, SVG, PDF and the pages.
 
-The one importer of matplotlib, which is slow: a file of this folder is imported when it is first asked for, as in
-`plots.gap.gap_figure`. Nothing here touches matplotlib's global state, so figures may be made in any process or thread.
-Levels differ in colour (of scales that survive colour blindness and grey print), line style and marker.
+A figure is made from the tables of a result, so that a folder of results gives the same figure as the run itself.
+matplotlib is slow to import and only imported here: a file of this folder is imported when it is first used, as in
+`plots.gap.gap_figure`. Levels differ in colour (of scales that survive colour blindness and grey print), line style and
+marker. Differences are measured minus model.
 """
 
+import logging
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bushfit.report.plots import (  # noqa: F401
+        appendix,
         batch,
         fits,
         gap,
@@ -22,9 +24,12 @@ if TYPE_CHECKING:
         style,
     )
 
+#: matplotlib complains about each line of a user's matplotlibrc that it does not know; our figures do not use the file.
+logging.getLogger("matplotlib").setLevel(logging.ERROR)
+
 
 def __getattr__(name: str) -> Any:
-    """A file of this folder, imported now."""
+    """Import a file of this folder."""
     if name.startswith("_") or find_spec(f"{__name__}.{name}") is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return import_module(f"{__name__}.{name}")

@@ -62,6 +62,7 @@ class Panel:
     intervals: Array | None = None
 
 
+@style.in_own_style
 def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> Figure:
     """Two columns of panels, the bushings along x in the manifest's order; of more than forty quantities the first.
 
@@ -189,6 +190,7 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
         )
 
 
+@style.in_own_style
 def comparison_figure(found: SideBySide) -> Figure:
     """All results at every place they are compared at: two rows of panels a place, the differences below the values.
 

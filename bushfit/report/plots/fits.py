@@ -1,186 +1,241 @@
-"""A fit against its tests: sweeps and loops with the model over them, and what is left."""
+"""A fit beside its tests: sweeps and loops with the model and with measured minus model."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import LoopData, SweepData
 from bushfit.geometry import Place
-from bushfit.model.model import Model
-from bushfit.prediction.stiffness import Band
+from bushfit.model.result import Result
 from bushfit.report.plots import style
-from bushfit.report.plots.points import (
-    SECTORS,
-    Axis,
-    Kind,
-    Points,
-    by_direction,
-    by_kind,
-    curves_of,
-    held_with,
+from bushfit.report.plots.measured import (
+    SECTOR,
+    Curve,
+    SweepGroup,
+    loops_of,
     means,
-    over_sectors,
     phase_after_turn,
+    sector_means,
+    sweep_groups,
 )
-from bushfit.report.plots.prediction import FINE, draw, draw_curves, points_note
+from bushfit.report.tables import columns_of, moved_of
 from bushfit.units import for_people, told
 
 #: Height of a panel of residuals [cm].
 _STRIP = 2.6
-#: Most rows of a loop that are drawn: a panel is some 400 pixels wide, and a loop crosses it several times.
-_MOST_ROWS = 1600
-_RESIDUALS = "Residuals: model less measured in units of noise; 95 % of them should lie in the grey."
-_OUTLIERS = "Crosses: outliers, at the edge where they lie beyond it."
+#: Points of a model's line.
+_FINE = 60
+#: Curves of more points than this are drawn with small dots.
+_MANY_POINTS = 60
+#: Most rows of a loop that are drawn.
+_MOST_ROWS = 360
+#: Relative error that a file states of a point, from which the point is not drawn: such points hide the others.
+_WORST_DRAWN = 0.05
+_RESIDUALS = "Lower panels: measured minus model, in units of noise. 95 % of the points should be in the grey band."
+_OUTLIERS = "Crosses: outliers, drawn at the edge if they are beyond it."
 
 
-def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> Figure:
-    """Magnitude and loss factor of sweeps over what they step through, measured and modelled; their residuals below.
+@style.in_own_style
+def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
+    """Stiffness magnitude and loss factor of sweeps, measured and modelled, with the residuals below.
 
-    A row of panels per place and kind of sweep; along x lies what is stepped, or the frequency where nothing was held.
-    The model keeps the effects of the rig, since sweeps hold them.
+    A row of panels per place and stepped quantity. The model includes the effects of the rig, as the tests do.
+
+    Args:
+        result: the model beside the tests.
+        table: as `tables.sweeps_table` makes it.
+        title: of the figure.
     """
-    kinds = by_kind(data_sets)
-    figure = style.new_figure(title, (style.ROW + _STRIP) * len(kinds))
-    grid = figure.subplots(2 * len(kinds), 2, squeeze=False, height_ratios=[style.ROW, _STRIP] * len(kinds))
-    for (kind, mine), pair, strips in zip(kinds.items(), grid[::2], grid[1::2], strict=True):
-        if curves_of(mine, kind):
-            draw_curves(pair, kind, model, mine)
-        else:
-            points, held = means(mine), held_with(kind.axis)
-            levels = np.unique(getattr(points, held))
-            as_measured = means([sweep.noise_free(model) for sweep in mine]) if model.knows_circumstances else None
-            lines = as_measured or _model_lines(model, kind.place, points, kind.axis)
-            draw(pair, kind.place, lines, points, kind.axis, levels)
-        _draw_residuals(pair, strips, model, mine, kind)
-    outlying = any((data_set.weights == 0.0).any() for data_set in data_sets)
-    return style.explained(figure, "Lines: model.", points_note(data_sets), _RESIDUALS, _OUTLIERS * outlying)
+    groups = sweep_groups(table, result)
+    figure = style.new_figure(title, (style.ROW + _STRIP) * len(groups))
+    grid = figure.subplots(2 * len(groups), 2, squeeze=False, height_ratios=[style.ROW, _STRIP] * len(groups))
+    for group, pair, strips in zip(groups, grid[::2], grid[1::2], strict=True):
+        draw_curves(pair, group, result)
+        _draw_residuals(pair, strips, group)
+    outliers = _OUTLIERS * bool((table["outlier"] == "yes").any())
+    return style.explained(figure, "Lines: model.", points_note(table), _RESIDUALS, outliers)
 
 
-def _draw_residuals(
-    pair: Sequence[Axes], strips: Sequence[Axes], model: Model, data_sets: Sequence[SweepData], kind: Kind
-) -> None:
-    """The residuals of one kind of sweeps, of the gain left and of the phase right, below the panels `pair`."""
-    scale = kind.place.display.displacement.factor if kind.axis == "amplitude" else 1.0
-    x = [scale * getattr(data_set, kind.axis) for data_set in data_sets]
-    for part, (panel, strip, name) in enumerate(zip(pair, strips, ("gain", "phase"), strict=True)):
-        residuals = [data_set.shown(model).reshape(2, -1)[part] for data_set in data_sets]
-        for look, place, at in _looks(data_sets, kind):
-            marker = style.DOT | {"color": look.color, "alpha": 0.8}
-            strip.plot(x[place][at], residuals[place][at], look.marker, **marker)
+def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None:
+    """Draw magnitude (left) and loss factor (right) of a group of sweeps: points as measured, lines of the model.
+
+    Args:
+        pair: two panels.
+        group: of sweeps; a curve per level.
+        result: the model with the effects of the rig.
+    """
+    stiffness = columns_of(group.place)[1]
+    factor, labels = stiffness_scale(group.place, max(curve.rows[stiffness].max() for curve in group.curves))
+    looks = style.styles(len(group.curves), group.palette)
+    for axes, label, header, scale in zip(pair, labels, (stiffness, "loss factor [-]"), (factor, 1.0), strict=True):
+        for curve, look in zip(group.curves, looks, strict=True):
+            draw_points(axes, drawn_points(curve), group.x_header, header, scale, look)
+            x, values = _model_line(group, curve, header, result)
+            axes.plot(x, scale * values, color=look.color, ls=look.dashes, lw=1.3)
+        x = np.concatenate([curve.rows[group.x_header] for curve in group.curves])
+        style.label_axes(axes, group.x_header, label, x)
+    names = [style.file_name(curve.name, 30) for curve in group.curves]
+    if group.shares_levels:
+        style.name_levels(pair[-1], names, group.palette, [True] * len(names))
+    else:
+        style.legend(pair[-1], [look.handle(True) for look in looks], names, "test")
+
+
+def stiffness_scale(place: Place, largest: float) -> tuple[float, tuple[str, str]]:
+    """Factor from the units of the tables to those of a figure, and labels for stiffness and loss factor.
+
+    Args:
+        place: of the tests.
+        largest: stiffness or modulus to draw, in the unit of the tables.
+    """
+    name, factor = place.display.stiffness
+    unit, to_figure = for_people(name, factor, largest / factor)
+    quantity = columns_of(place)[1].partition(" [")[0]
+    symbol = " |K|" if quantity == "stiffness" else ""
+    return to_figure / factor, (f"{place} {quantity}{symbol} [{unit}]", f"{place} loss factor [-]")
+
+
+def drawn_points(curve: Curve) -> pd.DataFrame:
+    """Rows of a curve without outliers and without points of large stated error."""
+    keep = curve.rows["outlier"] == "no"
+    if "stated error [-]" in curve.rows:
+        keep &= ~(curve.rows["stated error [-]"] > _WORST_DRAWN)
+    return curve.rows[keep]
+
+
+def draw_points(axes: Axes, rows: pd.DataFrame, along: str, header: str, scale: float, look: style.Style) -> None:
+    """Draw means of the repeats of a column with bars from the smallest to the largest."""
+    repeats = rows.groupby(along)[header]
+    x, count = repeats.mean().index.to_numpy(), len(repeats)
+    if count < len(rows):
+        axes.vlines(x, scale * repeats.min(), scale * repeats.max(), color=look.color, lw=0.7, alpha=0.7)
+    points = style.POINT if count <= _MANY_POINTS else style.DOT | {"alpha": 0.5}
+    axes.plot(x, scale * repeats.mean(), look.marker, color=look.color, **points)
+
+
+def points_note(table: pd.DataFrame) -> str:
+    """Sentence that explains the measured points of a table of sweeps."""
+    point = [name for name in table if name in ("sweep", "stepped", "frequency [Hz]") or "amplitude [" in str(name)]
+    repeated = bool(table.duplicated(point).any())
+    bars = "mean of the repeats, with bars from the smallest to the largest" if repeated else "as measured"
+    hidden = int((table["stated error [-]"] > _WORST_DRAWN).sum()) if "stated error [-]" in table else 0
+    left_out = f" {hidden} points with a stated error above {100 * _WORST_DRAWN:g} % are not drawn." if hidden else ""
+    return f"Points: {bars}.{left_out}"
+
+
+def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) -> tuple[Array, Array]:
+    """The model along a curve: on a fine grid, or at the measured points where it depends on more than the level."""
+    if not group.shares_levels or result.model.knows_circumstances:
+        x, values = means(curve.rows, group.x_header, f"model {header}")
+        return x, values
+    x = curve.rows[group.x_header].to_numpy()
+    fine = np.geomspace(x.min(), x.max(), _FINE)
+    length = group.place.display.displacement.factor
+    axes = (fine, curve.level / length) if group.axis == "frequency" else (curve.level, fine / length)
+    stiffness = result.model.stiffness(group.place, *np.broadcast_arrays(*axes))
+    if header == "loss factor [-]":
+        return fine, stiffness.imag / stiffness.real
+    return fine, np.abs(stiffness) * group.place.display.stiffness.factor
+
+
+def _draw_residuals(pair: Sequence[Axes], strips: Sequence[Axes], group: SweepGroup) -> None:
+    """Draw residuals of stiffness (left) and loss (right) below the panels of a group of sweeps."""
+    looks = style.styles(len(group.curves), group.palette)
+    for panel, strip, part in zip(pair, strips, ("stiffness", "loss"), strict=True):
+        header = f"{part} residual [noise]"
+        for curve, look in zip(group.curves, looks, strict=True):
+            points = drawn_points(curve)
+            look_of_points = style.DOT | {"color": look.color, "alpha": 0.8}
+            strip.plot(points[group.x_header], points[header], look.marker, **look_of_points)
         strip.sharex(panel)
-        reach = np.concatenate(x)
-        style.label_axes(strip, panel.get_xlabel(), f"{name} residual\n/ noise", reach)
-        if kind.axis == "amplitude" and reach.max() > 3.0 * reach.min():  # half a decade
-            style.logarithmic(strip, reach)
+        rows = pd.concat([curve.rows for curve in group.curves])
+        style.label_axes(strip, group.x_header, f"{part} residual\n/ noise", rows[group.x_header].to_numpy())
+        if group.axis == "amplitude" and rows[group.x_header].max() > 3.0 * rows[group.x_header].min():
+            style.logarithmic(strip, rows[group.x_header].to_numpy())
         panel.tick_params(labelbottom=False)
         panel.set_xlabel("")
         style.noise_band(strip)
-        for place, data_set in enumerate(data_sets):
-            outlying = data_set.weights == 0.0
-            style.mark_outliers(strip, x[place][outlying], residuals[place][outlying])
+        outliers = rows[rows["outlier"] == "yes"]
+        style.mark_outliers(strip, outliers[group.x_header].to_numpy(), outliers[header].to_numpy())
 
 
-def _looks(data_sets: Sequence[SweepData], kind: Kind) -> Iterator[tuple[style.Style, int, Array]]:
-    """How the points of each level are drawn, or of each curve: style, number of the test, which of its points."""
-    if curves := curves_of(data_sets, kind):
-        for curve, look in zip(curves, style.styles(len(curves), kind.palette), strict=True):
-            yield look._replace(marker="o"), curve.test, curve.points & (data_sets[curve.test].weights > 0.0)
-        return
-    held = held_with(kind.axis)
-    levels = np.unique(np.concatenate([getattr(data_set.with_weight(), held) for data_set in data_sets]))
-    for place, data_set in enumerate(data_sets):
-        for look, level in zip(style.styles(levels.size, held), levels, strict=True):
-            yield look, place, (getattr(data_set, held) == level) & (data_set.weights > 0.0)
+@style.in_own_style
+def loops_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
+    """Force over displacement of loops, measured and modelled, and residuals over the phase of the cycle.
 
+    A row of panels per place. Of each loop at most 360 rows of the first and the last two cycles are drawn.
 
-def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Figure:
-    """Force over displacement, measured and modelled, and residuals over the phase of the cycle; a row per direction.
-
-    Of each loop at most 1600 rows, from the first and last two cycles, are drawn. The model keeps the effects of the
-    rig, since loops hold them.
+    Args:
+        result: the model beside the tests; it includes the effects of the rig.
+        table: as `tables.loops_table` makes it.
+        title: of the figure.
     """
-    directions = by_direction(data_sets)
-    figure = style.new_figure(title, 1.25 * style.ROW * len(directions))  # a hysteresis loop wants a square
-    grid = figure.subplots(len(directions), 2, squeeze=False, width_ratios=[1.15, 1.0])
-    for (direction, mine), (loop_panel, phase_panel) in zip(directions.items(), grid, strict=True):
-        _draw_loops(loop_panel, model, direction, mine)
-        style.label_axes(phase_panel, "phase after the upper turn [deg]", "residual / noise")
-        for data_set, look in zip(mine, style.styles(len(mine), "loop"), strict=True):
-            rows, residual = _drawn_rows(data_set), data_set.misfit(model)
+    places = list(loops_of(table, result))
+    figure = style.new_figure(title, 1.25 * style.ROW * len(places))  # a hysteresis loop wants a square
+    grid = figure.subplots(len(places), 2, squeeze=False, width_ratios=[1.15, 1.0])
+    for (place, loops), (force_panel, phase_panel) in zip(places, grid, strict=True):
+        _draw_forces(force_panel, place, loops)
+        style.label_axes(phase_panel, "phase after the upper turn [deg]", "force residual / noise")
+        for loop, look in zip(loops.values(), style.styles(len(loops), "loop"), strict=True):
+            counted = loop[loop["outlier"] == "no"]
+            phase, residual = phase_after_turn(counted, place), counted["residual [noise]"].to_numpy()
+            rows = _drawn_rows(counted)
             dots: dict[str, Any] = {"color": look.color, "alpha": 0.4, **style.DOT}
-            phase_panel.plot(phase_after_turn(data_set)[rows], residual[rows], ".", **dots)
-            middle, shares = over_sectors(data_set)
-            phase_panel.plot(middle, shares @ residual, color=look.color, ls=look.dashes, lw=1.4)
+            phase_panel.plot(phase[rows], residual[rows], ".", **dots)
+            phase_panel.plot(*sector_means(phase, residual), color=look.color, ls=look.dashes, lw=1.4)
         style.noise_band(phase_panel)
         phase_panel.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
-        loops_legend(phase_panel, mine, besides={"model": Line2D([], [], color=style.INK, lw=0.8)})
-    note = _OUTLIERS if any(data_set.drive.outliers["force"].rows.size for data_set in data_sets) else ""
+        handles = [look.handle(False) for look in style.styles(len(loops), "loop")]
+        model = {"model": Line2D([], [], color=style.INK, lw=0.8)}
+        style.legend(phase_panel, handles, loop_labels(place, loops), "loop", besides=model)
     return style.explained(
         figure,
-        "Left: measured force over the motion cleared of noise; black: model.",
-        _RESIDUALS,
-        f"Lines there: means over {360 // SECTORS} deg.",
-        note,
+        "Left: measured force over displacement without its noise. Black lines: model. Right: measured minus model, "
+        f"in units of the noise of a row, and means over {SECTOR:g}° of the cycle (lines). 95 % of the points should "
+        "be in the grey band.",
+        _OUTLIERS * bool((table["outlier"] == "yes").any()),
     )
 
 
-def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[LoopData]) -> None:
-    (unit, length), force_units, _ = direction.display
-    largest = max(float(np.abs(data_set.drive.force).max()) for data_set in data_sets)
-    force_unit, factor = for_people(*force_units, largest)
-    motion_name, force_name, _ = direction.motion.words
-    style.label_axes(axes, f"{motion_name} [{unit}]", f"{direction} {force_name} [{force_unit}]")
-    for data_set, look in zip(data_sets, style.styles(len(data_sets), "loop"), strict=True):
-        drive, rows = data_set.drive, _drawn_rows(data_set)
-        phase = drive.phase[rows]
-        motion, modelled = length * drive.displacement(phase), factor * data_set.force(model)[rows]
-        modelled[1:][np.diff(phase) > 0.5] = np.nan  # the cycles between, which are not drawn
-        axes.plot(motion, factor * drive.force[rows], "o", color=look.color, alpha=0.5, **style.DOT)
-        axes.plot(motion, modelled, color=style.INK, lw=0.8)
-    for data_set in data_sets:
-        loop, rows = data_set.test, data_set.drive.outliers["force"].rows
-        phase = (loop.time[rows] - loop.time[0]) * data_set.drive.frequency
-        style.mark_outliers(axes, length * data_set.drive.displacement(phase), factor * loop.force[rows])
+def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame]) -> None:
+    motion, force = moved_of(place), columns_of(place)[2]
+    name, factor = place.display.force
+    unit, to_figure = for_people(name, factor, max(loop[force].abs().max() for loop in loops.values()) / factor)
+    scale = to_figure / factor
+    moved, resisting, _ = place.motion.words
+    style.label_axes(axes, f"{moved} [{place.display.displacement.name}]", f"{place} {resisting} [{unit}]")
+    for loop, look in zip(loops.values(), style.styles(len(loops), "loop"), strict=True):
+        counted = loop[loop["outlier"] == "no"]
+        shown = counted.iloc[_drawn_rows(counted)]
+        modelled = scale * shown[f"model {force}"].to_numpy()
+        turns = shown["time [s]"] * shown["frequency [Hz]"]
+        modelled[1:][np.diff(turns) > 0.5] = np.nan  # between the first and the last cycles
+        axes.plot(shown[motion], scale * shown[force], "o", color=look.color, alpha=0.5, **style.DOT)
+        axes.plot(shown[motion], modelled, color=style.INK, lw=0.8)
+    outliers = pd.concat(loops.values())
+    outliers = outliers[outliers["outlier"] == "yes"]
+    style.mark_outliers(axes, outliers[motion].to_numpy(), scale * outliers[force].to_numpy())
 
 
-def loops_legend(axes: Axes, data_sets: Sequence[LoopData], **words: Any) -> None:
-    """Name the loops of a panel; `words` are what else `legend` takes."""
-    handles = [look.handle(False) for look in style.styles(len(data_sets), "loop")]
-    style.legend(axes, handles, loop_labels(data_sets), **({"title": "loop"} | words))
-
-
-def loop_labels(data_sets: Sequence[LoopData]) -> list[str]:
-    """Each loop of a direction by amplitude and frequency, and by file on a second line where that leaves twins."""
-    unit, length = data_sets[0].direction.display.displacement
-    labels = [f"{told(unit, length * each.amplitude[0])}, {told('Hz', each.frequency[0])}" for each in data_sets]
+def loop_labels(place: Place, loops: dict[str, pd.DataFrame]) -> list[str]:
+    """Label of each loop by amplitude and frequency, with the name of the test where these repeat."""
+    labels = []
+    for loop in loops.values():
+        motion = loop[moved_of(place)]
+        amplitude = told(place.display.displacement.name, float(motion.max() - motion.min()) / 2.0)
+        labels.append(f"{amplitude}, {told('Hz', float(loop['frequency [Hz]'].iloc[0]))}")
     if len(set(labels)) == len(labels):
         return labels
-    return [f"{label}\n{style.file_name(each.test.name)}" for label, each in zip(labels, data_sets, strict=True)]
+    return [f"{label}\n{style.file_name(name)}" for label, name in zip(labels, loops, strict=True)]
 
 
-def _model_lines(model: Model, direction: Place, points: Points, axis: Axis) -> Points:
-    """The model over what was stepped through at each value that was held meanwhile, as far as it was measured."""
-    along, held = getattr(points, axis), getattr(points, held_with(axis))
-    levels = np.unique(held)
-    spans = [along[held == level] for level in levels]
-    stepped = np.concatenate([np.geomspace(span.min(), span.max(), FINE) for span in spans])
-    at_level = np.repeat(levels, FINE)
-    frequency, amplitude = (stepped, at_level) if axis == "frequency" else (at_level, stepped)
-    stiffness = model.stiffness(direction, frequency, amplitude)
-    magnitude, loss_factor = np.abs(stiffness), stiffness.imag / stiffness.real
-    return Points(frequency, amplitude, Band(*3 * [magnitude]), Band(*3 * [loss_factor]))
-
-
-def _drawn_rows(data_set: LoopData) -> Array:
-    """Rows of the first and last two cycles, thinned to what an eye can tell apart, without the outliers."""
-    phase = data_set.drive.phase
-    drawn = (phase < 2.0) | (phase > phase[-1] - 2.0)
-    if phase.size == data_set.test.force.size:
-        drawn[data_set.drive.outliers["force"].rows] = False
-    rows = np.flatnonzero(drawn)
+def _drawn_rows(loop: pd.DataFrame) -> Array:
+    """Numbers of the rows of the first and the last two cycles, thinned evenly."""
+    turns = (loop["time [s]"] * loop["frequency [Hz]"]).to_numpy()
+    rows = np.flatnonzero((turns < turns[0] + 2.0) | (turns > turns[-1] - 2.0))
     return rows[:: max(1, -(-rows.size // _MOST_ROWS))]

@@ -1,4 +1,4 @@
-"""Test files as they are: loops, sweeps and histories; and what raw histories, or a resonance test, are reduced to."""
+"""Test files as recorded (loops, sweeps, histories), and the reduction of raw histories and of resonance tests."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -9,60 +9,64 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
-from bushfit.geometry import TRANSLATION
+from bushfit.effects.contract import Array
+from bushfit.geometry import TRANSLATION, Place
 from bushfit.inspection.record import Inspected
 from bushfit.reading.measurement import Loop, Sweep, loss_factor
 from bushfit.reduction.resonance import LARGEST_ERROR, Resonance
 from bushfit.reduction.result import Reduction
 from bushfit.report.plots import style
-from bushfit.report.plots.points import BINS, Kind, Repeats, held_with, ranges
-from bushfit.report.plots.prediction import axis_label, pair_labels
-from bushfit.report.tables import words
+from bushfit.report.plots.fits import stiffness_scale
+from bushfit.report.plots.measured import TIME_BINS, ranges
+from bushfit.report.tables import columns_of
 from bushfit.units import for_people, told
 
 #: Colour of a history.
 _COLOR = "#3b528b"
-#: Most rows of a loop that are drawn over the displacement: more are not told apart.
+#: Most rows of a loop that are drawn over the displacement.
 _MOST_ROWS = 6000
-#: A common scale over the range of a panel at most; chosen: it fills a third, as is said below the picture.
+#: Largest common scale over the range of a panel: the panel then fills a third of it.
 _ALIKE = 3
 #: Height of a history, and of the panels of noise and distortion [cm].
 _STRIP, _NOISE_ROW = 2.7, 4.2
-#: Most histories that are drawn: with more the figure leaves the page.
+#: Most histories that are drawn on one page.
 _MOST_HISTORIES = 4
 
 
-def inspection_figure(every: Sequence[Inspected], first: int = 0, count: int = 5) -> Figure:
-    """A row a file: a loop over displacement and over time, a sweep over frequency, a history over time.
+@style.in_own_style
+def inspection_figure(files: Sequence[Inspected], first: int = 0, count: int = 5) -> Figure:
+    """Test files as recorded, a row of panels per file: loops over displacement and time, sweeps over frequency.
 
     Args:
-        every: all files that were inspected; drawn are so many of them, from the `first` on.
+        files: all files that were inspected.
+        first: number of the first file to draw.
+        count: of files to draw.
     """
-    files, known = every[first : first + count], Counter(seen.label for seen in every)
-    page = f", {first // count + 1} of {-(-len(every) // count)}" if len(every) > count else ""
-    figure = style.new_figure(f"Test files as they are{page}", (style.ROW + 0.7) * len(files))
-    grid = figure.add_gridspec(len(files), 1)
-    for row, seen in enumerate(files):
-        place = grid[row, 0]
-        called = f"{seen.file.parent.name}/{seen.label}" if known[seen.label] > 1 else seen.label
-        name = style.file_name(called, letters=48)  # what is said of the file stands on the same line
-        words = f"{seen.kind}, {seen.direction or 'direction unknown'}"
-        words += ", force turned" * (seen.entry.get("force_sign") == -1)
-        title = f"{name}: {words}" + (f", {len(seen.odd)} odd" if seen.odd else "")
-        if isinstance(seen.measured, Sweep):
-            panel = _draw_sweep(place, seen.measured)
-        elif seen.measured is not None:
-            panel = _draw_history(figure, place, seen.measured, loop=seen.kind == "loop")
+    shown, names = files[first : first + count], Counter(file.label for file in files)
+    page = f", {first // count + 1} of {-(-len(files) // count)}" if len(files) > count else ""
+    figure = style.new_figure(f"Test files as recorded{page}", (style.ROW + 0.7) * len(shown))
+    grid = figure.add_gridspec(len(shown), 1)
+    for row, file in enumerate(shown):
+        name = f"{file.file.parent.name}/{file.label}" if names[file.label] > 1 else file.label
+        title = f"{style.file_name(name, letters=48)}: {file.kind}, {file.direction or 'direction unknown'}"
+        title += ", sign of the force reversed" * (file.entry.get("force_sign") == -1)
+        title += f", {len(file.odd)} remarks" if file.odd else ""
+        if isinstance(file.measured, Sweep):
+            panel = _draw_sweep(grid[row, 0], file.measured)
+        elif file.measured is not None:
+            panel = _draw_history(figure, grid[row, 0], file.measured, loop=file.kind == "loop")
         panel.set_title(title, fontsize=8.5, loc="left", color=style.GREY)
     _scale_alike(figure.axes[:])
-    swept = any(isinstance(seen.measured, Sweep) for seen in files)
-    sweeps = "Sweeps: every point as measured, lines through the means of the repeats." if swept else ""
-    scales = "Panels of one direction have the same scales where each fills a third of them."
-    return style.explained(figure, sweeps, scales if len(files) > 1 else "")
+    swept = any(isinstance(file.measured, Sweep) for file in shown)
+    return style.explained(
+        figure,
+        "Sweeps: points as measured, lines through the means of the repeats." * swept,
+        "Panels of one direction share their scales if each fills a third of them." * (len(shown) > 1),
+    )
 
 
 def _scale_alike(panels: Sequence[Axes]) -> None:
-    """Give panels of one direction that show the same the same scales, where all stay readable in them."""
+    """Give panels of one direction and quantity common scales if all stay readable in them."""
     alike: dict[tuple[object, ...], list[Axes]] = {}
     for axes in panels:
         alike.setdefault((axes.get_label(), axes.get_xlabel(), axes.get_ylabel()), []).append(axes)
@@ -75,8 +79,7 @@ def _scale_alike(panels: Sequence[Axes]) -> None:
 
 
 def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bool) -> Axes:
-    """Both channels over time, long ones as the range in each bin, and force over displacement where it is a loop; the
-    first panel is returned."""
+    """Draw both channels over time and, of a loop, force over displacement; return the first panel."""
     (length, to_length), unit_force, _ = history.direction.display
     force, to_force = for_people(*unit_force, float(np.abs(history.force).max()))
     names = history.direction.motion.words
@@ -86,7 +89,7 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
     motion, load = to_length * history.displacement, to_force * history.force
     labels = f"{names[0]}\n[{length}]", f"{names[1]}\n[{force}]"
     for axes, values, label in zip(over_time, (motion, load), labels, strict=True):
-        if history.time.size <= 2 * BINS:
+        if history.time.size <= 2 * TIME_BINS:
             axes.plot(history.time, values, lw=0.8, color=_COLOR)
         else:
             axes.fill_between(*ranges(history.time, values), step="post", color=_COLOR, lw=0.6)
@@ -105,39 +108,48 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
 
 
 def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
-    """Stiffness and loss factor over what the sweep steps through; the first panel is returned."""
-    units = sweep.direction.display
-    stiffness, factor = for_people(*units.stiffness, float(np.abs(sweep.stiffness).max()))
-    pair = place.subgridspec(1, 2).subplots(squeeze=False)[0]
-    axis = Kind(sweep.direction, sweep.stepped).axis
-    held = held_with(axis)
-    scales = {"frequency": ("Hz", 1.0), "amplitude": units.displacement}
-    (_, x_factor), (unit, length) = scales[axis], scales[held]
-    x, at_level = x_factor * getattr(sweep, axis), sweep.held
-    levels = np.unique(at_level)
-    drawn = style.styles(levels.size, held)
-    kinds = (
-        (factor * np.abs(sweep.stiffness), f"{words(sweep.direction)[2].replace('stiffness', '|K|')} [{stiffness}]"),
-        (sweep.stiffness.imag / sweep.stiffness.real, "loss factor [-]"),
+    """Draw stiffness and loss factor over what the sweep steps through; return the first panel."""
+    length = sweep.direction.display.displacement
+    factor, labels = stiffness_scale(sweep.direction, _largest(sweep.direction, sweep.stiffness))
+    by_amplitude = sweep.stepped == "amplitude"
+    held, unit, scale = ("frequency", "Hz", 1.0) if by_amplitude else ("amplitude", *length)
+    table = pd.DataFrame(
+        {
+            "x": sweep.step * (length.factor if by_amplitude else 1.0),
+            "level": sweep.held,
+            "stiffness": factor * sweep.direction.display.stiffness.factor * np.abs(sweep.stiffness),
+            "loss": loss_factor(sweep.stiffness),
+        }
     )
-    for axes, (values, label) in zip(pair, kinds, strict=True):
-        for level, look in zip(levels, drawn, strict=True):
-            at = at_level == level
-            points = Repeats.at(x[at], at_level[at])
-            axes.plot(points.along, points.mean(values[at]), color=look.color, ls=look.dashes, lw=0.8)
-            axes.plot(x[at], values[at], look.marker, color=look.color, alpha=0.75, **style.POINT)
+    pair = place.subgridspec(1, 2).subplots(squeeze=False)[0]
+    looks = style.styles(table["level"].nunique(), held)
+    for axes, quantity, label in zip(pair, ("stiffness", "loss"), labels, strict=True):
+        for (_, rows), look in zip(table.groupby("level"), looks, strict=True):
+            means = rows.groupby("x")[quantity].mean()
+            axes.plot(means.index, means, color=look.color, ls=look.dashes, lw=0.8)
+            axes.plot(rows["x"], rows[quantity], look.marker, color=look.color, alpha=0.75, **style.POINT)
         axes.set_label(str(sweep.direction))
-        style.label_axes(axes, axis_label(sweep.direction, axis), label, x)
-    labels = [told(unit, length * level) for level in levels]
+        x_label = columns_of(sweep.direction)[0] if by_amplitude else "frequency [Hz]"
+        style.label_axes(axes, x_label, label, table["x"].to_numpy())
     if sweep.stepped:
-        style.name_levels(pair[-1], labels, held, [True] * levels.size)
+        levels = [told(unit, scale * level) for level in np.unique(table["level"])]
+        style.name_levels(pair[-1], levels, held, [True] * len(levels))
     return pair[0]
 
 
-def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str) -> Figure:
-    """Each history with the cycles used; stiffness and loss factor over frequency; noise and harmonic distortion.
+def _largest(place: Place, stiffness: Array) -> float:
+    """Largest magnitude of complex stiffnesses [SI] in the unit of the tables of a place."""
+    return place.display.stiffness.factor * float(np.abs(stiffness).max())
 
-    Of more than four histories the first four are drawn.
+
+@style.in_own_style
+def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str) -> Figure:
+    """Histories with the cycles used, stiffness and loss factor over frequency, and noise and harmonic distortion.
+
+    Args:
+        reduction: operating points of all histories.
+        histories: as recorded; the first four are drawn.
+        title: of the figure.
     """
     shown = histories[:_MOST_HISTORIES]
     figure = style.new_figure(title, _STRIP * len(shown) + style.ROW + _NOISE_ROW)
@@ -158,20 +170,20 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
     left_out = f" The first {len(shown)} of {len(histories)} histories." if len(histories) > len(shown) else ""
     return style.explained(
         figure,
-        f"Top: displacement over time; coloured: the steady cycles used, grey: ramps, pauses, transients.{left_out}",
-        "Bars: twice the standard error. Noise: standard error of a point, relative to |K|.",
-        "Distortion: overtones over the fundamental (THD), filled of the force, hollow of the displacement.",
+        f"Top: displacement over time; coloured: steady cycles used, grey: ramps, pauses, transients.{left_out}",
+        "Bars: twice the standard error. Noise: standard error of a point relative to |K|.",
+        "Distortion: harmonics relative to the fundamental; filled symbols: force, open symbols: displacement.",
     )
 
 
 def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[float, style.Style]) -> None:
-    """Displacement over time; what was used has the colour of its level."""
+    """Draw displacement over time, the cycles used in the colour of their level."""
     unit, factor = reduction.direction.display.displacement
     time, low, high = ranges(history.time, factor * history.displacement)
     axes.fill_between(time, low, high, color="#c8c8c8", lw=0.4, step="post")
     for level, look in looks.items():
-        mine = [step for step in reduction.steps if step.name == history.name and step.level == level]
-        inside = [(time >= step.start) & (time <= step.end) for step in mine]
+        steps = [step for step in reduction.steps if step.name == history.name and step.level == level]
+        inside = [(time >= step.start) & (time <= step.end) for step in steps]
         used = np.any([np.zeros(time.shape, dtype=bool), *inside], axis=0)
         axes.fill_between(time, low, high, where=used, color=look.color, lw=0.4, step="post")
     style.label_axes(axes, "time [s]", f"{reduction.direction.motion.words[0]}\n[{unit}]")
@@ -181,14 +193,15 @@ def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[flo
 def _draw_points(
     pair: Sequence[Axes], reduction: Reduction, steps: pd.DataFrame, looks: dict[float, style.Style]
 ) -> None:
-    """Stiffness and loss factor over frequency, with bars of twice the standard error."""
+    """Draw stiffness and loss factor over frequency with bars of twice the standard error."""
     unit, length = reduction.direction.display.displacement
-    factor, names = pair_labels(reduction.direction, steps["stiffness"].abs().max())
+    factor, names = stiffness_scale(reduction.direction, _largest(reduction.direction, steps["stiffness"].to_numpy()))
+    factor *= reduction.direction.display.stiffness.factor
     for level, look in looks.items():
-        mine = steps[steps["level"] == level]
-        frequency, magnitude = mine["frequency"], (factor * mine["stiffness"].abs()).to_numpy()
-        factors = loss_factor(mine["stiffness"].to_numpy())
-        errors = magnitude * mine["gain_error"], (1.0 + factors**2) * mine["phase_error"]
+        rows = steps[steps["level"] == level]
+        frequency, magnitude = rows["frequency"], (factor * rows["stiffness"].abs()).to_numpy()
+        factors = loss_factor(rows["stiffness"].to_numpy())
+        errors = magnitude * rows["gain_error"], (1.0 + factors**2) * rows["phase_error"]
         for axes, value, error in zip(pair, (magnitude, factors), errors, strict=True):
             axes.plot(frequency, value, color=look.color, ls=look.dashes, lw=0.7, alpha=0.6)
             axes.vlines(frequency, value - 2 * error, value + 2 * error, color=look.color, lw=0.9)
@@ -202,23 +215,23 @@ def _draw_points(
 
 def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, style.Style]) -> None:
     for level, look in looks.items():
-        mine = steps[steps["level"] == level]
-        noise = np.hypot(mine["gain_error"], mine["phase_error"]) / 2**0.5
-        hollow = {"ms": 3.4, "mfc": "none", "mew": 0.7}
-        drawn = (
+        rows = steps[steps["level"] == level]
+        noise = np.hypot(rows["gain_error"], rows["phase_error"]) / 2**0.5
+        points = (
             (pair[0], noise, style.POINT),
-            (pair[1], mine["force_distortion"], style.POINT),
-            (pair[1], mine["displacement_distortion"], hollow),
+            (pair[1], rows["force_distortion"], style.POINT),
+            (pair[1], rows["displacement_distortion"], {"ms": 3.4, "mfc": "none", "mew": 0.7}),
         )
-        for axes, share, look_of in drawn:
-            axes.plot(mine["frequency"], 100 * share, look.marker, color=look.color, **look_of)
+        for axes, share, look_of_points in points:
+            axes.plot(rows["frequency"], 100 * share, look.marker, color=look.color, **look_of_points)
     for axes, name in zip(pair, ("noise [%]", "distortion [%]"), strict=True):
         style.label_axes(axes, "frequency [Hz]", name, steps["frequency"].to_numpy())
         axes.set_ylim(bottom=0.0)
 
 
+@style.in_own_style
 def resonance_figure(found: Resonance, title: str) -> Figure:
-    """Transmissibility and amplitude reached, stiffness and loss factor with errors, each over the frequency."""
+    """Transmissibility, amplitude reached, stiffness and loss factor of a resonance test over the frequency."""
     figure = style.new_figure(title, 2 * style.ROW)
     (ratio, amplitude), (stiffness, loss) = figure.subplots(2, 2, sharex=True)
     (unit, length), _, stiffness_units = TRANSLATION.display
@@ -247,10 +260,10 @@ def resonance_figure(found: Resonance, title: str) -> Figure:
         axes.vlines(found.frequency, values - error, values + error, color=color, lw=0.7, alpha=0.6)
         axes.set_ylim(low, high)
         style.label_axes(axes, "frequency [Hz]", label, found.test.frequency)
-    least = f"Where the error of K is beyond {100 * LARGEST_ERROR:g} % there is no point."
+    hidden = f"Points with an error of |K| beyond {100 * LARGEST_ERROR:g} % are not drawn."
     return style.explained(
         figure,
-        "Grey line: mass over base acceleration as measured. Points: means of neighbouring rows.",
-        "Bars: twice the standard error, large where the mass moves almost as the base does; they may leave the panel.",
-        least * bool(found.left_out.size),
+        "Grey line: acceleration of the mass over that of the base, as measured. Points: means of neighbouring rows.",
+        "Bars: twice the standard error; it is large where the mass moves almost as the base does.",
+        hidden * bool(found.left_out.size),
     )

@@ -23,6 +23,7 @@ _NEAR = 1.3
 _BEYOND = 4.0
 
 
+@style.in_own_style
 def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> Figure:
     """Stiffness and loss factor over reduced frequency, a row a place: at the amplitude with most temperatures."""
     places = list(dict.fromkeys(each.sweep.direction for each in found))
@@ -58,6 +59,7 @@ def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> F
     )
 
 
+@style.in_own_style
 def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -> Figure:
     """Shift factors over temperature, by the law and as each sweep asks for, and how far these are off the law."""
     figure = style.new_figure(title, style.ROW)
@@ -86,6 +88,7 @@ def _degree(found: Shifted) -> float:
     return float(np.round(found.temperature - CELSIUS))
 
 
+@style.in_own_style
 def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
     """Storage and loss modulus of each part and of its arms, and the relative error within the band."""
     figure = style.new_figure(title, style.ROW)

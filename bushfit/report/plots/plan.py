@@ -24,6 +24,7 @@ _MARKERS = {False: "o", True: "D"}
 _ONE_RUN = 2.8
 
 
+@style.in_own_style
 def plan_figure(plan: Plan) -> Figure:
     """Two panels a direction, the plan left and the standard programme right, and below the errors of both."""
     programmes = {"planned": plan.planned, "standard programme": plan.standard}

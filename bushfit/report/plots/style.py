@@ -1,14 +1,20 @@
-"""What all figures share: size, type, colours, legends, and the way to a file."""
+"""Size, type, colours and legends of all figures, and their way to a file.
+
+The user's matplotlibrc has no influence: `in_own_style` draws with matplotlib's defaults.
+"""
 
 import io
 import re
 import textwrap
 import warnings
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal, NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import wraps
+from threading import RLock
+from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
-from matplotlib import colormaps, rc_context
+from matplotlib import colormaps, rc_context, rcParamsDefault
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.cm import ScalarMappable
@@ -74,6 +80,33 @@ _TITLE_LETTERS, _NOTE_LETTERS, _LABEL_LETTERS = 64, 112, 27
 _MOST_LETTERS = 600
 #: Fonts that help out for names beyond Latin, Greek and Cyrillic, where they are installed.
 _WIDER_FONTS = {"Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "Microsoft YaHei", "SimHei", "PingFang SC"}
+#: matplotlib's defaults without those that choose a window system.
+_SETTINGS: dict[str, Any] = {
+    key: value for key, value in rcParamsDefault.items() if key.partition(".")[0] not in ("backend", "interactive")
+}
+#: matplotlib's settings belong to the process: one figure at a time changes them.
+_LOCK = RLock()
+_P = ParamSpec("_P")
+_Drawn = TypeVar("_Drawn", bound=Figure | None)
+
+
+@contextmanager
+def _own_settings(**settings: Any) -> Iterator[None]:
+    own: Any = {**_SETTINGS, "svg.hashsalt": "bushfit", "pdf.fonttype": 42, **settings}
+    with _LOCK, rc_context(own), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        yield
+
+
+def in_own_style(make: Callable[_P, _Drawn]) -> Callable[_P, _Drawn]:
+    """Decorator of a function that makes a figure: the user's matplotlibrc has no influence on it."""
+
+    @wraps(make)
+    def styled(*args: _P.args, **kwargs: _P.kwargs) -> _Drawn:
+        with _own_settings():
+            return make(*args, **kwargs)
+
+    return styled
 
 
 class Style(NamedTuple):
@@ -237,19 +270,19 @@ def explained(figure: Figure, *sentences: str) -> Figure:
     return figure
 
 
-def to_image(figure: Figure, form: str = "png") -> bytes:
-    """The figure as PNG, SVG or PDF, the same bytes for the same figure: no date, no version.
+def to_image(figure: Figure, form: str = "png", *, outlines: bool = True) -> bytes:
+    """The figure as PNG, SVG or PDF: the same bytes for the same figure, without date and version.
 
-    Texts of an SVG are outlines, which look the same wherever they are shown; those of a PDF can be found and copied.
+    Args:
+        form: "png", "svg" or "pdf".
+        outlines: whether texts of an SVG are outlines, which look the same everywhere, or texts, which are shorter.
     """
     for text in figure.findobj(Text):
         if CONTROL.search(text.get_text()):
             text.set_text(printable(text.get_text(), lines=True))
     buffer = io.BytesIO()
-    settings = rc_context({"svg.hashsalt": "bushfit", "svg.fonttype": "path", "pdf.fonttype": 42})
-    with warnings.catch_warnings(), settings:
-        warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        # past `savefig`, which draws twice: once to lay out what a single drawing lays out as well
+    with _own_settings(**{"svg.fonttype": "path" if outlines else "none"}):
+        # `savefig` would draw twice: once to lay out what a single drawing lays out as well
         canvas = get_registered_canvas_class(form)(figure)
         getattr(canvas, f"print_{form}")(buffer, metadata=dict.fromkeys(_UNSAID[form]))
     return buffer.getvalue()

@@ -51,6 +51,6 @@ def looped() -> Callable[..., LoopData]:
             model, direction, 0.1, amplitude, cycles=cycles, run_in=run_in, steps_per_cycle=1024, kind="loop"
         )
         force = record.force + 0.005 * np.ptp(record.force) * np.random.default_rng(7).normal(size=record.force.size)
-        return loop_data([Loop("$ loop $.csv", direction, record.time, record.displacement, force)])[0]
+        return loop_data([Loop(f"{1e3 * amplitude:g} mm.csv", direction, record.time, record.displacement, force)])[0]
 
     return loop

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import combinations
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,13 +13,16 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import LoopData, SweepData
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.prediction.stiffness import Prediction, predict
-from bushfit.report.plots.prediction import fine_grid
+from bushfit.prediction.stiffness import predict
+from bushfit.report.plots.fits import loops_figure, sweeps_figure
+from bushfit.report.plots.gap import gap_figure
+from bushfit.report.plots.prediction import prediction_figure
+from bushfit.report.tables import gap_table, loops_table, sweeps_table
 
 Swept = Callable[..., SweepData]
 Looped = Callable[..., LoopData]
@@ -32,12 +36,39 @@ def fitted(model: Model) -> Result:
     return Result(model, names, Covariance(names, np.diag([(0.02 * model.values[name]) ** 2 for name in names])))
 
 
-def predicted(
-    model: Model, direction: Direction, frequencies: Array = FREQUENCIES, amplitudes: Array = AMPLITUDES
-) -> tuple[Prediction, Prediction]:
-    """A prediction and its curves."""
-    prediction = predict(fitted(model), direction, frequencies, amplitudes)
-    return prediction, predict(fitted(model), direction, *fine_grid(prediction))
+def sweeps(model: Model, *data_sets: SweepData) -> Figure:
+    return sweeps_figure(Result(model), sweeps_table(model, data_sets), "CMP 15 961")
+
+
+def loops(model: Model, *data_sets: LoopData) -> Figure:
+    return loops_figure(Result(model), loops_table(model, data_sets), "CMP 15 961")
+
+
+def prediction(
+    result: Result, direction: Direction, *data_sets: SweepData, amplitudes: Array = AMPLITUDES, note: str = ""
+) -> Figure:
+    grid = predict(result, direction, FREQUENCIES, amplitudes)
+    table = sweeps_table(result.model, data_sets) if data_sets else None
+    return prediction_figure(result, grid, table, "CMP 15 961", note)
+
+
+def gap(
+    before: Model, after: Model, data_sets: Sequence[DataSet], corrected: Sequence[DataSet] = (), test: str = ""
+) -> Figure:
+    """The gap of two models of the same tests, or of tests that are corrected in the second."""
+    sides = [
+        SimpleNamespace(model=before, data_sets=data_sets),
+        SimpleNamespace(model=after, data_sets=corrected or data_sets),
+    ]
+    found = SimpleNamespace(before=sides[0], after=sides[1], result=Result(after))
+    added = [name for name in after.effects if name not in before.effects] or [test] * bool(test)
+    document = {
+        "verdict": "named",
+        "summary": "something closes the gap",
+        "effects": [{"name": name, "test": test or None} for name in added],
+        "gap": {"calibration": {"before": 5.0, "after": 1.0}, "heldout": {"before": 6.0, "after": 1.1}},
+    }
+    return gap_figure(gap_table(cast("Any", found)), Result(after), document, "mount")
 
 
 def lines(axes: Axes) -> list[Any]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figures import Looped, Swept, legend, note, points, titles, whole
+from figures import Looped, Swept, gap, legend, note, points, titles, whole
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -18,7 +18,6 @@ from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.report.plots.batch import Panel, batch_figure
-from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.style import to_image
 
 Heavier = Callable[[float], Model]
@@ -59,87 +58,75 @@ def headings(figure: Figure) -> list[str]:
     return [axes.get_title() for axes in figure.axes if axes.get_title()]
 
 
-def values(axes: Axes) -> Any:
-    (found,) = cells(axes)
-    return np.asarray(found.get_array())
-
-
 def test_rows_are_directions_and_parts_columns_before_and_after(
     paper_model: Model, heavier: Heavier, campaign: list[DataSet]
 ) -> None:
-    figure = gap_figure(paper_model, heavier(0.1), campaign, "mount", "Inertia closes the gap.")
-    assert names(figure) == ["axial storage", "axial loss", "radial storage", "radial loss", "axial loops / noise"]
+    figure = whole(gap(paper_model, heavier(0.1), campaign))
+    assert names(figure) == ["axial storage", "axial loss", "radial storage", "radial loss", "axial loops [%]"]
     assert figure.get_suptitle() == "mount"
-    assert figure.subfigs[0].get_suptitle() == "Inertia closes the gap."
-    before, after = headings(figure)
-    assert before.startswith("before\ndata fitted ")
-    assert after.startswith("after adding inertia\ndata fitted ")
-    squares = sum(np.sum(data_set.residual(paper_model) ** 2) for data_set in campaign)
-    counted = sum(data_set.counted for data_set in campaign)
-    assert f"data fitted {np.sqrt(squares / counted):.2f} x noise" in before
+    summary = "named: something closes the gap. Held-out data: 6.00 × noise before, 1.10 × noise after"
+    assert " ".join(figure.subfigs[0].get_suptitle().split()) == summary
+    assert headings(figure) == ["before\ndata fitted 5.00 × noise", "after adding inertia\ndata fitted 1.00 × noise"]
     x_labels = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel()]
     over_phase = ["phase after the upper turn [deg]"] * 2
-    assert x_labels == ["frequency [Hz]"] * 4 + [*over_phase, "measured less model, in units of noise"]
+    assert x_labels == ["frequency [Hz]"] * 4 + [*over_phase, "measured minus model [% of |K|]"]
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["0.1 mm", "0.2 mm", "0.5 mm"]
     bar = figure.axes[-1]
     assert {text.get_text() for text in bar.texts} == {"measured\nbelow model", "measured\nabove model"}
 
 
-def test_one_symmetric_scale_and_cells_that_are_measured_less_model_over_noise(
+def test_one_symmetric_scale_and_cells_that_are_measured_minus_model_in_percent(
     paper_model: Model, heavier: Heavier, campaign: list[DataSet], swept: Swept
 ) -> None:
-    figure = gap_figure(paper_model, heavier(0.1), campaign, "mount", "")
+    figure = gap(paper_model, heavier(0.1), campaign)
     coloured = [found for axes in maps(figure) for found in cells(axes)]
-    assert len(coloured) == 8
     norm, cmap = coloured[0].norm, coloured[0].cmap
     assert all(found.norm is norm and found.cmap == cmap for found in coloured)
     np.testing.assert_allclose(norm.boundaries, -norm.boundaries[::-1])
-    np.testing.assert_allclose(cmap(norm([0.0, -0.9, 0.9]))[:, :3], 0.92)  # nothing measured is white
+    np.testing.assert_allclose(cmap(norm([0.0, -0.4, 0.4]))[:, :3], 0.92)  # nothing measured is white
     below, above = cmap(norm([-4.0, 4.0]))
     assert below[2] > below[0], "blue below"
     assert above[0] > above[2], "red above"
-    share = np.mean(np.abs(np.concatenate([values(axes) for axes in maps(figure)])) > norm.vmax)
-    assert share <= 0.02
     data_set = swept(paper_model)
     harder = paper_model.with_values({name: 1.2 * paper_model.values[name] for name in ("mu", "m", "sigma_fmax")})
-    axes = maps(gap_figure(harder, paper_model, [data_set], "", ""))
+    axes = maps(gap(harder, paper_model, [data_set]))
     storage = values(axes[0])
     assert (storage < 0).all(), "the measurement lies below a model that is too stiff"
-    at = (data_set.amplitude == 2e-4) & (data_set.frequency == 55.0)
-    assert at.sum() == 3
-    expected = -data_set.deviation(harder)[at].real.mean()
-    noise = np.hypot(data_set.noise.random[data_set.name, 2e-4][0], data_set.noise.shared[0]) / np.sqrt(3.0)
-    assert storage[16 + 5] == pytest.approx(expected / noise)
-    right = np.concatenate([values(axes[1]), values(axes[3])])
-    assert 0.7 < np.std(right) < 1.3
+    here = (data_set.amplitude == 2e-4) & (data_set.frequency == 55.0)
+    assert here.sum() == 3
+    assert storage[16 + 5] == pytest.approx(-100.0 * data_set.off(harder)[0][here].mean())
+    assert np.std(values(axes[1])) < 2.0
     assert sum(len(found.get_segments()) for found in axes[0].collections if hasattr(found, "get_segments")) >= 48
 
 
-def test_loops_are_means_in_units_of_their_noise(paper_model: Model, looped: Looped) -> None:
+def values(axes: Axes) -> Any:
+    return np.concatenate([np.asarray(found.get_array()) for found in cells(axes)])
+
+
+def test_loops_are_means_in_percent_of_half_the_force_range(paper_model: Model, looped: Looped) -> None:
     data_set = looped(paper_model, 1e-3)
-    figure = gap_figure(paper_model, paper_model, [data_set], "loop", "Nothing is missing.")
-    (axes,) = whole(figure).axes
-    assert not axes.title.get_window_extent().overlaps(axes.get_legend().get_window_extent())
-    assert names(figure) == ["axial loops / noise"]
+    figure = whole(gap(paper_model, paper_model, [data_set]))
+    (axes,) = figure.axes
     assert headings(figure)[0].startswith("nothing added\n")
     curve = axes.get_lines()[0]
     assert len(curve.get_xdata()) == 36
-    assert 0.6 < np.std(curve.get_ydata()) < 1.5
-    assert axes.get_yscale() == "linear"
     assert legend(axes) == ["1 mm, 0.1 Hz"]
+    stiff = paper_model.with_values({name: 1.2 * paper_model.values[name] for name in ("mu", "m", "sigma_fmax")})
+    after_turn = gap(stiff, paper_model, [data_set]).axes[0].get_lines()[0].get_ydata()[0]
+    assert after_turn == pytest.approx(-20.0, abs=1.5), "20 % below at the upper turn"
 
 
-def test_a_mended_test_is_drawn_where_it_was_recorded(paper_model: Model, swept: Swept) -> None:
+def test_a_corrected_test_is_drawn_where_it_was_recorded(paper_model: Model, swept: Swept) -> None:
     """A radial sweep that was filed as axial: after, it is one of the radial direction, in the same row."""
     radial = swept(paper_model, Direction.RADIAL)
     filed = replace(radial, sweep=replace(radial.sweep, direction=Direction.AXIAL))
-    figure = gap_figure(paper_model, paper_model, [filed], "mount", "", mended=[radial])
+    figure = gap(paper_model, paper_model, [filed], corrected=[radial], test="radial.csv")
     assert names(figure) == ["axial storage", "axial loss"]
-    (before, after) = headings(figure)
-    assert before.startswith("the tests as they are")
-    assert after.startswith("if the record is mistaken")
+    before, after = headings(figure)
+    assert before.startswith("tests as recorded")
+    assert after.startswith("with the record corrected")
     storage = maps(figure)[:2]
-    assert np.abs(values(storage[0])).min() > 10.0 > 3.0 * np.sqrt(np.mean(np.square(values(storage[1]))))
+    assert np.abs(values(storage[0])).min() > 80.0 > 30.0 * np.sqrt(np.mean(np.square(values(storage[1]))))
 
 
 def panel(count: int) -> Panel:
