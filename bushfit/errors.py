@@ -61,7 +61,7 @@ class BushfitError(Exception):
 
 
 @contextmanager
-def naming(file: Path | None = None, place: str | None = None) -> Iterator[None]:
+def error_location(file: Path | None = None, place: str | None = None) -> Iterator[None]:
     """Names file and place, as far as they are given, in an error that is raised within by what does not know them."""
     try:
         yield
@@ -123,6 +123,6 @@ class BatchError(BushfitError):
     """A batch that cannot go on: no workers, another version on them, or a cluster that is gone."""
 
 
-def typed(path: Path) -> str:
+def quote_path(path: Path) -> str:
     """A path as it is typed into a terminal: in quotes where it holds what a shell would take apart."""
     return f'"{path}"' if _TAKEN_APART.search(str(path)) else str(path)

@@ -12,7 +12,7 @@ _LISTENER = ContextVar[Listener]("_LISTENER", default=lambda *_: None)
 
 
 @contextmanager
-def heard_by(listener: Listener) -> Iterator[None]:
+def report_progress_to(listener: Listener) -> Iterator[None]:
     """All work within is told to the listener."""
     token = _LISTENER.set(listener)
     try:
@@ -21,7 +21,7 @@ def heard_by(listener: Listener) -> Iterator[None]:
         _LISTENER.reset(token)
 
 
-def counting(what: str, items: Iterable[_Item], total: int = 0, remark: Callable[[], str] = str) -> Iterator[_Item]:
+def track(what: str, items: Iterable[_Item], total: int = 0, remark: Callable[[], str] = str) -> Iterator[_Item]:
     """The items one by one, each counted when its work is done: of so many, where they have no length themselves."""
     listener, total = _LISTENER.get(), len(items) if isinstance(items, Collection) else total
     listener(what, 0, total, "")

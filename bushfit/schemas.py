@@ -101,7 +101,7 @@ def _generator(way: str) -> Any:
 
 def _explained(made: dict[str, Any], kind: type) -> dict[str, Any]:
     """The schema of a table with what its type says of it and of its keys."""
-    from bushfit.validation import in_table
+    from bushfit.validation import inline_fields
 
     properties: dict[str, Any] = made["properties"]
     told = _beside_keys(kind) if is_typeddict(kind) else {}
@@ -109,7 +109,7 @@ def _explained(made: dict[str, Any], kind: type) -> dict[str, Any]:
         told |= _arguments(inspect.cleandoc(each.__doc__ or ""))
     for key in properties.keys() & told.keys():
         properties[key] = {**properties[key], "description": told[key]}
-    for field, keys in (in_table(kind) if is_dataclass(kind) else {}).items():
+    for field, keys in (inline_fields(kind) if is_dataclass(kind) else {}).items():
         value = properties.pop(field)
         inner = value.get("additionalProperties", value)
         made["required"] = [key for key in made.get("required", ()) if key != field]

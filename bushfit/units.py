@@ -80,7 +80,7 @@ def split_header(text: str) -> tuple[str, str | None]:
     return (match["name"], match["unit"].strip()) if match else (text.strip(), None)
 
 
-def factor(text: str, expected: str) -> float:
+def si_factor(text: str, expected: str) -> float:
     """The number that turns values in the unit `text` into SI; of a temperature, differences of values.
 
     Args:
@@ -90,32 +90,32 @@ def factor(text: str, expected: str) -> float:
     Raises:
         UnitError: an unknown unit, or a unit of another dimension.
     """
-    if expected == "K" and (degree := kelvin(text)):
+    if expected == "K" and (degree := kelvin_scale(text)):
         return degree[0]
     if expected == "m/s^2":
         text = _OF_ACCELERATION.get(text.strip(), text)
     scale, base = _resolve(text)
     if base != _resolve(expected)[1]:
         hint = 'a pound of force is "lbf"' if {"lb", "lbs"} & set(_WORD.findall(text)) else None
-        raise UnitError("the unit does not fit", found=f'"{text}"', expected=describe(expected), hint=hint)
+        raise UnitError("the unit does not fit", found=f'"{text}"', expected=describe_unit(expected), hint=hint)
     return scale
 
 
 def is_unit(text: str) -> bool:
     """Whether `text` is a unit, of whatever dimension."""
-    return agrees(text, text)
+    return is_compatible(text, text)
 
 
-def agrees(text: str, expected: str) -> bool:
+def is_compatible(text: str, expected: str) -> bool:
     """Whether `text` is a known unit of the same dimension as `expected`."""
     try:
-        factor(text, expected)
+        si_factor(text, expected)
     except UnitError:
         return False
     return True
 
 
-def quantity(value: object, *expected: str) -> float:
+def parse_quantity(value: object, *expected: str) -> float:
     """The SI value of a text such as "10 mm" that agrees with one of the expected SI units, such as "m".
 
     Raises:
@@ -137,12 +137,12 @@ def quantity(value: object, *expected: str) -> float:
         raise refused("this is no quantity", found=f'"{text}"', hint=f"{way} a decimal point")
     if not math.isfinite(float(number[0])):
         raise refused("the number is too large", found=f'"{text}"')
-    fitting = next((choice for choice in expected if agrees(own, choice)), expected[0])
+    fitting = next((choice for choice in expected if is_compatible(own, choice)), expected[0])
     # to 15 digits: 18 mm are 0.018 m, and not 0.018000000000000002 m
-    return sized(float(f"{float(number[0]) * factor(own, fitting):.{_MOST_DIGITS}g}"), fitting)
+    return check_size(float(f"{float(number[0]) * si_factor(own, fitting):.{_MOST_DIGITS}g}"), fitting)
 
 
-def sized(value: float, unit: str) -> float:
+def check_size(value: float, unit: str) -> float:
     """A value in SI, if it is zero or of a size that a bushing, its tests or its rig may have.
 
     Raises:
@@ -160,7 +160,7 @@ def sized(value: float, unit: str) -> float:
     )
 
 
-def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:
+def display_unit(unit: str, factor: float, size: float) -> tuple[str, float]:
     """Unit and factor from SI in which people read numbers of that size in SI: MPa for 1.09e6 Pa, kPa for 1.46e4 Pa."""
     unit, factor = _WRITTEN.get(unit, (unit, factor))
     number = abs(size) * factor
@@ -189,7 +189,7 @@ def number(value: float, digits: int, sign: str = "") -> str:
     return f"{float(mantissa):{sign}.{_MOST_DIGITS}g}e{int(power)}"
 
 
-def alike(values: Sequence[float], digits: int, least: int = 0) -> list[str]:
+def format_aligned(values: Sequence[float], digits: int, least: int = 0) -> list[str]:
     """Numbers that stand together, all with the decimals that the first needs for so many digits: 1.4530, 1.4488.
 
     Args:
@@ -213,7 +213,7 @@ def alike(values: Sequence[float], digits: int, least: int = 0) -> list[str]:
     return [text(value) for value in values]
 
 
-def stepped(start: float, stop: float, step: float) -> tuple[float, ...]:
+def regular_steps(start: float, stop: float, step: float) -> tuple[float, ...]:
     """Values from start to stop, both of them; none where they do not count upward from above zero, or are beyond
     100 000, by a typing error in the step."""
     if not (0.0 < start <= stop and step > 0.0 and (stop - start) / step < 100_000):
@@ -221,19 +221,19 @@ def stepped(start: float, stop: float, step: float) -> tuple[float, ...]:
     return tuple(start + i * step for i in range(int((stop - start) / step * (1.0 + 1e-9)) + 1))  # with the last one
 
 
-def told(unit: str, *values: float, digits: int = 3) -> str:
+def format_range(unit: str, *values: float, digits: int = 3) -> str:
     """Positive numbers of one unit as people read them, each once: 1.09 MPa, 5 to 155 Hz, 0.0221 um."""
-    unit, factor = for_people(unit, 1.0, math.sqrt(abs(min(values) * max(values))))
+    unit, factor = display_unit(unit, 1.0, math.sqrt(abs(min(values) * max(values))))
     return f"{' to '.join(dict.fromkeys(number(value * factor, digits) for value in values))} {unit}"
 
 
-def describe(expected: str) -> str:
+def describe_unit(expected: str) -> str:
     """An expected SI unit in words: "a length, such as mm"."""
     kind, example = _kind(expected)
     return f"{kind}, such as {example}"
 
 
-def example(expected: str) -> str:
+def example_unit(expected: str) -> str:
     """A unit that a user would write where the SI unit `expected` is meant."""
     return _kind(expected)[1]
 
@@ -285,19 +285,19 @@ def _registry() -> pint.UnitRegistry[Any]:
     return pint.UnitRegistry(str(Path(__file__).with_name("units.txt")), cache_folder=None)
 
 
-def kelvin(unit: str) -> tuple[float, float] | None:
+def kelvin_scale(unit: str) -> tuple[float, float] | None:
     """Kelvin per unit of temperature such as "°C", and kelvin at its zero; None for any other text."""
     return _TEMPERATURES.get(unit.replace("℃", "°C").replace("°", "deg").replace(" ", "").lower())
 
 
-def temperature(raw: object) -> float:
+def parse_temperature(raw: object) -> float:
     """The temperature [K] that a text such as "22 degC", "295 K" or "72 degF" states.
 
     Raises:
         UnitError: no text of a number and one of these units, or one below absolute zero.
     """
     found = re.fullmatch(r"\s*([+-]?\d+(?:[.,]\d+)?)\s*(.*?)\s*", raw) if isinstance(raw, str) else None
-    scale = kelvin(found[2]) if found else None
+    scale = kelvin_scale(found[2]) if found else None
     value = scale[0] * float(found[1].replace(",", ".")) + scale[1] if found and scale else -1.0
     if value < 0.0:
         raise UnitError("this is no temperature", found=repr(raw), expected='such as "22 degC" or "295 K"')

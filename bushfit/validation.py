@@ -17,7 +17,7 @@ from pydantic_core import ErrorDetails
 
 from bushfit.errors import BushfitError, CampaignError, did_you_mean
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
-from bushfit.units import quantity, stepped, temperature
+from bushfit.units import parse_quantity, parse_temperature, regular_steps
 
 T = TypeVar("T")
 
@@ -72,7 +72,7 @@ def unknown_key(key: str, known: Collection[str]) -> CampaignError:
     return CampaignError("unknown key", found=f'"{key}"', expected=expected, hint=hint)
 
 
-def converted(
+def converter(
     convert: Callable[[Any, ValidationInfo], Any], written: Mapping[str, Any] | None = None
 ) -> BeforeValidator:
     """A pydantic validator that calls convert(raw value, info); what it raises keeps its words.
@@ -91,7 +91,7 @@ def converted(
     return BeforeValidator(run, json_schema_input_type=Annotated[Any, WithJsonSchema(dict(written))])
 
 
-def standing_in_table(keys: Callable[[], Iterable[str]]) -> Mapping[str, Any]:
+def inline_keys(keys: Callable[[], Iterable[str]]) -> Mapping[str, Any]:
     """Metadata of a field whose keys, those that the function gives, stand in the table itself."""
     return {_IN_TABLE: keys}
 
@@ -102,7 +102,7 @@ def _adapter(schema: Any) -> TypeAdapter[Any]:
     return TypeAdapter(schema)
 
 
-def check_tables(
+def validate_tables(
     tables: Mapping[str, Any],
     file: Path | None,
     schema: type[T],
@@ -129,7 +129,7 @@ def check_tables(
     raise complaint  # outside of `except`: pydantic's error holds ours, and a ring of errors cannot be pickled
 
 
-def plain(value: Any, schema: Any) -> Any:
+def to_json_data(value: Any, schema: Any) -> Any:
     """A value of the type `schema`, which pydantic can check, as JSON-ready data."""
     return _adapter(schema).dump_python(value, mode="json")
 
@@ -164,7 +164,7 @@ def _place(table: type, location: tuple[int | str, ...]) -> str:
     for key in location:
         if isinstance(key, int):
             words[-1] += f" #{key + 1}"
-        elif key not in in_table(table):
+        elif key not in inline_fields(table):
             words.append(key)
         table = _table_at(table, (key,))
     return ".".join(words)
@@ -172,11 +172,11 @@ def _place(table: type, location: tuple[int | str, ...]) -> str:
 
 def known_keys(table: type) -> Sequence[str]:
     """The keys that a table of the file may have."""
-    inside = in_table(table)
+    inside = inline_fields(table)
     return [key for entry in fields(table) for key in (inside[entry.name]() if entry.name in inside else [entry.name])]
 
 
-def in_table(table: type) -> Mapping[str, Callable[[], Iterable[str]]]:
+def inline_fields(table: type) -> Mapping[str, Callable[[], Iterable[str]]]:
     """The fields whose keys stand in the table itself, each with the function that gives these keys."""
     known = fields(table) if is_dataclass(table) else ()
     return {entry.name: entry.metadata[_IN_TABLE] for entry in known if _IN_TABLE in entry.metadata}
@@ -204,14 +204,14 @@ LARGEST_SHAKEN = 1e6
 #: A list that is not empty; its check ends at the first error, as those of a hundred thousand would fill the memory.
 Several = Annotated[tuple[T, ...], Field(fail_fast=True), Field(min_length=1)]
 #: A value of a parameter: a number here, a text or a number in the file.
-Size = Annotated[
+ParameterValue = Annotated[
     float, WithJsonSchema({"type": ["string", "number"], "description": "with its unit; a ratio may be a number"})
 ]
 
 
 def si(*units: str) -> BeforeValidator:
     """A validator that takes a text with any of these units, and gives SI."""
-    return converted(lambda raw, _: quantity(raw, *units), text(f"a number with a unit of {' or '.join(units)}"))
+    return converter(lambda raw, _: parse_quantity(raw, *units), text(f"a number with a unit of {' or '.join(units)}"))
 
 
 def text(words: str) -> dict[str, Any]:
@@ -227,12 +227,12 @@ def motion(per: str = "") -> BeforeValidator:
 
     units = " or ".join(f"{each.displacement_unit}{per}" for each in (TRANSLATION, ROTATION, STRAINING))
     written = text(f"a number with a unit of {units}, by what is tested")
-    return converted(lambda raw, info: quantity(raw, unit(info.data.get("direction"))), written)
+    return converter(lambda raw, info: parse_quantity(raw, unit(info.data.get("direction"))), written)
 
 
 def table(convert: Callable[[dict[str, Any]], Any], written: Mapping[str, Any] | None = None) -> BeforeValidator:
     """A validator that converts a table, whose JSON Schema is `written`; what is none it leaves to pydantic."""
-    return converted(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw, written)
+    return converter(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw, written)
 
 
 def _frequencies(raw: dict[str, Any]) -> list[str]:
@@ -240,7 +240,7 @@ def _frequencies(raw: dict[str, Any]) -> list[str]:
     expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
     if set(raw) != {"start", "stop", "step"}:
         raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
-    values = stepped(*(quantity(raw[key], "Hz") for key in ("start", "stop", "step")))
+    values = regular_steps(*(parse_quantity(raw[key], "Hz") for key in ("start", "stop", "step")))
     if not values:
         raise CampaignError("this is no range of frequencies", found=str(raw), expected="0 < start <= stop, step > 0")
     return [f"{value!r} Hz" for value in values]
@@ -260,7 +260,9 @@ _FREQUENCIES = {
     ]
 }
 
-Temperature = Annotated[float, converted(lambda raw, _: temperature(raw), text('a temperature, such as "23 degC"'))]
+Temperature = Annotated[
+    float, converter(lambda raw, _: parse_temperature(raw), text('a temperature, such as "23 degC"'))
+]
 Length = Annotated[float, si("m"), Field(gt=0)]
 Angle = Annotated[float, si("rad"), Field(gt=0)]
 Strain = Annotated[float, si("1"), Field(gt=0)]

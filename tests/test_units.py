@@ -22,10 +22,10 @@ from bushfit.errors import UnitError
     ],
 )  # fmt: skip
 def test_units_that_people_read(value: float, unit: str, shown: str) -> None:
-    name, factor = units.for_people(unit, 1.0, value)
+    name, factor = units.display_unit(unit, 1.0, value)
     assert f"{value * factor:.6g} {name}" == shown
     plain = name.removesuffix("^alpha")
-    assert units.factor(plain, unit.removesuffix("^alpha")) * factor == pytest.approx(1.0), "the same quantity"
+    assert units.si_factor(plain, unit.removesuffix("^alpha")) * factor == pytest.approx(1.0), "the same quantity"
 
 
 @pytest.mark.parametrize(
@@ -40,7 +40,7 @@ def test_units_that_people_read(value: float, unit: str, shown: str) -> None:
 )  # fmt: skip
 def test_quantity_in_si(text: str, expected: str, value: float) -> None:
     """In the spellings of rigs and data sheets, too."""
-    assert units.quantity(text, expected) == pytest.approx(value, rel=1e-14)
+    assert units.parse_quantity(text, expected) == pytest.approx(value, rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -57,14 +57,14 @@ def test_quantity_in_si(text: str, expected: str, value: float) -> None:
 )  # fmt: skip
 def test_what_is_no_quantity_is_refused(value: object, expected: str, words: list[str]) -> None:
     with pytest.raises(UnitError) as caught:
-        units.quantity(value, expected)
+        units.parse_quantity(value, expected)
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
 @given(st.text(max_size=60))
 def test_any_text_is_a_unit_or_a_unit_error(text: str) -> None:
     try:
-        scale = units.factor(text, "N/m")
+        scale = units.si_factor(text, "N/m")
     except UnitError:
         return
     assert math.isfinite(scale)
@@ -96,7 +96,7 @@ def test_units_of_the_field_are_as_large_as_in_the_whole_list_of_pint() -> None:
 def test_units_of_two_readings_are_refused(unit: str, expected: str, said: str) -> None:
     """As pounds of mass where a force has to stand."""
     with pytest.raises(UnitError, match=said):
-        units.factor(unit, expected)
+        units.si_factor(unit, expected)
 
 
 @pytest.mark.parametrize("unit", units._EVERYDAY)
@@ -135,4 +135,4 @@ def test_a_number_keeps_its_digits(value: float, digits: int) -> None:
 def test_numbers_that_stand_together_end_alike(
     values: tuple[float, ...], digits: int, least: int, shown: list[str]
 ) -> None:
-    assert units.alike(values, digits, least) == shown
+    assert units.format_aligned(values, digits, least) == shown

@@ -30,8 +30,8 @@ from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.reduction.arrays import scatter
-from bushfit.units import number, quantity
-from bushfit.validation import Share, Size, converted, table, text
+from bushfit.units import number, parse_quantity
+from bushfit.validation import ParameterValue, Share, converter, table, text
 
 
 class Verdict(IntEnum):
@@ -58,9 +58,9 @@ class Bounds:
         at_least: bushings that the batch must have for sigma to be judged.
     """
 
-    min: Size | None = None
-    max: Size | None = None
-    nominal: Size | None = None
+    min: ParameterValue | None = None
+    max: ParameterValue | None = None
+    nominal: ParameterValue | None = None
     tolerance: Share | None = None
     sigma: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     at_least: Annotated[int, Field(ge=3)] = 10
@@ -101,17 +101,17 @@ class Bounds:
 
 def _stiffness(raw: object, info: ValidationInfo) -> object:
     point = info.data.get("at")
-    return quantity(raw, point.motion.stiffness_unit) if isinstance(point, Point) else 0.0
+    return parse_quantity(raw, point.motion.stiffness_unit) if isinstance(point, Point) else 0.0
 
 
 def _ratio(raw: object, _: ValidationInfo) -> object:
-    return raw if isinstance(raw, int | float) and not isinstance(raw, bool) else quantity(raw, "1")
+    return raw if isinstance(raw, int | float) and not isinstance(raw, bool) else parse_quantity(raw, "1")
 
 
 _LIMIT = Field(ge=0, allow_inf_nan=False)
-Ratio = Annotated[float, converted(_ratio, text("a share, or a number") | {"type": ["string", "number"]}), _LIMIT]
+Ratio = Annotated[float, converter(_ratio, text("a share, or a number") | {"type": ["string", "number"]}), _LIMIT]
 Stiffness = Annotated[
-    float, converted(_stiffness, text("a number with a unit of N/m, N*m/rad or Pa, by the point")), _LIMIT
+    float, converter(_stiffness, text("a number with a unit of N/m, N*m/rad or Pa, by the point")), _LIMIT
 ]
 
 

@@ -24,7 +24,7 @@ from bushfit.effects.mistakes import candidate_named
 from bushfit.errors import CampaignError
 from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import folder_name
-from bushfit.validation import Share, Text, check_tables, converted, unknown_key
+from bushfit.validation import Share, Text, converter, unknown_key, validate_tables
 
 Command = Literal["run", "fit", "diagnose", "predict"]
 
@@ -55,8 +55,8 @@ def _words(raw: object) -> object:
 
 
 Words = BeforeValidator(_words)
-Effects = Annotated[tuple[Annotated[str, converted(partial(_known, effect_named))], ...], Words]
-Candidates = Annotated[tuple[Annotated[str, converted(partial(_known, candidate_named))], ...], Words]
+Effects = Annotated[tuple[Annotated[str, converter(partial(_known, effect_named))], ...], Words]
+Candidates = Annotated[tuple[Annotated[str, converter(partial(_known, candidate_named))], ...], Words]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,7 +219,7 @@ def _csv_entries(path: Path) -> Iterator[Entry]:
             raise CampaignError(
                 "more cells than columns", file=path, place=place, found=str(len(cells)), expected=str(len(header))
             )
-        yield check_tables(filled, path, Entry, place=place)
+        yield validate_tables(filled, path, Entry, place=place)
 
 
 def _csv_lines(path: Path, text: str, delimiter: str) -> Iterator[tuple[str, list[str]]]:

@@ -13,8 +13,8 @@ from bushfit.effects import is_parameter, parameter_named, parameter_names
 from bushfit.errors import UnitError, did_you_mean
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion
 from bushfit.reading.measurement import Sweep
-from bushfit.units import agrees, for_people, quantity
-from bushfit.validation import converted
+from bushfit.units import display_unit, is_compatible, parse_quantity
+from bushfit.validation import converter
 
 #: A direction or a specimen, a frequency and an amplitude, each number with its unit.
 _WORDS = re.compile(r"\s*(\S.*?)[\s,]+([-+\d.eE]+\s*[A-Za-z]+)[\s,]+([-+\d.eE]+\s*[^\d\s.]+)\s*")
@@ -58,10 +58,10 @@ def parse_point(text: str) -> Point:
     if not match or (match[1] not in set(Direction) and did_you_mean(match[1].lower(), list(Direction))):
         hint = "write numbers with a decimal point" if re.search(r"\d,\d", text) else None
         raise UnitError("this is no operating point", found=repr(text), expected=expected, hint=hint)
-    strain = agrees(match[3].lstrip("+-.0123456789eE "), STRAINING.displacement_unit)
+    strain = is_compatible(match[3].lstrip("+-.0123456789eE "), STRAINING.displacement_unit)
     of_specimen = STRAINING if strain else TRANSLATION
     motion = Direction(match[1]).motion if match[1] in set(Direction) else of_specimen
-    frequency, amplitude = quantity(match[2], "Hz"), quantity(match[3], motion.displacement_unit)
+    frequency, amplitude = parse_quantity(match[2], "Hz"), parse_quantity(match[3], motion.displacement_unit)
     if not (frequency > 0.0 and amplitude > 0.0):
         raise UnitError("frequency and amplitude have to be above zero", found=repr(text), expected=expected)
     return Point(match[1], frequency, amplitude, motion.displacement_unit)
@@ -69,7 +69,7 @@ def parse_point(text: str) -> Point:
 
 _WRITTEN = {"type": "string", "description": 'a place, a frequency and an amplitude: "axial 25 Hz 0.1 mm"'}
 #: A point as a key of a TOML file.
-At = Annotated[Point, converted(lambda raw, _: parse_point(raw) if isinstance(raw, str) else raw, _WRITTEN)]
+At = Annotated[Point, converter(lambda raw, _: parse_point(raw) if isinstance(raw, str) else raw, _WRITTEN)]
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Quantity:
 
     def for_people(self, size: float) -> Quantity:
         """The same in the unit in which people read numbers of that size [SI]."""
-        return Quantity(self.name, *for_people(self.unit, self.factor, size))
+        return Quantity(self.name, *display_unit(self.unit, self.factor, size))
 
     @property
     def tabled(self) -> Quantity:

@@ -19,7 +19,7 @@ from bushfit.batch.quantities import PARTS, figures
 from bushfit.batch.work import failed, work
 from bushfit.effects.contract import Array
 from bushfit.errors import OutputError
-from bushfit.progress import counting
+from bushfit.progress import track
 from bushfit.report.contents import Kinds, Picture
 from bushfit.report.folder import check_free as check_writable
 from bushfit.report.folder import unwritable, write_files
@@ -119,7 +119,7 @@ def _worked(plan: Plan, workers: Pool) -> Outcome:
     numbers = defaultdict[str, Array](lambda: np.full((len(PARTS), count), np.nan))
     count_of = Counter[str]()
     come = pool.run(plan.rows, partial(work, orders=plan.orders), failed, workers)
-    for number, record in counting(
+    for number, record in track(
         "bushings", come, count, lambda: f"{count_of['failed']} failed" if count_of["failed"] else ""
     ):
         for name, known in figures(record):

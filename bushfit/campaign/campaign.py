@@ -12,17 +12,17 @@ from bushfit.campaign.quantities import Compound, ReportSettings, embedded
 from bushfit.campaign.schema import CampaignFile, FitSettings, PredictSettings, RigSettings, SimulateSettings
 from bushfit.campaign.toml import read_toml
 from bushfit.effects import effect_of, place_of, with_base
-from bushfit.errors import CampaignError, naming, typed
+from bushfit.errors import CampaignError, error_location, quote_path
 from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.model.model import FIVE, Model
-from bushfit.progress import counting
+from bushfit.progress import track
 from bushfit.reading.instruments import RECORDINGS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.stated import LoopFile, SweepFile, place_tested
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reduction.programme import programme
-from bushfit.units import CELSIUS, quantity
+from bushfit.units import CELSIUS, parse_quantity
 
 #: Endings of test files, which `bushfit init` makes a campaign of.
 TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods", *RECORDINGS)
@@ -81,14 +81,14 @@ def load_campaign(path: str | Path) -> Campaign:
             expected="[[loops]] or [[sweeps]] tables, or a [simulate] or a [compound] table",
             hint='add [[loops]] with file = "..." and direction = "axial"',
         )
-    with naming(path):
+    with error_location(path):
         bushing = Bushing(**vars(content.bushing)) if content.bushing else None
         specimens = tuple(Specimen(**vars(table)) for table in content.specimens)
         _check_places(content, specimens)
-    with naming(place="[report] logo"):
+    with error_location(place="[report] logo"):
         logo = embedded(path.parent / content.report.logo) if content.report.logo else None
     loops, sweeps = (
-        counting(f"{kind} read", reader_keywords(path, tests, specimens), len(tests))
+        track(f"{kind} read", reader_keywords(path, tests, specimens), len(tests))
         for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps))
     )
     found: dict[str, Any] = {
@@ -112,7 +112,7 @@ def load_bushing(path: Path) -> Bushing:
     if table is None:
         expected = "a [bushing] table with name, inner_radius, outer_radius and length"
         raise CampaignError("there is no bushing in it", file=path, expected=expected)
-    with naming(path):
+    with error_location(path):
         return Bushing(**vars(table))
 
 
@@ -124,14 +124,14 @@ def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
         raise CampaignError("nothing is said of what was tested", expected=expected)
     if doubles := {name for name in names if names.count(name) > 1}:
         raise CampaignError("two specimens have one name", place="[[specimens]]", found=", ".join(sorted(doubles)))
-    with naming(place="predict.directions"):
+    with error_location(place="predict.directions"):
         for name in content.predict.directions or ():
             place_named(name, specimens)
     simulated = content.simulate.effects if content.simulate else {}
     own = [f"{effect}.{name}" for effect, table in simulated.items() for name in table]
     for name in (*content.fit.effects, *content.fit.parameters, *own):
         if place := place_of(name):
-            with naming(place=name):
+            with error_location(place=name):
                 place_named(place, specimens)
 
 
@@ -161,7 +161,7 @@ def model_of(campaign: Campaign) -> Model:
         )
     effects = campaign.simulate.effects
     own = {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
-    with naming(campaign.path):
+    with error_location(campaign.path):
         names = with_base(dict.fromkeys(map(effect_of, own)))
         kept = {name: value for name, value in values.items() if effect_of(name) in names}
         return Model(campaign.bushing, names, {**kept, **own})
@@ -177,9 +177,9 @@ def refuse_tests(paths: Sequence[Path]) -> None:
     if tests:
         found = "a folder" if tests[0].is_dir() else "a test file" if len(tests) == 1 else "test files"
         sizes = '--inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm"'
-        hint = f"bushfit init {' '.join(map(typed, tests))} {sizes} makes one, with the sizes of your rubber"
+        hint = f"bushfit init {' '.join(map(quote_path, tests))} {sizes} makes one, with the sizes of your rubber"
     else:
-        found, hint = "a model", f"bushfit predict {typed(first)} predicts from a model"
+        found, hint = "a model", f"bushfit predict {quote_path(first)} predicts from a model"
     raise CampaignError("a campaign is needed", file=(tests or paths)[0], found=found, expected=expected, hint=hint)
 
 
@@ -208,10 +208,10 @@ def reader_keywords(
             "name": name,
             "shared": places.count(place) > 1,
         }
-        with naming(campaign, place=test.file):
+        with error_location(campaign, place=test.file):
             keywords["direction"] = body = place_tested(test.specimen, test.direction, specimens)
             if isinstance(test, SweepFile) and (amplitude := test.at_amplitude):
-                keywords["at_amplitude"] = held = quantity(amplitude, body.motion.displacement_unit)
+                keywords["at_amplitude"] = held = parse_quantity(amplitude, body.motion.displacement_unit)
                 if held <= 0.0:
                     raise CampaignError("at_amplitude is not positive", found=f'"{amplitude}"', expected="above zero")
         yield keywords

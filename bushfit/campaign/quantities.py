@@ -10,10 +10,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from bushfit.effects import is_parameter, parameter_named, parameter_names
-from bushfit.errors import CampaignError, UnitError, naming
+from bushfit.errors import CampaignError, UnitError, error_location
 from bushfit.reading.files import view_bytes
-from bushfit.units import quantity, sized
-from bushfit.validation import LARGEST_NUMBER, Name, converted, text, unknown_key
+from bushfit.units import check_size, parse_quantity
+from bushfit.validation import LARGEST_NUMBER, Name, converter, text, unknown_key
 
 #: The second to the power of alpha, at the end of the unit of m.
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
@@ -34,15 +34,15 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
 
     Ratios, and parameters of added effects, may be plain numbers.
     """
-    with naming(place=place):
+    with error_location(place=place):
         if not is_parameter(name):
             raise unknown_key(name, parameter_names())
         stated = parameter_named(name).unit
         unit = _S_TO_ALPHA.sub("", stated)
         is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
         if is_number and (unit == "1" or "." in name) and abs(raw) <= LARGEST_NUMBER:
-            return sized(float(raw), unit)
-        return quantity(_S_TO_ALPHA.sub("", raw) if unit != stated and isinstance(raw, str) else raw, unit)
+            return check_size(float(raw), unit)
+        return parse_quantity(_S_TO_ALPHA.sub("", raw) if unit != stated and isinstance(raw, str) else raw, unit)
 
 
 def parameter_values(raw: dict[str, Any]) -> dict[str, float]:
@@ -138,8 +138,8 @@ class Compound:
         rubber: the polymer.
     """
 
-    hardness: Annotated[float, converted(lambda raw, _: hardness(raw), text('such as "61 Shore A"'))]
-    filler: Annotated[float, converted(lambda raw, _: filler(raw), text('such as "27 phr"'))]
+    hardness: Annotated[float, converter(lambda raw, _: hardness(raw), text('such as "61 Shore A"'))]
+    filler: Annotated[float, converter(lambda raw, _: filler(raw), text('such as "27 phr"'))]
     rubber: Polymer = "natural"
 
 

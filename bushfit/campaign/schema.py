@@ -26,16 +26,16 @@ from bushfit.validation import (
     Frequency,
     Length,
     Name,
+    ParameterValue,
     Several,
     Share,
-    Size,
     Strain,
     Temperature,
     Text,
-    converted,
+    converter,
+    inline_keys,
     known_keys,
     si,
-    standing_in_table,
     table,
     unknown_key,
 )
@@ -55,7 +55,7 @@ def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
 
 
 #: Puts the direction or specimen itself into each test of [simulate].
-_SIMULATED_PLACES = converted(
+_SIMULATED_PLACES = converter(
     lambda raw, info: with_places(raw, [Specimen(**vars(table)) for table in info.data.get("specimens", ())])
 )
 
@@ -114,9 +114,9 @@ class ParameterSetting:
         vary: false holds the value.
     """
 
-    value: Size | None = None
-    min: Size | None = None
-    max: Size | None = None
+    value: ParameterValue | None = None
+    min: ParameterValue | None = None
+    max: ParameterValue | None = None
     vary: Flag = True
 
 
@@ -176,7 +176,7 @@ class FitSettings:
     loss: Loss = "linear"
     effects: tuple[Text, ...] = ()
     parameters: Annotated[Mapping[str, ParameterSetting], table(parameter_settings)] = field(
-        default_factory=dict, metadata=standing_in_table(parameter_names)
+        default_factory=dict, metadata=inline_keys(parameter_names)
     )
 
 
@@ -208,7 +208,7 @@ class SimulatedTest:
     """
 
     direction: Annotated[Place, InstanceOf[Place], WithJsonSchema({"type": "string"})] = field(
-        metadata=standing_in_table(lambda: PLACE_KEYS)
+        metadata=inline_keys(lambda: PLACE_KEYS)
     )
     temperature: Temperature | None = field(default=None, kw_only=True)
 
@@ -330,8 +330,8 @@ class SimulateSettings:
         loops, sweeps, resonances: the tests; empty for the rig's own choice.
     """
 
-    parameters: Annotated[Mapping[str, Size], table(parameter_values)] = field(default_factory=dict)
-    effects: Annotated[Mapping[str, Mapping[str, Size]], table(effect_values)] = field(default_factory=dict)
+    parameters: Annotated[Mapping[str, ParameterValue], table(parameter_values)] = field(default_factory=dict)
+    effects: Annotated[Mapping[str, Mapping[str, ParameterValue]], table(effect_values)] = field(default_factory=dict)
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     repeats: Count = 1
     noise: Share = 0.0

@@ -10,7 +10,7 @@ from bushfit.errors import CampaignError
 from bushfit.geometry import Bushing, Place, Specimen
 from bushfit.reading.files import line_of, read_utf8
 from bushfit.units import CELSIUS
-from bushfit.validation import check_tables
+from bushfit.validation import validate_tables
 
 T = TypeVar("T")
 
@@ -36,7 +36,7 @@ def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", lar
         CampaignError: the file is missing, too large, no TOML, or has keys or values that are not understood.
         UnitError: a quantity without a unit, or with one that does not fit.
     """
-    return check_tables(_parsed(path, what, largest), path, schema)
+    return validate_tables(_parsed(path, what, largest), path, schema)
 
 
 def _parsed(path: Path, what: str, largest: int) -> dict[str, Any]:

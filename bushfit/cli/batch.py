@@ -12,8 +12,8 @@ import click
 from bushfit.cli.common import Options, with_options
 from bushfit.cli.options import command_called, effect_option, file_option, flag, option, place_option, under
 from bushfit.cli.show import tell_table
-from bushfit.errors import naming
-from bushfit.units import alike, for_people
+from bushfit.errors import error_location
+from bushfit.units import display_unit, format_aligned
 
 if TYPE_CHECKING:
     from bushfit.batch.manifest import Command
@@ -103,7 +103,7 @@ def command(
     judged_by = read_limits(limits) if limits else None
     if limits and judged_by:
         check_judged(judged_by, limits, read.rows)
-    with naming(place="--at"):
+    with error_location(place="--at"):
         points = (*read.points, *map(parse_point, at), *(judged_by.points if judged_by else ()))
     formats = replace(options.formats, tables=tables, pictures=plots and options.formats.pictures, pages=reports)
     output = options.folder(read.stem).absolute()
@@ -124,9 +124,9 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
     if outcome.scatter:
         rows = []
         for quantity, (middle, spread) in outcome.scatter.items():
-            unit, factor = for_people(quantity.unit, 1.0, middle)
-            scatter = alike([spread * factor], 2)[0] if spread else ""  # one value tells of none
-            rows.append((quantity.name, alike([middle * factor], 4)[0], scatter, unit))
+            unit, factor = display_unit(quantity.unit, 1.0, middle)
+            scatter = format_aligned([spread * factor], 2)[0] if spread else ""  # one value tells of none
+            rows.append((quantity.name, format_aligned([middle * factor], 4)[0], scatter, unit))
         columns = ("quantity", "median", "robust std dev", "unit")
         tell_table(options, f"{plan.title}: {status['done']} bushing{'s' * (status['done'] > 1)}", columns, rows)
     rate = status.total() / max(outcome.seconds, 1e-9)

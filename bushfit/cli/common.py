@@ -18,8 +18,8 @@ from rich.markup import escape
 from rich.segment import Segment
 
 from bushfit.cli.options import FILE, FORMS, Folder, Function, Parameter, Size, Written, flag, in_order, option, under
-from bushfit.errors import ModelError, printable, typed
-from bushfit.progress import heard_by
+from bushfit.errors import ModelError, printable, quote_path
+from bushfit.progress import report_progress_to
 from bushfit.reading.tablefile import folder_name
 from bushfit.report.contents import Formats, Kinds
 from bushfit.report.folder import check_free, to_json, write_files
@@ -89,7 +89,7 @@ def shown_on(console: Console) -> Iterator[None]:
     timer = Timer(_PATIENCE, run_out)
     timer.start()
     try:
-        with heard_by(listen):
+        with report_progress_to(listen):
             yield
     finally:
         timer.cancel()
@@ -310,14 +310,18 @@ def open_model(file: Path) -> Result:
     ending = file.suffix.lower()
     if file.is_dir() or (file.is_file() and ending in (".toml", *TEST_FILES)):
         found = "a folder" if file.is_dir() else "a campaign" if ending == ".toml" else "a test file"
-        way = f"bushfit run {typed(file)}" if ending == ".toml" else f"bushfit init {typed(file)} ..., then bushfit run"
+        way = (
+            f"bushfit run {quote_path(file)}"
+            if ending == ".toml"
+            else f"bushfit init {quote_path(file)} ..., then bushfit run"
+        )
         inside = file / "model.json"
         raise ModelError(
             "a fitted model is needed",
             file=file,
             found=found,
             expected="a .json file, as bushfit run, the fits and diagnose write it",
-            hint=f"name the file: {typed(inside)}" if inside.is_file() else f"{way} makes one",
+            hint=f"name the file: {quote_path(inside)}" if inside.is_file() else f"{way} makes one",
         )
     return load_result(file)
 

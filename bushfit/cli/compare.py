@@ -11,8 +11,8 @@ from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options
 from bushfit.cli.options import FILE, command_called, effect_lists, option, place_option, under
 from bushfit.cli.show import tell_table
-from bushfit.errors import naming
-from bushfit.progress import counting
+from bushfit.errors import error_location
+from bushfit.progress import track
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
@@ -71,7 +71,7 @@ def command(
     job = Compare(asked_for(directions, grids), command_line("compare", *map(str, sources), *words))
     if families is not None:
         names = () if families == _ALL else tuple(name.replace(" ", "") for name in families.split(","))
-        with naming(place="--families"):
+        with error_location(place="--families"):
             for name in names:
                 all(map(effect_named, name.split("+")))
         campaign = load_campaign(sources[0])
@@ -80,7 +80,7 @@ def command(
     else:
         opened = [_opened(source) for source in sources]
         folder = options.free_folder(" and ".join(each.name for each, *_ in opened), job.kinds())
-        outcome = job.run([job.entry(*each) for each in counting("results fitted", opened)])
+        outcome = job.run([job.entry(*each) for each in track("results fitted", opened)])
     _tell(options, outcome)
     options.write(folder, options.formats.files(outcome.contents), outcome.document)
 

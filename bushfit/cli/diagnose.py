@@ -12,8 +12,8 @@ from rich.markup import escape
 from bushfit.cli.common import Options, Task, open_model, with_task
 from bushfit.cli.options import command_called, explanations, file_option, option, under
 from bushfit.cli.show import tell_parameters, tell_table
-from bushfit.errors import BushfitError, naming
-from bushfit.units import alike, for_people, number, quantity
+from bushfit.errors import BushfitError, error_location
+from bushfit.units import display_unit, format_aligned, number, parse_quantity
 
 if TYPE_CHECKING:
     from bushfit.diagnosis.record import Diagnosis
@@ -63,8 +63,8 @@ def command(
     from bushfit.jobs.diagnose import Diagnose
 
     start = open_model(model) if model else None
-    with naming(place="--tolerance"):
-        share = quantity(tolerance, "1")
+    with error_location(place="--tolerance"):
+        share = parse_quantity(tolerance, "1")
         if not 0.0 <= share <= 1.0:
             raise BushfitError("this is no share of |K|", found=f'"{tolerance}"', expected="0 % to 100 %")
     settings = Settings(max_effects, share, adopt, without, start.unresolved if start else ())
@@ -133,8 +133,8 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
     test = f" in {effect['test']}" if effect["test"] else ""
     console.print(f"  [bold]{effect['name']}[/bold]{escape(test)} ({effect['level']}): {escape(effect['sentence'])}")
     for parameter, entry in effect["parameters"].items():
-        unit, factor = for_people(entry["unit"], 1.0, entry["value"])
-        value, *ends = alike([factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, least=2)
+        unit, factor = display_unit(entry["unit"], 1.0, entry["value"])
+        value, *ends = format_aligned([factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, least=2)
         sure = f"95 % {' to '.join(ends)}" if ends else "without an interval"
         console.print(f"    {parameter} = {f'{value} {unit}'.removesuffix(' -')}, {sure}")
     if effect["twins"]:

@@ -58,7 +58,7 @@ def command(
     .fmu with arms.csv and arms.png, its Maxwell arms.
     """
     from bushfit.campaign.campaign import load_campaign
-    from bushfit.errors import naming
+    from bushfit.errors import error_location
     from bushfit.export.contract import UnitSystem
     from bushfit.jobs.export import Export, source_of
     from bushfit.jobs.predict import Predict
@@ -68,7 +68,7 @@ def command(
     asked = asked_for(directions, grids)
     if dialect and "nastran" not in formats:
         raise click.UsageError("'--dialect' is of '--format nastran'.")
-    with naming(place="--units"):
+    with error_location(place="--units"):
         system = UnitSystem.parse(units) if units is not None else None
     job = Export(
         tuple(dict.fromkeys(formats)),

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from bushfit.cli.options import Parameter, file_option, in_order, option, option_of, place_option, under
-from bushfit.errors import UnitError, naming
-from bushfit.units import quantity, stepped
+from bushfit.errors import UnitError, error_location
+from bushfit.units import parse_quantity, regular_steps
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import PredictSettings
@@ -55,8 +55,8 @@ def positive(text: str | None, option: str, unit: str) -> float | None:
     """
     if text is None:
         return None
-    with naming(place=option):
-        value = quantity(text, unit)
+    with error_location(place=option):
+        value = parse_quantity(text, unit)
         if not value > 0.0:
             raise UnitError("this is not positive", found=f'"{text}"', expected="a value above zero")
     return value
@@ -64,10 +64,10 @@ def positive(text: str | None, option: str, unit: str) -> float | None:
 
 def kelvin(text: str | None) -> float | None:
     """The value of --temperature [K]; None where it was not given."""
-    from bushfit.units import temperature
+    from bushfit.units import parse_temperature
 
-    with naming(place="--temperature"):
-        return None if text is None else temperature(text)
+    with error_location(place="--temperature"):
+        return None if text is None else parse_temperature(text)
 
 
 def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | None:
@@ -79,7 +79,7 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
     if text is None:
         return None
     expected = 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'
-    with naming(place=option):
+    with error_location(place=option):
         if re.search(r"\d,\d", text):
             raise UnitError(
                 "a comma between two digits may part numbers or be a decimal comma",
@@ -92,11 +92,13 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
             hint = "write the step, too: start:stop:step" if text.count(":") == 1 else None
             raise UnitError("these are no values with a unit", found=repr(text), expected=expected, hint=hint)
         counted = ":" in parts[1]
-        values = tuple(quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if counted else ","))
+        values = tuple(
+            parse_quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if counted else ",")
+        )
         if not counted and min(values) <= 0.0:
             raise UnitError("frequencies and amplitudes are above zero", found=text, expected=expected)
         if not counted:
             return values
-        if not (counted_up := stepped(*values)):
+        if not (counted_up := regular_steps(*values)):
             raise UnitError("start:stop:step does not count upward", found=text, expected=expected)
         return counted_up

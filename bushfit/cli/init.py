@@ -16,10 +16,10 @@ from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import STATED, TYPES, direction_error, options_named, with_stated
 from bushfit.cli.inspect import tell_left_out
 from bushfit.cli.options import command_called, flag, option, option_of, under
-from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
-from bushfit.progress import counting
+from bushfit.errors import BushfitError, CampaignError, MeasurementError, error_location, quote_path
+from bushfit.progress import track
 from bushfit.report.folder import check_free
-from bushfit.units import quantity
+from bushfit.units import parse_quantity
 
 if TYPE_CHECKING:
     from bushfit.geometry import Bushing
@@ -118,7 +118,7 @@ def command(
         "left_out": left_out,
     }
     options.write(folder, {file: text.encode() for file, text in written.items()}, document)
-    options.say(f"next: bushfit {'batch' if len(written) > 1 else 'run'} {typed(folder / target)}")
+    options.say(f"next: bushfit {'batch' if len(written) > 1 else 'run'} {quote_path(folder / target)}")
 
 
 def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
@@ -132,8 +132,8 @@ def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
     if diameter is None:
         hint = f'state it: {options[1]} "20 mm", or {options[0]} "10 mm"'
         raise CampaignError(f"the {side} size of the rubber is not stated", hint=hint)
-    with naming(place=options[1]):
-        return f"{1e3 * quantity(diameter, 'm') / 2.0:.12g} mm"
+    with error_location(place=options[1]):
+        return f"{1e3 * parse_quantity(diameter, 'm') / 2.0:.12g} mm"
 
 
 def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[str, str]]:
@@ -143,7 +143,7 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
     """
     from bushfit.campaign.schema import BushingTable
     from bushfit.geometry import Bushing
-    from bushfit.validation import check_tables
+    from bushfit.validation import validate_tables
 
     table = {f"{side}_radius": _radius(side, sizes) for side in _SIDES}
     if (length := sizes["length"]) is None:
@@ -151,7 +151,7 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
     table["length"] = length
     halved = [f"{side}_radius" for side in _SIDES if sizes[f"{side}_diameter"]]
     try:
-        return Bushing(**vars(check_tables({"name": name, **table}, None, BushingTable))), table
+        return Bushing(**vars(validate_tables({"name": name, **table}, None, BushingTable))), table
     except BushfitError as error:
         error.file = None
         if error.place:
@@ -179,12 +179,12 @@ def _usable(
         raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
     seen: list[Inspected] = []
     others = list(left_out)
-    for source in sources if questions.asked else counting("tests looked at", sources):
+    for source in sources if questions.asked else track("tests looked at", sources):
         one = questions.settled(source.stated, partial(_look, source, is_sized=is_sized, is_asked=questions.asked))
         if one.kind != "history":
             seen.append(one)
             continue
-        hint = f"bushfit reduce {typed(one.file)} --direction {one.direction or '...'} makes a sweep.csv of it"
+        hint = f"bushfit reduce {quote_path(one.file)} --direction {one.direction or '...'} makes a sweep.csv of it"
         if source.is_named:
             raise MeasurementError(
                 "this is a raw stepped-sine history, not a sweep",

@@ -16,7 +16,7 @@ from bushfit.cli.file_options import options_named, with_stated
 from bushfit.cli.options import command_called
 from bushfit.cli.show import tell_table
 from bushfit.errors import BushfitError
-from bushfit.progress import counting
+from bushfit.progress import track
 from bushfit.report import plots
 from bushfit.report.contents import Contents, Kinds
 
@@ -51,7 +51,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     folder = options.free_folder(files[0].stem, Kinds(pictures=tuple(pages)))
     seen: list[Inspected] = []
     failed: list[BushfitError] = []
-    for source in counting("tests looked at", sources):
+    for source in track("tests looked at", sources):
         try:
             with options_named():
                 seen.append(source.inspect())

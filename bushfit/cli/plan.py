@@ -17,8 +17,8 @@ from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for, grid_options, positive
 from bushfit.cli.options import FILE, Size, command_called, effect_lists, file_option, option, place_option, under
 from bushfit.cli.show import tell_table
-from bushfit.errors import naming
-from bushfit.units import for_people, number
+from bushfit.errors import error_location
+from bushfit.units import display_unit, number
 
 if TYPE_CHECKING:
     from bushfit.jobs.plan import PlanFile, Planned, Shown
@@ -106,7 +106,7 @@ def command(
     if beside and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' goes with MODEL.json.")
     folder = options.free_folder(opened.name, job.kinds(), CAMPAIGN_FILE, form="plan {}")
-    with naming(source):
+    with error_location(source):
         outcome = job.run(opened, beside)
     _tell(options, outcome)
     if count and outcome.plan.planned.tests:
@@ -205,7 +205,7 @@ def _tell_effects(options: Options, document: PlanFile) -> None:
     rows = []
     for name, shown in kept:
         sizes = [shown["planned"], shown["standard"]]
-        unit, factor = for_people(shown["unit"], 1.0, next(filter(None, sizes), 1.0))
+        unit, factor = display_unit(shown["unit"], 1.0, next(filter(None, sizes), 1.0))
         words = ["none" if size is None else number(size * factor, 3) for size in sizes]
         rows.append((escape(name), escape(shown["parameter"]), *words, unit))
     tell_table(options, title, ("effect", "amount", "plan", "standard", "unit"), rows, names=2)
@@ -215,11 +215,11 @@ def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check
     """The plan simulated, with a table of what was predicted and found."""
     from bushfit.batch import pool
     from bushfit.planning.campaign import Found, check
-    from bushfit.progress import counting
+    from bushfit.progress import track
 
     def every(seeds: Sequence[int], work: Callable[[Sequence[int]], list[Found]]) -> Iterator[tuple[int, Found]]:
         come = pool.run(seeds, work, lambda _: None, pool.LocalPool(os.cpu_count() or 1))
-        return counting("campaigns simulated and fitted", come, count)
+        return track("campaigns simulated and fitted", come, count)
 
     found = check(outcome.plan, count, seed, every)
     title = f"{len(found.off)} simulated campaigns from seed {found.seed} on: standard errors [%]"

@@ -88,7 +88,7 @@ def command(
 def tell_predictions(options: Options, outcome: Predicted) -> None:
     """The corners of each table, and what a user must know before using it."""
     from bushfit.report.tables import prediction_table, spread
-    from bushfit.units import alike, number
+    from bushfit.units import format_aligned, number
 
     for prediction in outcome.predictions:
         table = prediction_table(prediction)
@@ -102,7 +102,7 @@ def tell_predictions(options: Options, outcome: Predicted) -> None:
             cells = [number(value, 6) for value in row.iloc[:2]]
             for name, digits in zip(table.columns[2:4], (4, 3), strict=True):
                 band = row[f"{name}, low"], row[f"{name}, high"]
-                value, *ends = alike([row[name], *band], digits)
+                value, *ends = format_aligned([row[name], *band], digits)
                 cells.append(f"{value} ({' to '.join(ends)})" if band[0] < band[1] else value)
             rows.append(cells)
         tell_table(options, f"{whose}{place}, corners, with 95 % bands", list(table.columns[:4]), rows, names=2)

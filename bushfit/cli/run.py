@@ -12,7 +12,7 @@ from bushfit.cli.diagnose import tell_findings, tell_verdict
 from bushfit.cli.options import command_called
 from bushfit.cli.predict import tell_predictions
 from bushfit.cli.show import report, tell_fit, tell_result, tell_sources, tell_table
-from bushfit.units import alike, for_people, number
+from bushfit.units import display_unit, format_aligned, number
 
 if TYPE_CHECKING:
     from bushfit.fitting.procedures import TwoStep
@@ -144,10 +144,12 @@ def _tell_steps(options: Options, name: str, outcome: Ran) -> None:
 
 def _tell_passes(options: Options, two_step: TwoStep) -> None:
     parameters, last = two_step.result.model.parameters, two_step.passes[-1]
-    units = {name: for_people(parameters[name].unit, 1.0, value) for name, value in last.items()}
+    units = {name: display_unit(parameters[name].unit, 1.0, value) for name, value in last.items()}
     headers = [f"{name} [{unit}]" for name, (unit, _) in units.items()]
     # from the last pass, whose decimals the others have
-    columns = [alike([p[name] * factor for p in two_step.passes[::-1]], 5, 2) for name, (_, factor) in units.items()]
+    columns = [
+        format_aligned([p[name] * factor for p in two_step.passes[::-1]], 5, 2) for name, (_, factor) in units.items()
+    ]
     rows = ((str(count), *row) for count, row in enumerate(list(zip(*columns, strict=True))[::-1], start=1))
     tell_table(options, "static and dynamic fit in turn, pass by pass", ["pass", *headers], rows)
 
@@ -160,8 +162,8 @@ def _tell_cost(options: Options, two_step: Result, joint: Result) -> None:
         one, other = two_step.model.values[name], joint.model.values[name]
         errors = two_step.covariance.stderr(name), joint.covariance.stderr(name)
         ratio = f"{errors[0] / errors[1]:.1f}" if errors[0] and errors[1] else ""
-        unit, factor = for_people(joint.model.parameters[name].unit, 1.0, other)
-        shown = ["" if error is None else alike([error * factor], 2)[0] for error in errors]
-        second, first = alike([other * factor, one * factor], 4, least=2)
+        unit, factor = display_unit(joint.model.parameters[name].unit, 1.0, other)
+        shown = ["" if error is None else format_aligned([error * factor], 2)[0] for error in errors]
+        second, first = format_aligned([other * factor, one * factor], 4, least=2)
         rows.append((name, first, shown[0], second, shown[1], unit, f"{100 * (one / other - 1):+.1f} %", ratio))
     tell_table(options, "what the two-step procedure costs", columns, rows)

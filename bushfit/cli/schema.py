@@ -21,11 +21,11 @@ def command(name: str | None, options: Options) -> None:
 
     With -o, writes <name>.schema.json: that of NAME, or without NAME those of all files.
     """
-    from bushfit.errors import naming
+    from bushfit.errors import error_location
     from bushfit.report.folder import to_json
     from bushfit.schemas import DESCRIBED, schema
 
-    with naming(place="NAME"):
+    with error_location(place="NAME"):
         made = {each: schema(each) for each in ([name] if name else DESCRIBED if options.output else ())}
     document: dict[str, Any] = (
         made[name] if name else {**made} or {each: described.files for each, described in DESCRIBED.items()}

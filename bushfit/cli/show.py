@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from bushfit.cli.common import Options
-from bushfit.units import number, told
+from bushfit.units import format_range, number
 
 if TYPE_CHECKING:
     from bushfit.jobs.fits import Fitted
@@ -86,7 +86,7 @@ def _held(test: Misfit) -> str:
     from bushfit.report.tables import DISPLAYS
 
     unit, factor = DISPLAYS.get(test.unit or "", (test.unit or "", 1.0))
-    return told(unit, factor * (test.value or 0.0))
+    return format_range(unit, factor * (test.value or 0.0))
 
 
 def tell_sources(options: Options, result: Result) -> None:

@@ -10,8 +10,8 @@ import click
 
 from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.options import FILE, command_called, option, option_of, under
-from bushfit.errors import ModelError, UnitError, naming
-from bushfit.units import is_number, quantity
+from bushfit.errors import ModelError, UnitError, error_location
+from bushfit.units import is_number, parse_quantity
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import SimulateSettings
@@ -67,7 +67,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     plan = _with_options(plan, settings)
     for text in effects:
         truth = _with_effect(truth, text)
-    with naming(source):
+    with error_location(source):
         simulated = simulate(truth, plan)
     files = to_files(simulated, options.formats.table_form)
     folder = options.folder(simulated.result.name, "simulated {}")
@@ -79,8 +79,8 @@ def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateS
     changes = {name: value for name, value in settings.items() if value is not None}
     for name, given in changes.items():
         if isinstance(given, str):
-            with naming(place=option_of(name)):
-                changes[name] = quantity(given, "rad" if name == "phase_error" else "1")
+            with error_location(place=option_of(name)):
+                changes[name] = parse_quantity(given, "rad" if name == "phase_error" else "1")
                 if not 0.0 <= changes[name] < 1.0:
                     raise UnitError("impossible size", found=given, expected="0 up to 100 %, or below 1 rad")
     return replace(plan, **changes)
@@ -101,7 +101,9 @@ def _with_effect(model: Model, text: str) -> Model:
             + f"{effect.name}: {', '.join(parameter.name for parameter in effect.parameters)}",
         )
     unit = next(parameter.unit for parameter in effect.parameters if qualified(effect, parameter) == name)
-    with naming(place="--effect"):
-        size = float(value) if is_number(value) and unit == "1" else quantity(text.partition("=")[2].strip(), unit)
+    with error_location(place="--effect"):
+        size = (
+            float(value) if is_number(value) and unit == "1" else parse_quantity(text.partition("=")[2].strip(), unit)
+        )
     values = {name: size}
     return model.with_values(values) if effect.name in model.effects else model.with_effect(effect.name, values)

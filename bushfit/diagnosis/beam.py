@@ -25,7 +25,7 @@ from bushfit.diagnosis.refit import beside, refitted, within_reach
 from bushfit.diagnosis.words import judged
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.rig_class import ASSUMED, of_class
-from bushfit.progress import counting
+from bushfit.progress import track
 
 #: Refits at most of what is probable by a linear count alone. For time.
 _SETTLED = 8
@@ -54,11 +54,11 @@ class Search:
         """Every hypothesis that was weighed, the most probable first."""
         beam = [self.root]
         for depth in range(ROUNDS + 1):
-            for weighed in counting(f"round {depth + 1} of at most {ROUNDS + 1}", beam):
+            for weighed in track(f"round {depth + 1} of at most {ROUNDS + 1}", beam):
                 self._note_with_each(weighed, depth)
             if depth == ROUNDS or self._is_sure():
                 break
-            fresh = [one for weighed in counting("with one more", beam) for one in self._grown(weighed, depth)]
+            fresh = [one for weighed in track("with one more", beam) for one in self._grown(weighed, depth)]
             if depth == 0:
                 fresh += self._of_records()
             for weighed in fresh:
@@ -248,7 +248,7 @@ class Search:
         """The most promising mistakes in the record, the model as it came fitted to the tests with each put right."""
         data, base, found = self.asked.data, self.asked.base, []
         listed = claims(data, self.asked.without)
-        for claim in counting("mistakes put right", list(Screen(data).best(listed, _CLAIMS))):
+        for claim in track("mistakes put right", list(Screen(data).best(listed, _CLAIMS))):
             with suppress(FitError, ModelError):  # tests that nothing can be fitted to as mended
                 evidence = self.asked.fitted(claim.mended(data))
                 if [each.size for each in evidence.data_sets] == [each.size for each in base.data_sets]:

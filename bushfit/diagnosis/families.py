@@ -21,7 +21,7 @@ from bushfit.fitting.model_error import log_likelihood, with_model_error
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.prediction.comparison import CHANCE
-from bushfit.progress import counting
+from bushfit.progress import track
 from bushfit.units import number
 
 #: Laws of rate and of amplitude beside the paper's or in their place, of which families are made, each with each.
@@ -119,7 +119,7 @@ def fit_families(
     own = "+".join(["paper", *(name for name in model.effects if name not in BASE)])
     chains = {own: [first]}
     asked = names or known_families(model, data_sets)
-    for name in counting("families fitted", asked):
+    for name in track("families fitted", asked):
         with nullcontext() if names else suppress(FitError):
             chains[name] = _chain(chains, first, name, held, bounds)
     effects = {name: [] if name == own else name.split("+") for name in chains}
@@ -129,7 +129,7 @@ def fit_families(
     others = sorted((name for name in worth if name != own), key=worth.__getitem__, reverse=True)
     likely = [name for name in others if names or probability[name] >= _LIKELY] or others[:1]
     kept, found = {own, *(likely if names else likely[:_MOST])}, []
-    for name in counting("families held out", [name for name in worth if name in kept]):
+    for name in track("families held out", [name for name in worth if name in kept]):
         told, skipped = predicted_parts(first, chains[name][-1], bounds)
         out = HoldOut.of({part: of.residuals for part, of in told.items()}, skipped)
         gain = _gain(told, data_sets) if name != own else (None, None)

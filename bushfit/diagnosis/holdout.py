@@ -23,7 +23,7 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, SweepData, parted
-from bushfit.progress import counting
+from bushfit.progress import track
 from bushfit.reading.measurement import Stepped
 
 #: Share of all sweep points, those of the highest steps, that is one part.
@@ -125,7 +125,7 @@ def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[
     arguments are as of `hold_out`."""
     models = [_Fitted.of(evidence) for evidence in dict.fromkeys((before, after))]
     told, skipped = dict[str, Predicted](), list[Skipped]()
-    for part in counting("parts held out", list(parts(after.data_sets))):
+    for part in track("parts held out", list(parts(after.data_sets))):
         predictions = [model.predicted(part, bounds) for model in models]
         made = [prediction for prediction in predictions if not isinstance(prediction, Skipped)]
         if len(made) < len(models):

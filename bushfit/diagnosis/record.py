@@ -25,7 +25,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Alternative, Result
 from bushfit.prediction.caveats import warnings_of
-from bushfit.validation import plain
+from bushfit.validation import to_json_data
 
 #: Probability below which nothing is told of what may be else.
 _LEAST_TOLD = 0.01
@@ -205,7 +205,7 @@ class Diagnosis:
             "next_test": self.next_test,
             "warnings": warnings_of(self.result, notes=self.notes),
         }
-        return plain(document, DiagnosisFile)
+        return to_json_data(document, DiagnosisFile)
 
     def _gap(self) -> GapEntry:
         before, after = self.calibration

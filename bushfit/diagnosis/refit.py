@@ -18,7 +18,7 @@ from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import fit_from, probes
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
-from bushfit.progress import counting
+from bushfit.progress import track
 
 #: Chi-square beyond that of the best at which a refit is left on its way.
 _FAR = 60.0
@@ -44,7 +44,7 @@ def refitted(
         known = {name: value for name, value in start.items() if name in proposal.model.values}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
             fits[proposal.name] = fit_from(proposal.model.with_values(known), evidence.data_sets, held, limits)
-    list(counting("effects refitted", _finished(fits), len(fits)))
+    list(track("effects refitted", _finished(fits), len(fits)))
     best = min((fit.chi_square for fit in fits.values()), default=0.0)
     near = {name: fit for name, fit in fits.items() if _ended(fit) or fit.chi_square <= best + _FAR}
     return {name: Evidence(fit.solution, evidence.data_sets) for name, fit in near.items()}

@@ -17,7 +17,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import Source
-from bushfit.units import CELSIUS, agrees, factor, number, told
+from bushfit.units import CELSIUS, format_range, is_compatible, number, si_factor
 
 #: What the four units of a system measure, in SI.
 _BASES = ("m", "kg", "s", "N")
@@ -49,12 +49,12 @@ class UnitSystem:
         refused = partial(UnitError, found=f'"{text}"', expected='a length, a mass, a time and a force: "mm t s N"')
         found: dict[str, Unit] = {}
         for word in text.replace(",", " ").split():
-            base = next((base for base in _BASES if agrees(word, base)), None)
+            base = next((base for base in _BASES if is_compatible(word, base)), None)
             if base is None:
                 raise refused(f'"{word}" is none of the four units')
             if base in found:
                 raise refused(f'"{found[base].name}" and "{word}" measure the same')
-            found[base] = Unit(word, 1.0 / factor(word, base))
+            found[base] = Unit(word, 1.0 / si_factor(word, base))
         if len(found) < len(_BASES):
             raise refused("a unit is missing")
         system = cls(*(found[base] for base in _BASES))
@@ -137,8 +137,8 @@ class Order:
                 unit, factor = place.display.displacement
                 reached = [factor * strain / model.unit_strain(place) for strain in measured.strain]
                 warm = [kelvin - CELSIUS for kelvin in measured.temperature or ()]
-                parts = [str(place), told("Hz", *measured.frequency), told(unit, *reached)]
-                parts.append(told("degC", *warm) if warm else "temperature not stated")
+                parts = [str(place), format_range("Hz", *measured.frequency), format_range(unit, *reached)]
+                parts.append(format_range("degC", *warm) if warm else "temperature not stated")
                 parts.append("fitted there" if str(place) in measured.directions else "not fitted there")
                 yield "valid", ", ".join(parts)
         yield from (("left out", loss) for loss in losses)

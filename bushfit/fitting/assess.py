@@ -17,7 +17,7 @@ from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_str
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Quality, Range
-from bushfit.units import CELSIUS, number, told
+from bushfit.units import CELSIUS, format_range, number
 
 #: Distance of the reduced chi-square from 1 beyond which noise alone is no explanation, in standard deviations.
 _LACK_OF_FIT = 5.0
@@ -240,7 +240,7 @@ def implausible(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> list[s
     ratio = moduli[hardest] / moduli[softest]
     if ratio > _MOST_STIFFENING:
         return [f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, which no rubber does: {_CHECK}"]
-    said = f"a shear modulus of {told('Pa', moduli[hardest])} is that of no rubber: {_CHECK}"
+    said = f"a shear modulus of {format_range('Pa', moduli[hardest])} is that of no rubber: {_CHECK}"
     return [] if _SOFTEST < moduli[hardest] < _HARDEST else [said]
 
 
@@ -249,7 +249,7 @@ def refuse_strain(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> None
     for each in data_sets:
         largest = float(np.max(each.amplitude))
         if (strain := largest * unit_strain(bushing, each.direction)) > _MOST_STRAIN:
-            amplitude = told(each.direction.motion.displacement_unit, largest)
+            amplitude = format_range(each.direction.motion.displacement_unit, largest)
             raise FitError(
                 "no rubber bears the amplitude of this test",
                 place=each.name,

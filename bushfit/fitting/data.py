@@ -12,7 +12,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.session import measured_session
 from bushfit.effects import BASE, effect_named, effect_of, with_base
 from bushfit.effects.contract import Array
-from bushfit.errors import FitError, ModelError, naming
+from bushfit.errors import FitError, ModelError, error_location
 from bushfit.fitting.assess import refuse_strain
 from bushfit.fitting.coordinates import Bounds, residual
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data, with_level_errors
@@ -47,7 +47,7 @@ class Data:
             FitError: a loop is not one whole cycle or more, lacks rows, or gives energy; a strain that no rubber bears.
             ModelError: [fit] effects has an unknown effect, or one twice.
         """
-        with naming(campaign.path, place="[fit] effects"):
+        with error_location(campaign.path, place="[fit] effects"):
             Model.started(None, with_base(campaign.fit.effects), {})
         data = cls(
             campaign,
@@ -55,7 +55,7 @@ class Data:
             tuple(sweep_data(campaign.sweeps, campaign.fit.residuals, campaign.rig)),
             {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
         )
-        with naming(campaign.path):
+        with error_location(campaign.path):
             refuse_strain(campaign.bushing, data.data_sets)
         return data.in_session()
 
@@ -121,7 +121,7 @@ class Data:
 
     def start(self, data_sets: Sequence[DataSet], held: Mapping[str, float]) -> dict[str, float]:
         """Values of the paper's parameters, and what the campaign gives, to start a fit of some tests from."""
-        with naming(self.campaign.path):
+        with error_location(self.campaign.path):
             return start_values(self.campaign.bushing, data_sets, {**self.given, **held})
 
     def started(self, effects: Sequence[str], data_sets: Sequence[DataSet], held: Mapping[str, float]) -> Model:
@@ -130,7 +130,7 @@ class Data:
         fixed = {name: value for name, value in self.given.items() if not self.free((name,))}
         bushing, every = self.campaign.bushing, list[tuple[Model, dict[str, float]]]()
         for known in (self.given, fixed):
-            with naming(self.campaign.path):
+            with error_location(self.campaign.path):
                 values = start_values(bushing, data_sets, {**known, **held})
             every.append((Model.started(bushing, effects, values), values))
         model, values = every[0] if fixed == self.given else min(every, key=lambda pair: _misfit(pair[0], data_sets))
@@ -168,7 +168,7 @@ class Data:
         data_sets = self.some(self.data_sets, "there is nothing to fit", hint)
         if places is None:
             return [*_compound(self.loops), *_compound(self.sweeps)]
-        with naming(self.campaign.path):
+        with error_location(self.campaign.path):
             wanted = [place_named(str(place), self.campaign.specimens) for place in places]
         chosen = [data_set for data_set in data_sets if data_set.direction in wanted]
         if not chosen:

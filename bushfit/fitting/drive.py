@@ -28,7 +28,7 @@ from bushfit.fitting.repeats import FLOOR
 from bushfit.fitting.row_noise import RowNoise, of_a_lone_cycle, row_noise
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.harmonics import as_complex, basis, least_squares, series
-from bushfit.units import for_people, number
+from bushfit.units import display_unit, number
 
 #: Share of the amplitude, or of half the force's range, from which on a mean is told as a preload; chosen: sensors are
 #: off zero by less.
@@ -349,7 +349,7 @@ def _preload(drive: Drive) -> Iterator[str]:
         f"a mean {motion} of {number(units.displacement.factor * mean_motion, 3)} {units.displacement.name}"
     ] * off_zero
     if abs(drive.datum) > (TOLD_MEAN if off_zero else _PRELOADED) * drive.half_range:
-        unit, factor = for_people(*units.force, drive.datum)
+        unit, factor = display_unit(*units.force, drive.datum)
         means.append(f"a mean {force} of {number(factor * drive.datum, 3)} {unit}")
     if means:
         yield f"recorded about {' and '.join(means)}; the model knows no preload: the fit takes the loop about its mean"

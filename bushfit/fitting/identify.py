@@ -18,7 +18,7 @@ from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.information import Information, further_test, percent, relative_sizes
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
-from bushfit.units import told
+from bushfit.units import format_range
 
 #: Relative standard error beyond which a direction counts as open, and a parameter as not determined.
 _OPEN = 0.15
@@ -195,5 +195,5 @@ def _combinations(
         error = known.error(combination.weights(values))
         if error < enough:
             at = f" at {slow:.3g} Hz" if "omega" in combination.formula else ""
-            value = told("Pa", combination.value(values), digits=4)
+            value = format_range("Pa", combination.value(values), digits=4)
             yield f"{combination.formula}{at} = {value} to {percent(error)}{combination.remark}"

@@ -36,7 +36,7 @@ from bushfit.geometry import place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import End, Result
-from bushfit.units import for_people, number
+from bushfit.units import display_unit, number
 
 STATIC = ("mu", "sigma_fmax", "eps_half")
 DYNAMIC = ("m", "alpha")
@@ -296,6 +296,6 @@ def _at_edge(name: str, end: End, solution: Solution, data_sets: Sequence[DataSe
     if limit is None:
         return f"{name} ended at the edge of what is possible: the data do not determine it"
     parameter = solution.model.parameters[name]
-    unit, factor = for_people(parameter.unit, 1.0, limit)
+    unit, factor = display_unit(parameter.unit, 1.0, limit)
     how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
     return f"{name} ended at the edge of what is possible: all that the tests show of it is {how} (95 %)"

@@ -17,7 +17,7 @@ from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, coordinat
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import solve
 from bushfit.model.covariance import Z95, Covariance
-from bushfit.progress import counting
+from bushfit.progress import track
 
 #: Longest step of the search, in coordinates, which are of order one: one that the fit of the others follows.
 _LONGEST_STEP = 0.5
@@ -123,7 +123,7 @@ def profile95(
     linear = linear_errors(best.jacobian)
     allowed = _allowed(best, data_sets, covariance, linear)
     found: dict[str, Interval] = {}
-    for i, name in enumerate(counting("profiles", names)):
+    for i, name in enumerate(track("profiles", names)):
         profile = _Profile(name, best, data_sets, bounds, {start[i]: best})
         step = min(_FIRST_REACH * allowed[i] * linear[i], _LONGEST_STEP)
         low, high = (profile.end(start[i], bound, step, allowed[i]) for bound in limits[i])

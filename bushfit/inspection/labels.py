@@ -104,7 +104,7 @@ def wrong_labels(
     unit, factor = direction.display.displacement
     expected = direction.motion.displacement_unit
     stated = [
-        units.quantity(each.text, expected) / (2.0 if each.convention == "peak-to-peak" else 1.0)
+        units.parse_quantity(each.text, expected) / (2.0 if each.convention == "peak-to-peak" else 1.0)
         for each in labels.of(expected)
     ]
     if stated and not any(_near(value, x) for value in stated for x in amplitudes):
@@ -114,7 +114,7 @@ def wrong_labels(
             ": the name may count peak-to-peak" if double else ""
         )
     said = labels.of("Hz")
-    if said and not any(_near(units.quantity(each.text, "Hz"), f) for each in said for f in frequencies):
+    if said and not any(_near(units.parse_quantity(each.text, "Hz"), f) for each in said for f in frequencies):
         yield f"the name says {_or(said)}, the frequency is {_listed(frequencies)} Hz"
 
 

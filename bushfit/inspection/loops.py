@@ -18,7 +18,7 @@ from bushfit.reduction.cycles import lone_outliers
 from bushfit.reduction.harmonics import cycle_harmonics, resolved_order, series
 from bushfit.reduction.steps import reduce
 from bushfit.reduction.turning_points import least_prominence
-from bushfit.units import alike, for_people, number
+from bushfit.units import display_unit, format_aligned, number
 
 #: Usual steps of the clock that make a gap; chosen: a clock that stutters takes fewer.
 _GAP_STEPS = 5.0
@@ -164,7 +164,7 @@ def look_at_loop(loop: Loop, labels: Labels) -> Findings:
     drive = drive_of(loop)
     units = loop.direction.display
     (length, to_length), half_force = units.displacement, np.ptp(loop.force) / 2.0
-    force, to_force = for_people(*units.force, float(half_force))
+    force, to_force = display_unit(*units.force, float(half_force))
     names = loop.direction.motion.words
     half_motion = np.ptp(loop.displacement) / 2.0
     amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, float(drive.force.mean())
@@ -175,8 +175,8 @@ def look_at_loop(loop: Loop, labels: Labels) -> Findings:
         f"{loop.time.size / drive.cycles:.4g} rows a cycle",
         "amplitude": f"{number(to_length * amplitude, 4)} {length} zero-to-peak",
         # as far down as the amplitude is told: what lies below is noise
-        f"mean {names[0]}": f"{alike([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",
-        f"mean {names[1]}": f"{alike([to_force * half_force, to_force * mean_force], 4)[1]} {force}",
+        f"mean {names[0]}": f"{format_aligned([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",
+        f"mean {names[1]}": f"{format_aligned([to_force * half_force, to_force * mean_force], 4)[1]} {force}",
         "noise": f"{number(100 * drive.noise / half_force, 2)} % of half the {names[1]}'s range, a row"
         f"{drive.correlated}",
     }
@@ -267,8 +267,8 @@ def _settling(force: Array, error: float, least: float, name: str, unit: Unit) -
     change, last_change = force[-1] - force[0], force[-1] - force[-2]
     # the standard error of an amplitude is sqrt(2) `error`, that of a difference of two is 2 `error`
     if abs(change) > max(_REAL_CHANGE * 2.0 * error, least):
-        shown, factor = for_people(*unit, float(force[-1]))
-        last, first = alike([factor * force[-1], factor * force[0]], 4)
+        shown, factor = display_unit(*unit, float(force[-1]))
+        last, first = format_aligned([factor * force[-1], factor * force[0]], 4)
         settled = abs(last_change) < max(_REAL_CHANGE * error, least / 2.0) and force.size > 2
         yield (
             f"the cycles {'settle' if settled else 'are still settling'}: the {name} amplitude goes from "
@@ -279,7 +279,7 @@ def _settling(force: Array, error: float, least: float, name: str, unit: Unit) -
 def _drifting(mean: Array, least: float, name: str, unit: Unit) -> Iterator[str]:
     """A sentence where the mean of a channel changes over the cycles by more than `least`."""
     if abs(mean[-1] - mean[0]) > least:
-        last, first = alike([unit.factor * mean[-1], unit.factor * mean[0]], 3, least=1)
+        last, first = format_aligned([unit.factor * mean[-1], unit.factor * mean[0]], 3, least=1)
         yield f"the {name} drifts: its mean goes from {first} to {last} {unit.name}"
 
 

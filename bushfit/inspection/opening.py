@@ -12,7 +12,7 @@ import numpy as np
 
 from bushfit.campaign.campaign import reader_keywords
 from bushfit.campaign.schema import SpecimenTable
-from bushfit.errors import BushfitError, MeasurementError, NoTestError, naming, typed
+from bushfit.errors import BushfitError, MeasurementError, NoTestError, error_location, quote_path
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.inspection.labels import keys_from_labels, labels_of_file, temperatures_of
 from bushfit.inspection.loops import look_at_history, look_at_loop, look_at_programme
@@ -31,7 +31,7 @@ from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
 from bushfit.reduction.programme import programme
 from bushfit.reduction.steps import sines
-from bushfit.validation import check_tables
+from bushfit.validation import validate_tables
 
 #: Sizes of a block in shear, as [[specimens]] has them.
 BLOCK_KEYS = ("area", "thickness", "elements")
@@ -91,7 +91,7 @@ def _refuse_resonance(file: Path, stated: Mapping[str, Any]) -> None:
             "this is a resonance test, not a sweep",
             kind=NoTestError,
             expected="loops and sweeps",
-            hint=f'bushfit reduce {typed(file)} --mass "..." makes a sweep of it',
+            hint=f'bushfit reduce {quote_path(file)} --mass "..." makes a sweep of it',
         )
 
 
@@ -111,7 +111,7 @@ def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | Non
     elif len(keys) == 1:
         return direction_of(file, table, stated)
     name = stated.get("specimen", "bar" if "strain" in keys else "coupon")
-    return Specimen(**vars(check_tables({"name": name, **keys}, None, SpecimenTable)))
+    return Specimen(**vars(validate_tables({"name": name, **keys}, None, SpecimenTable)))
 
 
 def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Direction | None:
@@ -246,8 +246,8 @@ def _keywords(
     """What a reader is called with for a file that a campaign lists with these keys."""
     specimens = [direction] if isinstance(direction, Specimen) else []
     tested = {} if specimens else {"direction": str(direction)}
-    test = check_tables({**entry, "file": str(file), **tested}, file, schema)
-    with naming(file, "at_amplitude"):  # which alone is converted there
+    test = validate_tables({**entry, "file": str(file), **tested}, file, schema)
+    with error_location(file, "at_amplitude"):  # which alone is converted there
         return {**next(reader_keywords(Path(), [test], specimens)), "name": file.stem}
 
 

@@ -17,7 +17,7 @@ from bushfit.geometry import Place, Specimen
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.tablefile import folder_name
-from bushfit.validation import plain
+from bushfit.validation import to_json_data
 
 #: A hysteresis loop, a sweep, or the raw history of a stepped sine.
 Kind = Literal["loop", "sweep", "history"]
@@ -140,7 +140,7 @@ class Inspected:
             "kind": self.kind,
             "direction": str(self.direction) if self.direction else None,
             "written": dict(self.written),
-            "columns": plain(self.columns, tuple[ColumnSeen, ...]),
+            "columns": to_json_data(self.columns, tuple[ColumnSeen, ...]),
             "facts": dict(self.facts),
             "assumed": self.assumed,
             "odd": list(self.odd),

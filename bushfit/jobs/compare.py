@@ -33,8 +33,8 @@ from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFil
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.page import comparison_page
 from bushfit.report.tables import contrast_table
-from bushfit.units import number, told
-from bushfit.validation import plain
+from bushfit.units import format_range, number
+from bushfit.validation import to_json_data
 from bushfit.version import __version__
 
 #: Results that are compared at most: the colours of a picture, and the columns of a table.
@@ -172,7 +172,7 @@ def _entry(label: str, entry: Entry) -> ComparedEntry:
         "reduced_chi_square": result.quality.reduced_chi_square if result.quality else None,
         "nrmse": result.quality.nrmse if result.quality else None,
         "measured": result.measured and _plain(result.measured),
-        "inputs": plain(result.inputs, tuple[Source, ...]),
+        "inputs": to_json_data(result.inputs, tuple[Source, ...]),
     }
 
 
@@ -300,7 +300,7 @@ def _family_to_use(families: Sequence[FittedFamily], entries: Sequence[Entry]) -
         apart = at[moduli.max(axis=0) > (1.0 + _AGREED) * moduli.min(axis=0)]
         below, above = apart[apart < middle[axis]], apart[apart > middle[axis]]
         reach.append((below.max(initial=at[0]), above.min(initial=at[-1])))
-    frequencies, strains = told("Hz", *reach[0]), told("%", *(100.0 * end for end in reach[1]))
+    frequencies, strains = format_range("Hz", *reach[0]), format_range("%", *(100.0 * end for end in reach[1]))
     names = ", ".join(other for other, *_ in others)
     return (
         f"{said}; {names}, of {100.0 * _LIKELY:g} % or more, have its modulus within {100.0 * _AGREED:g} % over "

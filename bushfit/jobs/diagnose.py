@@ -12,7 +12,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.errors import FitError, typed
+from bushfit.errors import FitError, quote_path
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import NEXT, TwoStep, fit_two_step
 from bushfit.jobs.fits import (
@@ -88,7 +88,7 @@ class Diagnose:
         found, path = diagnose(data, self.model, self.settings), data.campaign.path
         if found.verdict == "ambiguous" and (sets := look_alikes(found)) and path.suffix == ".toml":
             there = Path(path.name) if path.is_absolute() else path  # results keep no path of a machine
-            command = f"bushfit plan {typed(there)} --rivals {','.join(sets[0])}"
+            command = f"bushfit plan {quote_path(there)} --rivals {','.join(sets[0])}"
             found = replace(found, next_test=f"{found.next_test}; {command} chooses tests that tell them apart")
         if not (found.changed or self.model or self.settings.adopt):  # then the model to use is that of `fit`
             joint = (self.joint or Fit().run(data)).result

@@ -15,7 +15,7 @@ from bushfit.errors import ModelError
 from bushfit.export.contract import Dialect, Exported, Order, UnitSystem
 from bushfit.jobs.predict import Predict, Predicted
 from bushfit.model.result import Result
-from bushfit.progress import counting
+from bushfit.progress import track
 from bushfit.reading.files import sha256, view_bytes
 from bushfit.reading.measurement import Source
 from bushfit.report.artifacts import arms_contents
@@ -102,7 +102,7 @@ class Export:
         day = datetime.now(UTC).date().isoformat()
         order = Order(result, source, tuple(predicted.predictions), *settings, self.predict.temperature, day)
         exported = {}
-        for name in counting("formats written", self.formats):
+        for name in track("formats written", self.formats):
             module, _, function = FORMATS[name].partition(":")
             exported[name] = getattr(importlib.import_module(f"bushfit.{module}"), function)(order)
         return Written(predicted, exported)

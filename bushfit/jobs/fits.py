@@ -8,7 +8,7 @@ from typing import Any
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.effects import with_base
-from bushfit.errors import FitError, typed
+from bushfit.errors import FitError, quote_path
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, SweepData
 from bushfit.fitting.master_curve import can_shift
@@ -46,7 +46,7 @@ def campaign_document(data: Data, command: str, options: Iterable[str] = ()) -> 
 
 def command_line(command: str, *words: str) -> str:
     """A command of bushfit as it is typed into a terminal."""
-    return " ".join(["bushfit", command, *(typed(Path(word)) for word in words)])
+    return " ".join(["bushfit", command, *(quote_path(Path(word)) for word in words)])
 
 
 def options_typed(**options: str | bool | Iterable[str] | None) -> tuple[str, ...]:

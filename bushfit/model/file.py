@@ -14,14 +14,14 @@ from typing import Any, NoReturn
 import numpy as np
 
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.errors import ModelError, naming
+from bushfit.errors import ModelError, error_location
 from bushfit.geometry import Bushing, Specimen
 from bushfit.model.covariance import Covariance
 from bushfit.model.document import SCHEMAS, AlternativeTable, CovarianceTable, ModelFile
 from bushfit.model.model import Model
 from bushfit.model.result import Alternative, Quality, Range, Result
 from bushfit.reading.files import read_utf8
-from bushfit.validation import check_tables
+from bushfit.validation import validate_tables
 from bushfit.version import __version__
 
 #: The effect that older files have in place of a factor of its own for the radial direction, and its parameter.
@@ -70,8 +70,8 @@ def from_document(document: object, file: Path | None = None) -> Result:
     hint = "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"
     tables = _object(document, file, "a model")
     require_schema(tables, file, "a model", *SCHEMAS, hint=hint)
-    checked = check_tables(_up_to_date(_renamed(tables), file), file, ModelFile, kind=ModelError)
-    with naming(file):
+    checked = validate_tables(_up_to_date(_renamed(tables), file), file, ModelFile, kind=ModelError)
+    with error_location(file):
         return _result(checked)
 
 
@@ -128,7 +128,7 @@ def _result(tables: ModelFile) -> Result:
         campaign=tables.campaign,
         alternatives=tuple(_alternative_of(each, number, model) for number, each in enumerate(tables.alternatives, 1)),
     )
-    with naming(place="fit, directions"):
+    with error_location(place="fit, directions"):
         for name in result.measured.directions if result.measured else ():
             result.place(name)
     return result
@@ -136,7 +136,7 @@ def _result(tables: ModelFile) -> Result:
 
 def _alternative_of(table: AlternativeTable, number: int, model: Model) -> Alternative:
     """One of the alternatives of a model, with the data of its correction where it has that too."""
-    with naming(place=f"alternatives, #{number}"):
+    with error_location(place=f"alternatives, #{number}"):
         unnamed = model.unnamed if UNNAMED in table.effects else None
         return Alternative(Model(model.bushing, table.effects, table.values, unnamed), table.probability)
 

@@ -18,7 +18,7 @@ from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
 from bushfit.model.structure import Structure, as_one_layer, in_groups, seen_by
-from bushfit.units import for_people
+from bushfit.units import display_unit
 
 #: What records a response: a sweep or a loop, which may have force chains of their own.
 Kind = Literal["sweep", "loop"]
@@ -192,7 +192,7 @@ class Model:
         lines = [f"K = k ({branches}), k the stiffness of this shape per modulus"]
         lines += [f"  {effect.name}: {effect.equation}" for effect in self.records if not isinstance(effect, Branch)]
         for name, parameter in self.parameters.items():
-            unit, factor = for_people(parameter.unit, 1.0, self.values[name])
+            unit, factor = display_unit(parameter.unit, 1.0, self.values[name])
             lines.append(f"  {name} = {self.values[name] * factor:.6g} {unit}".removesuffix(" -"))
         return "\n".join(lines)
 

@@ -15,7 +15,7 @@ from bushfit.geometry import Bushing, Place, Specimen, place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Source, Stepped
-from bushfit.units import alike, for_people, number
+from bushfit.units import display_unit, format_aligned, number
 from bushfit.validation import Flag, Number, WholeNumber
 
 #: A picture as a data URI: what a page may show of a file that somebody else wrote, and nothing else.
@@ -257,8 +257,10 @@ class Result:
         lines = [f"Result of {self.name}"]
         for name, parameter in self.model.parameters.items():
             value, stderr = self.model.values[name], self.covariance.stderr(name)
-            unit, factor = for_people(parameter.unit, 1.0, value)
-            error, size = alike([stderr * factor, value * factor], 2) if stderr else ("", number(value * factor, 4))
+            unit, factor = display_unit(parameter.unit, 1.0, value)
+            error, size = (
+                format_aligned([stderr * factor, value * factor], 2) if stderr else ("", number(value * factor, 4))
+            )
             lines.append(f"  {name} = {' +- '.join(filter(None, (size, error)))} {unit}".removesuffix(" -"))
         if self.quality:
             misfit, chi_square = number(100 * self.quality.nrmse, 2), number(self.quality.reduced_chi_square, 3)

@@ -11,7 +11,7 @@ from bushfit.diagnosis.next_test import entropy_left
 from bushfit.effects.contract import Array
 from bushfit.planning.contract import Knowledge
 from bushfit.planning.sensitivity import Grid, Information, relative_slopes
-from bushfit.progress import counting
+from bushfit.progress import track
 
 #: Fall of the logarithm of the variance that a run, or an exchange, is worth; chosen: a quarter per cent of the error.
 _WORTH = 5e-3
@@ -164,7 +164,7 @@ def best_runs(criterion: Criterion, budget: Budget, start: Array, kept: Array) -
     best = criterion.together(counts)
     for _ in range(8):  # nearly all plans take three
         before = best
-        for test in counting("tests of the plan exchanged", np.flatnonzero(counts).tolist()):
+        for test in track("tests of the plan exchanged", np.flatnonzero(counts).tolist()):
             for fewer in {1, int(counts[test] - kept[test])} - {0}:
                 if counts[test] - fewer < kept[test]:
                     continue

@@ -14,7 +14,7 @@ from bushfit.model.result import Range, Result
 from bushfit.planning.contract import Knowledge, Points, Target, Wanted
 from bushfit.prediction.caveats import unfitted
 from bushfit.prediction.stiffness import predict
-from bushfit.units import number, told
+from bushfit.units import format_range, number
 
 #: Runs of each test that stand for no end of them; chosen: years of the rig, in which what scatters is gone.
 ENDLESS = 1000
@@ -83,7 +83,7 @@ class Goal:
         if self.points:
             unit, factor = self.points.place.display.displacement
             frequency, amplitude = (float(each[worst]) for each in (self.points.frequency, self.points.amplitude))
-            where = f" at {told('Hz', frequency)} and {told(unit, factor * amplitude)}"
+            where = f" at {format_range('Hz', frequency)} and {format_range(unit, factor * amplitude)}"
         return f"{percent(size)}{where} is {words}"
 
     def _variance(self, off: Array) -> Array:

@@ -11,7 +11,7 @@ from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
 from bushfit.reading.measurement import SAME_TEMPERATURE
-from bushfit.units import CELSIUS, number, told
+from bushfit.units import CELSIUS, format_range, number
 
 #: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
 #: set points by less.
@@ -171,6 +171,8 @@ def extrapolations(
             yield f"{what or direction}: {there}: extrapolated by the law of Williams, Landel and Ferry"
     for axis, unit, digits, asked, (low, high) in axes:
         if asked.min() < low * (1 - MARGIN) or asked.max() > high * (1 + MARGIN):
-            here, there = (told(unit, *ends, digits=digits) for ends in ((asked.min(), asked.max()), (low, high)))
+            here, there = (
+                format_range(unit, *ends, digits=digits) for ends in ((asked.min(), asked.max()), (low, high))
+            )
             said = f"predicted at {axis} of {here}, but fitted at {there} only: {BEYOND}"
             yield f"{what or direction}: {said}"

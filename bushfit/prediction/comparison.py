@@ -20,7 +20,7 @@ from bushfit.geometry import Place
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Band, Prediction, predict
-from bushfit.units import alike, number, told
+from bushfit.units import format_aligned, format_range, number
 
 #: Probability with which chance alone makes a difference somewhere that is said to be one.
 CHANCE = 0.05
@@ -316,7 +316,7 @@ def _told(band: Band, unit: str, at: Contrast) -> str:
     def figures(i: int, word: str) -> str:
         value, ends = abs(band.value[i]), sorted((abs(band.low[i]), abs(band.high[i])))
         digits = int(np.clip(np.floor(np.log10(value)) - np.floor(np.log10(ends[1] - ends[0])) + 1, 2, _MOST_DIGITS))
-        shown = alike([value, *ends], digits)
+        shown = format_aligned([value, *ends], digits)
         return f"{shown[0]}{unit} ({shown[1]} to {shown[2]}) {word}"
 
     if not len(band.root):
@@ -341,4 +341,4 @@ def _told(band: Band, unit: str, at: Contrast) -> str:
 def _point(at: Contrast, i: int) -> str:
     """An operating point in words."""
     unit, factor = at.place.display.displacement
-    return f"{told('Hz', at.reference.frequency[i])}, {told(unit, factor * at.reference.amplitude[i])}"
+    return f"{format_range('Hz', at.reference.frequency[i])}, {format_range(unit, factor * at.reference.amplitude[i])}"

@@ -184,12 +184,14 @@ class Vocabulary:
                 *self._said_twice(name),
             ):
                 role = self._roles.get(candidate)
-                is_unit = units.is_unit if role != "temperature" else units.kelvin
+                is_unit = units.is_unit if role != "temperature" else units.kelvin_scale
                 if role is None or not (certain or is_unit(unit or "")):
                     continue
-                if candidate in _UNITS_OF and not any(units.agrees(unit or "", si) for si in _UNITS_OF[candidate]):
+                if candidate in _UNITS_OF and not any(
+                    units.is_compatible(unit or "", si) for si in _UNITS_OF[candidate]
+                ):
                     continue
-                if not (candidate == "f" and unit and any(units.agrees(unit, si) for si in _UNITS_NOT_F[role])):
+                if not (candidate == "f" and unit and any(units.is_compatible(unit, si) for si in _UNITS_NOT_F[role])):
                     return Heading(role, unit, counted)
         return None
 
@@ -204,8 +206,10 @@ class Vocabulary:
 def is_angular(header: str, unit: str) -> bool:
     """Whether a frequency counts radians: its unit does, or its header says so and the unit counts nothing (1/s)."""
     name = plain(header)
-    return units.agrees(unit, "rad/s") or (
-        "hz" not in unit.lower() and any(name.startswith(plain(word)) for word in _ANGULAR) and units.agrees(unit, "Hz")
+    return units.is_compatible(unit, "rad/s") or (
+        "hz" not in unit.lower()
+        and any(name.startswith(plain(word)) for word in _ANGULAR)
+        and units.is_compatible(unit, "Hz")
     )
 
 

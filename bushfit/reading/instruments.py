@@ -140,7 +140,13 @@ def tdms(data: bytes, _: Path) -> Iterator[Group]:
             said, values, over = channel.properties, channel[:], None
             if step := said.get("wf_increment"):
                 unit = said.get("wf_xunit_string") or "s"
-                name = "frequency" if units.agrees(unit, "Hz") else "time" if units.agrees(unit, "s") else "x"
+                name = (
+                    "frequency"
+                    if units.is_compatible(unit, "Hz")
+                    else "time"
+                    if units.is_compatible(unit, "s")
+                    else "x"
+                )
                 over = Channel(name, said.get("wf_start_offset", 0.0) + step * np.arange(len(values)), unit)
             channels.append(Channel(channel.name, values, said.get("unit_string", ""), over))
         yield group.name, channels, [*file.properties.items(), *group.properties.items()]

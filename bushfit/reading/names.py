@@ -86,13 +86,13 @@ class Labels:
 
     def of(self, expected: str) -> list[Quantity]:
         """The quantities of the dimension of a unit, each once; those that are marked alone, if any is."""
-        found = [each for each in dict.fromkeys(self.quantities) if units.agrees(each.unit, expected)]
+        found = [each for each in dict.fromkeys(self.quantities) if units.is_compatible(each.unit, expected)]
         return [each for each in found if each.is_marked] or found
 
     def __or__(self, other: "Labels") -> "Labels":
         """What both say; what this one says goes first."""
         own = {unit for unit in ("m", "rad", "1", "Hz") if self.of(unit)}
-        more = tuple(each for each in other.quantities if not any(units.agrees(each.unit, unit) for unit in own))
+        more = tuple(each for each in other.quantities if not any(units.is_compatible(each.unit, unit) for unit in own))
         either = {field.name: getattr(self, field.name) or getattr(other, field.name) for field in fields(self)}
         return Labels(**{**either, "quantities": self.quantities + more})
 
@@ -197,7 +197,7 @@ def _cells(line: Line) -> Sequence[str]:
 def _is_quantity(text: str, expected: str) -> bool:
     """Whether a text is a quantity of the dimension of an SI unit."""
     try:
-        units.temperature(text) if expected == "K" else units.quantity(text, expected)
+        units.parse_temperature(text) if expected == "K" else units.parse_quantity(text, expected)
     except UnitError:
         return False
     return True

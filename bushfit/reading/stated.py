@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from bushfit.errors import CampaignError, naming
+from bushfit.errors import CampaignError, error_location
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.reading.columns import Rows
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
@@ -21,7 +21,7 @@ from bushfit.validation import (
     Share,
     Temperature,
     Text,
-    converted,
+    converter,
     motion,
     table,
     text,
@@ -33,7 +33,7 @@ PLACE_KEYS = ("direction", "specimen")
 #: Lists of tests in [simulate].
 _LISTS = ("loops", "sweeps", "resonances")
 #: Takes the direction of a specimen for none.
-_SHEAR = converted(lambda raw, _: None if raw == "shear" else raw, {"enum": [*Direction, "shear"]})
+_SHEAR = converter(lambda raw, _: None if raw == "shear" else raw, {"enum": [*Direction, "shear"]})
 
 
 def place_tested(specimen: object, direction: object, specimens: Sequence[Specimen]) -> Place:
@@ -72,7 +72,7 @@ def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
     def placed(test: Any, place: str) -> Any:
         if not isinstance(test, dict):
             return test
-        with naming(place=place):
+        with error_location(place=place):
             direction = place_tested(test.get("specimen"), test.get("direction"), specimens)
         return {**{key: value for key, value in test.items() if key not in PLACE_KEYS}, "direction": direction}
 

@@ -231,7 +231,7 @@ def _of_temperature(
     if unit is None and stated is None and np.ptp(found) <= ONE_TEST:
         return rows, None, None
     column = table.column("temperature", "K")
-    celsius = found + (si.kelvin(unit or "") or (1.0, 0.0))[1] - si.CELSIUS
+    celsius = found + (si.kelvin_scale(unit or "") or (1.0, 0.0))[1] - si.CELSIUS
     each = celsius + si.CELSIUS
     if stated is None:
         if np.ptp(celsius) <= ONE_TEST:

@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from bushfit import units
-from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
+from bushfit.errors import MeasurementError, NoColumnError, UnitError, error_location
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.columns import Columns, Rows
 from bushfit.reading.files import sha256, to_utf8, view_bytes
@@ -131,37 +131,37 @@ class Table(Columns):
             raise self.missing(role, expected, hint)
         column = self.roles[role]
         if column.unit is None and (expected != "1" or role in OF_MOTION):
-            example = units.example(expected)
+            example = units.example_unit(expected)
             raise UnitError(
                 f"the {_label(role)} has no unit",
                 file=self.file,
                 place=self.place(self.layout.header_line, column),
                 found=f'"{column.header}"',
-                expected=units.describe(expected),
+                expected=units.describe_unit(expected),
                 hint=f'write "{column.header} [{example}]" in the header, '
                 f'or units = {{ {role} = "{example}" }} in the campaign',
             )
         unit = column.unit or "1"
         others = ("m", "rad", "N/m", "N*m/rad") if self.motion is STRAINING else ("1", "Pa")
-        if role in OF_MOTION and role != "force" and any(units.agrees(unit, other) for other in others):
+        if role in OF_MOTION and role != "force" and any(units.is_compatible(unit, other) for other in others):
             self.refuse_other_motion(role, [column.header])
-        with naming(self.file, self.place(self.layout.header_line, column)):
+        with error_location(self.file, self.place(self.layout.header_line, column)):
             if expected == "Hz" and is_angular(column.header, unit):
-                per_second = "rad/s" if units.agrees(unit, "rad/s") else "Hz"
-                return replace(column, scale=units.factor(unit, per_second) / (2.0 * math.pi))
-            return replace(column, scale=units.factor(unit, expected))
+                per_second = "rad/s" if units.is_compatible(unit, "rad/s") else "Hz"
+                return replace(column, scale=units.si_factor(unit, per_second) / (2.0 * math.pi))
+            return replace(column, scale=units.si_factor(unit, expected))
 
     def agrees(self, role: str, expected: str) -> bool:
         """Whether a role has a column with a unit of the dimension of `expected`."""
         column = self.roles.get(role)
-        return column is not None and column.unit is not None and units.agrees(column.unit, expected)
+        return column is not None and column.unit is not None and units.is_compatible(column.unit, expected)
 
     def missing(self, role: str, expected: str, hint: str | None = None) -> MeasurementError:
         """The error for a role that has no column; `expected` is its SI unit."""
         self.refuse_other_motion(role)
         return self.header_error(
             f"there is no column for the {_label(role)}",
-            expected=f'a header such as "{_label(role)} [{units.example(expected)}]"',
+            expected=f'a header such as "{_label(role)} [{units.example_unit(expected)}]"',
             hint=f"name the column in the campaign: {self.columns_key(role, expected)}" + (f", {hint}" if hint else ""),
         )
 
@@ -169,7 +169,7 @@ class Table(Columns):
         """The key that names the column of a role, with the one header that names none and has a unit that fits."""
         usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
         free = (header for header in self.headers if usual.heading(header) is None)
-        found = [header for header in free if units.agrees(units.split_header(header)[1] or "", unit)]
+        found = [header for header in free if units.is_compatible(units.split_header(header)[1] or "", unit)]
         return f'columns = {{ {role} = "{found[0] if len(found) == 1 else "..."}" }}'
 
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
@@ -201,7 +201,7 @@ class Table(Columns):
                 continue
             role = heading.role
             column = self._column_of(heading, index, stated_units.get(role))
-            if plain(header) == "t" and role == "temperature" and not units.kelvin(column.unit or ""):
+            if plain(header) == "t" and role == "temperature" and not units.kelvin_scale(column.unit or ""):
                 continue  # a time, or another quantity
             if role == "frequency" and role in roles:  # in Hz and in rad/s
                 angular = [is_angular(one.header, one.unit or "") for one in (roles[role], column)]
@@ -210,7 +210,7 @@ class Table(Columns):
                     continue
             if _is_k(header) and role not in columns:
                 known = role in roles and not _is_k(roles[role].header)  # K* says more than K
-                if known or not any(units.agrees(column.unit or "", si) for si in ("N/m", "N*m/rad")):
+                if known or not any(units.is_compatible(column.unit or "", si) for si in ("N/m", "N*m/rad")):
                     continue
             if role in roles and self.texts(index) == self.texts(roles[role].index):
                 continue

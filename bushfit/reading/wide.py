@@ -221,7 +221,7 @@ def _of_role(heading: Heading) -> _WideHeading:
 def _stepped_in(unit: str | None) -> str | None:
     """What has a unit: a frequency, or an amplitude."""
     roles = {"Hz": "frequency", "m": "amplitude", "rad": "amplitude", "1": "amplitude"}
-    return next((role for si, role in roles.items() if unit and units.agrees(unit, si)), None)
+    return next((role for si, role in roles.items() if unit and units.is_compatible(unit, si)), None)
 
 
 def _as_long_table(

@@ -9,7 +9,7 @@ import numpy as np
 from typing_extensions import Doc, TypedDict
 
 from bushfit.geometry import Place
-from bushfit.units import for_people, number
+from bushfit.units import display_unit, number
 
 #: Relative distance of an amplitude from its level that is told; chosen: |K| may then be 1 % off.
 MISSED_LEVEL = 0.03
@@ -160,7 +160,7 @@ def _preload(reduction: Reduction) -> Iterator[str]:
         (force, units.force, [s.mean_force for s in steps], max(abs(s.stiffness) * s.amplitude for s in steps)),
     ):
         if abs(np.median(found)) > 0.5 * largest:  # sensors are off zero by less
-            written, factor = for_people(*unit, max(found, key=abs))
+            written, factor = display_unit(*unit, max(found, key=abs))
             ends = dict.fromkeys(number(factor * end, 3) for end in sorted((min(found), max(found)), key=abs))
             means.append(f"a mean {word} of {' to '.join(ends)} {written}")
     if means:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
-from bushfit.progress import counting
+from bushfit.progress import track
 from bushfit.reading.measurement import Complex, Floats, Loop
 from bushfit.reduction.cycles import Cycles, keeps_changing, lone_outliers, mean_from_steady, pieces, resumes_in_phase
 from bushfit.reduction.harmonics import HarmonicFit
@@ -49,7 +49,7 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
         one.at(~(lone_outliers(one.time, one.displacement) | lone_outliers(one.time, one.force))) for one in histories
     ]
     outliers = sum(one.time.size for one in histories) - sum(one.time.size for one in sound)
-    found = [_steps_of(history, fewest_cycles) for history in counting("histories reduced", sound)]
+    found = [_steps_of(history, fewest_cycles) for history in track("histories reduced", sound)]
     steps = [step for some, _ in found for step in some]
     skipped = tuple(skip for _, some in found for skip in some)
     if not steps:

@@ -19,8 +19,8 @@ from bushfit.model.file import require_schema
 from bushfit.prediction.comparison import ParameterContrast
 from bushfit.report.compare_document import SCHEMA, ComparisonFile
 from bushfit.report.tables import numbers, required
-from bushfit.units import for_people, number, split_header, told
-from bushfit.validation import check_tables
+from bushfit.units import display_unit, format_range, number, split_header
+from bushfit.validation import validate_tables
 
 #: Digits of a parameter's value, and decimals of a difference at most.
 _DIGITS = 4
@@ -84,7 +84,7 @@ class SideBySide:
             ModelError: another schema, or a key that is missing or of the wrong kind.
         """
         require_schema(document, file, "a comparison", SCHEMA, hint="bushfit compare writes it anew")
-        checked = check_tables(document, file, ComparisonFile, kind=ModelError)
+        checked = validate_tables(document, file, ComparisonFile, kind=ModelError)
         first, *others = [entry["label"] for entry in checked["compared"]] or [""]
         pairs, families = checked["pairs"], checked["families"]
         asked = [(first, other) for other in dict.fromkeys(others) if other != first]
@@ -216,7 +216,7 @@ class SideBySide:
 
         largest = max(float(np.nanmax(line.value, initial=0.0)) for line in lines(heads.stiffness, 1.0, own))
         name, unit = split_header(heads.stiffness)
-        shown, scale = for_people(unit or "", 1.0, largest)
+        shown, scale = display_unit(unit or "", 1.0, largest)
         off = [(label, table, "") for label, table, who in own if who == "other"]
         panels = [
             Panel(f"{name} [{shown}]", [*lines(heads.stiffness, scale, own)], 0.0),
@@ -224,7 +224,9 @@ class SideBySide:
             Panel(f"{name} less {first}'s [%]", [*lines(heads.relative, 100.0, off)], LEAST_PERCENT),
             Panel(f"loss factor less {first}'s [-]", [*lines(heads.loss, 1.0, off)], LEAST_LOSS),
         ]
-        return Sides(place, along, [told(split_header(held)[1] or "", float(level)) for level in levels], panels)
+        return Sides(
+            place, along, [format_range(split_header(held)[1] or "", float(level)) for level in levels], panels
+        )
 
 
 class Heads(NamedTuple):
@@ -264,7 +266,7 @@ FAMILY_HEADS = ("family", "parameters", "NRMSE", "chi2", "odds", "held out", "fi
 
 def parameter_cells(row: ParameterContrast) -> list[str]:
     """Name, both values, difference with its 95 % interval, probability and unit, as people read them."""
-    unit, factor = for_people(row.unit, 1.0, row.reference)
+    unit, factor = display_unit(row.unit, 1.0, row.reference)
     values = [number(value * factor, _DIGITS) for value in (row.reference, row.other)]
     if row.difference is None or row.interval is None or row.holm is None:
         return [row.name, *values, "", row.note, "", unit]

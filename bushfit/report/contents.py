@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
-from bushfit.progress import counting
+from bushfit.progress import track
 from bushfit.reading.tablefile import Form, ending, to_bytes
 from bushfit.report import plots
 from bushfit.report.folder import to_json
@@ -103,7 +103,7 @@ class Formats:
         files = {f"{name}.json": to_json(document) for name, document in contents.documents.items()}
         tables = {name: cache(make) for name, make in contents.tables.items()}
         drawn = lru_cache(1)(lambda name: contents.pictures[name]())  # once for all forms, which follow each other
-        for name, form in counting("files made", self._shown(contents.kinds)):
+        for name, form in track("files made", self._shown(contents.kinds)):
             if form in self.picture_forms:
                 files[f"{name}.{form}"] = plots.style.to_image(drawn(name), form)
             else:

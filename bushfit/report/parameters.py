@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from bushfit.model.result import Result
-from bushfit.units import alike, for_people
+from bushfit.units import display_unit, format_aligned
 
 #: A value below its least possible value times this is shown as resting there: logarithms tell no more apart.
 _AT_LEAST = 1.01
@@ -47,13 +47,13 @@ def parameter_rows(result: Result) -> Iterator[Row]:
             stderr = interval = None
         elif interval == parameter.bounds:
             interval = None
-        digits, (unit, factor) = _PLAIN_DIGITS, for_people(parameter.unit, 1.0, value)
+        digits, (unit, factor) = _PLAIN_DIGITS, display_unit(parameter.unit, 1.0, value)
         if stderr and value:  # two of the standard error
             carried = math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2
             digits = min(max(carried, _FEWEST_DIGITS), _MOST_DIGITS)
         known = [end * factor for end in interval or () if end is not None]
-        shown, *texts = alike([value * factor, *known], digits, least=2)
+        shown, *texts = format_aligned([value * factor, *known], digits, least=2)
         ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
-        error = "" if stderr is None else alike([stderr * factor], 2)[0]
+        error = "" if stderr is None else format_aligned([stderr * factor], 2)[0]
         state = f"at {result.at_bound[name]}" if name in result.at_bound else "held" * (name not in result.fitted)
         yield Row(name, state, shown, error, " to ".join(ends), unit, parameter.meaning)

@@ -11,7 +11,7 @@ import pandas as pd
 from typing_extensions import Doc, TypedDict
 
 from bushfit.campaign.toml import body_lines, table_lines
-from bushfit.errors import typed
+from bushfit.errors import quote_path
 from bushfit.geometry import STRAINING, Display, Place, Specimen, Unit, stated_strain
 from bushfit.model.document import ModelFile
 from bushfit.model.file import to_document
@@ -57,9 +57,9 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
         for each in tests:
             lines += table_lines(kind, f"{each.name}.{end}", each.direction, each.temperature)
     for mass, test in simulated.resonances:
-        file, folder = (typed(Path(name)) for name in (f"{test.name}.{end}", test.name))
+        file, folder = (quote_path(Path(name)) for name in (f"{test.name}.{end}", test.name))
         tested = "specimen" if isinstance(test.direction, Specimen) else "direction"
-        place = typed(Path(str(test.direction)))
+        place = quote_path(Path(str(test.direction)))
         lines += ["", "# A sweep comes of this resonance test with:"]
         lines += [f'# bushfit reduce {file} --mass "{mass:.6g} kg" --{tested} {place} -o {folder}']
         lines += [f"# {line}" for line in table_lines("sweeps", f"{test.name}/sweep.{end}", test.direction) if line]

@@ -19,7 +19,7 @@ from bushfit.errors import CampaignError
 from bushfit.geometry import Direction, Place
 from bushfit.model import rig
 from bushfit.model.model import Model
-from bushfit.progress import counting
+from bushfit.progress import track
 from bushfit.reduction.resonance import response
 
 #: The paper's loop: 1 mm at 0.1 Hz.
@@ -86,9 +86,9 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
         truth,
         tuple(
             (test, _clean_loop(truth, test, own.at(0)))
-            for test, own in counting("loops simulated", list(zip(loops, under, strict=False)))
+            for test, own in track("loops simulated", list(zip(loops, under, strict=False)))
         ),
-        tuple((test, _clean_sweep(truth, test, steps_per_cycle)) for test in counting("sweeps simulated", sweeps)),
+        tuple((test, _clean_sweep(truth, test, steps_per_cycle)) for test in track("sweeps simulated", sweeps)),
         tuple((test, _clean_resonance(truth, test, steps_per_cycle)) for test in resonances),
     )
 

@@ -43,7 +43,7 @@ LIBRARIES = {
 BUSHFIT = (
     "import lmfit, pandas, scipy.optimize\n"
     "from bushfit import units\n"
-    "units.factor('mm', 'm')  # imports what knows units\n"
+    "units.si_factor('mm', 'm')  # imports what knows units\n"
     "from bushfit.campaign.campaign import Campaign\n"
     "from bushfit.fitting.data import Data\n"
     "from bushfit.fitting.procedures import fit_static\n"

@@ -23,7 +23,7 @@ from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
-from bushfit.progress import heard_by
+from bushfit.progress import report_progress_to
 
 Rig = Callable[..., Campaign]
 FREQUENCIES = (5.0, 15.0, 45.0, 100.0, 155.0)
@@ -43,7 +43,7 @@ def profiled(campaign: Campaign) -> Result:
 def test_good_data_make_it_the_symmetric_interval(rig: Rig) -> None:
     told: list[tuple[str, int | None, int | None, str]] = []
     data = Data.of(replace(rig(1, **plan(1e-3)), rig=RigSettings(gain_error=0.0)))
-    with heard_by(lambda *step: told.append(step)):
+    with report_progress_to(lambda *step: told.append(step)):
         result = fit_joint(data, profile=True)
     assert told == [("profiles", done, 5, "") for done in (*range(6), None)]
     assert fit_joint(data).profile == {}

@@ -188,7 +188,7 @@ def in_si(dialect: Dialect) -> list[Floats]:
             columns.append(column * (1.0 / (2.0 * np.pi)))
         else:
             si = {"mm": "m", "N/mm": "N/m", "MPa": "Pa", "%": "1", "-": "1"}.get(unit, unit)
-            columns.append(column * units.factor(own, si))
+            columns.append(column * units.si_factor(own, si))
     return columns
 
 

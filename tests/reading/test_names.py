@@ -94,7 +94,7 @@ def test_lines_above_a_table_and_the_name_before_the_headers() -> None:
     ]
     said = labels_above(Line(number, content) for number, content in enumerate(lines, start=1))
     assert said.temperature == "23.5 °C"
-    assert units.temperature(said.temperature) == pytest.approx(296.65)
+    assert units.parse_temperature(said.temperature) == pytest.approx(296.65)
     assert (said.date, said.operator, said.preload, said.specimen_number) == ("2024-05-03", "3", "2 kN", "17")
     assert amplitudes(said) == [("0.2 mm", "peak-to-peak")]
     assert [each.text for each in said.of("Hz")] == ["10 Hz"]
@@ -110,6 +110,6 @@ def test_any_name_and_any_line_say_something_that_can_be_read(text: str) -> None
     for said in (labels_in_names(text), labels_above([Line(1, text)]), labels_above([Line(1, [text, text])])):
         for expected in ("m", "rad", "1", "Hz"):
             for each in said.of(expected):
-                assert units.quantity(each.text, expected) >= 0.0
+                assert units.parse_quantity(each.text, expected) >= 0.0
         if said.temperature:
-            assert units.temperature(said.temperature) > 0.0
+            assert units.parse_temperature(said.temperature) > 0.0

@@ -18,7 +18,7 @@ from bushfit.report.page.chart import Panel as PlacePanel
 from bushfit.report.page.report import MOST, conditions, corners, tube
 from bushfit.report.page.sweeps import LOG_FREQUENCIES
 from bushfit.report.tables import numbers
-from bushfit.units import alike, number, split_header, told
+from bushfit.units import format_aligned, format_range, number, split_header
 
 #: Curves of a page, and points of all of them, of which each has a value and a band: with these it stays below 500 kB;
 #: but no curve has fewer than `_FEWEST`.
@@ -80,8 +80,8 @@ def _entry(entry: ComparedEntry) -> dict[str, Any]:
     bushing, measured = entry["bushing"], entry["measured"]
     tests = "given, not fitted"
     if measured:
-        strain = told("%", *(100.0 * end for end in measured.strain))
-        tests = f"{told('Hz', *measured.frequency)}, strain {strain}, {', '.join(measured.directions)}"
+        strain = format_range("%", *(100.0 * end for end in measured.strain))
+        tests = f"{format_range('Hz', *measured.frequency)}, strain {strain}, {', '.join(measured.directions)}"
     stated = dict(conditions(source.conditions for source in entry["inputs"]))
     body = tube(Bushing(*astuple(bushing))) if bushing else "rubber compound"
     return {"of": entry, "body": body, "tests": tests, "conditions": stated}
@@ -142,10 +142,10 @@ def _tabled(found: SideBySide, places: Sequence[str]) -> Iterator[tuple[Any, ...
             for what, difference, of, scale, percent in kinds:
                 value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))
                 shown, *ends = (signed(each, high - low) for each in (value, low, high))
-                sides = alike([row[f"{who} {what}"] for who in ("reference", "other")], 4)
+                sides = format_aligned([row[f"{who} {what}"] for who in ("reference", "other")], 4)
                 sure = row[f"{difference}, sure"] == "yes"
                 cells.append((*(side + of for side in sides), shown + percent, " to ".join(ends), sure))
-            at = f"{number(row['frequency [Hz]'], 4)} Hz", told(length or "", row[heads.amplitude])
+            at = f"{number(row['frequency [Hz]'], 4)} Hz", format_range(length or "", row[heads.amplitude])
             yield place, label, *at, *cells
 
 

@@ -25,7 +25,7 @@ from bushfit.report.page.chart import (
 from bushfit.report.page.readback import ReportData
 from bushfit.report.page.sweeps import Level, by_stepped, levels_of
 from bushfit.report.tables import columns_of, complete, moved_of, numbers, shortened, spread
-from bushfit.units import number, split_header, told
+from bushfit.units import format_range, number, split_header
 
 #: Rows of all loops of a page, with which it stays below 500 kB; but no loop has fewer than `_FEWEST`.
 _MOST_ROWS, _FEWEST = 2400, 24
@@ -116,7 +116,7 @@ def _maps_at(place: Place, gap: pd.DataFrame, found: ReportData) -> Iterator[Cel
     for _, along, held, rows in by_stepped(place, mine[mine["kind"] == "sweep"], found.tests):
         levels = levels_of(found, rows, held)
         (x,), (name, unit) = numbers(pd.concat([level.rows for level in levels]), along), split_header(along)
-        ends = told(unit or "", float(x.min())), name.split()[0], told(unit or "", float(x.max()))
+        ends = format_range(unit or "", float(x.min())), name.split()[0], format_range(unit or "", float(x.max()))
         for part in ("storage", "loss"):
             yield _map(part, levels, x, ends)
     loops = complete(mine[mine["kind"] == "loop"], "time [s]", "frequency [Hz]", moved_of(place))

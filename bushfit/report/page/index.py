@@ -25,7 +25,7 @@ from bushfit.report.page.readback import canonical, read_table
 from bushfit.report.process import ENOUGH, LEVEL, Process, charted
 from bushfit.report.tables import BETWEEN, numbers, spread
 from bushfit.units import number, split_header
-from bushfit.validation import Number, WholeNumber, check_tables
+from bushfit.validation import Number, WholeNumber, validate_tables
 
 #: Points of a chart at most but for those that need a look, taken evenly and in no step that cavities or shifts have:
 #: multiples of the golden section are.
@@ -258,7 +258,7 @@ def read_batch(folder: Path, base: str = "") -> Contents:
     file = folder / "batch.json"
     document = read_document(file)
     require_schema(document, file, "a batch", SCHEMA, hint="run the batch again with --resume")
-    check_tables(document, file, Batch, kind=ModelError)
+    validate_tables(document, file, Batch, kind=ModelError)
     table = read_table(folder, "batch")
     if table is None or not {"name", "status", "folder", "warnings"} <= set(table):
         raise ModelError(
@@ -282,7 +282,7 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
         reported: folders of the bushings that have a report of their own.
         base: what links begin with.
     """
-    batch = check_tables(documents["batch"], None, Batch, kind=ModelError)
+    batch = validate_tables(documents["batch"], None, Batch, kind=ModelError)
     table = canonical(tables["batch"])
     order = np.argsort(table["order of test [-]"]) if "order of test [-]" in table else np.arange(len(table))
     named = table["subgroup"].iloc[order].tolist() if "subgroup" in table else [""]

@@ -29,7 +29,7 @@ from bushfit.reading.tablefile import for_each_distinct, in_a_line, undefused
 from bushfit.report.artifacts import place_names
 from bushfit.report.contents import Contents, Documents, Tables
 from bushfit.report.tables import TEXTS, required
-from bushfit.validation import LARGEST_NUMBER, check_tables
+from bushfit.validation import LARGEST_NUMBER, validate_tables
 
 #: Documents that hold a model, the one to use first.
 MODELS = ("model", "dynamic", "static")
@@ -88,12 +88,12 @@ class ReportData:
             hint = "bushfit diagnose writes it anew"
             require_schema(diagnosis, at.get("diagnosis"), "a diagnosis", *DIAGNOSES, hint=hint)
             diagnosis = diagnosis if has_odds else {**diagnosis, **_ODDS}
-            diagnosis = check_tables(diagnosis, at.get("diagnosis"), DiagnosisFile, kind=ModelError)
+            diagnosis = validate_tables(diagnosis, at.get("diagnosis"), DiagnosisFile, kind=ModelError)
         campaign, provenance = model.get("campaign"), model.get("provenance", {})
         return cls(
             result,
             from_document(plain, at.get(PLAIN)) if plain else None,
-            check_tables(campaign, at.get(name), CampaignTable, "campaign", kind=ModelError) if campaign else None,
+            validate_tables(campaign, at.get(name), CampaignTable, "campaign", kind=ModelError) if campaign else None,
             diagnosis,
             has_odds,
             {"bushfit": provenance.get("bushfit") or "", **provenance.get("packages", {})},

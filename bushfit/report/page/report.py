@@ -24,7 +24,7 @@ from bushfit.report.page.readback import ReportData
 from bushfit.report.page.sweeps import amplitude_panels, cole_cole_panels, frequency_panels, sweeps_of
 from bushfit.report.parameters import Row, interval_kind, parameter_rows
 from bushfit.report.tables import DISPLAYS, IF_RIGS, columns_of, complete, numbers, spread
-from bushfit.units import alike, for_people, number, told
+from bushfit.units import display_unit, format_aligned, format_range, number
 
 #: How a verdict is coloured: nothing to do, something to know, something to do.
 _TONES = {"consistent": "good", "named": "good", "unexplained": "bad"}
@@ -169,8 +169,8 @@ def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str | int]:
         "test": test.test,
         "kind": {"loop": "hysteresis loop", "sweep": "sweep"}.get(test.kind, test.kind),
         "place": test.place,
-        "frequency": told("Hz", *test.frequency_Hz),
-        "amplitude": told(unit, *(factor * end for end in test.amplitude)),
+        "frequency": format_range("Hz", *test.frequency_Hz),
+        "amplitude": format_range(unit, *(factor * end for end in test.amplitude)),
         "rows": test.rows,
         "conditions": ", ".join(stated),
         "nrmse": f"{number(100 * met.nrmse, 2)} %" if met else "",
@@ -181,8 +181,8 @@ def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str | int]:
 def _sizes(effect: EffectEntry) -> Iterator[tuple[str, str, str]]:
     """Name, value and interval of the parameters of an effect that was named, as people read them."""
     for name, size in effect["parameters"].items():
-        unit, factor = for_people(size["unit"], 1.0, size["value"])
-        value, *ends = alike([factor * x for x in (size["value"], *(size["ci95"] or ()))], 4, least=2)
+        unit, factor = display_unit(size["unit"], 1.0, size["value"])
+        value, *ends = format_aligned([factor * x for x in (size["value"], *(size["ci95"] or ()))], 4, least=2)
         yield name, f"{value} {unit}".removesuffix(" -"), " to ".join(ends)
 
 
@@ -219,14 +219,14 @@ def _tabled(found: ReportData) -> Iterator[tuple[str, ...]]:
         known = complete(table, "frequency [Hz]", amplitude, *names, *band, *parts)
         kinds: tuple[tuple[str, int, Callable[[float], float]], ...] = ((names[0], 4, float), (names[1], 3, _degrees))
         for row in corners(known, amplitude, _AMPLITUDES, frequencies):
-            cells = [str(place), unit, f"{number(row['frequency [Hz]'], 4)} Hz", told(length, row[amplitude])]
+            cells = [str(place), unit, f"{number(row['frequency [Hz]'], 4)} Hz", format_range(length, row[amplitude])]
             for name, digits, shown in kinds:
                 ends = [shown(row[key]) for key in (name, f"{name}, low", f"{name}, high")]
-                value, *ends_told = alike(ends, digits, least=2)
+                value, *ends_told = format_aligned(ends, digits, least=2)
                 measured = row.get(f"measured {name}", np.nan)
                 cells += [value, " to ".join(ends_told)]
-                cells.append("" if np.isnan(measured) else alike([shown(measured)], digits)[0])
-            yield *cells, *(alike([row[name]], 4)[0] for name in (names[1], *parts))
+                cells.append("" if np.isnan(measured) else format_aligned([shown(measured)], digits)[0])
+            yield *cells, *(format_aligned([row[name]], 4)[0] for name in (names[1], *parts))
 
 
 def _degrees(loss_factor: float) -> float:

@@ -20,7 +20,7 @@ from bushfit.reading.runs import nominal
 from bushfit.report.page.chart import DASHES, MOST_LEVELS, MOST_PLACES, Panel, Series, chart, colors, every_nth, span_of
 from bushfit.report.page.readback import ReportData
 from bushfit.report.tables import IF_RIGS, columns_of, complete, numbers, prediction_table, spread
-from bushfit.units import CELSIUS, SIZES, number, split_header, told
+from bushfit.units import CELSIUS, SIZES, format_range, number, split_header
 
 #: Points of all sweeps of a page, with which it stays below 500 kB; but no curve has fewer than `_FEWEST`.
 _MOST_POINTS, _FEWEST = 3200, 24
@@ -236,7 +236,7 @@ def levels_of(found: ReportData, rows: pd.DataFrame, held: str) -> list[Level]:
     levels = list[Level]()
     for (*own, level), there in groups:
         words = (each if isinstance(each, str) else f"{number(each, 3)} °C" for each in own)
-        name = level if isinstance(level, str) else told(split_header(held)[1] or "", level)
+        name = level if isinstance(level, str) else format_range(split_header(held)[1] or "", level)
         levels.append(Level(", ".join([*words, name]), level, there))
     return levels
 

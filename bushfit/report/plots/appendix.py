@@ -18,7 +18,7 @@ from bushfit.report.plots import style
 from bushfit.report.plots.measured import sweep_groups
 from bushfit.report.plots.prediction import lines_of
 from bushfit.report.tables import columns_of, spread
-from bushfit.units import told
+from bushfit.units import format_range
 
 #: Most amplitudes that are drawn.
 _MOST_LEVELS = 6
@@ -64,7 +64,9 @@ def complex_figure(result: Result, prediction: Prediction, table: pd.DataFrame |
     style.label_axes(storage, "frequency [Hz]", f"storage {stiffness_header}", lines.frequency)
     style.label_axes(loss, "frequency [Hz]", f"loss {stiffness_header}", lines.frequency)
     style.label_axes(cole_cole, f"storage [{stiffness_unit}]", f"loss [{stiffness_unit}]")
-    style.name_levels(cole_cole, [told(unit, length * level) for level in levels], "amplitude", [True] * levels.size)
+    style.name_levels(
+        cole_cole, [format_range(unit, length * level) for level in levels], "amplitude", [True] * levels.size
+    )
     return style.explained(figure, "Lines: model, shaded: its 95 % band. Points: measured, mean of the repeats.")
 
 

@@ -24,7 +24,7 @@ from bushfit.report.plots.measured import (
     sweep_groups,
 )
 from bushfit.report.tables import columns_of, moved_of
-from bushfit.units import for_people, told
+from bushfit.units import display_unit, format_range
 
 #: Height of a panel of residuals [cm].
 _STRIP = 2.6
@@ -94,7 +94,7 @@ def stiffness_scale(place: Place, largest: float) -> tuple[float, tuple[str, str
         largest: stiffness or modulus to draw, in the unit of the tables.
     """
     name, factor = place.display.stiffness
-    unit, to_figure = for_people(name, factor, largest / factor)
+    unit, to_figure = display_unit(name, factor, largest / factor)
     quantity = columns_of(place)[1].partition(" [")[0]
     symbol = " |K|" if quantity == "stiffness" else ""
     return to_figure / factor, (f"{place} {quantity}{symbol} [{unit}]", f"{place} loss factor [-]")
@@ -205,7 +205,7 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
 def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame]) -> None:
     motion, force = moved_of(place), columns_of(place)[2]
     name, factor = place.display.force
-    unit, to_figure = for_people(name, factor, max(loop[force].abs().max() for loop in loops.values()) / factor)
+    unit, to_figure = display_unit(name, factor, max(loop[force].abs().max() for loop in loops.values()) / factor)
     scale = to_figure / factor
     moved, resisting, _ = place.motion.words
     style.label_axes(axes, f"{moved} [{place.display.displacement.name}]", f"{place} {resisting} [{unit}]")
@@ -227,8 +227,8 @@ def loop_labels(place: Place, loops: dict[str, pd.DataFrame]) -> list[str]:
     labels = []
     for loop in loops.values():
         motion = loop[moved_of(place)]
-        amplitude = told(place.display.displacement.name, float(motion.max() - motion.min()) / 2.0)
-        labels.append(f"{amplitude}, {told('Hz', float(loop['frequency [Hz]'].iloc[0]))}")
+        amplitude = format_range(place.display.displacement.name, float(motion.max() - motion.min()) / 2.0)
+        labels.append(f"{amplitude}, {format_range('Hz', float(loop['frequency [Hz]'].iloc[0]))}")
     if len(set(labels)) == len(labels):
         return labels
     return [f"{label}\n{style.file_name(name)}" for label, name in zip(labels, loops, strict=True)]

@@ -19,7 +19,7 @@ from bushfit.report.plots import style
 from bushfit.report.plots.fits import stiffness_scale
 from bushfit.report.plots.measured import TIME_BINS, ranges
 from bushfit.report.tables import columns_of
-from bushfit.units import for_people, told
+from bushfit.units import display_unit, format_range
 
 #: Colour of a history.
 _COLOR = "#3b528b"
@@ -81,7 +81,7 @@ def _scale_alike(panels: Sequence[Axes]) -> None:
 def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bool) -> Axes:
     """Draw both channels over time and, of a loop, force over displacement; return the first panel."""
     (length, to_length), unit_force, _ = history.direction.display
-    force, to_force = for_people(*unit_force, float(np.abs(history.force).max()))
+    force, to_force = display_unit(*unit_force, float(np.abs(history.force).max()))
     names = history.direction.motion.words
     grid = place.subgridspec(2, 2 if loop else 1, width_ratios=[1.0, 1.2] if loop else None)
     over_time = [figure.add_subplot(grid[0, -1])]
@@ -132,7 +132,7 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
         x_label = columns_of(sweep.direction)[0] if by_amplitude else "frequency [Hz]"
         style.label_axes(axes, x_label, label, table["x"].to_numpy())
     if sweep.stepped:
-        levels = [told(unit, scale * level) for level in np.unique(table["level"])]
+        levels = [format_range(unit, scale * level) for level in np.unique(table["level"])]
         style.name_levels(pair[-1], levels, held, [True] * len(levels))
     return pair[0]
 
@@ -210,7 +210,7 @@ def _draw_points(
         style.label_axes(axes, "", name, steps["frequency"].to_numpy())
         axes.tick_params(labelbottom=False)
     handles = [look.handle(True) for look in looks.values()]
-    style.legend(pair[-1], handles, [told(unit, length * level) for level in looks], "amplitude")
+    style.legend(pair[-1], handles, [format_range(unit, length * level) for level in looks], "amplitude")
 
 
 def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, style.Style]) -> None:
@@ -235,7 +235,7 @@ def resonance_figure(found: Resonance, title: str) -> Figure:
     figure = style.new_figure(title, 2 * style.ROW)
     (ratio, amplitude), (stiffness, loss) = figure.subplots(2, 2, sharex=True)
     (unit, length), _, stiffness_units = TRANSLATION.display
-    stiffness_unit, factor = for_people(*stiffness_units, float(np.abs(found.stiffness).max()))
+    stiffness_unit, factor = display_unit(*stiffness_units, float(np.abs(found.stiffness).max()))
     color = style.styles(1, "amplitude")[0].color
     upper = (
         (ratio, np.abs(found.transmissibility), "transmissibility |T| [-]"),

@@ -13,7 +13,7 @@ from bushfit.model.result import Result
 from bushfit.reading.measurement import loss_factor
 from bushfit.report.plots import style
 from bushfit.report.tables import words
-from bushfit.units import CELSIUS, for_people, number
+from bushfit.units import CELSIUS, display_unit, number
 
 #: Points of a line.
 _FINE = 200
@@ -37,7 +37,9 @@ def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> F
         level = float(np.median(reached[near.argmax() :][: near.max()]))  # near it most points lie
         moved, length = place.display.displacement
         levels.append(f"{place} {number(level * length, 3)} {moved}")
-        unit, factor = for_people(*place.display.stiffness, max(np.abs(each.reduced_stiffness).max() for each in mine))
+        unit, factor = display_unit(
+            *place.display.stiffness, max(np.abs(each.reduced_stiffness).max() for each in mine)
+        )
         reach = np.concatenate([each.reduced_frequency for each in mine])
         frequency = np.geomspace(reach.min(), reach.max(), _FINE)
         line = model.stiffness(place, frequency, level)
@@ -98,7 +100,7 @@ def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
     frequency = omega / (2.0 * np.pi)
     inside = (frequency >= low) & (frequency <= high)
     wholes = [part_modulus(model, part.size, omega, part.under) for part in arms]
-    unit, factor = for_people("Pa", 1.0, max(float(np.abs(whole).max()) for whole in wholes))
+    unit, factor = display_unit("Pa", 1.0, max(float(np.abs(whole).max()) for whole in wholes))
     looks = style.styles(len(arms), "loop")
     for part, whole, look in zip(arms, wholes, looks, strict=True):
         made = part.at(omega)

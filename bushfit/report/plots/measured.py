@@ -13,7 +13,7 @@ from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.report.tables import columns_of, moved_of
-from bushfit.units import number, told
+from bushfit.units import format_range, number
 
 #: Quantity along the x axis of a sweep.
 Axis = Literal["frequency", "amplitude"]
@@ -100,7 +100,7 @@ def _group(place: Place, axis: Axis, rows: pd.DataFrame, *, free: bool) -> Sweep
     for values, of_level in rows.groupby([key.to_numpy() for key in keys], sort=not free, dropna=False):
         *conditions, level = cast("tuple[str | float, ...]", values)
         words = [value if isinstance(value, str) else f"{number(value, 3)} °C" for value in conditions]
-        words.append(level if isinstance(level, str) else told(unit, level))
+        words.append(level if isinstance(level, str) else format_range(unit, level))
         value = np.nan if isinstance(level, str) else level
         curves.append(Curve(", ".join(words), value, of_level.sort_values(_header(place, axis), kind="stable")))
     return SweepGroup(place, axis, palette, curves)

@@ -18,7 +18,7 @@ from bushfit.report.plots import style
 from bushfit.report.plots.fits import draw_curves, draw_points, drawn_points, points_note, stiffness_scale
 from bushfit.report.plots.measured import Axis, Curve, SweepGroup, sweep_groups
 from bushfit.report.tables import IF_RIGS, columns_of, spread
-from bushfit.units import for_people, told
+from bushfit.units import display_unit, format_range
 
 #: Points of a model's line.
 _FINE = 60
@@ -175,8 +175,8 @@ def draw_prediction(
         style.label_axes(axes, x_header, label, x)
         highest = from_si * getattr(prediction, name).high.max()
         style.least_span(axes, 0.04 * highest if name == "stiffness" else 0.01)  # flat curves shall look flat
-    unit, to_people = for_people(*(("Hz", 1.0) if held == "frequency" else place.display.displacement), levels.min())
-    names = [told(unit, to_people * level) for level in levels]
+    unit, to_people = display_unit(*(("Hz", 1.0) if held == "frequency" else place.display.displacement), levels.min())
+    names = [format_range(unit, to_people * level) for level in levels]
     besides = _other_lines(with_rig=any(laid) and lines.rig is not None, if_rigs=prediction.if_rigs is not None)
     style.name_levels(pair[-1], names, held, laid, besides)
     return any(laid)

@@ -16,7 +16,7 @@ from bushfit import __version__
 from bushfit.cli.common import Options
 from bushfit.cli.show import tell_table
 from bushfit.report.folder import check_free, to_json
-from bushfit.validation import plain
+from bushfit.validation import to_json_data
 from cards.card import Row, card
 from cards.families import CARD_SEEDS, FAMILIES, Family, tasks
 from cards.outcome import Outcome
@@ -118,7 +118,7 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
         "card": cards,
         "outcomes": [outcome for found in outcomes.values() for outcome in found],
     }
-    document = plain(whole, Scorecard)
+    document = to_json_data(whole, Scorecard)
     if folder:
         replace(options, force=True).write(folder, {SCORECARD: to_json(document)}, document)
     else:
