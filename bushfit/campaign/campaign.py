@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from bushfit.campaign.copies import without_copied_repeats, without_copied_tests
 from bushfit.campaign.quantities import Compound, ReportSettings, embedded
 from bushfit.campaign.schema import CampaignFile, FitSettings, PredictSettings, RigSettings, SimulateSettings
 from bushfit.campaign.toml import read_toml
@@ -93,8 +94,12 @@ def load_campaign(path: str | Path) -> Campaign:
     )
     found: dict[str, Any] = {
         **{"name": content.name or (bushing or specimens[0]).name, "bushing": bushing, "specimens": specimens},
-        "loops": tuple(loop for each in loops for loop in programme(read_loop(**each), each["test"])),
-        "sweeps": tuple(read_sweep(**each) for each in sweeps),
+        "loops": tuple(
+            without_copied_tests([loop for each in loops for loop in programme(read_loop(**each), each["test"])])
+        ),
+        "sweeps": tuple(
+            without_copied_repeats(sweep) for sweep in without_copied_tests([read_sweep(**each) for each in sweeps])
+        ),
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "logo": logo,
     }

@@ -42,6 +42,10 @@ class Source:
     conditions: Mapping[str, str | float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
+    def with_note(self, note: str) -> Source:
+        """The same provenance with one more note."""
+        return replace(self, notes=(*self.notes, note))
+
 
 @dataclass(frozen=True)
 class Part:

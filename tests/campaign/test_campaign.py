@@ -79,7 +79,7 @@ waveform = "sine"
     assert campaign.sweeps[0].amplitude[0] == pytest.approx(0.05e-3)
     (folder / "loop.csv").write_text(LOOP)
     (folder / "more").mkdir()
-    (folder / "more/loop.csv").write_text(LOOP)
+    (folder / "more/loop.csv").write_text(LOOP.replace(",0\n", ",0.01\n"))
     campaign = campaign_from(BUSHING + TESTS + '[[loops]]\nfile = "more/loop.csv"\ndirection = "axial"\n', folder)
     assert [loop.name for loop in campaign.loops] == ["loop.csv", "more/loop.csv"]
     # A least modulus of 0 says that it is not negative; a logarithm has no 0.

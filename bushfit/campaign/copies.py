@@ -1,0 +1,104 @@
+"""Tests that a campaign lists twice under two names, and repeats that were copied: each counts once, with a note."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bushfit.reading.measurement import Loop, Source, Sweep
+
+#: Points that agree in all digits from which on they are copies; chosen: fewer may agree by chance in rounded files.
+_FEWEST_POINTS = 5
+#: Digits that are compared: the last ones hold what a conversion of units leaves.
+_DIGITS = 9
+
+_Test = TypeVar("_Test", Loop, Sweep)
+
+
+def without_copied_tests(tests: Sequence[_Test]) -> list[_Test]:
+    """Leave out tests whose numbers are those of an earlier test in the same direction, or of the same specimen.
+
+    Two measurements never agree in all digits. A copy holds no information, so the fit must not count it again.
+
+    Args:
+        tests: loops, or sweeps, of a campaign in its order.
+
+    Returns:
+        The tests that remain, each with a note that names its copies.
+    """
+    copies: defaultdict[object, list[_Test]] = defaultdict(list)
+    for number, test in enumerate(tests):
+        is_short = isinstance(test, Sweep) and test.frequency.size < _FEWEST_POINTS
+        copies[test.direction, number if is_short else _numbers(test)].append(test)
+    return [
+        _with_note(same[0], f"the same data are in {_listed([_file(copy) for copy in same[1:]])}: counted once")
+        if len(same) > 1
+        else same[0]
+        for same in copies.values()
+    ]
+
+
+def without_copied_repeats(sweep: Sweep) -> Sweep:
+    """Leave out the runs of a sweep that repeat an earlier run of the same level, or frequency, in all digits.
+
+    Returns:
+        The sweep itself where there is none; else the rows that remain, with a note that names the repeats.
+    """
+    runs: set[bytes] = set()
+    is_copy = np.zeros(sweep.frequency.size, dtype=bool)
+    repeats: list[int] = []
+    for repeat in np.unique(sweep.repeat).tolist():
+        for held in np.unique(sweep.held[sweep.repeat == repeat]).tolist():
+            rows = (sweep.repeat == repeat) & (sweep.held == held)
+            numbers = _digits(sweep, rows)
+            if numbers in runs:
+                is_copy |= rows
+                repeats.append(repeat)
+            runs.add(numbers)
+    points = int(np.count_nonzero(is_copy))
+    if sweep.stepped is None or points < _FEWEST_POINTS:
+        return sweep
+    kept = ~is_copy
+    names = ("frequency", "amplitude", "stiffness", "repeat", "reached", "relative_error", "temperature")
+    columns = {name: getattr(sweep, name) for name in names}
+    columns = {name: values[kept] for name, values in columns.items() if isinstance(values, np.ndarray)}
+    which = _listed([f"{repeat}" for repeat in dict.fromkeys(repeats)])
+    one = len(set(repeats)) == 1
+    note = (
+        f"{points} points of repeat{'' if one else 's'} {which} are those of an earlier repeat in all digits: counted "
+        "once, and data rows are numbered without them"
+    )
+    return _with_note(replace(sweep, **columns), note)
+
+
+def _numbers(test: Loop | Sweep) -> bytes:
+    """All numbers that were measured in a test."""
+    if isinstance(test, Loop):
+        return np.stack((test.time, test.displacement, test.force)).tobytes()
+    return _digits(test, np.ones(test.frequency.size, dtype=bool))
+
+
+def _digits(sweep: Sweep, rows: NDArray[np.bool_]) -> bytes:
+    """Frequencies, amplitudes and stiffness of some rows of a sweep, rounded, in an order of their own."""
+    stiffness = sweep.stiffness[rows]
+    amplitude = sweep.amplitude_reached[rows]
+    numbers = np.stack([sweep.frequency[rows], amplitude, stiffness.real, stiffness.imag])
+    scale = 10.0 ** (_DIGITS - 1 - np.floor(np.log10(np.maximum(np.abs(numbers), 1e-300))))
+    numbers = np.round(numbers * scale) / scale
+    return numbers[:, np.lexsort(numbers[::-1])].tobytes()
+
+
+def _with_note(test: _Test, note: str) -> _Test:
+    source: Source | None = test.source
+    return replace(test, source=source and source.with_note(note))
+
+
+def _file(test: Loop | Sweep) -> str:
+    return test.source.file.name if test.source else test.name
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

@@ -1,0 +1,52 @@
+"""The same data under two names, or as two repeats: named, and counted once, in a fit and in a diagnosis."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from shell import CAMPAIGN, Run
+
+from bushfit.model.file import load_result
+
+LOOP = "data/cmp_15961/loop_axial_1.csv"
+SWEEP = "data/cmp_15961/sweep_axial.csv"
+
+
+@pytest.fixture
+def once(bushfit: Run, own: Path) -> Path:
+    """A campaign in which repeat 1 of the axial sweep is the only one."""
+    sweep = pd.read_csv(own / SWEEP)
+    sweep[sweep["repeat"] == 1].to_csv(own / SWEEP, index=False)
+    return own / CAMPAIGN
+
+
+@pytest.mark.parametrize("command", ["fit", "diagnose"])
+def test_copies_count_once(bushfit: Run, own: Path, once: Path, command: str) -> None:
+    bushfit(command, once, "-o", own / "once", "--no-plots")
+    sweep, text = pd.read_csv(own / SWEEP), once.read_text(encoding="utf-8")
+    repeats = [sweep.assign(repeat=number) for number in (1, 2, 3)]
+    pd.concat(repeats).to_csv(own / SWEEP, index=False)
+    (own / LOOP).with_name("again.csv").write_bytes((own / LOOP).read_bytes())
+    (own / LOOP).with_name("linked.csv").symlink_to(own / LOOP)
+    for name in ("again", "linked"):
+        text += f'\n[[loops]]\nfile = "../data/cmp_15961/{name}.csv"\ndirection = "axial"\n'
+    once.write_text(text, encoding="utf-8")
+    done = bushfit(command, once, "-o", own / "copied", "--no-plots")
+    assert "loop_axial_1: the same data are in again.csv and linked.csv: counted once" in done.stderr
+    assert f"{2 * len(sweep)} points of repeats 2 and 3 are those of an earlier repeat in all digits" in done.stderr
+    single, copied = (load_result(own / folder / "model.json") for folder in ("once", "copied"))
+    assert vars(copied.model)["values"] == vars(single.model)["values"]
+    assert copied.covariance.stderr("m") == single.covariance.stderr("m")
+
+
+def test_sweeps_in_two_files_and_real_repeats(bushfit: Run, own: Path) -> None:
+    (own / SWEEP).with_name("copy.csv").write_bytes((own / SWEEP).read_bytes())
+    campaign = own / CAMPAIGN
+    text = campaign.read_text(encoding="utf-8")
+    text += '\n[[sweeps]]\nfile = "../data/cmp_15961/copy.csv"\ndirection = "axial"\n'
+    campaign.write_text(text, encoding="utf-8")
+    done = bushfit("fit", campaign, "-o", own / "x", "--no-plots")
+    assert "sweep_axial: the same data are in copy.csv: counted once" in done.stderr
+    assert "earlier repeat" not in done.stderr
