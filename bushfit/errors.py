@@ -1,4 +1,4 @@
-"""The error tree: every message says where, what was found, what was expected, and the next step."""
+"""Errors that a user can correct: a message has a place, the value found, the value expected and the next step."""
 
 from __future__ import annotations
 
@@ -9,25 +9,24 @@ from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 
-#: Characters of a quoted value at most: four lines of a terminal.
+#: Maximum length of a quoted value in a message [characters].
 _LONGEST_QUOTE = 300
-#: Characters that could steer a terminal or break a line, marks that turn the order of what follows around, and halves
-#: of surrogate pairs.
+#: Control characters, line separators, marks that reverse the direction of text, and single surrogates.
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
-#: Characters of a path for which a shell wants quotes.
-_TAKEN_APART = re.compile(r"[^\w./\\:~+,@%=-]")
+#: Characters of a path that a shell would interpret.
+_SHELL_CHARACTERS = re.compile(r"[^\w./\\:~+,@%=-]")
 
 
 class BushfitError(Exception):
-    """Something the user can put right; the command line prints it and exits with status 2.
+    """An error that the user can correct; the command line prints it and exits with status 2.
 
     Args:
-        problem: what is wrong, in one clause.
-        file: the file it is in.
-        place: the line, row, column or key in that file.
-        found: what stands there.
-        expected: what should stand there.
-        hint: the next step.
+        problem: the problem in one clause.
+        file: file that contains the problem.
+        place: line, row, column or key in the file.
+        found: value in the file.
+        expected: value or kind of value that is valid.
+        hint: next step for the user.
     """
 
     def __init__(
@@ -49,20 +48,25 @@ class BushfitError(Exception):
         super().__init__(str(self))
 
     def __str__(self) -> str:
-        where = ", ".join(part for part in (str(self.file) if self.file else None, self.place) if part)
-        head = f"{where}: {self.problem}" if where else self.problem
+        location = ", ".join(part for part in (str(self.file) if self.file else None, self.place) if part)
+        head = f"{location}: {self.problem}" if location else self.problem
         lines = (("", head), ("  found: ", self.found), ("  expected: ", self.expected), ("  try: ", self.hint))
         return "\n".join(label + printable(text) for label, text in lines if text)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """The error from its parts, for pickle: errors travel between the processes of a batch."""
+        """Recipe for pickle, because errors are passed between the processes of a batch."""
         state = {key: getattr(self, key) for key in ("file", "place", "found", "expected", "hint")}
         return partial(type(self), self.problem, **state), ()
 
 
 @contextmanager
 def error_location(file: Path | None = None, place: str | None = None) -> Iterator[None]:
-    """Names file and place, as far as they are given, in an error that is raised within by what does not know them."""
+    """Context that adds a file and a place to errors raised inside it.
+
+    Args:
+        file: replaces the file of the error, unless None.
+        place: replaces the place of the error, unless None.
+    """
     try:
         yield
     except BushfitError as error:
@@ -70,17 +74,29 @@ def error_location(file: Path | None = None, place: str | None = None) -> Iterat
         raise
 
 
-def did_you_mean(name: str, known: Collection[str], *, likeness: float = 0.6) -> str | None:
-    """A hint at the known name that is most like another; None where none is, on difflib's scale from 0 to 1."""
-    near = get_close_matches(name, known, n=1, cutoff=likeness)
+def did_you_mean(name: str, candidates: Collection[str], *, similarity: float = 0.6) -> str | None:
+    """Hint that suggests the most similar name.
+
+    Args:
+        name: unknown name.
+        candidates: known names.
+        similarity: least ratio of `difflib.SequenceMatcher`, between 0 and 1.
+
+    Returns:
+        The hint, or None if no candidate is similar enough.
+    """
+    near = get_close_matches(name, candidates, n=1, cutoff=similarity)
     return f'did you mean "{near[0]}"?' if near else None
 
 
 def printable(text: str, *, lines: bool = False) -> str:
-    """A text in one line, or in its `lines`, with control characters written as escapes.
+    """Text with control characters replaced by escape sequences.
 
-    All that stands in files of others goes through this on its way to people, so that no file can steer the terminal
-    that shows it, or make a table, a picture or a page show what it does not say.
+    Every text from a measurement or campaign file passes through this function before it is printed or put on a page.
+
+    Args:
+        text: any text.
+        lines: keep line breaks.
     """
     if lines:
         return "\n".join(map(printable, text.split("\n")))
@@ -88,7 +104,7 @@ def printable(text: str, *, lines: bool = False) -> str:
 
 
 class UnitError(BushfitError):
-    """A quantity without a unit, with an unknown unit, or with a unit of another dimension."""
+    """A quantity without a unit, with an unknown unit or with a unit of another dimension."""
 
 
 class CampaignError(BushfitError):
@@ -100,11 +116,11 @@ class MeasurementError(BushfitError):
 
 
 class NoTestError(MeasurementError):
-    """A table that holds no test."""
+    """A table without a test."""
 
 
 class NoColumnError(MeasurementError):
-    """A table without the header that a column was named by."""
+    """A table without a column of the header that was given."""
 
 
 class ModelError(BushfitError):
@@ -112,17 +128,17 @@ class ModelError(BushfitError):
 
 
 class FitError(BushfitError):
-    """Measurements that cannot support the fit that was asked for."""
+    """Measurements that do not determine the requested fit."""
 
 
 class OutputError(BushfitError):
-    """A result that cannot be written, or must not be overwritten."""
+    """A result that cannot be written or must not be overwritten."""
 
 
 class BatchError(BushfitError):
-    """A batch that cannot go on: no workers, another version on them, or a cluster that is gone."""
+    """A batch that cannot continue: no workers, another version on the workers, or no connection to the cluster."""
 
 
 def quote_path(path: Path) -> str:
-    """A path as it is typed into a terminal: in quotes where it holds what a shell would take apart."""
-    return f'"{path}"' if _TAKEN_APART.search(str(path)) else str(path)
+    """A path as it is typed in a terminal, in quotes if it contains characters that a shell would interpret."""
+    return f'"{path}"' if _SHELL_CHARACTERS.search(str(path)) else str(path)

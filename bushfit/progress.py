@@ -1,19 +1,19 @@
-"""How far long work is: counted where it is done, told to whoever listens, such as the command line."""
+"""Progress of long computations: reported where the work is done, shown by the command line."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TypeVar
 
-_Item = TypeVar("_Item")
-#: Told what is being done, how many of it are done (None at its end), of how many, and a remark.
+Item = TypeVar("Item")
+#: Function of the description, the number of finished items (None at the end), their total number, and a remark.
 Listener = Callable[[str, int | None, int, str], None]
 _LISTENER = ContextVar[Listener]("_LISTENER", default=lambda *_: None)
 
 
 @contextmanager
 def report_progress_to(listener: Listener) -> Iterator[None]:
-    """All work within is told to the listener."""
+    """Context in which `track` calls the listener."""
     token = _LISTENER.set(listener)
     try:
         yield
@@ -21,13 +21,23 @@ def report_progress_to(listener: Listener) -> Iterator[None]:
         _LISTENER.reset(token)
 
 
-def track(what: str, items: Iterable[_Item], total: int = 0, remark: Callable[[], str] = str) -> Iterator[_Item]:
-    """The items one by one, each counted when its work is done: of so many, where they have no length themselves."""
+def track(description: str, items: Iterable[Item], total: int = 0, remark: Callable[[], str] = str) -> Iterator[Item]:
+    """Iterate over items and report the progress to the listener.
+
+    Args:
+        description: of the work, such as "loops simulated".
+        items: to iterate over.
+        total: number of items, if they have no length.
+        remark: called after each item; returns a short text about the state of the work.
+
+    Yields:
+        The items; an item counts as finished when the next one is requested.
+    """
     listener, total = _LISTENER.get(), len(items) if isinstance(items, Collection) else total
-    listener(what, 0, total, "")
+    listener(description, 0, total, "")
     try:
-        for done, item in enumerate(items, start=1):
+        for finished, item in enumerate(items, start=1):
             yield item
-            listener(what, done, total, remark())
+            listener(description, finished, total, remark())
     finally:
-        listener(what, None, total, "")
+        listener(description, None, total, "")

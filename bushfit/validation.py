@@ -1,8 +1,7 @@
-"""Checks a parsed TOML or JSON file against dataclasses with pydantic, whose errors become the project's own.
+"""Validation of parsed TOML and JSON files against frozen dataclasses, with pydantic and the project's error messages.
 
-It knows no campaign and no model, but the kinds of values in their files: texts such as "10 mm" become SI. A table of
-the file is a frozen dataclass. Where the keys of a field stand in the table itself and not under the field's own name,
-the field says so with `field(metadata=standing_in_table(keys))`.
+Texts such as "10 mm" become SI values. `field(metadata=inline_keys(keys))` marks a field whose keys are in the table
+itself instead of under the name of the field.
 """
 
 import re
@@ -16,16 +15,15 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, Valid
 from pydantic_core import ErrorDetails
 
 from bushfit.errors import BushfitError, CampaignError, did_you_mean
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
 from bushfit.units import parse_quantity, parse_temperature, regular_steps
 
 T = TypeVar("T")
 
-#: Known keys that an error lists at most: one line of them.
-_MOST_LISTED = 12
-#: pydantic's name for an error about a key that the table does not have.
+#: Maximum number of known keys in a message.
+_MAXIMUM_LISTED = 12
+#: Error type of pydantic for an unknown key.
 _UNKNOWN = "unexpected_keyword_argument"
-#: pydantic's names for what has the wrong shape, in the words of TOML.
+#: Expected kind of value in the words of TOML, by error type of pydantic.
 _SHAPES = {
     "dataclass_type": "a table",
     "dict_type": "a table",
@@ -41,43 +39,46 @@ _SHAPES = {
     "int_type": "a whole number",
     "float_type": "a number",
 }
-#: A number that pydantic writes with all its zeros.
+#: A number with many digits in a message of pydantic.
 _ZEROS = re.compile(r"\d{16,}")
-#: Values of Python's as TOML and JSON write them.
+#: Python constants as TOML and JSON write them.
 _WORDS = {"None": "null", "True": "true", "False": "false"}
-#: Key in the metadata of a field, for a function that gives the keys which stand in the table itself.
-_IN_TABLE = "keys in the table itself"
+#: Key in the metadata of a field for the function that returns its inline keys.
+_INLINE = "inline keys"
 
-#: Largest number, with either sign; chosen: its square is a number still, and nothing in SI comes near it.
+#: Largest magnitude of a number; its square is finite.
 LARGEST_NUMBER = 1e100
-#: Largest whole number, with either sign: beyond, floats leave out some.
+#: Largest magnitude of a whole number that a float represents exactly.
 _LARGEST_COUNT = 2**53
-#: A finite number; neither a text nor true is one.
+#: A finite number; texts and booleans are refused.
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
-#: A whole number; neither a text, nor true, nor 3.0 is one.
+#: A whole number; texts, booleans and 3.0 are refused.
 WholeNumber = Annotated[int, Field(strict=True, ge=-_LARGEST_COUNT, le=_LARGEST_COUNT)]
-#: True or false; neither a text nor a number is one.
+#: True or false; texts and numbers are refused.
 Flag = Annotated[bool, Field(strict=True)]
 #: A text that is not empty.
 Text = Annotated[str, Field(min_length=1)]
-#: What tables, plots, folders and the terminal are headed with: one line without control characters.
+#: A title of tables, plots and folders: one line without control characters.
 Name = Annotated[str, Field(strict=True, min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$")]
 
 
-def unknown_key(key: str, known: Collection[str]) -> CampaignError:
-    """The error for a key that is none of the known ones."""
-    hint = did_you_mean(key, known, likeness=0.5)
+def unknown_key(key: str, known_names: Collection[str]) -> CampaignError:
+    """Error for an unknown key, with the known keys and the most similar one."""
+    hint = did_you_mean(key, known_names, similarity=0.5)
     hint = f"{hint} It is half of a diameter" if hint and "diameter" in key and "radius" in hint else hint
-    expected = "one of " + ", ".join([*known][:_MOST_LISTED]) + (", ..." if len(known) > _MOST_LISTED else "")
+    listed = [*known_names][:_MAXIMUM_LISTED]
+    expected = "one of " + ", ".join(listed) + (", ..." if len(known_names) > _MAXIMUM_LISTED else "")
     return CampaignError("unknown key", found=f'"{key}"', expected=expected, hint=hint)
 
 
 def converter(
     convert: Callable[[Any, ValidationInfo], Any], written: Mapping[str, Any] | None = None
 ) -> BeforeValidator:
-    """A pydantic validator that calls convert(raw value, info); what it raises keeps its words.
+    """Validator of pydantic that converts a raw value and keeps the message of a BushfitError.
 
-    `written` is the JSON Schema of what stands in the file; without it, it is that of the converted value.
+    Args:
+        convert: function of the raw value and the validation info.
+        written: JSON Schema of the raw value in the file; by default the schema of the converted value.
     """
 
     def run(raw: Any, info: ValidationInfo) -> Any:
@@ -92,13 +93,17 @@ def converter(
 
 
 def inline_keys(keys: Callable[[], Iterable[str]]) -> Mapping[str, Any]:
-    """Metadata of a field whose keys, those that the function gives, stand in the table itself."""
-    return {_IN_TABLE: keys}
+    """Metadata of a dataclass field whose keys are in the table itself.
+
+    Args:
+        keys: returns the keys.
+    """
+    return {_INLINE: keys}
 
 
 @cache
 def _adapter(schema: Any) -> TypeAdapter[Any]:
-    """pydantic's validator of a schema, built once, because that takes longer than most checks."""
+    """Cached validator of a schema; building it takes longer than most validations."""
     return TypeAdapter(schema)
 
 
@@ -110,32 +115,40 @@ def validate_tables(
     *,
     kind: type[BushfitError] = CampaignError,
 ) -> T:
-    """A parsed TOML or JSON file as the dataclass `schema`, which pydantic can check; all quantities in SI.
+    """Convert a parsed TOML or JSON file to a dataclass, with all quantities in SI.
 
-    Errors name the file and the place in it, None for a whole file.
+    Args:
+        tables: parsed file, or a part of it.
+        file: for error messages.
+        schema: dataclass with annotations of pydantic.
+        place: location of the part in the file, for error messages.
+        kind: class of the error for keys or values that are not valid.
+
+    Returns:
+        An instance of the schema.
 
     Raises:
-        kind: keys or values that are not understood.
-        UnitError: a quantity without a unit, or with one that does not fit.
+        kind: invalid keys or values.
+        UnitError: a quantity without a unit or with an incompatible unit.
     """
     try:
         return cast(T, _adapter(cast(Hashable, schema)).validate_python(tables))
     except ValidationError as error:
-        # a mistyped key is missing and unknown: the latter says more
+        # a mistyped key is both missing and unknown: report it as unknown
         details = sorted(error.errors(include_url=False), key=lambda detail: detail["type"] != _UNKNOWN)
         complaint = _complaint(details[0], schema, kind)
     complaint.file = file
     complaint.place = ", ".join(filter(None, (place, complaint.place)))
-    raise complaint  # outside of `except`: pydantic's error holds ours, and a ring of errors cannot be pickled
+    raise complaint  # outside of `except`, because errors that refer to each other cannot be pickled
 
 
 def to_json_data(value: Any, schema: Any) -> Any:
-    """A value of the type `schema`, which pydantic can check, as JSON-ready data."""
+    """Convert a value of a type known to pydantic to JSON-compatible data."""
     return _adapter(schema).dump_python(value, mode="json")
 
 
 def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> BushfitError:
-    """One of pydantic's errors in the project's words, with its place in the file."""
+    """Error of the project for an error of pydantic, with its location in the file."""
     location = detail["loc"]
     place = _place(schema, location)
     cause = detail.get("ctx", {}).get("error")
@@ -149,8 +162,8 @@ def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> 
         error = kind("a key is missing", expected=f"{key} = ..." if isinstance(key, str) else "a further value")
     else:
         found = _WORDS.get(str(detail["input"]), str(detail["input"]))
-        said = re.sub("^(Input|String) should (be|have) ", "", detail["msg"])
-        expected = _SHAPES.get(detail["type"], _ZEROS.sub(lambda digits: f"{float(digits[0]):g}", said))
+        message = re.sub("^(Input|String) should (be|have) ", "", detail["msg"])
+        expected = _SHAPES.get(detail["type"], _ZEROS.sub(lambda digits: f"{float(digits[0]):g}", message))
         single = detail["type"] == "tuple_type" and isinstance(detail["input"], dict)
         hint = f"write [[{place}]], in two brackets: there may be several" if single else None
         error = kind("this value is not understood", found=found, expected=expected, hint=hint)
@@ -159,7 +172,7 @@ def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> 
 
 
 def _place(table: type, location: tuple[int | str, ...]) -> str:
-    """A place as the file has it, such as "simulate.loops #2.frequency"; tables of an array are counted from 1."""
+    """Location as in the file, such as "simulate.loops #2.frequency"; tables of an array are numbered from 1."""
     words: list[str] = []
     for key in location:
         if isinstance(key, int):
@@ -171,19 +184,19 @@ def _place(table: type, location: tuple[int | str, ...]) -> str:
 
 
 def known_keys(table: type) -> Sequence[str]:
-    """The keys that a table of the file may have."""
+    """All keys that a table of the file may contain."""
     inside = inline_fields(table)
     return [key for entry in fields(table) for key in (inside[entry.name]() if entry.name in inside else [entry.name])]
 
 
 def inline_fields(table: type) -> Mapping[str, Callable[[], Iterable[str]]]:
-    """The fields whose keys stand in the table itself, each with the function that gives these keys."""
-    known = fields(table) if is_dataclass(table) else ()
-    return {entry.name: entry.metadata[_IN_TABLE] for entry in known if _IN_TABLE in entry.metadata}
+    """Names of the fields with inline keys, and the functions that return the keys."""
+    members = fields(table) if is_dataclass(table) else ()
+    return {member.name: member.metadata[_INLINE] for member in members if _INLINE in member.metadata}
 
 
 def _table_at(table: type, location: tuple[int | str, ...]) -> type:
-    """The dataclass of the table at a place below another; the one nearest above where the place is no table."""
+    """Dataclass of the table at a location below another table, or the nearest dataclass above it."""
     for key in location:
         if key in (hints := get_type_hints(table)):
             inside = (part for part in _parts(hints[key]) if isinstance(part, type) and is_dataclass(part))
@@ -192,51 +205,39 @@ def _table_at(table: type, location: tuple[int | str, ...]) -> type:
 
 
 def _parts(hint: Any) -> Iterable[Any]:
-    """A type and all that it is made of."""
+    """Yield a type and, recursively, its arguments."""
     yield hint
     for part in get_args(hint):
         yield from _parts(part)
 
 
-#: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
-#: far beyond every shaker, and numbers stay finite.
+#: Largest mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test; the least is the inverse.
 LARGEST_SHAKEN = 1e6
-#: A list that is not empty; its check ends at the first error, as those of a hundred thousand would fill the memory.
+#: A list that is not empty; validation stops at the first error, to save memory.
 Several = Annotated[tuple[T, ...], Field(fail_fast=True), Field(min_length=1)]
-#: A value of a parameter: a number here, a text or a number in the file.
+#: Value of a parameter: a text or a number in the file.
 ParameterValue = Annotated[
     float, WithJsonSchema({"type": ["string", "number"], "description": "with its unit; a ratio may be a number"})
 ]
 
 
 def si(*units: str) -> BeforeValidator:
-    """A validator that takes a text with any of these units, and gives SI."""
+    """Validator that converts a text with a unit compatible with one of the SI units to SI."""
     return converter(lambda raw, _: parse_quantity(raw, *units), text(f"a number with a unit of {' or '.join(units)}"))
 
 
 def text(words: str) -> dict[str, Any]:
-    """The JSON Schema of a text that is described in words."""
+    """JSON Schema of a text with a description."""
     return {"type": "string", "description": words}
 
 
-def motion(per: str = "") -> BeforeValidator:
-    """A validator as `si("m")`, but by the motion of the table's direction: [rad], or a strain; "/s" for a speed."""
-
-    def unit(direction: object) -> str:
-        return (direction.motion if isinstance(direction, Place) else TRANSLATION).displacement_unit + per
-
-    units = " or ".join(f"{each.displacement_unit}{per}" for each in (TRANSLATION, ROTATION, STRAINING))
-    written = text(f"a number with a unit of {units}, by what is tested")
-    return converter(lambda raw, info: parse_quantity(raw, unit(info.data.get("direction"))), written)
-
-
 def table(convert: Callable[[dict[str, Any]], Any], written: Mapping[str, Any] | None = None) -> BeforeValidator:
-    """A validator that converts a table, whose JSON Schema is `written`; what is none it leaves to pydantic."""
+    """Validator that converts a table with the given JSON Schema; other values are left to pydantic."""
     return converter(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw, written)
 
 
 def _frequencies(raw: dict[str, Any]) -> list[str]:
-    """A list of frequencies as texts from { start, stop, step }, with both ends."""
+    """Texts of the frequencies from a table with start, stop and step, both ends included."""
     expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
     if set(raw) != {"start", "stop", "step"}:
         raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
@@ -247,7 +248,7 @@ def _frequencies(raw: dict[str, Any]) -> list[str]:
 
 
 _HERTZ = text("a number with a unit of Hz")
-#: How frequencies are written: a list, or a range with both ends.
+#: JSON Schema of frequencies: a list, or a range.
 _FREQUENCIES = {
     "anyOf": [
         {"type": "array", "items": _HERTZ, "minItems": 1},
@@ -270,7 +271,6 @@ Frequency = Annotated[float, si("Hz"), Field(gt=0)]
 Frequencies = Annotated[
     tuple[Frequency, ...], Field(fail_fast=True), table(_frequencies, _FREQUENCIES), Field(min_length=1)
 ]
-Displacement = Annotated[float, motion(), Field(gt=0)]
 SHAKEN = Field(ge=1.0 / LARGEST_SHAKEN, le=LARGEST_SHAKEN)
 Share = Annotated[float, si("1"), Field(ge=0, lt=1)]
-Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]  # of repeats or cycles: more than any rig runs
+Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]  # repeats or cycles

@@ -14,13 +14,12 @@ from bushfit.errors import CampaignError
 from bushfit.geometry import TRANSLATION, Direction, Place, Shape, Specimen, SpecimenKind, StatedStrain
 from bushfit.reading.measurement import Stepped, Waveform
 from bushfit.reading.resonance import FEWEST_ROWS
-from bushfit.reading.stated import PLACE_KEYS, LoopFile, SweepFile, with_places
+from bushfit.reading.stated import PLACE_KEYS, Displacement, LoopFile, SweepFile, with_places
 from bushfit.validation import (
     LARGEST_SHAKEN,
     SHAKEN,
     Angle,
     Count,
-    Displacement,
     Flag,
     Frequencies,
     Frequency,

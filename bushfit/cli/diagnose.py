@@ -134,7 +134,9 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
     console.print(f"  [bold]{effect['name']}[/bold]{escape(test)} ({effect['level']}): {escape(effect['sentence'])}")
     for parameter, entry in effect["parameters"].items():
         unit, factor = display_unit(entry["unit"], 1.0, entry["value"])
-        value, *ends = format_aligned([factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, least=2)
+        value, *ends = format_aligned(
+            [factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, minimum_digits=2
+        )
         sure = f"95 % {' to '.join(ends)}" if ends else "without an interval"
         console.print(f"    {parameter} = {f'{value} {unit}'.removesuffix(' -')}, {sure}")
     if effect["twins"]:

@@ -243,9 +243,13 @@ def _tell(options: Options, reduction: Reduction) -> None:
             f"{len(steps)}",
             _span([number(frequency, 4) for frequency in sorted(step.nominal_frequency for step in steps)]),
             _span(
-                format_aligned(sorted((factor * abs(step.stiffness) for step in steps), reverse=True), 4, least=2)[::-1]
+                format_aligned(
+                    sorted((factor * abs(step.stiffness) for step in steps), reverse=True), 4, minimum_digits=2
+                )[::-1]
             ),
-            _span(format_aligned(sorted((step.loss_factor for step in steps), reverse=True), 3, least=2)[::-1]),
+            _span(
+                format_aligned(sorted((step.loss_factor for step in steps), reverse=True), 3, minimum_digits=2)[::-1]
+            ),
             number(100 * max(step.gain_error for step in steps), 1),
             number(100 * max(step.force_distortion for step in steps), 2),
         )
@@ -273,7 +277,7 @@ def _tell_resonance(options: Options, found: Resonance) -> None:
     for _, group in groupby(range(count), lambda place: lines[place]):
         rows = list(group)
         amplitudes, ratios = (
-            _span(format_aligned(sorted(values[rows].tolist(), reverse=True), 3, least=3)[::-1])
+            _span(format_aligned(sorted(values[rows].tolist(), reverse=True), 3, minimum_digits=3)[::-1])
             for values in (length * found.amplitude, np.abs(found.transmissibility))
         )
         figures = (

@@ -164,6 +164,6 @@ def _tell_cost(options: Options, two_step: Result, joint: Result) -> None:
         ratio = f"{errors[0] / errors[1]:.1f}" if errors[0] and errors[1] else ""
         unit, factor = display_unit(joint.model.parameters[name].unit, 1.0, other)
         shown = ["" if error is None else format_aligned([error * factor], 2)[0] for error in errors]
-        second, first = format_aligned([other * factor, one * factor], 4, least=2)
+        second, first = format_aligned([other * factor, one * factor], 4, minimum_digits=2)
         rows.append((name, first, shown[0], second, shown[1], unit, f"{100 * (one / other - 1):+.1f} %", ratio))
     tell_table(options, "what the two-step procedure costs", columns, rows)

@@ -102,7 +102,7 @@ def effect_named(name: str) -> Effect:
         return unnamed.EFFECT
     if place := place_of(name):
         return FAMILIES[name.partition(".")[0]].of_place(place)
-    near = did_you_mean(name, LIBRARY, likeness=0.5)
+    near = did_you_mean(name, LIBRARY, similarity=0.5)
     raise ModelError("unknown effect", found=name, expected="one of " + ", ".join(LIBRARY), hint=near)
 
 

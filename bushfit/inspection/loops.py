@@ -279,7 +279,7 @@ def _settling(force: Array, error: float, least: float, name: str, unit: Unit) -
 def _drifting(mean: Array, least: float, name: str, unit: Unit) -> Iterator[str]:
     """A sentence where the mean of a channel changes over the cycles by more than `least`."""
     if abs(mean[-1] - mean[0]) > least:
-        last, first = format_aligned([unit.factor * mean[-1], unit.factor * mean[0]], 3, least=1)
+        last, first = format_aligned([unit.factor * mean[-1], unit.factor * mean[0]], 3, minimum_digits=1)
         yield f"the {name} drifts: its mean goes from {first} to {last} {unit.name}"
 
 

@@ -5,15 +5,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, ValidationInfo
 
 from bushfit.errors import CampaignError, error_location
-from bushfit.geometry import Direction, Place, Specimen
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
 from bushfit.reading.columns import Rows
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Source, Stepped, Waveform, rebuild_time
-from bushfit.units import CELSIUS
+from bushfit.units import CELSIUS, parse_quantity
 from bushfit.validation import (
     Count,
     Frequency,
@@ -22,7 +22,6 @@ from bushfit.validation import (
     Temperature,
     Text,
     converter,
-    motion,
     table,
     text,
     unknown_key,
@@ -34,6 +33,29 @@ PLACE_KEYS = ("direction", "specimen")
 _LISTS = ("loops", "sweeps", "resonances")
 #: Takes the direction of a specimen for none.
 _SHEAR = converter(lambda raw, _: None if raw == "shear" else raw, {"enum": [*Direction, "shear"]})
+
+
+def motion_quantity(suffix: str = "") -> BeforeValidator:
+    """Validator that converts a text to SI, with the unit of displacement of the table's direction or specimen.
+
+    Args:
+        suffix: of the SI unit, such as "/s" for a speed.
+
+    Returns:
+        Validator for values in m, rad or 1, times the suffix.
+    """
+
+    def convert(raw: Any, info: ValidationInfo) -> float:
+        direction = info.data.get("direction")
+        motion = direction.motion if isinstance(direction, Place) else TRANSLATION
+        return parse_quantity(raw, motion.displacement_unit + suffix)
+
+    units = " or ".join(f"{motion.displacement_unit}{suffix}" for motion in (TRANSLATION, ROTATION, STRAINING))
+    return converter(convert, text(f"a number with a unit of {units}, by what is tested"))
+
+
+#: Amplitude of the motion of a test.
+Displacement = Annotated[float, motion_quantity(), Field(gt=0)]
 
 
 def place_tested(specimen: object, direction: object, specimens: Sequence[Specimen]) -> Place:
@@ -160,7 +182,7 @@ class LoopFile(TestFile):
     columns: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS, "header")] = field(default_factory=dict)
     units: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS, "unit")] = field(default_factory=dict)
     force_sign: Literal[1, -1] = 1
-    rate: Annotated[float, motion("/s"), Field(gt=0)] | None = None
+    rate: Annotated[float, motion_quantity("/s"), Field(gt=0)] | None = None
     frequency: Frequency | None = None
     waveform: Waveform | None = None
 

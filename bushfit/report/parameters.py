@@ -52,7 +52,7 @@ def parameter_rows(result: Result) -> Iterator[Row]:
             carried = math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2
             digits = min(max(carried, _FEWEST_DIGITS), _MOST_DIGITS)
         known = [end * factor for end in interval or () if end is not None]
-        shown, *texts = format_aligned([value * factor, *known], digits, least=2)
+        shown, *texts = format_aligned([value * factor, *known], digits, minimum_digits=2)
         ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
         error = "" if stderr is None else format_aligned([stderr * factor], 2)[0]
         state = f"at {result.at_bound[name]}" if name in result.at_bound else "held" * (name not in result.fitted)

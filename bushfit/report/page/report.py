@@ -182,7 +182,7 @@ def _sizes(effect: EffectEntry) -> Iterator[tuple[str, str, str]]:
     """Name, value and interval of the parameters of an effect that was named, as people read them."""
     for name, size in effect["parameters"].items():
         unit, factor = display_unit(size["unit"], 1.0, size["value"])
-        value, *ends = format_aligned([factor * x for x in (size["value"], *(size["ci95"] or ()))], 4, least=2)
+        value, *ends = format_aligned([factor * x for x in (size["value"], *(size["ci95"] or ()))], 4, minimum_digits=2)
         yield name, f"{value} {unit}".removesuffix(" -"), " to ".join(ends)
 
 
@@ -222,7 +222,7 @@ def _tabled(found: ReportData) -> Iterator[tuple[str, ...]]:
             cells = [str(place), unit, f"{number(row['frequency [Hz]'], 4)} Hz", format_range(length, row[amplitude])]
             for name, digits, shown in kinds:
                 ends = [shown(row[key]) for key in (name, f"{name}, low", f"{name}, high")]
-                value, *ends_told = format_aligned(ends, digits, least=2)
+                value, *ends_told = format_aligned(ends, digits, minimum_digits=2)
                 measured = row.get(f"measured {name}", np.nan)
                 cells += [value, " to ".join(ends_told)]
                 cells.append("" if np.isnan(measured) else format_aligned([shown(measured)], digits)[0])
