@@ -17,7 +17,7 @@ from bushfit.effects.mistakes import MISTAKES, SEPARATOR, Mistake, file_or_name,
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, SweepData, loop_data, with_gain_errors
-from bushfit.geometry import Bushing, Place
+from bushfit.geometry import Bushing, Place, stiffness_per_modulus, unit_strain
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
 
@@ -107,8 +107,8 @@ def adopted(data: Data, names: Collection[str]) -> tuple[Data, list[str]]:
 def _claimed(data: Data, name: str) -> Claim:
     """What one --adopt claims."""
     mistake, test = mistake_named(name), name.partition(SEPARATOR)[2]
-    every = [*data.loops, *data.sweeps]
-    possible = [place for place, one in enumerate(every) if mistake and mistake.possible(one.test)]
+    every: list[DataSet] = [*data.loops, *data.sweeps]
+    possible = [place for place, one in enumerate(every) if mistake and _is_possible(mistake, one, data)]
     tests = tuple(place for place in possible if every[place].name == test)
     if mistake is None or bool(tests) != bool(mistake.kinds) or (test and not tests):
         expected = [labelled(name.partition(SEPARATOR)[0], every[place].name) for place in possible]
@@ -118,6 +118,14 @@ def _claimed(data: Data, name: str) -> Claim:
             expected="one of " + ", ".join(expected) if expected else "another mistake: no test has room for this one",
         )
     return Claim(mistake, tests)
+
+
+def _is_possible(mistake: Mistake, data_set: DataSet, data: Data) -> bool:
+    """Whether a mistake can have been made in a test, by its columns and by the modulus that it implies."""
+    bushing, place = data.campaign.bushing, data_set.direction
+    modulus = float(np.median(np.abs(data_set.measured))) / stiffness_per_modulus(bushing, place)
+    strain = float(np.max(data_set.amplitude)) * unit_strain(bushing, place)
+    return mistake.possible(data_set.test) and mistake.explains(data_set.test, modulus, strain)
 
 
 def claims(data: Data, without: Collection[str]) -> list[Claim]:
@@ -133,7 +141,7 @@ def claims(data: Data, without: Collection[str]) -> list[Claim]:
         places = [
             place
             for place, data_set in enumerate(every)
-            if mistake.possible(data_set.test) and labelled(mistake.name, data_set.name) not in without
+            if _is_possible(mistake, data_set, data) and labelled(mistake.name, data_set.name) not in without
         ]
         groups: list[tuple[int, ...]] = [(place,) for place in places]
         groups += [tuple(p for p in places if every[p].kind == kind) for kind in ("loop", "sweep")]

@@ -21,6 +21,9 @@ from bushfit.reading.measurement import Complex, Loop, Sweep
 
 _Test = TypeVar("_Test", bound=Loop | Sweep)
 
+#: Shear moduli of rubbers in use [Pa], and strain amplitudes of tests [-], at least and at most; chosen: a tenth of the
+#: softest and ten times the stiffest compound, a tenth of the smallest and twice the largest test.
+_MODULI, _STRAINS = (2e4, 3e8), (3e-4, 5.0)
 #: Between the name of a mistake and that of the test it was made in.
 SEPARATOR = ":"
 
@@ -41,6 +44,7 @@ class Mistake(Effect):
             sweep only.
         doubt: whether a complex stiffness as stated leaves room for the mistake; None for always.
         swaps: whether the direction is another one.
+        scales: whether it is a power of 1000, made only where no rubber could have given the test as it is stated.
     """
 
     level: Level = Level.RECORD
@@ -56,6 +60,7 @@ class Mistake(Effect):
     stiffness: Callable[[Complex], Complex] | None = None
     doubt: Callable[[Complex], bool] | None = None
     swaps: bool = False
+    scales: bool = False
 
     def mended(self, test: _Test) -> _Test | None:
         """The test as it was measured if this mistake was made in it; None where it cannot have been made."""
@@ -89,6 +94,18 @@ class Mistake(Effect):
         fits = kind in self.kinds and self.motion in (None, place.motion)
         doubtful = self.doubt is None or (isinstance(test, Sweep) and self.doubt(test.stiffness))
         return fits and doubtful and not (self.swaps and other_direction(place) is None)
+
+    def explains(self, test: Loop | Sweep, modulus: float, strain: float) -> bool:
+        """Whether a rubber could have given a test only with this power of 1000; True for mistakes of another kind.
+
+        Args:
+            modulus: shear modulus that the test as stated implies [Pa].
+            strain: largest strain amplitude as stated [-].
+        """
+        if not self.scales:
+            return True
+        factor = self.force / self.displacement if isinstance(test, Loop) else self.force
+        return not _is_of_rubber(modulus, strain) and _is_of_rubber(factor * modulus, self.displacement * strain)
 
     def _direction(self, place: Place) -> Place:
         return (other_direction(place) if self.swaps else None) or place
@@ -125,6 +142,11 @@ def other_direction(place: Place) -> Direction | None:
     if place is Direction.AXIAL:
         return Direction.RADIAL
     return Direction.AXIAL if place is Direction.RADIAL else None
+
+
+def _is_of_rubber(modulus: float, strain: float) -> bool:
+    """Whether a rubber can have a shear modulus [Pa], and a test of one a strain amplitude [-]."""
+    return _MODULI[0] < modulus < _MODULI[1] and _STRAINS[0] < strain < _STRAINS[1]
 
 
 def _loss(stiffness: Complex) -> float:
