@@ -8,14 +8,17 @@ Notes:
     machine leaves torn is found by its hash, so that no write has to wait for the disk.
 """
 
+from __future__ import annotations
+
 import contextlib
 import hashlib
 import json
 import os
 import shutil
+import sys
 import uuid
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -23,8 +26,7 @@ from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import Point
 from bushfit.errors import OutputError
-from bushfit.report.contents import Formats
-from bushfit.report.folder import claim
+from bushfit.report.results import Formats
 from bushfit.version import __version__
 
 #: Layout of a record; records of another are done again.
@@ -126,3 +128,39 @@ def held(output: Path) -> Iterator[None]:
     finally:
         shutil.rmtree(output / STAGE, ignore_errors=True)
         claimed.close()
+
+
+def claim(folder: Path, *, wait: bool = True) -> Claim:
+    """Mark a folder as in use, for other runs to see, until the claim is closed or this process ends.
+
+    Raises:
+        BlockingIOError: another holds it, and `wait` is False.
+    """
+    if sys.platform == "win32":
+        return Claim(None)
+    import fcntl
+
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return Claim(None)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError as error:
+        os.close(descriptor)
+        if isinstance(error, BlockingIOError):
+            raise
+        return Claim(None)
+    return Claim(descriptor)
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A folder marked as in use: the open folder that holds the lock, None where there are no locks."""
+
+    descriptor: int | None
+
+    def close(self) -> None:
+        """End the claim."""
+        if self.descriptor is not None:
+            os.close(self.descriptor)

@@ -23,7 +23,7 @@ from bushfit.batch.work import Orders
 from bushfit.effects.contract import Array
 from bushfit.prediction.caveats import BEYOND
 from bushfit.reduction.arrays import scatter
-from bushfit.report.contents import Contents, Formats
+from bushfit.report.results import Formats, ResultFile, figure_file, json_file, page_file, table_file
 from bushfit.report.tables import BETWEEN
 
 if TYPE_CHECKING:
@@ -207,20 +207,21 @@ class Outcome:
         return self.judge.allowed if self.judge else {}
 
     @property
-    def contents(self) -> Contents:
+    def files(self) -> list[ResultFile]:
         """All that is written of the whole batch under the name `batch`, and its page."""
-        panels, pages = self._panels() if self.plan.formats.pictures else [], {}
-        if self.plan.formats.pages:
-            from bushfit.report.page.index import page_of
-
-            pages["index"] = page_of(self.plan.orders.output)
+        panels = self._panels() if self.plan.formats.pictures else []
 
         def drawn() -> Figure:
             from bushfit.report.plots.batch import batch_figure
 
             return batch_figure(panels, self.plan.title, [row.name for row in self.plan.rows])
 
-        return Contents({"batch": self.document}, {"batch": self.table}, {"batch": drawn} if panels else {}, pages)
+        files = [json_file("batch", self.document), table_file("batch", self.table)]
+        if self.plan.formats.pages:
+            from bushfit.report.page.index import page_of
+
+            files.append(page_file("index", page_of(self.plan.orders.output), files))
+        return [*files, figure_file("batch", drawn)] if panels else files
 
     def table(self) -> pd.DataFrame:
         """A row a bushing, in the manifest's order, a unit that people use in every header.

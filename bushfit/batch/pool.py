@@ -52,7 +52,7 @@ class LocalPool:
         if forks:
             from multiprocessing.forkserver import ensure_running
 
-            self._context.set_forkserver_preload(["bushfit.batch.work", "bushfit.jobs.fits", "pandas"])
+            self._context.set_forkserver_preload(["bushfit.batch.work", "bushfit.commands.fit", "pandas"])
             ensure_running()
 
     def executor(self) -> Executor:

@@ -20,12 +20,9 @@ from bushfit.batch.work import failed, work
 from bushfit.effects.contract import Array
 from bushfit.errors import OutputError
 from bushfit.progress import track
-from bushfit.report.contents import Kinds, Picture
-from bushfit.report.folder import check_free as check_writable
-from bushfit.report.folder import unwritable, write_files
+from bushfit.report.results import Picture, encode_all, unwritable, write_files
+from bushfit.report.results import check_free as check_writable
 
-#: All that is written of the whole batch: what is said of it, its table, picture and page.
-KINDS = Kinds(("batch",), ("batch",), ("batch",), ("index",))
 #: The files of these in whatever form, in the batch's folder.
 FILES = ["index.html", *(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture)))]
 #: Keys of a record that are not held in memory: the figures have its numbers, and a later run asks for the files.
@@ -39,7 +36,7 @@ def check_free(plan: Plan, *, force: bool) -> None:
         OutputError: the folder cannot be written or holds a batch, or the report cannot be written.
     """
     output, over = plan.orders.output, force or plan.orders.resume
-    check_writable(output, FILES, force=True)
+    check_writable(output, [], overwrite=True)
     found = [name for name in (*FILES, ledger.ROWS) if (output / name).exists()]
     if found and not over:
         raise OutputError(
@@ -54,7 +51,7 @@ def check_free(plan: Plan, *, force: bool) -> None:
             if place in [own / name for name in FILES] or own / ledger.ROWS in (place, *place.parents):
                 problem = "the report cannot stand among the results of the rows, nor in place of the table"
                 raise OutputError(problem, file=plan.junit)
-            check_writable(plan.junit.parent, [plan.junit.name], force=over)
+            check_writable(plan.junit.parent, [plan.junit.name], overwrite=over)
 
 
 @contextmanager
@@ -89,12 +86,12 @@ def run(plan: Plan, workers: Pool, tell: Callable[[Outcome], None]) -> Outcome:
             outcome = _worked(plan, workers)
             ready = output / ledger.STAGE / "whole"
             ready.mkdir()
-            for name, content in plan.formats.files(outcome.contents).items():
+            for name, content in encode_all(outcome.files, plan.formats).items():
                 (ready / name).write_bytes(content)
             if plan.junit:
                 with _blamed_on(plan.junit):
-                    report = {plan.junit.name: outcome.junit()}
-                    write_files(plan.junit.parent, report, force=True, before=lambda: tell(outcome))
+                    tell(outcome)
+                    write_files(plan.junit.parent, {plan.junit.name: outcome.junit()})
             else:
                 tell(outcome)
             for file in sorted(ready.iterdir()):

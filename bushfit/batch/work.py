@@ -13,18 +13,18 @@ from bushfit.batch.document import Found, Record
 from bushfit.batch.manifest import Row, Settings
 from bushfit.batch.quantities import Point, curve_of
 from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.commands.diagnose import DiagnosisOutput, diagnose
 from bushfit.diagnosis.record import Diagnosis
-from bushfit.diagnosis.record import Settings as How
 from bushfit.effects import effect_named
 from bushfit.errors import BatchError, BushfitError
 from bushfit.fitting.data import Data
-from bushfit.jobs.diagnose import Diagnose, Diagnosed
 from bushfit.model.file import load_result
 from bushfit.model.result import End, Result
 from bushfit.prediction.caveats import warnings_of
-from bushfit.prediction.stiffness import Band, predict
+from bushfit.prediction.stiffness import Band
+from bushfit.prediction.stiffness import predict as predict_stiffness
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.report.contents import Formats
+from bushfit.report.results import Formats, encode_all
 from bushfit.version import __version__
 
 
@@ -99,10 +99,12 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
     if settings.model:
         inputs[settings.model] = ledger.digest(Path(settings.model).read_bytes())
     if "run" in (settings.commands or ()):
-        from bushfit.jobs.diagnose import Run
+        from bushfit.commands.run import run
 
-        ran = Run().run(Data.of(campaign))  # whose tables of the prediction come in any case, as those of predict
-        files |= orders.formats.files(ran.contents) | replace(orders.formats, tables=True).files(ran.predicted.contents)
+        ran = run(campaign)  # whose tables of the prediction come in any case, as those of predict
+        files |= encode_all(ran.files, orders.formats)
+        predicted = [file for file in ran.predicted.files if file.name != "measured"]
+        files |= encode_all(predicted, replace(orders.formats, tables=True))
         result, diagnosed = ran.result, ran.diagnosed
     else:
         result, diagnosed = _one_by_one(campaign, settings, orders.formats, files)
@@ -115,32 +117,31 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
 
 def _one_by_one(
     campaign: Campaign, settings: Settings, formats: Formats, files: dict[str, bytes]
-) -> tuple[Result, Diagnosed | None]:
+) -> tuple[Result, DiagnosisOutput | None]:
     """fit, diagnose and predict, as far as they are asked for, each going on from the one before."""
-    from bushfit.jobs.fits import Fit
-    from bushfit.jobs.predict import Predict
+    from bushfit.commands.fit import fit
+    from bushfit.commands.predict import predict
 
     commands = settings.commands or ()
     start = result = load_result(Path(settings.model)) if settings.model else None
     data = Data.of(campaign) if set(commands) - {"predict"} else None
     diagnosed = joint = None
     if "fit" in commands and data:
-        fitted = Fit(settings.directions or (), settings.effects or ()).run(data)
-        result, made = fitted.result, formats.files(fitted.contents)
+        fitted = fit(data, directions=settings.directions or (), effects=settings.effects or ())
+        result, made = fitted.result, encode_all(fitted.files, formats)
         joint = None if settings.directions or settings.effects else fitted
         if "diagnose" in commands:  # as `run` calls them: model.json is with what diagnose added
             made["joint.json"] = made.pop("model.json")
         files |= made
     if "diagnose" in commands and data:
         asked = {key: getattr(settings, key) for key in ("max_effects", "tolerance", "adopt", "without")}
-        asked["unresolved"] = start and start.unresolved
-        how = How(**{key: value for key, value in asked.items() if value is not None})
-        diagnosed = Diagnose(how, start.model if start else None, joint=joint).run(data)
+        given = {key: value for key, value in asked.items() if value is not None}
+        diagnosed = diagnose(data, model=start, joint=joint, **given)
         result = diagnosed.result
-        files |= formats.files(diagnosed.contents)
+        files |= encode_all(diagnosed.files, formats)
     assert result is not None  # the manifest has seen to it that there is a model
     if "predict" in commands:
-        files |= replace(formats, tables=True).files(Predict().run(result, campaign).contents_beside)
+        files |= encode_all(predict(result, campaign).files, replace(formats, tables=True))
     return result, diagnosed
 
 
@@ -174,7 +175,7 @@ def numbers_of(result: Result, points: Sequence[Point], notes: Sequence[str]) ->
         if (place := result.place(point.place)).motion != point.motion:
             expected = f"an amplitude in {place.display.displacement.name}"
             raise BatchError("this amplitude is none of the place", found=str(point), expected=expected)
-        prediction = predict(result, place, [point.frequency], [point.amplitude])
+        prediction = predict_stiffness(result, place, [point.frequency], [point.amplitude])
         at[str(point)] = {"stiffness": _band(prediction.stiffness), "loss factor": _band(prediction.loss_factor)}
         said.append(prediction.warnings)
     quality = result.quality

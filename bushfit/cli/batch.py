@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, with_options
 from bushfit.cli.options import command_called, effect_option, file_option, flag, option, place_option, under
-from bushfit.cli.show import tell_table
+from bushfit.cli.output import Output, with_output
 from bushfit.errors import error_location
 from bushfit.units import display_unit, format_aligned
 
@@ -56,7 +55,7 @@ _MOST_SHOWN = 10
     flag("--plots", "Those of each bushing, too."),
     flag("--reports", "The page of each bushing that is diagnosed, too."),
 )
-@with_options("results/<manifest>", "tables", "pictures", "pages")
+@with_output("results/<manifest>", "tables", "pictures", "pages")
 def command(
     manifest: tuple[str, ...],
     commands: tuple[Command, ...],
@@ -71,7 +70,7 @@ def command(
     tables: bool,
     plots: bool,
     reports: bool,
-    options: Options,
+    output: Output,
 ) -> None:
     """Fit (diagnose, predict, run) many campaigns, with a row each in one table.
 
@@ -105,21 +104,18 @@ def command(
         check_judged(judged_by, limits, read.rows)
     with error_location(place="--at"):
         points = (*read.points, *map(parse_point, at), *(judged_by.points if judged_by else ()))
-    formats = replace(options.formats, tables=tables, pictures=plots and options.formats.pictures, pages=reports)
-    output = options.folder(read.stem).absolute()
-    orders = Orders(output, tuple(dict.fromkeys(points)), formats, resume)
-    plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.formats)
-    check_free(plan, force=options.force)
-    outcome = run(plan, workers, lambda outcome: options.print_json(outcome.summary))
-    _tell(options, outcome, options.folder(read.stem))
+    formats = replace(output.formats, tables=tables, pictures=plots and output.formats.pictures, pages=reports)
+    orders = Orders(output.folder(read.stem).absolute(), tuple(dict.fromkeys(points)), formats, resume)
+    plan = Plan(read.stem, read.rows, orders, judged_by, junit, output.formats)
+    check_free(plan, force=output.force)
+    outcome = run(plan, workers, lambda outcome: output.print_json(outcome.summary))
+    _tell(output, outcome, output.folder(read.stem))
     if outcome.status["failed"] or outcome.missed:
         click.get_current_context().exit(1)
 
 
-def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
+def _tell(output: Output, outcome: Outcome, folder: Path) -> None:
     """Counts, the batch's own scatter, what failed, what misses limits and what passes on condition."""
-    from bushfit.batch.run import KINDS
-
     status, plan = outcome.status, outcome.plan
     if outcome.scatter:
         rows = []
@@ -128,18 +124,20 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
             scatter = format_aligned([spread * factor], 2)[0] if spread else ""  # one value tells of none
             rows.append((quantity.name, format_aligned([middle * factor], 4)[0], scatter, unit))
         columns = ("quantity", "median", "robust std dev", "unit")
-        tell_table(options, f"{plan.title}: {status['done']} bushing{'s' * (status['done'] > 1)}", columns, rows)
+        output.print_table(f"{plan.title}: {status['done']} bushing{'s' * (status['done'] > 1)}", columns, rows)
     rate = status.total() / max(outcome.seconds, 1e-9)
     kept = f", {outcome.kept} of them from before" if outcome.kept else ""
-    options.say(f"{status['done']} done{kept}, {status['failed']} failed; {outcome.seconds:.1f} s, {rate:.1f} a second")
+    output.print(
+        f"{status['done']} done{kept}, {status['failed']} failed; {outcome.seconds:.1f} s, {rate:.1f} a second"
+    )
     if plan.limits:
-        options.say(
+        output.print(
             "limits: " + (", ".join(f"{count} {word}" for word, count in outcome.limits.items()) or "none judged")
         )
-    options.warn(outcome.notes)
+    output.print_warnings(outcome.notes)
     for name, each in outcome.together.process.items():
         if each["capability"]:
-            options.say(f"capability: {name}: {each['capability']}")
+            output.print(f"capability: {name}: {each['capability']}")
     for word, names in (
         ("failed", [f"{name}: {'; '.join(map(str.strip, error.splitlines()))}" for name, error in outcome.errors]),
         ("out of limits", [f"{name}: {words}" for name, words in outcome.missed]),
@@ -147,8 +145,9 @@ def _tell(options: Options, outcome: Outcome, folder: Path) -> None:
         ("differs", [f"{each['name']}: {each['words']}" for each in outcome.together.differ]),
     ):
         for name in names[:_MOST_SHOWN]:
-            options.say(f"{word}: {name}")
+            output.print(f"{word}: {name}")
         if len(names) > _MOST_SHOWN:
-            options.say(f"... and {len(names) - _MOST_SHOWN} more {word}: see {options.formats.table('batch')}")
-    written = [*(name for name in options.formats.names(KINDS) if (folder / name).exists()), "bushings/"]
-    options.say(f"wrote {', '.join(written)} to {folder}")
+            output.print(f"... and {len(names) - _MOST_SHOWN} more {word}: see {output.formats.table('batch')}")
+    names = [name for file in outcome.files for name in output.formats.names(file)]
+    written = [*(name for name in names if (folder / name).exists()), "bushings/"]
+    output.print(f"wrote {', '.join(written)} to {folder}")

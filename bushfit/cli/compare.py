@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, open_source, with_options
-from bushfit.cli.grids import asked_for, grid_options
 from bushfit.cli.options import FILE, command_called, effect_lists, option, place_option, under
-from bushfit.cli.show import tell_table
+from bushfit.cli.output import Output, with_output
+from bushfit.cli.shared_options import grid_options, grid_values
 from bushfit.errors import error_location
 from bushfit.progress import track
 
 if TYPE_CHECKING:
-    from bushfit.campaign.campaign import Campaign
-    from bushfit.jobs.compare import Compared
-    from bushfit.model.result import Result
+    from bushfit.commands.compare import ComparedResult, ComparisonOutput
 
-#: What --families means without names.
+#: Value of --families without names.
 _ALL = "all"
 
 
@@ -46,9 +43,9 @@ _ALL = "all"
         shell_complete=effect_lists,
     ),
 )
-@with_options("results/<names>", "tables", "pictures", "pages")
+@with_output("results/<names>", "tables", "pictures", "pages")
 def command(
-    sources: tuple[Path, ...], families: str | None, directions: tuple[str, ...], options: Options, **grids: str | None
+    sources: tuple[Path, ...], families: str | None, directions: tuple[str, ...], output: Output, **grids: str | None
 ) -> None:
     """Compare A, the reference, with others: what differs, by how much, and whether by more than chance.
 
@@ -59,68 +56,71 @@ def command(
     Writes compare.json, parameters.csv, differences.csv, compare.png, compare.html; with --families families.csv.
     """
     from bushfit.campaign.campaign import load_campaign
+    from bushfit.commands.compare import MOST, compare
+    from bushfit.commands.loading import model_file
+    from bushfit.commands.provenance import command_line, option_words
     from bushfit.effects import effect_named
-    from bushfit.jobs.compare import MOST, Compare
-    from bushfit.jobs.fits import command_line, options_typed
 
     if families is None and not 2 <= len(sources) <= MOST:
         raise click.UsageError(f"2 to {MOST} results are compared; one campaign alone with '--families' after it.")
     if families is not None and len(sources) > 1:
         raise click.UsageError("'--families' is of one campaign.")
-    words = options_typed(families=families, direction=directions, **grids)
-    job = Compare(asked_for(directions, grids), command_line("compare", *map(str, sources), *words))
+    words = option_words(families=families, direction=directions, **grids)
+    settings: dict[str, Any] = grid_values(directions, grids)
+    settings["command"] = command_line("compare", *map(str, sources), *words)
     if families is not None:
         names = () if families == _ALL else tuple(name.replace(" ", "") for name in families.split(","))
         with error_location(place="--families"):
             for name in names:
                 all(map(effect_named, name.split("+")))
         campaign = load_campaign(sources[0])
-        folder = options.free_folder(campaign.name, job.kinds(families=True), form="{} families")
-        outcome = job.run_families(campaign, str(sources[0]), names)
+        folder = output.free_folder(campaign.name, "compare.json", form="{} families")
+        compared = compare(campaign, families=names, **settings)
     else:
-        opened = [_opened(source) for source in sources]
-        folder = options.free_folder(" and ".join(each.name for each, *_ in opened), job.kinds())
-        outcome = job.run([job.entry(*each) for each in track("results fitted", opened)])
-    _tell(options, outcome)
-    options.write(folder, options.formats.files(outcome.contents), outcome.document)
+        entries = [_entry(source, directions) for source in track("results fitted", sources)]
+        folder = output.free_folder(" and ".join(entry.name for entry in entries), "compare.json")
+        compared = compare(*entries, **settings)
+    _print_comparison(output, compared)
+    inputs = [source if source.suffix == ".toml" else model_file(source) for source in sources]
+    output.write(folder, compared.files, compared.document, inputs)
 
 
-def _opened(source: Path) -> tuple[Campaign | Result, str, str | None]:
-    """What a command line names, as typed, with its hash: a campaign, or the result in a model file or in a folder."""
+def _entry(source: Path, directions: tuple[str, ...]) -> ComparedResult:
+    """One of the results: of a model file, of a results folder, or of a campaign, which is fitted."""
     from bushfit.campaign.campaign import Campaign
-    from bushfit.jobs.export import source_of
+    from bushfit.commands.compare import compared_result
+    from bushfit.commands.loading import load_source, model_file, model_source
 
-    opened = open_source(source)
-    if isinstance(opened, Campaign):
-        return opened, str(source), None
-    return opened, str(source), source_of(source / "model.json" if source.is_dir() else source).sha256
+    loaded = load_source(source)
+    digest = None if isinstance(loaded, Campaign) else model_source(model_file(source)).sha256
+    return compared_result(loaded, str(source), digest, directions)
 
 
-def _tell(options: Options, outcome: Compared) -> None:
-    """Who is who, and what differs: of families, how they meet the tests; parameters and stiffness with -v."""
+def _print_comparison(output: Output, compared: ComparisonOutput) -> None:
+    """Print the letters of the results, and what differs; of families, how they fit the tests."""
     from bushfit.report.compared import FAMILY_HEADS, SideBySide
 
-    for label, entry in zip(outcome.labels, outcome.entries, strict=True):
-        options.say(f"{label}: {entry.name} ({entry.source})")
-    if options.verbose or not outcome.families:
-        _tell_parameters(options, outcome)
-    if outcome.families:
+    for label, entry in zip(compared.labels, compared.entries, strict=True):
+        output.print(f"{label}: {entry.name} ({entry.source})")
+    if output.verbose or not compared.families:
+        _print_parameters(output, compared)
+    if compared.families:
         title = "families; held out: root mean square in units of noise, 1 where noise is all"
-        tell_table(options, title, FAMILY_HEADS, SideBySide.of(outcome.document).family_cells())
-    for line in (*outcome.advice, *(outcome.words if options.verbose or not outcome.families else ())):
-        options.say(line)
-    options.warn(outcome.warnings)
+        output.print_table(title, FAMILY_HEADS, SideBySide.of(compared.document).family_cells())
+    for line in (*compared.advice, *(compared.words if output.verbose or not compared.families else ())):
+        output.print(line)
+    output.print_warnings(compared.warnings)
 
 
-def _tell_parameters(options: Options, outcome: Compared) -> None:
-    """The parameters of each beside those of the first."""
+def _print_parameters(output: Output, compared: ComparisonOutput) -> None:
+    """Print the parameters of each result beside those of the first."""
     from bushfit.report.compared import chance, parameter_cells
 
-    first, *others = outcome.labels
-    for label, found in zip(others, outcome.comparisons, strict=True):
+    first, *others = compared.labels
+    for label, comparison in zip(others, compared.comparisons, strict=True):
         title = f"parameters of {label} against {first}; p: chance of such a difference, by Holm over all of them"
         columns = ("parameter", first, label, "difference", "95 % interval", "p", "unit")
-        tell_table(options, title, columns, map(parameter_cells, found.parameters))
-        if found.joint:
-            p, count = found.joint
-            options.say(f"all {count} together, correlations counted: p {chance(p)}")
+        output.print_table(title, columns, map(parameter_cells, comparison.parameters))
+        if comparison.joint:
+            p, count = comparison.joint
+            output.print(f"all {count} together, correlations counted: p {chance(p)}")

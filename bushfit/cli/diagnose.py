@@ -1,4 +1,4 @@
-"""`bushfit diagnose`: where do model and measurement disagree, and what is missing?"""
+"""`bushfit diagnose`: where model and tests disagree, and which effect is missing."""
 
 from __future__ import annotations
 
@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, Task, open_model, with_task
 from bushfit.cli.options import command_called, explanations, file_option, option, under
-from bushfit.cli.show import tell_parameters, tell_table
+from bushfit.cli.output import Output, with_output
+from bushfit.cli.printing import print_parameters
+from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
 from bushfit.errors import BushfitError, error_location
 from bushfit.units import display_unit, format_aligned, number, parse_quantity
 
 if TYPE_CHECKING:
+    from bushfit.campaign.schema import Loss
+    from bushfit.commands.diagnose import DiagnosisOutput
     from bushfit.diagnosis.record import Diagnosis
-    from bushfit.jobs.diagnose import Diagnosed
 
 #: Colours of the verdicts on a terminal.
 _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
@@ -47,9 +49,16 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
     option("--tolerance", "SHARE", "Gaps below this share of the stiffness do not count [1 %].", default="1 %"),
     file_option("--model", "Start from the effects of this model.json [the paper's three]."),
 )
-@with_task("pages", soft_l1="the same with outliers left out")
+@campaign_options(soft_l1="the same with outliers left out")
+@with_output("results/<campaign name>", "tables", "pictures", "pages")
 def command(
-    model: Path | None, adopt: tuple[str, ...], without: tuple[str, ...], max_effects: int, tolerance: str, task: Task
+    campaigns: tuple[Path, ...],
+    model: Path | None,
+    tolerance: str,
+    loss: Loss | None,
+    max_nrmse: float | None,
+    output: Output,
+    **settings: Any,
 ) -> None:
     """Find where the model and the tests of CAMPAIGN disagree, name the missing effect, add it, show the gap shrink.
 
@@ -59,77 +68,86 @@ def command(
 
     Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv, gap.png, report.html.
     """
-    from bushfit.diagnosis.record import Settings
-    from bushfit.jobs.diagnose import Diagnose
+    from bushfit.commands.diagnose import diagnose
+    from bushfit.commands.fit import prepare_tests
+    from bushfit.commands.loading import load_model
+    from bushfit.commands.provenance import input_files
 
-    start = open_model(model) if model else None
+    start = load_model(model) if model else None
     with error_location(place="--tolerance"):
         share = parse_quantity(tolerance, "1")
         if not 0.0 <= share <= 1.0:
             raise BushfitError("this is no share of |K|", found=f'"{tolerance}"', expected="0 % to 100 %")
-    settings = Settings(max_effects, share, adopt, without, start.unresolved if start else ())
-    task.perform(Diagnose(settings, start.model if start else None), tell_diagnosis)
+    campaign = open_campaign(campaigns)
+    folder = output.free_folder(campaign.name, "diagnosis.json", "model.json")
+    data = prepare_tests(campaign, loss)
+    output.print_warnings(data.notes)
+    diagnosed = diagnose(data, model=start, tolerance=share, **settings)
+    print_diagnosis(output, diagnosed)
+    inputs = [*input_files(campaign), *([model] if model else [])]
+    output.write(folder, diagnosed.files, diagnosed.document, inputs)
+    exit_above(max_nrmse, diagnosed.result)
 
 
-def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
-    """The finding at a glance: the result with its gap, where it is, the next test, and then the details."""
-    diagnosis = outcome.diagnosis
-    tell_verdict(options, name, outcome)
-    tell_findings(options, outcome)
-    for effect in outcome.document["effects"]:
-        options.console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
-    if options.verbose:
-        _tell_candidates(options, diagnosis)
-    if diagnosis.added or options.verbose:
+def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
+    """Print a diagnosis: the verdict, the gap and where it is, the next test, and then the details."""
+    diagnosis = diagnosed.diagnosis
+    print_verdict(output, diagnosed)
+    print_findings(output, diagnosed)
+    for effect in diagnosed.document["effects"]:
+        output.console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
+    if output.verbose:
+        _print_candidates(output, diagnosis)
+    if diagnosis.added or output.verbose:
         title = "model with what was added" if diagnosis.added else "model as it was"
-        tell_parameters(options, title, diagnosis.result)
-    options.warn(outcome.document["warnings"])
+        print_parameters(output, title, diagnosis.result)
+    output.print_warnings(diagnosed.document["warnings"])
 
 
-def tell_verdict(options: Options, name: str, outcome: Diagnosed) -> None:
-    """The verdict in a word, with what stays unknown, in a sentence, and how probable what may be missing is."""
+def print_verdict(output: Output, diagnosed: DiagnosisOutput) -> None:
+    """Print the verdict, its summary, and the probability of what may be missing."""
     from bushfit.diagnosis.record import odds_in_words
 
-    colour = _COLOURS.get(outcome.headline, "yellow")
-    options.console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{escape(outcome.headline)}[/]")
-    for line in (outcome.diagnosis.summary, *odds_in_words(outcome.document)):
-        options.console.print(f"  {escape(line)}")
+    colour = _COLOURS.get(diagnosed.headline, "yellow")
+    output.console.print(f"[bold]{escape(diagnosed.name)}:[/bold] [bold {colour}]{escape(diagnosed.headline)}[/]")
+    for line in (diagnosed.diagnosis.summary, *odds_in_words(diagnosed.document)):
+        output.console.print(f"  {escape(line)}")
 
 
-def tell_findings(options: Options, outcome: Diagnosed) -> None:
-    """The effects named with their sizes, the gap before and after, what is usable, where it is, and the next test."""
-    console, diagnosis, document = options.console, outcome.diagnosis, outcome.document
+def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
+    """Print the effects named with their sizes, the gap before and after, where it is, and the next test."""
+    console, diagnosis, document = output.console, diagnosed.diagnosis, diagnosed.document
     for effect in document["effects"]:
-        _tell_effect(options, effect)
-    _tell_gap(options, document)
+        _print_effect(output, effect)
+    _print_gap(output, document)
     for title, regions in (("where", diagnosis.where), ("what remains", diagnosis.remainder)):
         if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):
             console.print(f"  [bold]{title}[/bold]")
-            for where in regions:
-                console.print(f"    {where.excess:5.1f} x noise: {escape(where.reading)}")
+            for region in regions:
+                console.print(f"    {region.excess:5.1f} x noise: {escape(region.reading)}")
     if diagnosis.next_test:
         console.print(f"  [bold]next test:[/bold] {escape(diagnosis.next_test)}")
 
 
-def _tell_gap(options: Options, document: Mapping[str, Any]) -> None:
-    """The gap, held out first, and within what the model is usable."""
-    gap, usable, console = document["gap"], document["usable"], options.console
-    held = gap["heldout"]
-    held_out = [f"{held[when]:.2f}" for when in ("before", "after")] if held else ["not testable", ""]
-    rows = (("held out", *held_out), ("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values())))
-    tell_table(options, "gap, in units of noise (1 is the floor)", ("", "before", "after"), rows)
+def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
+    """Print the gap, held out first, and the expected error of the model."""
+    gap, usable, console = document["gap"], document["usable"], output.console
+    held_out = gap["heldout"]
+    cells = [f"{held_out[when]:.2f}" for when in ("before", "after")] if held_out else ["not testable", ""]
+    rows = (("held out", *cells), ("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values())))
+    output.print_table("gap, in units of noise (1 is the floor)", ("", "before", "after"), rows)
     if usable:
         how = "of what was predicted from other runs" if usable["held_out"] else "of what was fitted"
-        words = f"{number(100 * usable['stiffness'], 2)} % of stiffness and {number(usable['loss_factor'], 2)}"
-        console.print(f"  usable within {words} of loss factor (95 % {how})")
-    if options.verbose:
+        error = f"{number(100 * usable['stiffness'], 2)} % of stiffness and {number(usable['loss_factor'], 2)}"
+        console.print(f"  usable within {error} of loss factor (95 % {how})")
+    if output.verbose:
         for part in gap["skipped"]:
             console.print(f"  not held out: {part['part']}; {part['reason']}")
 
 
-def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
-    """One effect that was named, as an entry of the document: its physics, sizes, evidence and look-alikes."""
-    console = options.console
+def _print_effect(output: Output, effect: Mapping[str, Any]) -> None:
+    """Print one effect that was named: its physics, sizes and look-alikes."""
+    console = output.console
     test = f" in {effect['test']}" if effect["test"] else ""
     console.print(f"  [bold]{effect['name']}[/bold]{escape(test)} ({effect['level']}): {escape(effect['sentence'])}")
     for parameter, entry in effect["parameters"].items():
@@ -137,8 +155,8 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
         value, *ends = format_aligned(
             [factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, minimum_digits=2
         )
-        sure = f"95 % {' to '.join(ends)}" if ends else "without an interval"
-        console.print(f"    {parameter} = {f'{value} {unit}'.removesuffix(' -')}, {sure}")
+        interval = f"95 % {' to '.join(ends)}" if ends else "without an interval"
+        console.print(f"    {parameter} = {f'{value} {unit}'.removesuffix(' -')}, {interval}")
     if effect["twins"]:
         names = " or ".join((effect["name"], *effect["twins"]))
         if effect["alternatives"]:
@@ -151,9 +169,9 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
         console.print(f"    cannot be told from: {escape(', '.join(effect['alternatives']))}")
 
 
-def _tell_candidates(options: Options, diagnosis: Diagnosis) -> None:
-    """Every candidate that was refitted, and why it won or lost."""
+def _print_candidates(output: Output, diagnosis: Diagnosis) -> None:
+    """Print every candidate that was refitted, and why it won or lost."""
     title = "candidates: what each takes off chi-square, and how probably it is part of what is missing"
-    known = ((each, each.gain) for each in diagnosis.candidates if each.gain is not None)
-    rows = ((each.name, each.why, f"{gain:.0f}", f"{each.probability:.2f}") for each, gain in known)
-    tell_table(options, title, ("candidate", "why", "gain", "probability"), rows, names=2)
+    fitted = ((candidate, candidate.gain) for candidate in diagnosis.candidates if candidate.gain is not None)
+    rows = ((one.name, one.why, f"{gain:.0f}", f"{one.probability:.2f}") for one, gain in fitted)
+    output.print_table(title, ("candidate", "why", "gain", "probability"), rows, text_columns=2)

@@ -1,13 +1,13 @@
 """`bushfit export`: model -> files of solvers, multibody codes and spreadsheets."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import click
 
-from bushfit.cli.common import Options, open_model, with_options
-from bushfit.cli.grids import asked_for, kelvin, positive, where_predicted
 from bushfit.cli.options import FILE, command_called, option, under
+from bushfit.cli.output import Output, with_output
+from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction_options
 
 
 @command_called(
@@ -15,7 +15,7 @@ from bushfit.cli.options import FILE, command_called, option, under
     "data/arm_bushing/truth.json --format nastran --format xlsx",
     'data/arm_bushing/truth.json --format abaqus --units "m kg s N" -o results/si',
 )
-@click.argument("model", metavar="MODEL.json", type=FILE)
+@click.argument("model", metavar="MODEL", type=FILE)
 @under(
     "For which program",
     option(
@@ -35,8 +35,8 @@ from bushfit.cli.options import FILE, command_called, option, under
     ),
     option("--accuracy", "ERROR", "Largest error of the modulus that an fmu may have [1 %].", default="1 %"),
 )
-@where_predicted("Take the grid of this campaign.")
-@with_options("results/<name>", "tables", "pictures")
+@prediction_options("Take the grid of this campaign.")
+@with_output("results/<name>", "tables", "pictures")
 def command(
     model: Path,
     formats: tuple[str, ...],
@@ -46,42 +46,38 @@ def command(
     units: str | None,
     dialect: Literal["optistruct"] | None,
     accuracy: str,
-    options: Options,
+    output: Output,
     **grids: str | None,
 ) -> None:
     """Write a fitted model for other programs: a solver, a multibody code, a spreadsheet.
 
-    MODEL.json is the model.json of run, fit or diagnose, or dynamic.json. What a format cannot carry, and what that
-    costs, is said. Effects of the rig are left out. z is the bushing's axis.
+    MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. What a format cannot carry, and what
+    that costs, is said. Effects of the rig are left out. z is the bushing's axis.
 
     Writes bushing.bdf, .fem, .inp or .xlsx, bushing_car.bus and bushing_ride.bus (adams), a CSV file a table, or an
     .fmu with arms.csv and arms.png, its Maxwell arms.
     """
     from bushfit.campaign.campaign import load_campaign
+    from bushfit.commands.export import export
+    from bushfit.commands.loading import load_model, model_file
+    from bushfit.commands.provenance import input_files
     from bushfit.errors import error_location
     from bushfit.export.contract import UnitSystem
-    from bushfit.jobs.export import Export, source_of
-    from bushfit.jobs.predict import Predict
-    from bushfit.report.contents import Kinds
 
-    result, loaded = open_model(model), load_campaign(campaign) if campaign else None
-    asked = asked_for(directions, grids)
+    result, loaded = load_model(model), load_campaign(campaign) if campaign else None
+    settings: dict[str, Any] = grid_values(directions, grids)
     if dialect and "nastran" not in formats:
         raise click.UsageError("'--dialect' is of '--format nastran'.")
     with error_location(place="--units"):
-        system = UnitSystem.parse(units) if units is not None else None
-    job = Export(
-        tuple(dict.fromkeys(formats)),
-        Predict(asked, temperature=kelvin(temperature)),
-        positive(accuracy, "--accuracy", "1") or 0.0,
-        system,
-        dialect or "nastran",
-        options.formats.table_form == "decimal-comma",
-    )
-    folder = options.free_folder((loaded or result).name, Kinds())
-    outcome = job.run(result, source_of(model), loaded)
-    for name, exported in outcome.exported.items():
-        for loss in exported.losses:
-            options.say(f"{name} leaves out: {loss}")
-    options.warn(outcome.predicted.warnings)
-    options.write(folder, {**outcome.files, **options.formats.files(outcome.contents)}, outcome.document)
+        settings["units"] = UnitSystem.parse(units) if units is not None else None
+    settings["temperature"] = kelvin(temperature)
+    settings["accuracy"] = positive(accuracy, "--accuracy", "1")
+    comma = output.formats.table_form == "decimal-comma"
+    names, file = tuple(dict.fromkeys(formats)), model_file(model)
+    exported = export(file, names, loaded, dialect=dialect or "nastran", decimal_comma=comma, **settings)
+    for name, written in exported.exported.items():
+        for loss in written.losses:
+            output.print(f"{name} leaves out: {loss}")
+    output.print_warnings(exported.predicted.warnings)
+    inputs = [file, *(input_files(loaded) if loaded else [])]
+    output.write(output.folder((loaded or result).name), exported.files, exported.document, inputs)

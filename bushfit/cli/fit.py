@@ -1,16 +1,27 @@
-"""`bushfit fit-static`, `fit-dynamic` and `fit`: loops, sweeps, or both together -> parameters."""
+"""`bushfit fit-static`, `fit-dynamic` and `fit`: parameters from loops, sweeps, or both together."""
+
+from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from bushfit.cli.common import Task, open_model, with_task
 from bushfit.cli.options import command_called, effect_option, file_option, flag, place_option, under
-from bushfit.cli.show import tell_fit
+from bushfit.cli.output import Output, with_output
+from bushfit.cli.printing import print_fit
+from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
+
+if TYPE_CHECKING:
+    from bushfit.campaign.schema import Loss
+    from bushfit.commands.fit import FitOutput
 
 
 @command_called("fit-static", "configs/cmp_15961.toml")
 @under("How it is fitted", file_option("--dynamic", "Hold m and alpha at those of this dynamic.json."))
-@with_task()
-def static(dynamic: Path | None, task: Task) -> None:
+@campaign_options()
+@with_output("results/<campaign name>", "tables", "pictures")
+def static(
+    campaigns: tuple[Path, ...], dynamic: Path | None, loss: Loss | None, max_nrmse: float | None, output: Output
+) -> None:
     """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, at given m and alpha.
 
     These come from --dynamic, or from [fit] of the campaign. Where they are not known yet the part of the model that
@@ -18,9 +29,12 @@ def static(dynamic: Path | None, task: Task) -> None:
 
     Writes static.json, loops.csv and loops.png.
     """
-    from bushfit.jobs.fits import FitStatic
+    from bushfit.commands.fit import fit_static
+    from bushfit.commands.loading import load_model
 
-    task.perform(FitStatic(open_model(dynamic) if dynamic else None), tell_fit)
+    campaign, start = open_campaign(campaigns), load_model(dynamic) if dynamic else None
+    folder = output.free_folder(campaign.name, "static.json")
+    _finish(output, folder, fit_static(campaign, dynamic=start, loss=loss), dynamic, max_nrmse)
 
 
 @command_called("fit-dynamic", "configs/cmp_15961.toml")
@@ -30,8 +44,11 @@ def static(dynamic: Path | None, task: Task) -> None:
         "--static", "Hold mu, sigma_fmax and eps_half at those of this static.json [the loops are fitted first]."
     ),
 )
-@with_task()
-def dynamic(static: Path | None, task: Task) -> None:
+@campaign_options()
+@with_output("results/<campaign name>", "tables", "pictures")
+def dynamic(
+    campaigns: tuple[Path, ...], static: Path | None, loss: Loss | None, max_nrmse: float | None, output: Output
+) -> None:
     """Fit m and alpha to the smallest-amplitude sweep of CAMPAIGN, at given mu, sigma_fmax and eps_half.
 
     These come from --static, and their errors are carried over; without it the loops of CAMPAIGN are fitted first.
@@ -39,9 +56,12 @@ def dynamic(static: Path | None, task: Task) -> None:
 
     Writes dynamic.json, a model that bushfit predict takes, sweeps.csv and sweeps.png.
     """
-    from bushfit.jobs.fits import FitDynamic
+    from bushfit.commands.fit import fit_dynamic
+    from bushfit.commands.loading import load_model
 
-    task.perform(FitDynamic(open_model(static) if static else None), tell_fit)
+    campaign, start = open_campaign(campaigns), load_model(static) if static else None
+    folder = output.free_folder(campaign.name, "dynamic.json")
+    _finish(output, folder, fit_dynamic(campaign, static=start, loss=loss), static, max_nrmse)
 
 
 @command_called("fit", "configs/arm_bushing.toml --direction axial --direction radial --profile")
@@ -54,8 +74,17 @@ def dynamic(static: Path | None, task: Task) -> None:
     effect_option("Add an effect to the model, such as inertia; may be given again. A wrong NAME lists all."),
     flag("--profile", "Add 95 % intervals by profile likelihood (some seconds)."),
 )
-@with_task()
-def fit(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:
+@campaign_options()
+@with_output("results/<campaign name>", "tables", "pictures")
+def fit(
+    campaigns: tuple[Path, ...],
+    directions: tuple[str, ...],
+    effects: tuple[str, ...],
+    profile: bool,
+    loss: Loss | None,
+    max_nrmse: float | None,
+    output: Output,
+) -> None:
     """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
 
     This is the fit to use: bushfit predict takes its model. Without axial loops, or axial sweeps, it takes those of all
@@ -65,6 +94,21 @@ def fit(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, ta
 
     Writes model.json, and of loops and sweeps a table and a plot each.
     """
-    from bushfit.jobs.fits import Fit
+    from bushfit.commands.fit import fit as fit_campaign
 
-    task.perform(Fit(directions, effects, profile), tell_fit)
+    campaign = open_campaign(campaigns)
+    folder = output.free_folder(campaign.name, "model.json")
+    result = fit_campaign(campaign, directions=directions, effects=effects, profile=profile, loss=loss)
+    _finish(output, folder, result, None, max_nrmse)
+
+
+def _finish(output: Output, folder: Path, fitted: FitOutput, model: Path | None, max_nrmse: float | None) -> None:
+    """Print and write the output of a fit; `model` is the model file that was read."""
+    from bushfit.commands.provenance import input_files
+
+    campaign = fitted.data.campaign
+    output.print_warnings(fitted.data.notes)
+    print_fit(output, campaign.name, fitted)
+    inputs = [*input_files(campaign), *([model] if model else [])]
+    output.write(folder, fitted.files, fitted.document, inputs)
+    exit_above(max_nrmse, fitted.result)

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import STATED, TYPES, direction_error, options_named, with_stated
 from bushfit.cli.inspect import tell_left_out
 from bushfit.cli.options import command_called, flag, option, option_of, under
+from bushfit.cli.output import Output, with_output
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, error_location, quote_path
 from bushfit.progress import track
-from bushfit.report.folder import check_free
+from bushfit.report.results import check_free, raw_file
 from bushfit.units import parse_quantity
 
 if TYPE_CHECKING:
@@ -68,13 +68,13 @@ _Seen = TypeVar("_Seen")
 )
 @with_stated()
 @under("Output", flag("--no-input", "Ask nothing, as in a script: say what lacks."))
-@with_options("results/<bushing name>")
+@with_output("results/<bushing name>")
 def command(
     files: tuple[Path, ...],
     name: str | None,
     no_input: bool,
     stated: Mapping[str, Any],
-    options: Options,
+    output: Output,
     **sizes: str | None,
 ) -> None:
     """Write a campaign from test files and the geometry of the bushing.
@@ -85,40 +85,41 @@ def command(
     from bushfit.geometry import Specimen
     from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named
 
-    questions = Questions.of(options, no_input=no_input)
+    questions = Questions.of(output, no_input=no_input)
     usual = (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
     if name is None and questions.asked and not any(sizes.values()):
         name = click.prompt("name of the bushing", default=usual, err=True)
     name = name or usual
-    folder, target = options.folder(name), "campaign.toml"
-    if options.output and options.output.suffix == ".toml":
-        folder, target = options.output.parent, options.output.name
+    folder, target = output.folder(name), "campaign.toml"
+    if output.output and output.output.suffix == ".toml":
+        folder, target = output.output.parent, output.output.name
     size = partial(_bushing, name)
     bushing = questions.settled(sizes, size) if any(sizes.values()) else None
-    check_free(folder, [target], force=options.force)
+    check_free(folder, [target], overwrite=output.force)
     seen, left_out = _usable(files, stated, questions, is_sized=bushing is not None)
     seen = with_specimens_named(seen)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
         bushing = questions.settled(sizes, size)
     table = bushing and bushing[1]
     if len({one.part for one in seen if one.part}) > 1:
-        target = target if options.output and options.output.suffix == ".toml" else "batch.toml"
+        target = target if output.output and output.output.suffix == ".toml" else "batch.toml"
         written = campaigns_of_parts(name, table, seen, folder, target)
-        check_free(folder, list(written), force=options.force)
+        check_free(folder, list(written), overwrite=output.force)
     else:
         written = {target: campaign_text(name, table, seen, folder)}
     if bushing:
-        _tell_bushing(options, bushing[0])
+        _tell_bushing(output, bushing[0])
     for one in seen:
-        _tell(options, one)
-    tell_left_out(options, left_out)
+        _tell(output, one)
+    tell_left_out(output, left_out)
     document: InspectionDocument = {
         "campaign": written[target],
         "files": [one.to_document() for one in seen],
         "left_out": left_out,
     }
-    options.write(folder, {file: text.encode() for file, text in written.items()}, document)
-    options.say(f"next: bushfit {'batch' if len(written) > 1 else 'run'} {quote_path(folder / target)}")
+    results = [raw_file(file, text.encode()) for file, text in written.items()]
+    output.write(folder, results, document, files)
+    output.print(f"next: bushfit {'batch' if len(written) > 1 else 'run'} {quote_path(folder / target)}")
 
 
 def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
@@ -221,36 +222,36 @@ def _look(source: Source, stated: Mapping[str, Any], *, is_sized: bool, is_asked
     return one
 
 
-def _tell_bushing(options: Options, bushing: Bushing) -> None:
+def _tell_bushing(output: Output, bushing: Bushing) -> None:
     inner, outer, long = (1e3 * size for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length))
     across = f"from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick"
-    options.say(f"{bushing.name}: rubber {across}, {long:.6g} mm long")
+    output.print(f"{bushing.name}: rubber {across}, {long:.6g} mm long")
 
 
-def _tell(options: Options, seen: Inspected) -> None:
+def _tell(output: Output, seen: Inspected) -> None:
     """One line of what a file is, what was assumed, and what is odd."""
     facts = seen.facts
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
-    options.say(f"{seen.file.parent / seen.label}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
-    options.warn([f"{seen.label}: {sentence}" for sentence in seen.odd])
+    output.print(f"{seen.file.parent / seen.label}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
+    output.print_warnings([f"{seen.label}: {sentence}" for sentence in seen.odd])
     if seen.assumed:
-        options.say(f"  {seen.assumed}")
+        output.print(f"  {seen.assumed}")
 
 
 @dataclass(frozen=True)
 class Questions:
     """Questions of one command, where somebody is `asked`; the last answer to one is offered when it comes again."""
 
-    options: Options
+    output: Output
     asked: bool
     _answers: dict[_Key, Any] = field(default_factory=lambda: dict.fromkeys(_ONCE))
 
     @classmethod
-    def of(cls, options: Options, *, no_input: bool) -> Questions:
+    def of(cls, output: Output, *, no_input: bool) -> Questions:
         """Those of a command, none where nobody is there to answer, or wants to be asked."""
-        asked = not (no_input or options.quiet or options.as_json) and sys.stdin is not None and sys.stdin.isatty()
-        return cls(options, asked)
+        asked = not (no_input or output.quiet or output.as_json) and sys.stdin is not None and sys.stdin.isatty()
+        return cls(output, asked)
 
     def settled(self, stated: Mapping[str, Any], look: Callable[[Mapping[str, Any]], _Seen]) -> _Seen:
         """What comes of what is stated, with answers to what the errors of that ask for."""
@@ -278,7 +279,7 @@ class Questions:
         name, role = key
         known = self._answers.get(key)
         if key not in _ONCE or known is None:
-            self.options.say(f"\n{told}")
+            self.output.print(f"\n{told}")
             words = _WORDS.get(name, name.replace("_", " ")).format(role=role.replace("_", " "))
             usual = _ONCE.get(key, known)
             known = click.prompt(words, default=usual, type=TYPES.get(name), show_default=usual != "", err=True)

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import options_named, with_stated
 from bushfit.cli.options import command_called
-from bushfit.cli.show import tell_table
+from bushfit.cli.output import Output, with_output
 from bushfit.errors import BushfitError
 from bushfit.progress import track
 from bushfit.report import plots
-from bushfit.report.contents import Contents, Kinds
+from bushfit.report.results import figure_file
 
 if TYPE_CHECKING:
     from bushfit.inspection.record import Inspected, InspectionDocument
@@ -31,8 +30,8 @@ _FILES_A_PICTURE = 5
 
 @command_called("inspect", "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv")
 @with_stated()
-@with_options("results/<first file>", "pictures")
-def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
+@with_output("results/<first file>", "pictures")
+def command(files: tuple[Path, ...], stated: Mapping[str, Any], output: Output) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw histories.
 
     FILE may be a folder, or a workbook with several tests. For each test: how every column was understood, in which
@@ -45,10 +44,10 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     from bushfit.inspection.record import pasted_text, with_specimens_named
 
     sources, left_out = gather(files, stated)
-    tell_left_out(options, left_out)
+    tell_left_out(output, left_out)
     last = math.ceil(len(sources) / _FILES_A_PICTURE)
     pages = ["inspect", *(f"inspect_{page}" for page in range(2, last + 1))]
-    folder = options.free_folder(files[0].stem, Kinds(pictures=tuple(pages)))
+    folder = output.folder(files[0].stem)
     seen: list[Inspected] = []
     failed: list[BushfitError] = []
     for source in track("tests looked at", sources):
@@ -58,13 +57,13 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         except BushfitError as error:
             failed.append(error)
         else:
-            tell(options, seen[-1])
+            tell(output, seen[-1])
     for alone, beside in zip(seen, together := with_contradictions(seen), strict=True):
         for sentence in beside.odd[len(alone.odd) :]:
-            options.console.print(f"[yellow]odd:[/yellow] {escape(beside.label)}: {escape(sentence)}")
+            output.console.print(f"[yellow]odd:[/yellow] {escape(beside.label)}: {escape(sentence)}")
     seen = with_specimens_named(together)
     text = pasted_text(seen)
-    if not options.as_json:
+    if not output.as_json:
         click.echo(text, nl=False)
     if failed:
         for other in failed[:-1]:
@@ -75,37 +74,39 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         "left_out": list(left_out),
         "campaign": text,
     }
-    if options.formats.pictures:
-        figures = {
-            page: partial(plots.inspection.inspection_figure, seen, number * _FILES_A_PICTURE, _FILES_A_PICTURE)
+    if output.formats.pictures:
+        figures = [
+            figure_file(
+                page, partial(plots.inspection.inspection_figure, seen, number * _FILES_A_PICTURE, _FILES_A_PICTURE)
+            )
             for number, page in enumerate(pages)
-        }
-        options.write(folder, options.formats.files(Contents(pictures=figures)), document)
+        ]
+        output.write(folder, figures, document, files)
     else:
-        options.print_json(document)
+        output.print_json(document)
 
 
-def tell(options: Options, seen: Inspected) -> None:
+def tell(output: Output, seen: Inspected) -> None:
     """One file in words: columns, facts, oddities."""
-    console = options.console
+    console = output.console
     written = ", ".join(f"{label} {value}" for label, value in seen.written.items())
     title = f"{seen.file.parent / seen.label}: {_KINDS[seen.kind]}, {seen.direction or 'direction unknown'}"
     rows = []
     for column in seen.columns:
         ends = ("" if end is None else f"{end:.6g}" for end in (column.low, column.high))
         rows.append((escape(column.header), column.role or "(not needed)", escape(column.unit or ""), *ends))
-    tell_table(options, title, ("column", "taken for", "unit", "from", "to"), rows)
+    output.print_table(title, ("column", "taken for", "unit", "from", "to"), rows)
     for label, value in {"written with": written, **seen.facts}.items():
-        options.say(f"  {label}: {value}")
+        output.print(f"  {label}: {value}")
     if seen.assumed:
-        options.say(f"  {seen.assumed}")
+        output.print(f"  {seen.assumed}")
     for sentence in seen.odd:
         console.print(f"  [yellow]odd:[/yellow] {escape(sentence)}")
     if not seen.odd:
         console.print("  nothing odd")
 
 
-def tell_left_out(options: Options, left_out: Sequence[str]) -> None:
+def tell_left_out(output: Output, left_out: Sequence[str]) -> None:
     """A line for each file or sheet that holds no test."""
     for sentence in left_out:
-        options.say(f"left out: {sentence}")
+        output.print(f"left out: {sentence}")

@@ -12,7 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from bushfit.reading.tablefile import Form
-from bushfit.report.contents import Picture
+from bushfit.report.results import Picture
 
 #: In which a bushing is tested: geometry, which has them, is slow to import.
 DIRECTIONS = ("axial", "radial", "torsion")
@@ -223,25 +223,28 @@ def file_option(name: str, words: str) -> Parameter:
     return option(name, "FILE", words, type=FILE)
 
 
-FORMS: dict[Written, Parameter] = {
-    "tables": option(
-        "--table-format",
-        "FORM",
-        "csv, decimal-comma (German Excel) or xlsx [csv].",
-        type=click.Choice(get_args(Form)),
-        default="csv",
-        envvar="BUSHFIT_TABLE_FORMAT",
-        show_envvar=True,
-    ),
-    "pictures": option(
-        "--plot-format",
-        "FORM",
-        "png, svg, pdf; may be given again [png].",
-        type=click.Choice(get_args(Picture)),
-        multiple=True,
-        default=["png"],
-        envvar="BUSHFIT_PLOT_FORMAT",
-        show_envvar=True,
-    ),
-    "pages": flag("--no-report", "Write no page (HTML)."),
-}
+def format_options(*kinds: Written) -> list[Parameter]:
+    """Options for the formats of tables and figures, and for leaving pages out."""
+    options: dict[Written, Parameter] = {
+        "tables": option(
+            "--table-format",
+            "FORM",
+            "csv, decimal-comma (German Excel) or xlsx [csv].",
+            type=click.Choice(get_args(Form)),
+            default="csv",
+            envvar="BUSHFIT_TABLE_FORMAT",
+            show_envvar=True,
+        ),
+        "pictures": option(
+            "--plot-format",
+            "FORM",
+            "png, svg, pdf; may be given again [png].",
+            type=click.Choice(get_args(Picture)),
+            multiple=True,
+            default=["png"],
+            envvar="BUSHFIT_PLOT_FORMAT",
+            show_envvar=True,
+        ),
+        "pages": flag("--no-report", "Write no page (HTML)."),
+    }
+    return [options[kind] for kind in kinds]

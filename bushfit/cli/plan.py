@@ -6,24 +6,20 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import click
-from rich.markup import escape
 
-from bushfit.cli.common import Options, open_source, with_options
-from bushfit.cli.grids import asked_for, grid_options, positive
 from bushfit.cli.options import FILE, Size, command_called, effect_lists, file_option, option, place_option, under
-from bushfit.cli.show import tell_table
+from bushfit.cli.output import Output, with_output
+from bushfit.cli.shared_options import grid_options, grid_values, positive
 from bushfit.errors import error_location
 from bushfit.units import display_unit, number
 
 if TYPE_CHECKING:
-    from bushfit.jobs.plan import PlanFile, Planned, Shown
+    from bushfit.commands.plan import PlanFile, PlanOutput, Shown
     from bushfit.planning.campaign import Check
-    from bushfit.planning.contract import Aim
 
 #: Hours of the rig at most: months, as a typing error.
 _MOST_HOURS = 2000.0
@@ -66,7 +62,7 @@ _MOST_VALUES = 6
     option("--check count", "N", "Simulate the plan N times, and fit it.", type=click.IntRange(2, 100_000)),
     option("--seed", "N", "Of its random numbers [0].", type=click.IntRange(0), default=0),
 )
-@with_options("results/plan <name>", "tables", "pictures")
+@with_output("results/plan <name>", "tables", "pictures")
 def command(
     source: Path,
     aim: str | None,
@@ -78,7 +74,7 @@ def command(
     campaign: Path | None,
     count: int | None,
     seed: int,
-    options: Options,
+    output: Output,
     **grids: str | None,
 ) -> None:
     """Choose the tests that would tell most, within what the rig can do.
@@ -89,7 +85,8 @@ def command(
     Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml to simulate.
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
-    from bushfit.jobs.plan import CAMPAIGN_FILE, PlanTests
+    from bushfit.commands.loading import load_source
+    from bushfit.commands.plan import plan, with_check
 
     if aim not in (None, "rivals") and rivals:
         raise click.UsageError("'--rivals' goes with '--for rivals'.")
@@ -97,23 +94,28 @@ def command(
         raise click.UsageError("'--parameters' goes with '--for parameters'.")
     if targets and (aim or rivals or parameters):
         raise click.UsageError("'--target' is an aim of its own: without '--for', '--parameters' and '--rivals'.")
-    usual = "targets" if targets else "rivals" if rivals else "parameters" if parameters else "predictions"
-    sizes = dict(map(_target, targets))
-    job = PlanTests(
-        cast("Aim", aim or usual), hours, directions, _names(parameters), _names(rivals), sizes, asked_for((), grids)
-    )
-    opened, beside = open_source(source), load_campaign(campaign) if campaign else None
+    implied = "targets" if targets else "rivals" if rivals else "parameters" if parameters else "predictions"
+    settings: dict[str, Any] = {
+        **grid_values((), grids),
+        "aim": aim or implied,
+        "hours": hours,
+        "test_directions": directions,
+        "parameters": _names(parameters),
+        "rivals": _names(rivals),
+        "targets": dict(map(_target, targets)),
+    }
+    opened, beside = load_source(source), load_campaign(campaign) if campaign else None
     if beside and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' goes with MODEL.json.")
-    folder = options.free_folder(opened.name, job.kinds(), CAMPAIGN_FILE, form="plan {}")
+    folder = output.free_folder(opened.name, "plan.json", form="plan {}")
     with error_location(source):
-        outcome = job.run(opened, beside)
-    _tell(options, outcome)
+        outcome = plan(opened, beside, **settings)
+    _print_plan(output, outcome)
     if count and outcome.plan.planned.tests:
-        outcome = replace(outcome, check=_checked(options, outcome, count, seed))
-    options.write(folder, {**options.formats.files(outcome.contents), **outcome.campaign}, outcome.document)
+        outcome = with_check(outcome, _checked(output, outcome, count, seed))
+    output.write(folder, outcome.files, outcome.document, [source, *([campaign] if campaign else [])])
     if outcome.plan.planned.tests:
-        options.say(f"next: make the tests in the order of {folder / options.formats.table('plan')}")
+        output.print(f"next: make the tests in the order of {folder / output.formats.table('plan')}")
     if missed := [name for name, target in outcome.document["targets"].items() if not target["met"]]:
         click.echo(f"bushfit: these targets are not met: {', '.join(missed)}", err=True)
         click.get_current_context().exit(1)
@@ -132,31 +134,31 @@ def _target(text: str) -> tuple[str, float]:
     return name.strip(), positive(size.strip(), "--target", "1") or 0.0
 
 
-def _tell(options: Options, outcome: Planned) -> None:
+def _print_plan(output: Output, outcome: PlanOutput) -> None:
     """The tests, what they would tell beside the standard programme, and what a user must know."""
     document = outcome.document
-    options.say(f"known before: {document['source']}")
-    _tell_tests(options, outcome)
+    output.print(f"known before: {document['source']}")
+    _print_tests(output, outcome)
     standard = f"standard, {number(document['hours_standard'], 3)} h"
     columns = ("of", "before", f"plan, {number(document['hours_planned'], 3)} h", standard)
     rows = {**document["parameters"], **{f"stiffness, {place}": row for place, row in document["stiffness"].items()}}
     rows |= {f"loss factor, {place} [0.01]": row for place, row in document["loss_factor"].items()}
     title = "standard errors [%]: known before, by the plan, and by the standard programme of tests"
-    tell_table(options, title, columns, _percents(rows, ("before", "planned", "standard")))
-    _tell_targets(options, document)
-    _tell_effects(options, document)
+    output.print_table(title, columns, _percents(rows, ("before", "planned", "standard")))
+    _print_targets(output, document)
+    _print_effects(output, document)
     if rivals := document["rivals"]:
         apart = ", ".join(f"{number(rivals[key], 3)} by the {key} tests" for key in ("planned", "standard"))
-        options.say(
+        output.print(
             f"{' and '.join(rivals['effects'])}: {apart} apart in expected chi-square; from "
             f"{number(rivals['enough'], 3)} on they are told apart in nine of ten cases"
         )
     if document["enough"]:
-        options.say(document["enough"])
-    options.warn(document["warnings"])
+        output.print(document["enough"])
+    output.print_warnings(document["warnings"])
 
 
-def _tell_tests(options: Options, outcome: Planned) -> None:
+def _print_tests(output: Output, outcome: PlanOutput) -> None:
     """Each test with the number of its runs; the sheet has them in their order."""
     from bushfit.campaign.schema import SimulatedLoop
     from bushfit.planning.contract import motions
@@ -167,9 +169,9 @@ def _tell_tests(options: Options, outcome: Planned) -> None:
         sizes, rates = motions(test)
         what = f"loop, {test.cycles} cycles" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}"
         motion = f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0)
-        rows.append((escape(str(test.direction)), what, *motion, str(runs)))
+        rows.append((str(test.direction), what, *motion, str(runs)))
     columns = ("direction", "test", "amplitude", "frequency [Hz]", "runs")
-    tell_table(options, f"{len(programme.tests)} runs", columns, rows, names=4)
+    output.print_table(f"{len(programme.tests)} runs", columns, rows, text_columns=4)
 
 
 def _listed(values: Sequence[float], factor: float) -> str:
@@ -180,38 +182,38 @@ def _listed(values: Sequence[float], factor: float) -> str:
 
 def _percents(rows: Mapping[str, Mapping[str, Any]], keys: Sequence[str]) -> list[tuple[str, ...]]:
     """Each name with the shares that its row has under some keys, in percent."""
-    return [(escape(name), *(number(100.0 * row[key], 2) for key in keys)) for name, row in rows.items()]
+    return [(name, *(number(100.0 * row[key], 2) for key in keys)) for name, row in rows.items()]
 
 
-def _tell_targets(options: Options, document: PlanFile) -> None:
+def _print_targets(output: Output, document: PlanFile) -> None:
     """Each target beside what is reached now, by the plan and by the standard programme."""
     targets = document["targets"]
     sizes = _percents(targets, ("asked", "before", "planned", "standard"))
     rows = [(*row, "met" if target["met"] else "not met") for row, target in zip(sizes, targets.values(), strict=True)]
     if rows:
         columns = ("of", "asked for", "before", "plan", "standard", "")
-        tell_table(options, "targets: 95 % interval either way, the widest [%]", columns, rows)
+        output.print_table("targets: 95 % interval either way, the widest [%]", columns, rows)
 
 
-def _tell_effects(options: Options, document: PlanFile) -> None:
+def _print_effects(output: Output, document: PlanFile) -> None:
     """The smallest amounts of effects that the plan finds, those first that it shows least well beside the standard."""
 
     def least_well(shown: Shown) -> float:
         return (shown["standard"] or math.inf) / (shown["planned"] or math.inf)
 
     ranked = sorted(document["visible"].items(), key=lambda item: least_well(item[1]))
-    kept = ranked if options.verbose else ranked[:_MOST_EFFECTS]
+    kept = ranked if output.verbose else ranked[:_MOST_EFFECTS]
     title = f"smallest amounts found in nine of ten cases, {len(kept)} of {len(ranked)} effects"
     rows = []
     for name, shown in kept:
         sizes = [shown["planned"], shown["standard"]]
         unit, factor = display_unit(shown["unit"], 1.0, next(filter(None, sizes), 1.0))
         words = ["none" if size is None else number(size * factor, 3) for size in sizes]
-        rows.append((escape(name), escape(shown["parameter"]), *words, unit))
-    tell_table(options, title, ("effect", "amount", "plan", "standard", "unit"), rows, names=2)
+        rows.append((name, shown["parameter"], *words, unit))
+    output.print_table(title, ("effect", "amount", "plan", "standard", "unit"), rows, text_columns=2)
 
 
-def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check:
+def _checked(output: Output, outcome: PlanOutput, count: int, seed: int) -> Check:
     """The plan simulated, with a table of what was predicted and found."""
     from bushfit.batch import pool
     from bushfit.planning.campaign import Found, check
@@ -227,7 +229,7 @@ def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check
     for name, *sizes in zip(found.names, found.predicted, found.found, low, high, strict=True):
         predicted, scatter, *ends = (number(100.0 * size, 3) for size in sizes)
         rows.append((name, predicted, scatter, " to ".join(ends)))
-    tell_table(options, title, ("of", "predicted", "found", "95 %"), rows)
+    output.print_table(title, ("of", "predicted", "found", "95 %"), rows)
     if found.failed:
-        options.say(f"{found.failed} could not be fitted")
+        output.print(f"{found.failed} could not be fitted")
     return found

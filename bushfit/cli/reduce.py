@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from bushfit.cli.common import Options, with_options
 from bushfit.cli.file_options import direction_error, options_named, with_stated
-from bushfit.cli.grids import parse_grid, positive
 from bushfit.cli.options import command_called, option, under
-from bushfit.cli.show import tell_table
+from bushfit.cli.output import Output, with_output
+from bushfit.cli.shared_options import parse_grid, positive
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.report import plots
-from bushfit.report.contents import Contents, Kinds
+from bushfit.report.results import figure_file, table_file
 from bushfit.units import format_aligned, number
 
 if TYPE_CHECKING:
@@ -53,13 +52,13 @@ _LINES_AN_OCTAVE = 3
     option("--specimen", "NAME", "What was tested, if it is no bushing."),
     option("--base-acceleration", "ACCELERATION", 'Such as "0.1 g", if no column says it.'),
 )
-@with_options("results/<first file>", "tables", "pictures")
+@with_output("results/<first file>", "tables", "pictures")
 def command(
     files: tuple[Path, ...],
     stated: Mapping[str, Any],
     levels: str | None,
     cycles: int,
-    options: Options,
+    output: Output,
     **shaker: str | None,
 ) -> None:
     """Reduce raw stepped-sine histories or a resonance test to a sweep.
@@ -70,20 +69,19 @@ def command(
 
     Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """
-    formats, kinds = options.formats, Kinds(tables=("sweep",), pictures=("reduce",))
-    folder = options.free_folder(files[0].stem, kinds)
+    folder = output.free_folder(files[0].stem, output.formats.table("sweep"))
     table = _resonance_table(files[0], stated, shaker)
     found = (
         _histories(files, stated, levels, cycles) if table is None else _resonance(files, table, stated, shaker, levels)
     )
-    found.tell(options)
-    contents = Contents(tables={"sweep": lambda: found.points}, pictures={"reduce": found.figure})
-    file = formats.table("sweep")
+    found.tell(output)
+    file = output.formats.table("sweep")
     snippet = f'[[sweeps]]\nfile = "{file}"\n{found.body} = {json.dumps(found.name, ensure_ascii=False)}\n'
     document = {found.body: found.name, "points": found.points.to_dict(orient="list"), **found.document}
     document |= {"warnings": list(found.warnings), "campaign": snippet}
-    options.write(folder, formats.files(contents), document)
-    options.say(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}")
+    results = [table_file("sweep", lambda: found.points), figure_file("reduce", found.figure)]
+    output.write(folder, results, document, files)
+    output.print(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}")
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ class _Reduced:
     name: str
     points: pd.DataFrame
     warnings: Sequence[str]
-    tell: Callable[[Options], None]
+    tell: Callable[[Output], None]
     figure: Callable[[], Figure]
     document: Mapping[str, Any] = field(default_factory=dict)
 
@@ -119,7 +117,7 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
         str(direction),
         reduced_table(reduction),
         reduction.warnings,
-        lambda options: _tell(options, reduction),
+        lambda output: _tell(output, reduction),
         lambda: plots.inspection.reduction_figure(reduction, histories, title),
     )
 
@@ -177,7 +175,7 @@ def _resonance(
         specimen or str(direction),
         resonance_table(reduction),
         reduction.warnings,
-        lambda options: _tell_resonance(options, reduction),
+        lambda output: _tell_resonance(output, reduction),
         lambda: plots.inspection.resonance_figure(reduction, title),
         {"mass_kg": mass, "resonance_Hz": frequency, "transmissibility_at_resonance": largest},
     )
@@ -226,13 +224,13 @@ def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:
     return histories
 
 
-def _tell(options: Options, reduction: Reduction) -> None:
+def _tell(output: Output, reduction: Reduction) -> None:
     """A line a level and repeat, with -v a line a point."""
     units = reduction.direction.display
     (unit, length), (stiffness_unit, factor) = units.displacement, units.stiffness
 
     def line(step: Step) -> tuple[float, ...]:
-        return (step.level, step.repeat, *((step.nominal_frequency,) if options.verbose else ()))
+        return (step.level, step.repeat, *((step.nominal_frequency,) if output.verbose else ()))
 
     count, rows = len(reduction.steps), []
     for (level, repeat, *_), group in groupby(sorted(reduction.steps, key=line), line):
@@ -256,14 +254,14 @@ def _tell(options: Options, reduction: Reduction) -> None:
         rows.append(cells)
     title = f"{count} point{'s' * (count > 1)} found; of each line the largest noise and distortion"
     heads = ("repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]", "THD [%]")
-    tell_table(options, title, (f"level [{unit}]", *heads), rows)
-    options.warn(reduction.warnings)
-    if options.verbose:
+    output.print_table(title, (f"level [{unit}]", *heads), rows)
+    output.print_warnings(reduction.warnings)
+    if output.verbose:
         for skip in reduction.skipped:
-            options.say(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}")
+            output.print(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}")
 
 
-def _tell_resonance(options: Options, found: Resonance) -> None:
+def _tell_resonance(output: Output, found: Resonance) -> None:
     """A line a third of an octave, with -v a line a point."""
     import numpy as np
 
@@ -273,7 +271,7 @@ def _tell_resonance(options: Options, found: Resonance) -> None:
     (unit, length), _, (stiffness_unit, factor) = TRANSLATION.display
     frequency, largest = found.peak
     count, cells = found.frequency.size, []
-    lines = range(count) if options.verbose else (_LINES_AN_OCTAVE * np.log2(found.frequency)).round().tolist()
+    lines = range(count) if output.verbose else (_LINES_AN_OCTAVE * np.log2(found.frequency)).round().tolist()
     for _, group in groupby(range(count), lambda place: lines[place]):
         rows = list(group)
         amplitudes, ratios = (
@@ -292,8 +290,8 @@ def _tell_resonance(options: Options, found: Resonance) -> None:
         f"|T| {largest:.2f}\nof each line the median of |K| and loss factor, and the largest error"
     )
     heads = ("f [Hz]", "points", f"amplitude [{unit}]", "|T|", f"|K| [{stiffness_unit}]", "loss factor", "error [%]")
-    tell_table(options, title, heads, cells)
-    options.warn(found.warnings)
+    output.print_table(title, heads, cells)
+    output.print_warnings(found.warnings)
 
 
 def _span(rising: Sequence[str]) -> str:

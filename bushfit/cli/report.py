@@ -1,17 +1,17 @@
-"""`bushfit report`: a folder of results -> one page to show, to print and to mail."""
+"""`bushfit report`: one page of a results folder, to show, print and mail."""
 
 from pathlib import Path
 
 import click
 
-from bushfit.cli.common import Options, with_options
 from bushfit.cli.options import FILE, command_called
+from bushfit.cli.output import Output, with_output
 
 
 @command_called("report", "data/reports/mystery_mount -o results/page")
 @click.argument("folder", metavar="DIR", type=FILE)
-@with_options("DIR")
-def command(folder: Path, options: Options) -> None:
+@with_output("DIR")
+def command(folder: Path, output: Output) -> None:
     """Make one page of DIR, the results of run, diagnose, a fit, or of a batch: to show, to print, to mail.
 
     The page is a single file that needs no network: what was tested, the verdict and within what the model is usable,
@@ -21,13 +21,11 @@ def command(folder: Path, options: Options) -> None:
 
     Writes report.html, or for a batch index.html.
     """
-    from bushfit.report.contents import pages_of
-    from bushfit.report.folder import check_free
-    from bushfit.report.page import folder_contents
+    from bushfit.report.page import folder_pages
+    from bushfit.report.results import Formats, raw_file
 
-    target = options.output or folder
-    base = "" if options.output is None else f"{folder.resolve().as_uri()}/"
-    contents = folder_contents(folder, base)
-    check_free(target, [f"{name}.html" for name in contents.pages], force=options.force)
-    pages = pages_of(contents)
-    options.write(target, pages, {"pages": {str(target / name): len(page) for name, page in pages.items()}})
+    target = output.output or folder
+    base = "" if output.output is None else f"{folder.resolve().as_uri()}/"
+    pages = {name: page for file in folder_pages(folder, base) for name, page in Formats().encode(file).items()}
+    files = [raw_file(name, page) for name, page in pages.items()]
+    output.write(target, files, {"pages": {str(target / name): len(page) for name, page in pages.items()}})

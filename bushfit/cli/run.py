@@ -1,4 +1,4 @@
-"""`bushfit run`: the whole chain."""
+"""`bushfit run`: every fit, the diagnosis, and the prediction."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bushfit.cli.common import Options, Task, with_task
-from bushfit.cli.diagnose import tell_findings, tell_verdict
+from bushfit.cli.diagnose import print_findings, print_verdict
 from bushfit.cli.options import command_called
-from bushfit.cli.predict import tell_predictions
-from bushfit.cli.show import report, tell_fit, tell_result, tell_sources, tell_table
+from bushfit.cli.output import Output, with_output
+from bushfit.cli.predict import print_predictions
+from bushfit.cli.printing import print_fit, print_origin, print_result, print_step
+from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
 from bushfit.units import display_unit, format_aligned, number
 
 if TYPE_CHECKING:
+    from bushfit.campaign.schema import Loss
+    from bushfit.commands.run import RunOutput
     from bushfit.fitting.procedures import TwoStep
-    from bushfit.jobs.diagnose import Ran
     from bushfit.model.result import Range, Result
 
 #: Standard errors up to which two fits are said to agree.
@@ -28,8 +30,9 @@ _OPEN = 100.0
 
 
 @command_called("run", "configs/cmp_15961.toml")
-@with_task("pages")
-def command(task: Task) -> None:
+@campaign_options()
+@with_output("results/<campaign name>", "tables", "pictures", "pages")
+def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | None, output: Output) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 
     Shows the verdict of diagnose, the parameters of the model to use, the range that was tested, and the corners of
@@ -38,60 +41,68 @@ def command(task: Task) -> None:
     Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
     diagnosis.json, candidates.csv, report.html; as table and plot: loops, sweeps, gap, axial, radial, each specimen.
     """
-    from bushfit.jobs.diagnose import Run
+    from bushfit.commands.fit import prepare_tests
+    from bushfit.commands.provenance import input_files
+    from bushfit.commands.run import run
 
-    task.perform(Run(), tell_run, _model_to_use)
+    campaign = open_campaign(campaigns)
+    folder = output.free_folder(campaign.name, "model.json", "diagnosis.json")
+    data = prepare_tests(campaign, loss)
+    output.print_warnings(data.notes)
+    outcome = run(data)
+    print_run(output, campaign.name, outcome)
+    output.write(folder, outcome.files, outcome.document, input_files(campaign))
+    output.print(_model_to_use(folder, outcome))
+    exit_above(max_nrmse, outcome.result)
 
 
-def tell_run(options: Options, name: str, outcome: Ran) -> None:
-    """The result, with -v the steps on the way, and the procedure of the paper in one line."""
-    found, result = outcome.diagnosed, outcome.result
-    if found:
-        tell_verdict(options, name, found)
+def print_run(output: Output, name: str, outcome: RunOutput) -> None:
+    """Print the result, with -v the steps before it, and the procedure of the paper in one line."""
+    diagnosed, result = outcome.diagnosed, outcome.result
+    if diagnosed:
+        print_verdict(output, diagnosed)
     else:
-        options.say(f"{name}: every parameter is held, so diagnose is passed over")
-    tell_result(options, f"{name}: {'model with what was added' if outcome.added else 'joint fit'}", result)
-    if found and found.diagnosis.verdict != "consistent":
-        tell_findings(options, found)
+        output.print(f"{name}: every parameter is held, so diagnose is passed over")
+    print_result(output, f"{name}: {'model with what was added' if outcome.added else 'joint fit'}", result)
+    if diagnosed and diagnosed.diagnosis.verdict != "consistent":
+        print_findings(output, diagnosed)
     if result.measured:
-        _tell_range(options, outcome, result.measured)
-    tell_sources(options, result)
-    tell_predictions(options, outcome.predicted)
-    if options.verbose:
-        _tell_steps(options, name, outcome)
+        _print_range(output, outcome, result.measured)
+    print_origin(output, result)
+    print_predictions(output, outcome.predicted)
+    if output.verbose:
+        _print_steps(output, name, outcome)
     two_step = outcome.two_step and two_step_line(outcome.two_step, outcome.joint.result)
-    options.say(two_step or f"{outcome.no_two_step}: the two-step procedure is passed over")
+    output.print(two_step or f"{outcome.reason_left_out}: the two-step procedure is passed over")
 
 
-def _model_to_use(folder: Path, outcome: Ran) -> str:
-    """Which of the files to use."""
+def _model_to_use(folder: Path, outcome: RunOutput) -> str:
+    """Sentence on which of the model files to use."""
     which = "the joint fit"
     if outcome.diagnosed and outcome.added:
-        found = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
-        which = f"with {found}; joint.json is without"
+        effects = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
+        which = f"with {effects}; joint.json is without"
     elif outcome.diagnosed and outcome.diagnosed.diagnosis.changed:  # a mistake in the record is named
         which = "the joint fit to the tests as they are: put the record right first, then run again"
     return f"the model to use: {folder / 'model.json'}, {which}"
 
 
-def _tell_range(options: Options, outcome: Ran, measured: Range) -> None:
-    """Where the model was fitted to tests: least and largest frequency and amplitude, and the directions."""
+def _print_range(output: Output, outcome: RunOutput, measured: Range) -> None:
+    """Print the range of the fitted tests: smallest and largest frequency and amplitude, and the directions."""
     result, predicted = outcome.result, [p.direction for p in outcome.predicted.predictions]
     amplitudes = []
     for direction in dict.fromkeys([*map(result.place, measured.directions), *predicted]):
         unit, factor = direction.display.displacement
         per_strain = factor / result.model.unit_strain(direction)
         amplitudes.append(f"{direction} {_span([per_strain * end for end in measured.strain], 3)} {unit}")
-    options.console.print(
-        "tested range, least and largest of all tests; beyond it the model extrapolates", style="bold"
-    )
+    output.console.print("tested range, least and largest of all tests; beyond it the model extrapolates", style="bold")
     strains = f"{_span([100.0 * end for end in measured.strain], 2)} %"
     for label, text in (
         ("frequencies", f"{_span(measured.frequency, 3)} Hz"),
         ("strains", f"{strains}, which is {', '.join(amplitudes)}"),
         ("directions", ", ".join(measured.directions)),
     ):
-        options.say(f"  {label}: {text}")
+        output.print(f"  {label}: {text}")
 
 
 def _span(ends: Sequence[float], digits: int) -> str:
@@ -99,7 +110,7 @@ def _span(ends: Sequence[float], digits: int) -> str:
 
 
 def two_step_line(two_step: TwoStep, joint: Result) -> str:
-    """What the paper's procedure found, beside the joint fit, in a line; on a bound, errors count for nothing."""
+    """Line that compares the two-step procedure with the joint fit; at a bound, errors do not count."""
     found = two_step.result
     errors = {name: (found.covariance.stderr(name), joint.covariance.stderr(name)) for name in joint.fitted}
     known = {name: (error, least) for name, (error, least) in errors.items() if error and least}
@@ -127,22 +138,22 @@ def two_step_line(two_step: TwoStep, joint: Result) -> str:
     return f"two-step procedure (the paper's): {', '.join(parts)} (static.json, dynamic.json; -v shows it)"
 
 
-def _tell_steps(options: Options, name: str, outcome: Ran) -> None:
-    """Every step on the way to the result: the two-step procedure, the joint fit, and the diagnosis in full."""
+def _print_steps(output: Output, name: str, outcome: RunOutput) -> None:
+    """Print every step: the two-step procedure, the joint fit, and the diagnosis in full."""
     if outcome.static:
-        tell_fit(options, name, outcome.static)
+        print_fit(output, name, outcome.static)
     if outcome.two_step:
-        _tell_passes(options, outcome.two_step)
-        report(options, f"{name}: static and dynamic fit in turn", outcome.two_step.result)
+        _print_passes(output, outcome.two_step)
+        print_step(output, f"{name}: static and dynamic fit in turn", outcome.two_step.result)
     if outcome.added:
-        tell_fit(options, name, outcome.joint)
+        print_fit(output, name, outcome.joint)
     if outcome.two_step:
-        _tell_cost(options, outcome.two_step.result, outcome.joint.result)
+        _print_cost(output, outcome.two_step.result, outcome.joint.result)
     if outcome.diagnosed and outcome.diagnosed.diagnosis.verdict == "consistent":
-        tell_findings(options, outcome.diagnosed)
+        print_findings(output, outcome.diagnosed)
 
 
-def _tell_passes(options: Options, two_step: TwoStep) -> None:
+def _print_passes(output: Output, two_step: TwoStep) -> None:
     parameters, last = two_step.result.model.parameters, two_step.passes[-1]
     units = {name: display_unit(parameters[name].unit, 1.0, value) for name, value in last.items()}
     headers = [f"{name} [{unit}]" for name, (unit, _) in units.items()]
@@ -151,11 +162,11 @@ def _tell_passes(options: Options, two_step: TwoStep) -> None:
         format_aligned([p[name] * factor for p in two_step.passes[::-1]], 5, 2) for name, (_, factor) in units.items()
     ]
     rows = ((str(count), *row) for count, row in enumerate(list(zip(*columns, strict=True))[::-1], start=1))
-    tell_table(options, "static and dynamic fit in turn, pass by pass", ["pass", *headers], rows)
+    output.print_table("static and dynamic fit in turn, pass by pass", ["pass", *headers], rows)
 
 
-def _tell_cost(options: Options, two_step: Result, joint: Result) -> None:
-    """What the two-step procedure costs: its values and errors beside those of the joint fit."""
+def _print_cost(output: Output, two_step: Result, joint: Result) -> None:
+    """Print the values and errors of the two-step procedure beside those of the joint fit."""
     columns = ("parameter", "two-step", "std error", "joint", "std error", "unit", "difference", "error ratio")
     rows = []
     for name in (name for name in joint.fitted if name in two_step.model.values):
@@ -166,4 +177,4 @@ def _tell_cost(options: Options, two_step: Result, joint: Result) -> None:
         shown = ["" if error is None else format_aligned([error * factor], 2)[0] for error in errors]
         second, first = format_aligned([other * factor, one * factor], 4, minimum_digits=2)
         rows.append((name, first, shown[0], second, shown[1], unit, f"{100 * (one / other - 1):+.1f} %", ratio))
-    tell_table(options, "what the two-step procedure costs", columns, rows)
+    output.print_table("what the two-step procedure costs", columns, rows)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.options import FILE, command_called, option, option_of, under
+from bushfit.cli.output import Output, with_output
 from bushfit.errors import ModelError, UnitError, error_location
 from bushfit.units import is_number, parse_quantity
 
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     option("--gain-error", "SHARE", 'Shared by a run, one repeat of one amplitude: "0.4 %".'),
     option("--phase-error", "ANGLE", 'Shared by a run: "0.2 deg".'),
 )
-@with_options("results/simulated <name>", "tables")
-def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
+@with_output("results/simulated <name>", "tables")
+def command(source: Path, effects: tuple[str, ...], output: Output, **settings: Any) -> None:
     """Put a model on the virtual rig and write a campaign of simulated raw tests.
 
     The model is MODEL.json, tested as the paper's bushing was, or CAMPAIGN with tests of its [simulate] table. Every
@@ -51,31 +51,26 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     """
     from bushfit.campaign.campaign import load_campaign, model_of
     from bushfit.campaign.schema import SimulateSettings
-    from bushfit.effects.unnamed import NAME as UNNAMED
-    from bushfit.model.file import to_document
-    from bushfit.simulation.files import to_files
-    from bushfit.simulation.measured import simulate
+    from bushfit.commands.loading import load_model
+    from bushfit.commands.simulate import simulate_campaign
 
-    if source.suffix.lower() == ".json":
-        truth, plan = open_model(source).model, SimulateSettings()
+    if source.suffix.lower() == ".json" or source.is_dir():
+        truth, tests = load_model(source).model, SimulateSettings()
     else:
         campaign = load_campaign(source)
-        truth, plan = model_of(campaign), campaign.simulate or SimulateSettings()
-    if truth.unnamed:
-        options.warn(["what has no name is a correction of steady states, without a law in time: it is left out here"])
-        truth = truth.without(UNNAMED)
-    plan = _with_options(plan, settings)
+        truth, tests = model_of(campaign), campaign.simulate or SimulateSettings()
+    tests = _with_options(tests, settings)
     for text in effects:
         truth = _with_effect(truth, text)
     with error_location(source):
-        simulated = simulate(truth, plan)
-    files = to_files(simulated, options.formats.table_form)
-    folder = options.folder(simulated.result.name, "simulated {}")
-    options.say(truth.equation())
-    options.write(folder, files, {"truth": to_document(simulated.result), "files": sorted(files)})
+        simulated = simulate_campaign(truth, tests, output.formats.table_form)
+    output.print_warnings(simulated.warnings)
+    output.print(simulated.simulated.truth.equation())
+    folder = output.folder(simulated.simulated.result.name, "simulated {}")
+    output.write(folder, simulated.files, simulated.document, [source])
 
 
-def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateSettings:
+def _with_options(tests: SimulateSettings, settings: dict[str, Any]) -> SimulateSettings:
     changes = {name: value for name, value in settings.items() if value is not None}
     for name, given in changes.items():
         if isinstance(given, str):
@@ -83,7 +78,7 @@ def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateS
                 changes[name] = parse_quantity(given, "rad" if name == "phase_error" else "1")
                 if not 0.0 <= changes[name] < 1.0:
                     raise UnitError("impossible size", found=given, expected="0 up to 100 %, or below 1 rad")
-    return replace(plan, **changes)
+    return replace(tests, **changes)
 
 
 def _with_effect(model: Model, text: str) -> Model:

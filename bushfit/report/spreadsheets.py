@@ -8,7 +8,7 @@ from bushfit.export.contract import Exported, Order
 from bushfit.export.deck import NO_LOOPS
 from bushfit.model.result import Result
 from bushfit.reading.tablefile import to_csv, to_xlsx
-from bushfit.report.artifacts import place_names
+from bushfit.report.results import place_names
 from bushfit.report.tables import prediction_table, wide_table
 from bushfit.version import __version__
 

@@ -25,7 +25,7 @@ from bushfit.batch.pool import LocalPool, run
 from bushfit.batch.quantities import parse_point
 from bushfit.batch.work import Orders, failed, work
 from bushfit.errors import BatchError
-from bushfit.report.contents import Formats
+from bushfit.report.results import Formats
 
 ALL = ("batch", PATTERN, "-o", "all", "--no-plots")
 

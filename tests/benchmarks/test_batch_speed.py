@@ -26,7 +26,7 @@ from bushfit.batch.run import run
 from bushfit.batch.work import Orders
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.model.model import Model
-from bushfit.report.contents import Formats
+from bushfit.report.results import Formats
 from bushfit.simulation.files import to_files
 from bushfit.simulation.measured import simulate
 

@@ -148,7 +148,11 @@ def test_whole_commands(benchmark: BenchmarkFixture, root: Path, tmp_path: Path,
     pairs = {
         ("bushfit fit --no-plots over what it imports", "<= 1.15"): (
             (program, "fit", campaign, "--no-plots", "-q", "--force", "-o", str(tmp_path / "fit")),
-            (sys.executable, "-c", "import bushfit.cli.fit, bushfit.jobs.fits, pandas, scipy.optimize, scipy.ndimage"),
+            (
+                sys.executable,
+                "-c",
+                "import bushfit.cli.fit, bushfit.commands.fit, pandas, scipy.optimize, scipy.ndimage",
+            ),
         ),
         ("bushfit --help over import click", "<= 3"): (
             (program, "--help"),

@@ -21,7 +21,8 @@ from click.testing import CliRunner
 from shell import CAMPAIGN, GEOMETRY, Run, names
 from spoiled import FILES, MODEL
 
-from bushfit.cli import cli, common, main
+from bushfit.cli import cli, main
+from bushfit.cli import output as common
 
 COMMANDS = cli.list_commands(click.Context(cli))
 #: Lines of the longest help on a terminal of 80 columns.

@@ -34,7 +34,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Alternative, Range, Result, carried
 from bushfit.prediction.caveats import caveats
 from bushfit.prediction.stiffness import predict, predict_resonance
-from bushfit.report.folder import to_json
+from bushfit.report.results import to_json
 from bushfit.units import number
 
 

@@ -18,11 +18,11 @@ from tries import some
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import RigSettings
+from bushfit.commands.diagnose import diagnose
 from bushfit.diagnosis.claims import adopted
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction
-from bushfit.jobs.diagnose import Diagnose
 from bushfit.reading.measurement import Loop, Sweep
 
 AXIAL = "peak_to_peak:sweep_axial"
@@ -114,7 +114,7 @@ def test_what_all_tests_share_is_not_seen_and_not_named(measured: Measured) -> N
 
 
 def diagnosed(campaign: Path) -> Diagnosis:
-    return Diagnose().run(Data.of(load_campaign(campaign))).diagnosis
+    return diagnose(load_campaign(campaign)).diagnosis
 
 
 def parted(case: Path, folder: Path) -> tuple[Path, Path]:

@@ -19,16 +19,15 @@ from tries import some
 
 from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.schema import SimulateSettings
+from bushfit.commands.diagnose import diagnose as diagnose_campaign
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import twins_of
 from bushfit.fitting.data import Data
-from bushfit.jobs.diagnose import Diagnose
 from bushfit.model import rig
 from bushfit.model.model import Model
-from bushfit.report.contents import Formats
-from bushfit.report.folder import write_files
 from bushfit.report.page.readback import read_results
+from bushfit.report.results import Formats, write_results
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
@@ -64,10 +63,10 @@ class Found(dict[str, Diagnosis]):
         self._folder = folder
 
     def __missing__(self, case: str) -> Diagnosis:
-        found = Diagnose().run(Data.of(load_campaign(self._folder / case / "bushing.toml")))
+        found = diagnose_campaign(load_campaign(self._folder / case / "bushing.toml"))
         self[case] = found.diagnosis
         with TemporaryDirectory() as folder:  # what is written is read back
-            write_files(Path(folder) / "x", Formats(pictures=False).files(found.contents), force=False)
+            write_results(Path(folder) / "x", found.files, Formats(pictures=False))
             read_results(Path(folder) / "x")
         return self[case]
 

@@ -11,12 +11,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import FitSettings, PredictSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.schema import FitSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.commands.fit import fit, temperature_files
+from bushfit.commands.predict import predict as predict_campaign
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
 from bushfit.errors import FitError, ModelError
@@ -24,13 +27,11 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.master_curve import master_curve
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static
 from bushfit.geometry import Direction, Place, Specimen
-from bushfit.jobs.fits import Fit
-from bushfit.jobs.predict import Predict
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Stepped, Sweep
-from bushfit.report.artifacts import temperature_contents
+from bushfit.report.results import ResultFile
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 from bushfit.units import CELSIUS
@@ -104,7 +105,7 @@ def test_effects_of_the_campaign_are_in_every_fit(coupons: Campaign, paper_model
     mount = sweep(paper_model, MOUNT, FREQUENCIES, [1e-4, 5e-4], factor=1.1)
     effects = FitSettings(effects=("stiffness_factor.mount",))
     data = Data.of(replace(coupons, sweeps=(*coupons.sweeps, mount), specimens=(DMA, MOUNT), fit=effects))
-    fits = [fit_joint(data), Fit(effects=("stiffness_factor.mount",)).run(data).result, diagnose(data).result]
+    fits = [fit_joint(data), fit(data, effects=("stiffness_factor.mount",)).result, diagnose(data).result]
     for result in fits:
         assert result.model.effects[3:] == ("stiffness_factor.mount",)
         assert result.model.values["stiffness_factor.mount"] == pytest.approx(1.1, rel=0.01)
@@ -169,8 +170,8 @@ def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -
     for each in found:
         line = result.model.stiffness(Direction.AXIAL, each.reduced_frequency, each.sweep.amplitude)
         assert np.max(np.abs(each.reduced_stiffness / line - 1.0)) < 0.02
-    tables = temperature_contents(result, "bushing", data.sweeps).tables
-    factors, curve = (tables[name]() for name in ("shift_factors", "master_curve"))
+    tables = {file.name: file for file in temperature_files(data, result, "bushing") if file.kind == "table"}
+    factors, curve = (tables[name].make() for name in ("shift_factors", "master_curve"))
     assert len(factors) == len(DEGREES)
     assert len(curve) == sum(each.sweep.frequency.size for each in found)
     assert factors["log10 a_T [-]"].to_numpy() == pytest.approx([each.shift[0] / np.log(10.0) for each in found])
@@ -202,27 +203,31 @@ def test_a_sweep_off_the_law_says_so(truth: Model) -> None:
     assert off[1] < -4.0
 
 
+def tables_of(campaign: Campaign) -> dict[str, ResultFile]:
+    """Tables of a fit with the effect of temperature, by name."""
+    files = fit(campaign, effects=("temperature",)).files
+    return {file.name: file for file in files if file.kind == "table"}
+
+
 def test_a_sweep_of_amplitudes_has_no_shift_factor(truth: Model) -> None:
     """It goes into the fit, and neither its table nor its picture is promised or made."""
     amplitudes = tuple(np.geomspace(5e-5, 1e-3, 8).tolist())
     stepped = SimulatedSweep(Direction.AXIAL, amplitudes, (1.0, 30.0), stepped="amplitude", temperature=300.0)
     campaign = simulate(truth, replace(PLAN, loops=(), sweeps=(stepped,))).campaign()
-    job = Fit(effects=("temperature",))
-    assert job.kinds(campaign).tables == ("sweeps",)
-    assert [*job.run(Data.of(campaign)).contents.tables] == ["sweeps"]
+    assert [*tables_of(campaign)] == ["sweeps"]
     mixed = simulate(truth, replace(PLAN, loops=(), sweeps=(stepped, *SWEEPS))).campaign()
-    tables = job.run(Data.of(mixed)).contents.tables
-    assert [*tables] == [*job.kinds(mixed).tables] == ["sweeps", "master_curve", "shift_factors"]
-    assert len(tables["shift_factors"]()) == len(SWEEPS)
+    tables = tables_of(mixed)
+    assert [*tables] == ["sweeps", "master_curve", "shift_factors"]
+    assert len(tables["shift_factors"].make()) == len(SWEEPS)
 
 
 def test_only_tests_of_its_temperature_stand_beside_a_prediction(clean: Undisturbed) -> None:
     """At 38 degC one of five sweeps; all of them tell how well the model meets them."""
     campaign = measure(clean, PLAN).campaign()
     result = fit_joint(Data.of(campaign), effects=(*BASE, "temperature"))
-    settings = PredictSettings(directions=("axial",), frequencies=BAND, amplitudes=(5e-4,))
-    at_38, at_30 = (Predict(settings, temperature=CELSIUS + at).run(result, campaign) for at in (38.0, 30.0))
-    assert [len(at_38.beside), len(at_38.measured), len(at_30.beside)] == [1, len(SWEEPS), 0]
+    grid: dict[str, Any] = {"directions": ("axial",), "frequencies": BAND, "amplitudes": (5e-4,)}
+    at_38, at_30 = (predict_campaign(result, campaign, **grid, temperature=CELSIUS + at) for at in (38.0, 30.0))
+    assert len(at_38.measured) == len(SWEEPS)
     measured, none = (found.predictions[0].measured for found in (at_38, at_30))
     assert measured is not None
     assert none is not None

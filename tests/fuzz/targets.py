@@ -13,12 +13,12 @@ from typing import Any
 import bombs
 
 from bushfit.campaign.campaign import load_campaign
+from bushfit.commands.compare import compare, compared_result
+from bushfit.commands.plan import plan as plan_tests
+from bushfit.commands.predict import predict
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction, Specimen
 from bushfit.inspection.gathering import gather
-from bushfit.jobs.compare import Compare
-from bushfit.jobs.plan import PlanTests
-from bushfit.jobs.predict import Predict
 from bushfit.model.file import load_result, to_document
 from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.loops import read_loop
@@ -26,9 +26,8 @@ from bushfit.reading.resonance import read_resonance
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
-from bushfit.report.contents import pages_of
-from bushfit.report.folder import to_json
-from bushfit.report.page import folder_contents
+from bushfit.report.page import folder_pages
+from bushfit.report.results import Formats, encode_all, to_json
 
 CORPUS = Path(__file__).with_name("corpus")
 #: The files of a folder of results, by their names.
@@ -80,9 +79,9 @@ def plan(folder: Path, data: bytes) -> None:
     with clear_errors():
         source = load_campaign(file)
         if not source.loops and not source.sweeps:
-            planned = PlanTests(hours=1.0).run(source)
+            planned = plan_tests(source, hours=1.0)
             to_json(planned.document)
-            for content in planned.campaign.values():
+            for content in (part.make() for part in planned.files if part.kind == "raw"):
                 file.write_bytes(content)
                 load_campaign(file)
 
@@ -93,7 +92,7 @@ def model(folder: Path, data: bytes) -> None:
     with clear_errors():
         result = load_result(file)
         to_json(to_document(result))
-        Predict().run(result, None)
+        predict(result)
 
 
 def workbook(folder: Path, data: bytes) -> None:
@@ -113,11 +112,11 @@ def report(folder: Path, data: bytes) -> None:
     file.write_bytes(content)
     try:
         with clear_errors():
-            pages_of(folder_contents(folder))
+            encode_all(folder_pages(folder), Formats())
         if file.suffix == ".json":
             with clear_errors():
-                job = Compare()
-                job.run([job.entry(load_result(folder / "model.json"), name) for name in ("one", "other")])
+                result = load_result(folder / "model.json")
+                compare(*(compared_result(result, name) for name in ("one", "other")))
     finally:
         file.write_bytes(kept)
 

@@ -12,6 +12,7 @@ import pytest
 from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.quantities import Compound, Polymer
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.commands.plan import plan_sheet
 from bushfit.effects import BASE
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
@@ -24,7 +25,6 @@ from bushfit.planning.criterion import View
 from bushfit.planning.knowledge import gent_modulus, guess, noise_of, of_campaign, rig_of
 from bushfit.planning.plan import plan
 from bushfit.planning.sensitivity import Information, relative_slopes
-from bushfit.report.artifacts import plan_sheet
 from bushfit.simulation.measured import simulate
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL

@@ -11,6 +11,7 @@ import pytest
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.quantities import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.commands.plan import plan as plan_tests
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.coordinates import residual
@@ -18,7 +19,6 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import SweepData, new_loop, new_sweep
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Bushing, Direction, Place
-from bushfit.jobs.plan import PlanTests
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -260,7 +260,7 @@ def test_repeats_tell_the_noise_where_that_costs_little(
 ) -> None:
     def planned(enough: int) -> Plan:
         monkeypatch.setattr("bushfit.planning.plan._SCATTER_FREEDOM", enough)
-        return PlanTests("predictions", hours).run(load_campaign(root / "configs/new_bushing.toml")).plan
+        return plan_tests(load_campaign(root / "configs/new_bushing.toml"), hours=hours).plan
 
     told, without = planned(10), planned(0)
     runs = Counter(test for test in told.planned.tests if isinstance(test, SimulatedSweep))
@@ -274,7 +274,7 @@ def test_repeats_tell_the_noise_where_that_costs_little(
 
 def test_a_plan_after_a_campaign_is_no_blinder(root: Path) -> None:
     """A practice campaign whose standard programme repeats a loop, which stops show best in."""
-    found = PlanTests("predictions", 2.5).run(load_campaign(root / "data/practice/case_000/bushing.toml")).plan
+    found = plan_tests(load_campaign(root / "data/practice/case_000/bushing.toml"), hours=2.5).plan
     better, worst = mean_error(found.planned) / mean_error(found.standard), max(amounts_found(found).values())
     print(f"stiffness {better:.2f}, worst effect {worst:.3f}", found.notes)
     assert better < 0.9
@@ -293,7 +293,7 @@ def test_rivals_stand_beside_what_a_diagnosis_is_sure_of_and_take_few_hours(know
     after = of_campaign(Data.of(campaign), ("viscous", "delay"))
     assert {rival.model.effects[3] for rival in after.rivals} <= {"inertia", "fixture_resonance"}  # whose limit it is
     assert [rival.model.effects[4:] for rival in after.rivals] == [("viscous",), ("delay",)]
-    found = PlanTests("rivals", 8.0).run(after, campaign).plan
+    found = plan_tests(after, campaign, aim="rivals").plan
     print(found.planned.hours, found.planned.apart)
     assert found.planned.apart is not None
     assert found.planned.apart > 2.0 * RIVALS_APART
@@ -347,6 +347,6 @@ def test_what_tests_leave_open_a_thousand_times_over_stops_no_plan(paper_model: 
     apart = random.normal(size=(5, 5)) * 3e-5
     relative = np.outer(along, along) + apart @ apart.T
     result = Result(paper_model, names, Covariance(names, relative * np.outer(values, values)))
-    plan = PlanTests("parameters", 1.0).run(result).plan
+    plan = plan_tests(result, aim="parameters", hours=1.0).plan
     print(plan.planned.errors)
     assert np.all(plan.planned.errors < 0.5)

@@ -14,11 +14,11 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import sweep_data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, Shape, Specimen
-from bushfit.jobs.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES, default_grid
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result, carried
 from bushfit.prediction.caveats import caveats
+from bushfit.prediction.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES, default_grid
 from bushfit.prediction.stiffness import predict, predict_resonance
 from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import prediction_table, shaken_table

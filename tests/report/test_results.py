@@ -1,10 +1,11 @@
-"""Results whole or absent, never mixed, never over others unasked; tables and pictures named before they are made."""
+"""Result files: names and formats; the folder they go to, and files that are never replaced."""
 
 from __future__ import annotations
 
+import hashlib
 import io
-import json
 import os
+import signal
 import stat
 import subprocess
 import sys
@@ -23,58 +24,85 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from bushfit.campaign.campaign import load_campaign
+from bushfit.commands.compare import compare, compared_result
+from bushfit.commands.fit import fit
+from bushfit.commands.predict import predict
 from bushfit.errors import CONTROL, OutputError
 from bushfit.fitting.data import Data
-from bushfit.jobs.compare import Compare
-from bushfit.jobs.fits import Fit
-from bushfit.jobs.predict import Predict
 from bushfit.model.model import Model
 from bushfit.reading.tablefile import Form
-from bushfit.report import folder as results
-from bushfit.report.contents import Contents, Formats, Picture
-from bushfit.report.folder import write_files
 from bushfit.report.plots.style import to_image
+from bushfit.report.results import (
+    Formats,
+    Picture,
+    ResultFile,
+    encode_all,
+    figure_file,
+    json_file,
+    raw_file,
+    table_file,
+    write_results,
+)
 from bushfit.report.tables import loops_table, sweeps_table
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are forked and killed")
 
-HERE = Path(__file__).parent
 OLD = {"a.csv": b"old a", "b.json": b"old b"}
 NEW = {"a.csv": b"new a", "b.json": b"new b"}
 
 
-def script(name: str, *arguments: str) -> dict[str, int]:
-    done = subprocess.run(
-        [sys.executable, str(HERE / name), *arguments], capture_output=True, text=True, check=False, timeout=300
-    )
-    assert done.returncode == 0, done.stderr
-    print(done.stdout.strip())
-    return json.loads(done.stdout)
+def write(folder: Path, files: dict[str, bytes], *, force: bool = False, inputs: tuple[Path, ...] = ()) -> None:
+    write_results(folder, [raw_file(*pair) for pair in files.items()], overwrite=force, inputs=inputs)
 
 
-def exchange_works(folder: Path) -> bool:
-    one, other = folder / "one", folder / "other"
-    one.mkdir()
-    other.mkdir()
-    try:
-        results.exchange(one, other)
-    except OSError:
-        return False
-    return True
+def contents(folder: Path) -> dict[str, bytes]:
+    """Files of a folder but for the record."""
+    return {file.name: file.read_bytes() for file in folder.glob("[!.]*")}
 
 
-@pytest.mark.parametrize("how", ["killed", "full"])
-@pytest.mark.parametrize("where", ["new", "exchanged", "inside"])
-def test_stopped_at_every_system_call(where: str, how: str, tmp_path: Path) -> None:
-    """Every state is whole. Inside the folder where the user stands nothing can be exchanged, and what was decided is
-    ended by the next run."""
-    seen = script("interrupt.py", str(tmp_path / "results" / "x"), where, how)["seen"]
-    states = {state.split(",")[0] for state in seen}
-    allowed = {"new": {"absent", "new"}, "exchanged": {"old", "new"}, "inside": {"old", "new", "decided"}}[where]
-    if where == "exchanged" and not exchange_works(tmp_path):
-        allowed.add("decided")
-    assert states <= allowed
-    assert len(states) >= 2
+def test_a_killed_command_leaves_each_file_old_or_new_and_the_next_one_replaces_them(tmp_path: Path) -> None:
+    """Killed at every system call in turn: no file is torn, and none of them is taken for the user's."""
+    states = set()
+    for count in range(200):
+        folder = tmp_path / str(count)
+        write(folder, OLD)
+        status = _killed_at(count, folder)
+        found = contents(folder)
+        assert all(found[name] in (OLD[name], NEW[name]) for name in OLD), count
+        states.add(tuple(found.values()))
+        write(folder, NEW, force=True)
+        assert contents(folder) == NEW
+        if status == 0:
+            break
+    assert len(states) >= 3
+
+
+def _killed_at(count: int, folder: Path) -> int:
+    """Exit status of a process that writes the new files and is killed at a system call."""
+    child = os.fork()
+    if not child:
+        left = [count]
+
+        def fault(event: str, _: Any) -> None:
+            if event.startswith(("open", "os.")):
+                left[0] -= 1
+                if left[0] < 0:
+                    os.kill(os.getpid(), signal.SIGKILL)
+
+        sys.addaudithook(fault)
+        write(folder, NEW, force=True)
+        os._exit(0)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def test_a_figure_that_fails_loses_no_other_file(tmp_path: Path) -> None:
+    def broken() -> Figure:
+        raise RuntimeError("no font")
+
+    files = [figure_file("x", broken), json_file("y", {}), table_file("z", lambda: pd.DataFrame({"x [mm]": [1.0]}))]
+    with pytest.raises(RuntimeError):
+        write_results(tmp_path, files)
+    assert set(contents(tmp_path)) == {"y.json", "z.csv"}
 
 
 @pytest.fixture
@@ -93,20 +121,12 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", str(folder)], check=True)
 
 
-@pytest.mark.parametrize(
-    ("mounted", "size", "says"),
-    [("", 90_000, "No space left"), ("remount,ro", 10, "no right to write there")],
-    ids=["full", "read only"],
-)
-def test_a_disk_that_is_full_or_may_only_be_read(small_disk: Path, mounted: str, size: int, says: str) -> None:
-    write_files(small_disk / "x", OLD, force=False)
-    if mounted:
-        subprocess.run(["mount", "-o", mounted, str(small_disk)], check=True)
-    for place in (small_disk / "y", small_disk / "x"):
-        with pytest.raises(OutputError, match=says):
-            write_files(place, {"a.csv": bytes(size // 3), "b.json": bytes(2 * size // 3)}, force=True)
-    assert [path.name for path in small_disk.iterdir()] == ["x"]
+def test_a_full_disk_keeps_the_old_file(small_disk: Path) -> None:
+    write(small_disk / "x", OLD)
+    with pytest.raises(OutputError, match="No space left"):
+        write(small_disk / "x", {"a.csv": bytes(90_000)}, force=True)
     assert contents(small_disk / "x") == OLD
+    assert not list((small_disk / "x").glob("*.part"))
 
 
 def test_a_folder_that_allows_no_writing() -> None:
@@ -122,7 +142,7 @@ def test_a_folder_that_allows_no_writing() -> None:
             if os.getuid() == 0:
                 os.setuid(65534)
             try:
-                write_files(folder, NEW, force=True)
+                write(folder, NEW, force=True)
             except OutputError as error:
                 status = 0 if "no right to write there" in str(error) else 2
             os._exit(status)
@@ -130,121 +150,85 @@ def test_a_folder_that_allows_no_writing() -> None:
         assert contents(folder) == {}
 
 
-def test_files_are_flushed_one_by_one_where_the_system_knows_no_other_way(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    flushed: list[int] = []
-    monkeypatch.setattr(results, "_libc", lambda: None)
-    monkeypatch.setattr(os, "fsync", flushed.append)
-    write_files(tmp_path / "x", OLD, force=False)
-    write_files(tmp_path / "x", NEW, force=True)  # nor can folders be exchanged there
-    assert len(flushed) == 4
-    assert contents(tmp_path / "x") == NEW
-    assert [path.name for path in tmp_path.iterdir()] == ["x"]
-
-
-@pytest.mark.parametrize("force", [True, False])
-def test_runs_into_one_folder_at_a_time(tmp_path: Path, force: bool) -> None:
-    """Whole sets: with --force the last one stands, without it the first, and each other one is told."""
-    sets = [dict.fromkeys("abcdefgh", b"%d" % number * 2000) for number in range(8)]
-    refused: list[OutputError] = []
-
-    def write(files: dict[str, bytes]) -> None:
-        try:
-            write_files(tmp_path / "x", files, force=force)
-        except OutputError as error:
-            refused.append(error)
-
-    threads = [threading.Thread(target=write, args=(files,)) for files in sets]
+def test_commands_that_write_into_one_folder_lose_no_file(tmp_path: Path) -> None:
+    """Eight at once: the files of all of them are there, whole and known as results."""
+    sets = [{f"{number}.csv": b"%d" % number * 2000, "shared.csv": b"%d" % number * 2000} for number in range(8)]
+    write(tmp_path / "x", {"shared.csv": b"first"})
+    threads = [threading.Thread(target=write, args=(tmp_path / "x", files), kwargs={"force": True}) for files in sets]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert contents(tmp_path / "x") in sets
-    assert len(refused) == (0 if force else 7)
-    assert all("results stand there already" in str(error) for error in refused)
-    assert [path.name for path in tmp_path.iterdir()] == ["x"]
+    found = contents(tmp_path / "x")
+    assert found.pop("shared.csv") in [files["shared.csv"] for files in sets]
+    assert found == {name: content for files in sets for name, content in files.items() if name != "shared.csv"}
+    write(tmp_path / "x", dict.fromkeys((*found, "shared.csv"), b"again"), force=True)
 
 
-def test_what_a_killed_run_left_is_removed_but_not_what_another_run_is_at(tmp_path: Path) -> None:
-    left, at_work, of_the_user = (tmp_path / name for name in (".bushfit-abcdefgh", ".bushfit-ijklmnop", ".bushfit-x"))
-    for folder in (left, at_work, of_the_user):
-        (folder / "new").mkdir(parents=True)
-    claim = results.claim(at_work)
-    write_files(tmp_path / "x", NEW, force=False)
-    claim.close()
-    assert {path.name for path in tmp_path.iterdir()} == {"x", at_work.name, of_the_user.name}
-
-
-FILES = {"a.csv": b"1\n", "b.json": b"{}\n"}
-
-
-def contents(folder: Path, pattern: str = "*") -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.glob(pattern)}
-
-
-def test_a_new_folder_is_made_and_one_that_stands_keeps_rights_subfolders_and_links(tmp_path: Path) -> None:
+def test_a_new_folder_is_made_and_one_that_exists_keeps_rights_subfolders_and_links(tmp_path: Path) -> None:
     folder = tmp_path / "results" / "deep" / "x"
-    write_files(folder, FILES, force=False)
-    assert contents(folder) == FILES
-    assert [child.name for child in folder.parent.iterdir()] == ["x"]
+    write(folder, OLD)
     umask = os.umask(0)
     os.umask(umask)
-    assert stat.S_IMODE(folder.stat().st_mode) == 0o777 & ~umask
+    assert contents(folder) == OLD
+    assert stat.S_IMODE((folder / "a.csv").stat().st_mode) == 0o666 & ~umask
     folder = tmp_path / "x"
-    (folder / "sub" / "deep").mkdir(parents=True)
-    (folder / "sub" / "deep" / "mine.txt").write_text("mine")
+    (folder / "sub").mkdir(parents=True)
+    (folder / "sub" / "mine.txt").write_text("mine")
     (folder / "link").symlink_to("nowhere")
     folder.chmod(0o750)
     (tmp_path / "way").symlink_to(folder, target_is_directory=True)
-    write_files(folder, OLD, force=False)
-    write_files(tmp_path / "way", NEW, force=True)
+    write(folder, OLD)
+    write(tmp_path / "way", NEW, force=True)
     assert (tmp_path / "way").is_symlink()
     assert (folder / "a.csv").read_bytes() == b"new a"
-    assert (folder / "sub" / "deep" / "mine.txt").read_text() == "mine"
+    assert (folder / "sub" / "mine.txt").read_text() == "mine"
     assert (folder / "link").readlink() == Path("nowhere")
     assert folder.stat().st_mode & 0o777 == 0o750
 
 
-def test_a_file_in_the_way_stops_and_force_takes_away_what_the_same_command_wrote(tmp_path: Path) -> None:
-    """Not what another wrote, what somebody has changed since, or what stands there besides."""
-    folder = tmp_path / "x"
-    for names, by in (("abc", "one"), ("de", "other"), ("fg", "one")):
-        write_files(folder, {f"{name}.csv": b"1" for name in names}, force=False, by=by)
-    assert set(contents(folder, "[!.]*")) == {f"{letter}.csv" for letter in "abcdefg"}
-    (folder / "b.csv").write_bytes(b"mine")
-    (folder / "notes.txt").write_bytes(b"mine")
-    write_files(folder, {"c.csv": b"2", "d.csv": b"2"}, force=True, by="one")
-    new = {"c.csv": b"2", "d.csv": b"2", "e.csv": b"1"}
-    assert contents(folder, "[!.]*") == {"b.csv": b"mine", "notes.txt": b"mine", **new}
-    write_files(folder, {"h.csv": b"1"}, force=True, by="one")
-    assert set(contents(folder, "[!.]*")) == {"b.csv", "e.csv", "h.csv", "notes.txt"}
-    (tmp_path / "file").write_text("a file")
-    (tmp_path / "y" / "a.csv").mkdir(parents=True)
-    for folder, says in (
-        ("file", "not a folder"),
-        ("file/below", "cannot be written"),
-        ("y", "a folder stands where a file goes"),
-    ):
-        for force in (True, False):
-            with pytest.raises(OutputError, match=says):
-                write_files(tmp_path / folder, FILES, force=force)
-    assert (tmp_path / "file").read_text() == "a file"
-    assert list((tmp_path / "y").iterdir()) == [tmp_path / "y" / "a.csv"]
+@pytest.mark.parametrize("force", [True, False])
+def test_a_file_that_bushfit_did_not_write_is_never_replaced(tmp_path: Path, force: bool) -> None:
+    """One of the user's, a result that the user changed, a link, an input of the run, a folder, a file as folder."""
+    (tmp_path / "results").mkdir()
+    write(tmp_path / "results", OLD)
+    (tmp_path / "results" / "a.csv").write_bytes(b"changed")
+    (tmp_path / "results" / "c.csv").write_bytes(b"mine")
+    (tmp_path / "results" / "d.csv").symlink_to("b.json")
+    (tmp_path / "results" / "e.csv").mkdir()
+    for name in ("a.csv", "c.csv", "d.csv", "e.csv"):
+        with pytest.raises(OutputError) as refused:
+            write(tmp_path / "results", {"new.csv": b"1", name: b"2"}, force=force)
+        assert name in str(refused.value)
+        assert "--force" not in str(refused.value), "the hint would not help"
+    with pytest.raises(OutputError, match="input of this run"):
+        write(tmp_path / "results", {"b.json": b"2"}, force=force, inputs=(tmp_path / "results" / "d.csv",))
+    for folder in (tmp_path / "results" / "c.csv", tmp_path / "results" / "c.csv" / "below"):
+        with pytest.raises(OutputError, match="cannot be written"):
+            write(folder, NEW, force=force)
+    names = {path.name for path in (tmp_path / "results").glob("[!.]*")}
+    assert names == {"a.csv", "b.json", "c.csv", "d.csv", "e.csv"}
+    assert (tmp_path / "results" / "b.json").read_bytes() == b"old b"
 
 
-@pytest.mark.parametrize(
-    "record",
-    [b"", b"[]", b"\xff", b'{"written": {"one": {"../mine.txt": 3}}, "removed": ["../mine.txt"]}', b"[" * 100_000],
-)
-def test_a_record_that_is_spoiled_removes_nothing(record: bytes, tmp_path: Path) -> None:
-    folder = tmp_path / "x"
-    (tmp_path / "mine.txt").write_bytes(b"mine")
-    write_files(folder, {"a.csv": b"1", "b.csv": b"1"}, force=False, by="one")
-    (folder / ".bushfit.json").write_bytes(record)
-    write_files(folder, {"b.csv": b"2"}, force=True, by="one")
-    assert set(contents(folder, "[!.]*")) == {"a.csv", "b.csv"}
-    assert (tmp_path / "mine.txt").read_bytes() == b"mine"
+def test_results_are_replaced_with_force_alone_and_nothing_else_is_touched(tmp_path: Path) -> None:
+    write(tmp_path, OLD)
+    with pytest.raises(OutputError, match="results stand there already") as refused:
+        write(tmp_path, {"a.csv": b"2"})
+    assert "--force" in str(refused.value)
+    write(tmp_path, {"a.csv": b"2"}, force=True)
+    assert contents(tmp_path) == {"a.csv": b"2", "b.json": b"old b"}
+    record = (tmp_path / ".bushfit.sha256").read_text().splitlines()
+    assert record[-1] == f"{hashlib.sha256(b'2').hexdigest()}  a.csv"
+
+
+@pytest.mark.parametrize("record", [b"", b"\xff\x00", b"0  a.csv\n"])
+def test_without_a_record_a_file_is_taken_for_the_user_s(record: bytes, tmp_path: Path) -> None:
+    write(tmp_path, OLD)
+    (tmp_path / ".bushfit.sha256").write_bytes(record)
+    with pytest.raises(OutputError, match="not as bushfit wrote it"):
+        write(tmp_path, NEW, force=True)
+    assert contents(tmp_path) == OLD
 
 
 BEGINS = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
@@ -266,7 +250,7 @@ def drawn() -> Figure:
 
 @pytest.mark.parametrize(("form", "end"), [("csv", "csv"), ("decimal-comma", "csv"), ("xlsx", "xlsx")])
 @pytest.mark.parametrize("pictures", [("png",), ("svg", "pdf"), ()])
-def test_files_have_the_names_told_before(form: Form, end: str, pictures: tuple[Picture, ...]) -> None:
+def test_files_in_each_format(form: Form, end: str, pictures: tuple[Picture, ...]) -> None:
     made = list[Figure]()
 
     def picture() -> Figure:
@@ -274,14 +258,12 @@ def test_files_have_the_names_told_before(form: Form, end: str, pictures: tuple[
         return made[0]
 
     formats = Formats(pictures=bool(pictures), table_form=form, picture_forms=pictures)
-    table = pd.DataFrame({"x [mm]": np.ones(2)})
-    contents = Contents({"model": {}}, {"a": lambda: table, "b": lambda: table}, {"b": picture})
-    files = formats.files(contents)
-    assert list(files) == formats.names(contents.kinds)
-    assert list(files) == ["model.json", f"a.{end}", f"b.{end}", *(f"b.{each}" for each in pictures)]
-    assert len(made) == bool(pictures), "drawn once for all forms"
-    for each in pictures:
-        assert files[f"b.{each}"].startswith(BEGINS[each])
+    table = table_file("a", lambda: pd.DataFrame({"x [mm]": np.ones(2)}))
+    files = encode_all([json_file("model", {}), table, figure_file("a", picture)], formats)
+    assert list(files) == ["model.json", f"a.{end}", *(f"a.{ending}" for ending in pictures)]
+    assert len(made) == bool(pictures), "drawn once for all formats"
+    for ending in pictures:
+        assert files[f"a.{ending}"].startswith(BEGINS[ending])
 
 
 @pytest.mark.parametrize("form", get_args(Picture))
@@ -320,8 +302,8 @@ FILE = "=1+1 $\\foo$ \x1b[2J\u202ecsv.exe"
 
 
 @pytest.fixture(scope="module")
-def found(root: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Contents]:
-    """All that commands make of a campaign of such names."""
+def outputs(root: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[ResultFile]]:
+    """Result files of commands on a campaign of such names."""
     folder = tmp_path_factory.mktemp("foreign")
     text = (root / "configs/cmp_15961.toml").read_text().replace('"CMP 15 961"', f"'''{NAME}'''", 1)
     for number, file in enumerate(sorted((root / "data/cmp_15961").glob("*.csv"))):
@@ -332,26 +314,24 @@ def found(root: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Con
     assert "../data" not in text
     (folder / "campaign.toml").write_text(text, encoding="utf-8")
     campaign = load_campaign(folder / "campaign.toml")
-    fitted = Fit().run(Data.of(campaign))
-    job = Compare()
-    compared = job.run([job.entry(fitted.result, FILE), job.entry(fitted.result, NAME)])
+    fitted = fit(campaign)
     return {
-        "fit": fitted.contents,
-        "predict": Predict().run(fitted.result, campaign).contents_beside,
-        "compare": compared.contents,
+        "fit": [*fitted.files],
+        "predict": [*predict(fitted, campaign).files],
+        "compare": [*compare(*(compared_result(fitted, name) for name in (FILE, NAME))).files],
     }
 
 
 @pytest.mark.parametrize("command", ["fit", "predict", "compare"])
-def test_pictures_and_sheets(command: str, found: dict[str, Contents]) -> None:
-    contents, texts, cells = found[command], list[str](), list[Any]()
-    for make in contents.pictures.values():
-        figure = make()
+def test_pictures_and_sheets(command: str, outputs: dict[str, list[ResultFile]]) -> None:
+    files, texts, cells = outputs[command], list[str](), list[Any]()
+    for file in (file for file in files if file.kind == "figure"):
+        figure = file.make()
         to_image(figure)
         drawn = figure.findobj(Text)
         assert not [text.get_text() for text in drawn if text._preprocess_math(text.get_text())[1]], "mathematics"
         texts += [text.get_text() for text in drawn]
-    for name, content in Formats(pictures=False, table_form="xlsx").files(contents).items():
+    for name, content in encode_all(files, Formats(pictures=False, table_form="xlsx")).items():
         if name.endswith("xlsx"):
             book = openpyxl.load_workbook(io.BytesIO(content))
             cells += [cell for sheet in book for row in sheet.iter_rows() for cell in row]

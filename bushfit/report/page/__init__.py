@@ -18,7 +18,7 @@ from bushfit.units import number
 if TYPE_CHECKING:
     import jinja2
 
-    from bushfit.report.contents import Contents, Documents, Tables
+    from bushfit.report.results import Documents, ResultFile, Tables
 
 #: Where the templates are, with the style sheet and the script that go into every page.
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -93,25 +93,25 @@ def _environment() -> jinja2.Environment:
     return environment
 
 
-def folder_contents(folder: Path, base: str = "") -> Contents:
-    """What stands in a folder, with its page: `report` of a result, `compare` of a comparison, `index` of a batch.
+def folder_pages(folder: Path, base: str = "") -> list[ResultFile]:
+    """Pages of a results folder: `report` of a result, `compare` of a comparison, `index` of a batch.
 
     Args:
         folder: as `bushfit run`, `diagnose`, a fit, `compare` or `batch` wrote it.
-        base: of a batch, what its links begin with, where the page is to stand elsewhere.
+        base: of a batch, beginning of its links, if the page is written elsewhere.
 
     Raises:
-        ModelError: a folder of none of them, or a file in it that is not as bushfit writes it.
+        ModelError: a folder without results, or a file in it that is not as bushfit writes it.
     """
-    from bushfit.report.contents import Contents
     from bushfit.report.page.comparison import read_comparison
-    from bushfit.report.page.index import is_batch, read_batch
+    from bushfit.report.page.index import is_batch, page_of, read_batch
     from bushfit.report.page.readback import has_model, read_results
+    from bushfit.report.results import page_file
 
     if is_batch(folder):
-        return read_batch(folder, base)
+        return [page_file("index", page_of(folder, base), read_batch(folder))]
     compared = (folder / "compare.json").exists()
-    found = read_comparison(folder).paged(compare=comparison_page) if compared else Contents()
+    pages = [page_file("compare", comparison_page, read_comparison(folder))] if compared else []
     if has_model(folder) or not compared:
-        found |= read_results(folder).paged(report=report_page)
-    return found
+        pages.append(page_file("report", report_page, read_results(folder)))
+    return pages

@@ -12,11 +12,11 @@ from bushfit.geometry import Bushing
 from bushfit.model.file import read_document
 from bushfit.report.compare_document import ComparedEntry
 from bushfit.report.compared import FAMILY_HEADS, Heads, Panel, SideBySide, Sides, chance, parameter_cells, signed
-from bushfit.report.contents import Contents
 from bushfit.report.page.chart import DASHES, MOST_PLACES, Rule, Series, chart, colors, every_nth, span_of
 from bushfit.report.page.chart import Panel as PlacePanel
 from bushfit.report.page.report import MOST, conditions, corners, tube
 from bushfit.report.page.sweeps import LOG_FREQUENCIES
+from bushfit.report.results import ResultFile, json_file
 from bushfit.report.tables import numbers
 from bushfit.units import format_aligned, format_range, number, split_header
 
@@ -29,7 +29,7 @@ _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 24
 _CONDITIONS = ("Temperature", "Preload")
 
 
-def read_comparison(folder: Path) -> Contents:
+def read_comparison(folder: Path) -> list[ResultFile]:
     """The comparison in a folder.
 
     Raises:
@@ -38,7 +38,7 @@ def read_comparison(folder: Path) -> Contents:
     file = folder / "compare.json"
     document = read_document(file)
     SideBySide.of(document, file)
-    return Contents({"compare": document})
+    return [json_file("compare", document)]
 
 
 def comparison_context(found: SideBySide) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import chain
@@ -18,11 +18,11 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.file import read_document, require_schema
 from bushfit.reduction.arrays import scatter
-from bushfit.report.contents import Contents, Documents, Page, Tables
 from bushfit.report.page import filled, rendered
 from bushfit.report.page.chart import DASHES, LIMIT, Axis, Rule, Series, chart, colors, outline, span_of, stroke
 from bushfit.report.page.readback import canonical, read_table
 from bushfit.report.process import ENOUGH, LEVEL, Process, charted
+from bushfit.report.results import Documents, ResultFile, Tables, json_file, table_file
 from bushfit.report.tables import BETWEEN, numbers, spread
 from bushfit.units import number, split_header
 from bushfit.validation import Number, WholeNumber, validate_tables
@@ -249,8 +249,8 @@ def is_batch(folder: Path) -> bool:
     return (folder / "batch.json").exists() or (folder / "batch.csv").exists()
 
 
-def read_batch(folder: Path, base: str = "") -> Contents:
-    """What a batch wrote, with its page; links begin with `base`.
+def read_batch(folder: Path) -> list[ResultFile]:
+    """Document and table of a batch.
 
     Raises:
         ModelError: files that are missing, or not as bushfit writes them.
@@ -264,10 +264,10 @@ def read_batch(folder: Path, base: str = "") -> Contents:
         raise ModelError(
             "the table of the batch is missing", file=folder / "batch.csv", hint="run the batch again with --resume"
         )
-    return Contents({"batch": document}, {"batch": lambda: table}, {}, {"index": page_of(folder, base)})
+    return [json_file("batch", document), table_file("batch", lambda: table)]
 
 
-def page_of(folder: Path, base: str = "") -> Page:
+def page_of(folder: Path, base: str = "") -> Callable[[Documents, Tables], str]:
     """What makes the page of a batch, its bushings linked to their reports in a folder; links begin with `base`."""
     reports = folder.glob("bushings/*/report.html")
     reported = frozenset(f"{report.parent.parent.name}/{report.parent.name}" for report in reports)

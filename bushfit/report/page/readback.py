@@ -26,8 +26,7 @@ from bushfit.model.result import Result
 from bushfit.reading.files import read_utf8, view_bytes
 from bushfit.reading.parts import read_sheets
 from bushfit.reading.tablefile import for_each_distinct, in_a_line, undefused
-from bushfit.report.artifacts import place_names
-from bushfit.report.contents import Contents, Documents, Tables
+from bushfit.report.results import Documents, ResultFile, Tables, json_file, place_names, table_file
 from bushfit.report.tables import TEXTS, required
 from bushfit.validation import LARGEST_NUMBER, validate_tables
 
@@ -142,8 +141,8 @@ def has_model(folder: Path) -> bool:
     return any((folder / f"{name}.json").exists() for name in MODELS)
 
 
-def read_results(folder: Path) -> Contents:
-    """What stands in a folder of results.
+def read_results(folder: Path) -> list[ResultFile]:
+    """Documents and tables of a results folder.
 
     Raises:
         ModelError: no folder, none of results, or a file in it that is not as bushfit writes it.
@@ -164,8 +163,8 @@ def read_results(folder: Path) -> Contents:
     documents = {name: read_document(file) for name, file in files.items()}
     specimens = ReportData.of(documents, {}, files).result.specimens
     tables = {name: read_table(folder, name) for name in (*_TABLES, *place_names([*Direction, *specimens]))}
-    made = {name: partial(pd.DataFrame, table) for name, table in tables.items() if table is not None}
-    return Contents(documents, made)
+    made = [table_file(name, partial(pd.DataFrame, table)) for name, table in tables.items() if table is not None]
+    return [*(json_file(name, document) for name, document in documents.items()), *made]
 
 
 def canonical(table: pd.DataFrame) -> pd.DataFrame:

@@ -15,8 +15,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from bushfit.errors import printable
-from bushfit.report.contents import pages_of
-from bushfit.report.page import folder_contents
+from bushfit.report.page import folder_pages
+from bushfit.report.results import Formats, encode_all
 
 #: A page at most [bytes].
 LARGEST = 500_000
@@ -157,4 +157,4 @@ def page_of(folder: Path) -> str:
 
 def made_of(folder: Path) -> str:
     """The report that is made of what stands in a folder."""
-    return pages_of(folder_contents(folder))["report.html"].decode()
+    return encode_all(folder_pages(folder), Formats())["report.html"].decode()

@@ -29,11 +29,10 @@ from reading_html import (
 )
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.fitting.data import Data
-from bushfit.jobs.diagnose import Diagnose
-from bushfit.report.contents import Formats
+from bushfit.commands.diagnose import diagnose
 from bushfit.report.page import report_page, use_of
 from bushfit.report.page.readback import canonical, read_results
+from bushfit.report.results import Formats, encode_all
 
 Results = Callable[[str], Path]
 
@@ -56,8 +55,8 @@ def test_run_writes_a_whole_page_that_loads_nothing_and_its_folder_gives_the_sam
 
 def test_diagnose_writes_it_too_and_its_folder_gives_the_same(root: Path, tmp_path: Path) -> None:
     """Without tables of their own, loops and sweeps are shown from that of the gap."""
-    data = Data.of(load_campaign(root / "data/practice/case_001/bushing.toml"))
-    files = Formats(pictures=False).files(Diagnose().run(data).contents)
+    found = diagnose(load_campaign(root / "data/practice/case_001/bushing.toml"))
+    files = encode_all(found.files, Formats(pictures=False))
     for file, content in files.items():
         (tmp_path / file).write_bytes(content)
     page = files["report.html"].decode()

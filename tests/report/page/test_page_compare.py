@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 from production import COUNT, LOSSY, SOFT
 from reading_html import LARGEST, NASTY, assert_harmless, drawn, loads, parsed, spoiled
 
-from bushfit.report.contents import pages_of
-from bushfit.report.page import comparison_page, folder_contents
+from bushfit.report.page import comparison_page, folder_pages
 from bushfit.report.page.chart import Axis, Cells, Rule, Series, chart, maps
 from bushfit.report.page.index import index_page, read_batch
+from bushfit.report.results import Formats, encode_all
 
 NAMES = ["two", "families"]
 #: Keys of compare.json whose texts come from a user's files or names.
@@ -44,7 +44,7 @@ def documents(compared: Path) -> dict[str, Any]:
 @pytest.mark.parametrize("name", NAMES)
 def test_compare_writes_a_whole_page_and_its_folder_gives_the_same(compared: Path, name: str) -> None:
     page = (compared / name / "compare.html").read_text(encoding="utf-8")
-    assert pages_of(folder_contents(compared / name))["compare.html"].decode() == page
+    assert encode_all(folder_pages(compared / name), Formats())["compare.html"].decode() == page
     found = parsed(page)
     assert loads(page) == []
     assert len(page.encode()) < LARGEST
@@ -125,7 +125,7 @@ SLOW = pytest.mark.slow
 @SLOW
 def test_a_batch_writes_its_page_and_the_folder_gives_the_same(batch: Path) -> None:
     written = (batch / "index.html").read_bytes()
-    assert pages_of(read_batch(batch))["index.html"] == written
+    assert encode_all(folder_pages(batch), Formats())["index.html"] == written
     page = written.decode()
     assert loads(page) == []
     found = parsed(page)
@@ -157,7 +157,7 @@ def test_report_makes_it_again_and_elsewhere_with_whole_links(batch: Path, tmp_p
 @SLOW
 def test_the_page_shows_each_curve_against_the_batch_and_who_differs(made: Path) -> None:
     page = (made / "out/index.html").read_text(encoding="utf-8")
-    assert pages_of(read_batch(made / "out"))["index.html"].decode() == page
+    assert encode_all(folder_pages(made / "out"), Formats())["index.html"].decode() == page
     found = parsed(page)
     assert loads(page) == []
     alts = [value for tag, key, value in found.attributes if (tag, key) == ("svg", "aria-label")]

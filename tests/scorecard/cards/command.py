@@ -13,9 +13,8 @@ from rich.progress import Progress
 from typing_extensions import TypedDict
 
 from bushfit import __version__
-from bushfit.cli.common import Options
-from bushfit.cli.show import tell_table
-from bushfit.report.folder import check_free, to_json
+from bushfit.cli.output import Output
+from bushfit.report.results import check_free, raw_file, to_json
 from bushfit.validation import to_json_data
 from cards.card import Row, card
 from cards.families import CARD_SEEDS, FAMILIES, Family, tasks
@@ -80,17 +79,17 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
     the share right holds them. -o takes scorecard.json. Seeds from 77000 on are kept for cards that are shown; try and
     tune with others.
     """
-    options = Options(no_plots=True, **given)
-    folder = options.output
+    output = Output(no_plots=True, **given)
+    folder = output.output
     if keep and folder is None:
         raise click.UsageError("--keep needs a folder: -o/--output")
     if folder:
-        check_free(folder, [SCORECARD], force=options.force)
+        check_free(folder, [SCORECARD], overwrite=output.force)
     kept = folder / "campaigns" if folder and keep else None
     outcomes = {}
     for each in (name for name in FAMILIES if family in (name, "all")):
         chosen = tasks(campaigns, seed, each)
-        with Progress(console=options.console, transient=True, disable=options.quiet) as progress:
+        with Progress(console=output.console, transient=True, disable=output.quiet) as progress:
             bar = progress.add_task("hidden campaigns", total=len(chosen))
             outcomes[each] = run(chosen, kept, jobs, lambda _, at=bar, told=progress: told.advance(at), session)
     cards = {name: card(found, name) for name, found in outcomes.items()}
@@ -102,12 +101,12 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
             open_ = "too few to say" if row.target and row.over else ""
             met = open_ if row.met is None else ("met" if row.met else "missed")
             cells.append((row.measure, row.figure, str(row.over), row.target, met))
-        tell_table(options, title, ("measure", "figure", "over", "target", ""), cells)
+        output.print_table(title, ("measure", "figure", "over", "target", ""), cells)
         for test, count in Counter(outcome.decides for outcome in outcomes[name] if outcome.decides).most_common():
-            options.say(f"{count} x to be decided elsewhere: {test}")
+            output.print(f"{count} x to be decided elsewhere: {test}")
         for outcome in outcomes[name]:
             if outcome.error:
-                options.say(f"failed: {outcome.task}: {outcome.error}")
+                output.print(f"failed: {outcome.task}: {outcome.error}")
     whole: Scorecard = {
         "schema": "bushfit/scorecard/3",
         "version": __version__,
@@ -120,6 +119,6 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
     }
     document = to_json_data(whole, Scorecard)
     if folder:
-        replace(options, force=True).write(folder, {SCORECARD: to_json(document)}, document)
+        replace(output, force=True).write(folder, [raw_file(SCORECARD, to_json(document))], document)
     else:
-        options.print_json(document)
+        output.print_json(document)

@@ -19,6 +19,8 @@ from threadpoolctl import threadpool_limits
 
 from bushfit.batch import pool
 from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.commands.diagnose import diagnose as diagnose_campaign
+from bushfit.commands.plan import plan
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.locate import largest_smooth_misfit
 from bushfit.diagnosis.record import Diagnosis, Settings
@@ -27,14 +29,11 @@ from bushfit.effects import effect_of
 from bushfit.effects.mistakes import mistake_named
 from bushfit.errors import MeasurementError, ModelError
 from bushfit.fitting.data import Data
-from bushfit.jobs.diagnose import Diagnose
-from bushfit.jobs.plan import PlanTests
 from bushfit.planning.campaign import settings_of
 from bushfit.planning.contract import Noise, Test
 from bushfit.planning.offer import RIVALS_APART
-from bushfit.report.contents import Formats
-from bushfit.report.folder import write_files
 from bushfit.report.page.readback import read_results
+from bushfit.report.results import Formats, write_files, write_results
 from bushfit.simulation.files import to_files
 from bushfit.simulation.measured import Simulated, simulate
 from cards.families import RECIPES, campaign_of
@@ -96,13 +95,13 @@ def _worked(task: Task, folder: Path, hours: float | None) -> Outcome:
         simulated, sealed = campaign_of(task)
         files = to_files(simulated)
         del files["truth.json"]
-        write_files(place, files, force=True)
-        write_files(sealed_file.parent, {sealed_file.name: _SEALED.dump_json(sealed)}, force=True)
+        write_files(place, files)
+        write_files(sealed_file.parent, {sealed_file.name: _SEALED.dump_json(sealed)})
         started = time.process_time()
         data = Data.of(load_campaign(place / "campaign.toml"))
-        found = Diagnose(Settings(without=task.without)).run(data)
+        found = diagnose_campaign(data, without=task.without)
         diagnosis, seconds = found.diagnosis, time.process_time() - started
-        write_files(place / "results", Formats(pictures=False).files(found.contents), force=True)
+        write_results(place / "results", found.files, Formats(pictures=False), overwrite=True)
         read_results(place / "results")  # as `bushfit report` reads back what `bushfit diagnose` wrote
         truth = _SEALED.validate_json(sealed_file.read_bytes())
         outcome = _outcome(task, truth, diagnosis, seconds)
@@ -181,7 +180,7 @@ def planned_session(campaign: Campaign, hours: float) -> tuple[Test, ...]:
     fastest = max(float(sweep.frequency.max()) for sweep in campaign.sweeps)
     rig = replace(campaign.rig, max_frequency=_FASTER * fastest)
     try:
-        found = PlanTests("rivals", hours).run(replace(campaign, rig=rig)).plan.planned
+        found = plan(replace(campaign, rig=rig), aim="rivals", hours=hours).plan.planned
     except ModelError:  # rivals of which the fit of either is no model: no test is planned for them
         return ()
     return found.tests if found.apart is not None and found.apart >= RIVALS_APART else ()

@@ -1,0 +1,292 @@
+"""Output of a command: its messages and tables on the terminal, and its results folder."""
+
+from __future__ import annotations
+
+import os
+import sys
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields
+from functools import wraps
+from pathlib import Path
+from threading import Timer
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from rich import box
+from rich.cells import cell_len
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.markup import escape
+from rich.segment import Segment
+from rich.table import Table
+
+from bushfit.cli.options import Folder, Function, Parameter, Written, flag, format_options, in_order, option, under
+from bushfit.errors import printable
+from bushfit.progress import report_progress_to
+from bushfit.reading.tablefile import folder_name
+from bushfit.report.results import Formats, ResultFile, check_free, to_json, write_results
+
+if TYPE_CHECKING:
+    from bushfit.reading.tablefile import Form
+    from bushfit.report.results import Picture
+
+#: Seconds after which a command shows its progress.
+_PATIENCE = 2.0
+#: Width of tables if standard error is no terminal, in characters.
+_WIDTH = 100
+#: Characters between two columns of a table.
+_GAP = 2
+
+
+class _Console(Console):
+    """Console on which texts from files cannot steer the terminal: their control characters are escaped."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else segment._replace(text=printable(segment.text, lines=True))
+
+
+@dataclass(frozen=True)
+class Output:
+    """Output of one call of a command, as the options that all commands share ask for it.
+
+    Args:
+        output: folder for results, if it was given.
+        verbose, quiet: whether to print more, or nothing but errors.
+        as_json: whether to print the result as JSON on standard output.
+        force: whether to replace files of an earlier result.
+        no_plots, no_report: whether to leave out figures or HTML pages.
+        table_format, plot_format: formats of tables and figures.
+    """
+
+    output: Path | None = None
+    verbose: bool = False
+    quiet: bool = False
+    as_json: bool = False
+    force: bool = False
+    no_plots: bool = False
+    no_report: bool = False
+    table_format: Form = Formats.table_form
+    plot_format: Sequence[Picture] = Formats.picture_forms
+    _warned: set[str] = field(default_factory=set)
+
+    @property
+    def formats(self) -> Formats:
+        """Formats of result files, and the kinds to leave out."""
+        pictures = tuple(dict.fromkeys(self.plot_format))
+        return Formats(True, not self.no_plots, not self.no_report, self.table_format, pictures)
+
+    @property
+    def console(self) -> Console:
+        """Console on standard error; silent with --quiet."""
+        console = _Console(stderr=True, quiet=self.quiet, highlight=False, soft_wrap=True, emoji=False)
+        if not console.is_terminal:
+            console.width = int(os.environ.get("COLUMNS", _WIDTH))
+        return console
+
+    def folder(self, name: str, form: str = "{}") -> Path:
+        """Folder for results: that of --output, else results/<name>, with text around the name by `form`."""
+        return self.output or Path("results") / form.format(folder_name(name))
+
+    def free_folder(self, name: str, *files: str, form: str = "{}") -> Path:
+        """Folder for results, checked before the work: it can be written, and these files may be written there.
+
+        Args:
+            name: name of the result.
+            files: names of its main files, with endings.
+            form: text around the name, such as "plan {}".
+
+        Raises:
+            OutputError: the folder cannot be written, or holds one of the files.
+        """
+        folder = self.folder(name, form)
+        check_free(folder, files, overwrite=self.force)
+        return folder
+
+    def print(self, text: str) -> None:
+        """Print a line as it is, without markup."""
+        self.console.print(text, markup=False)
+
+    def print_warnings(self, lines: Iterable[str]) -> None:
+        """Print each warning that was not printed before."""
+        for line in (line for line in lines if line not in self._warned):
+            self._warned.add(line)
+            self.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
+
+    def print_table(
+        self, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, text_columns: int = 1
+    ) -> None:
+        """Print a table; if it is wider than the terminal, each row as a list of its cells.
+
+        Args:
+            title: title above the table.
+            columns: headers.
+            rows: cells of each row.
+            text_columns: number of columns with texts, which are wrapped; the other ones hold numbers, which are never
+                cut or wrapped.
+        """
+        rows, console = list(rows), self.console
+        cells = _wrapped(columns, rows, text_columns, console.width)
+        if cells is None:
+            console.print(title, style="bold", markup=False)
+            for row in rows:
+                console.print(_stacked(columns, row, text_columns), markup=False)
+            return
+        table = Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, title_style="bold")
+        for index, column in enumerate(cells[0]):
+            table.add_column(escape(column), justify="right" if index >= text_columns else "left", no_wrap=True)
+        for row in cells[1:]:
+            table.add_row(*map(escape, row))
+        console.print(table)
+
+    def print_json(self, document: Mapping[str, Any]) -> None:
+        """Print a document on standard output if --json is given."""
+        if self.as_json:
+            sys.stdout.write(to_json(document).decode())
+            sys.stdout.flush()
+
+    def write(
+        self,
+        folder: Path,
+        files: Iterable[ResultFile],
+        document: Mapping[str, Any] | None = None,
+        inputs: Iterable[Path] = (),
+    ) -> None:
+        """Write result files, print the document if --json is given, and print the names of the files.
+
+        Args:
+            folder: results folder.
+            files: result files.
+            document: content of --json.
+            inputs: files that the command has read, none of which is replaced.
+        """
+        files = list(files)
+        names = [name for file in files for name in self.formats.names(file)]
+        check_free(folder, names, overwrite=self.force, inputs=inputs)
+        if document is not None:
+            self.print_json(document)
+        written = write_results(folder, files, self.formats, overwrite=self.force, inputs=inputs)
+        self.print(f"wrote {', '.join(written)} to {folder}")
+
+
+def with_output(folder: str, *written: Written) -> Parameter:
+    """Decorator of a command: the options that all commands share become one `output`.
+
+    Args:
+        folder: default folder of results, as the help states it.
+        written: kinds of result file whose formats can be chosen.
+    """
+
+    def decorate(function: Function) -> Function:
+        @wraps(function)
+        def wrapped(**given: Any) -> Any:
+            names = [option.name for option in fields(Output) if option.name in given]
+            output = Output(**{name: given.pop(name) for name in names})
+            with _progress(output.console):
+                return function(output=output, **given)
+
+        return in_order(
+            wrapped,
+            under(
+                "Output",
+                option("-o --output", "DIR", f"For the results [{folder}].", type=Folder(path_type=Path)),
+                flag("--force", "Replace results that stand there."),
+                *format_options(*written),
+                flag("--no-plots", "Write no plots.", hidden="pictures" not in written),
+                flag("--json as_json", "Print the result as JSON on standard output."),
+                flag("-v --verbose"),
+                flag("-q --quiet", "Say more, or nothing but errors."),
+            ),
+        )
+
+    return decorate
+
+
+def _wrapped(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int, width: int
+) -> list[list[str]] | None:
+    """Headers and rows whose text columns are wrapped to the width of the terminal; None if they do not fit.
+
+    Text is broken between words only.
+    """
+    table = [list(map(printable, row)) for row in (columns, *rows)]
+    widths = [max(map(cell_len, column)) for column in zip(*table, strict=True)]
+    longest_word = [
+        max(cell_len(word) for cell in column for word in (cell.split() or [""])) for column in zip(*table, strict=True)
+    ]
+    excess = sum(widths) + _GAP * len(widths) - width
+    for index in sorted(range(text_columns), key=lambda index: longest_word[index] - widths[index]):
+        cut = max(0, min(excess, widths[index] - longest_word[index]))
+        widths[index], excess = widths[index] - cut, excess - cut
+    if excess > 0:
+        return None
+    for row in table:
+        for index in range(text_columns):
+            if cell_len(row[index]) > widths[index]:
+                row[index] = "\n".join(textwrap.wrap(row[index], widths[index], break_on_hyphens=False))
+    return table
+
+
+def _stacked(columns: Sequence[str], row: Sequence[str], text_columns: int) -> str:
+    """A row of a table as a list: its texts on one line, and below it each number with its header."""
+    lines = [", ".join(filter(None, row[:text_columns]))]
+    pairs = zip(columns[text_columns:], row[text_columns:], strict=True)
+    return "\n".join([*lines, *(f"  {column}: {cell}" if column else f"  {cell}" for column, cell in pairs if cell)])
+
+
+@contextmanager
+def _progress(console: Console) -> Iterator[None]:
+    """Show a line for each kind of work from two seconds on; on a terminal alone, and not with --quiet."""
+    if console.quiet or not (console.is_interactive and console.file.isatty()):
+        yield
+        return
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(20),
+        TextColumn("{task.fields[rate]} [red]{task.fields[remark]}"),
+    )
+    bar = Progress(*columns, console=console, transient=True, redirect_stdout=False)
+    lines, patient = dict[str, tuple[float, Any]](), True
+
+    def update(what: str, done: int | None, total: int, remark: str) -> None:
+        if done is None:
+            bar.remove_task(lines.pop(what)[1])
+        else:
+            if what not in lines:
+                lines[what] = monotonic(), bar.add_task(what, total=total, rate="", remark="")
+            start, line = lines[what]
+            bar.update(line, completed=done, rate=_rate(done, total, monotonic() - start), remark=remark)
+        show()
+
+    def show() -> None:
+        """Start or stop the bar: a message between two kinds of work gets a line of its own."""
+        if lines and not patient:
+            bar.start()
+        elif bar.live.is_started:
+            bar.stop()
+
+    def end_patience() -> None:
+        nonlocal patient
+        patient = False
+        show()
+
+    timer = Timer(_PATIENCE, end_patience)
+    timer.start()
+    try:
+        with report_progress_to(update):
+            yield
+    finally:
+        timer.cancel()
+        timer.join()
+        bar.stop()
+
+
+def _rate(done: int, total: int, seconds: float) -> str:
+    """Progress in words: how many are done, how fast, and the seconds left."""
+    if not done:
+        return f"0 of {total}"
+    pace = f"{done / seconds:.3g} a second" if done >= seconds else f"{seconds / done:.2g} s each"
+    return f"{done} of {total}, {pace}, {seconds / done * (total - done):.0f} s left"

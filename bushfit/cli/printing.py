@@ -1,0 +1,103 @@
+"""Printed results: parameters, quality of the fit, tests, correlations, and the equation of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+
+from bushfit.cli.output import Output
+from bushfit.units import format_range, number
+
+if TYPE_CHECKING:
+    from bushfit.commands.fit import FitOutput
+    from bushfit.model.result import Misfit, Result, Usable
+
+#: Correlation between two parameters above which it is shown without -v: the data determine only their combination.
+_STRONG_CORRELATION = 0.9
+#: Largest number of tests that are shown without -v, those with the largest misfit.
+_MOST_TESTS = 8
+
+
+def print_fit(output: Output, name: str, fitted: FitOutput) -> None:
+    """Print each step of a fit, and above all the parameters that the tests leave open."""
+    if left_open := fitted.result.left_open:
+        output.console.print(f"[bold]{escape(name)}:[/bold] [yellow]{escape(left_open)}[/]")
+    for title, result in fitted.steps:
+        print_step(output, f"{name}: {title}", result)
+
+
+def print_step(output: Output, title: str, result: Result) -> None:
+    """Print a result with its warnings and, with -v, the files behind it."""
+    from bushfit.prediction.caveats import warnings_of
+
+    print_result(output, title, result)
+    output.print_warnings(warnings_of(result))
+    print_origin(output, result)
+
+
+def print_result(output: Output, title: str, result: Result) -> None:
+    """Print the parameters of a result, its quality, its tests, and strong correlations."""
+    print_parameters(output, title, result)
+    if quality := result.quality:
+        gain = quality.loop_gain_error
+        loops = f", gain of a loop within {number(100 * gain, 2)} % ([rig] gain_error)" if gain else ""
+        output.print(
+            f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
+            f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % a point{loops}"
+        )
+    print_tests(output, result.tests, result.usable)
+    correlations = [
+        pair for pair in result.covariance.correlations() if output.verbose or abs(pair[2]) > _STRONG_CORRELATION
+    ]
+    if correlations:
+        output.print("correlation: " + ", ".join(f"{one}/{other} {value:+.2f}" for one, other, value in correlations))
+
+
+def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usable]) -> None:
+    """Print the misfit of each test, with -v of each of its runs, and the expected error of the model."""
+    tests = [test for test in misfits if output.verbose or test.held is None]
+    worst = sorted(tests, key=lambda test: -test.reduced_chi_square)[: len(tests) if output.verbose else _MOST_TESTS]
+    if len(tests) > 1:
+        title = "test by test: NRMSE and gain off [%] (+: the model is stiffer), chi2 the reduced chi-square"
+        columns, rows = ("test", "place", "points", "NRMSE", "chi2", "gain", ""), []
+        for test in (test for test in tests if test in worst):
+            name = test.test if test.held is None else f"  {_run_label(test)}"
+            gain = f"{round(100 * test.gain, 2) + 0.0:+.2f}"  # no -0
+            figures = (number(100 * test.nrmse, 2), number(test.reduced_chi_square, 2), gain)
+            rows.append((name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted"))
+        output.print_table(title, columns, rows, text_columns=2)
+    if left := len(tests) - len(worst):
+        output.print(
+            f"and {left} more {'test, which is' if left == 1 else 'tests, which are'} met better; -v shows them"
+        )
+    for place in usable:
+        how = "each predicted from other runs" if place.held_out else "as fitted"
+        error = f"{number(100 * place.stiffness, 2)} % of stiffness and {number(place.loss_factor, 2)} of loss factor"
+        output.print(f"{place.place}: usable within {error} (95 % of {place.points} points, {how})")
+
+
+def _run_label(test: Misfit) -> str:
+    """Amplitude or frequency of a run, in the unit of tables."""
+    from bushfit.report.tables import DISPLAYS
+
+    unit, factor = DISPLAYS.get(test.unit or "", (test.unit or "", 1.0))
+    return format_range(unit, factor * (test.value or 0.0))
+
+
+def print_origin(output: Output, result: Result) -> None:
+    """Print the equation of a model and the files behind it, with -v alone."""
+    if output.verbose:
+        output.print(result.model.equation())
+        for source in result.inputs:
+            output.print(f"input: {source.file} sha256 {source.sha256[:12]}")
+
+
+def print_parameters(output: Output, title: str, result: Result) -> None:
+    """Print the parameters: value, standard error, 95 % interval (by profile likelihood, if any), and unit."""
+    from bushfit.report.parameters import interval_kind, parameter_rows
+
+    columns = ("parameter", "value", "std error", interval_kind(result), "unit")
+    rows = ((row.label, row.value, row.error, row.interval, row.unit) for row in parameter_rows(result))
+    output.print_table(title, columns, rows)

@@ -1,0 +1,185 @@
+"""Options that several commands share, and their values in SI."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from bushfit.cli.options import (
+    FILE,
+    Function,
+    Parameter,
+    Size,
+    file_option,
+    in_order,
+    option,
+    option_of,
+    place_option,
+    under,
+)
+from bushfit.errors import UnitError, error_location
+from bushfit.units import parse_quantity, regular_steps
+
+if TYPE_CHECKING:
+    from bushfit.campaign.campaign import Campaign
+    from bushfit.model.result import Result
+
+#: SI units of the options of a grid, by their keys.
+_UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
+
+
+def campaign_options(soft_l1: str = "points far off pull less, outliers not at all") -> Parameter:
+    """Argument CAMPAIGN, as `campaigns`, and the options of every command that fits it.
+
+    Args:
+        soft_l1: effect of the loss soft_l1, as the help states it.
+    """
+
+    def decorate(function: Function) -> Function:
+        return in_order(
+            function,
+            click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
+            under(
+                "How it is fitted",
+                option(
+                    "--loss",
+                    "LOSS",
+                    f"linear: least squares [the campaign's, else this]; soft_l1: {soft_l1}.",
+                    type=click.Choice(["linear", "soft_l1"]),
+                ),
+                option(
+                    "--max-nrmse",
+                    "SHARE",
+                    "Exit status 1 above this misfit (NRMSE), such as 2 %.",
+                    type=Size("share up to 1, such as 0.02 or 2 %", 1.0),
+                ),
+            ),
+        )
+
+    return decorate
+
+
+def open_campaign(campaigns: Sequence[Path]) -> Campaign:
+    """Load the one campaign of a command line.
+
+    Raises:
+        UsageError: several campaigns.
+        CampaignError: test files in its place, or a campaign that cannot be used.
+    """
+    from bushfit.campaign.campaign import load_campaign, refuse_tests
+
+    first, *others = campaigns
+    if others:
+        refuse_tests(campaigns)
+        extra = "argument" if len(others) == 1 else "arguments"
+        raise click.UsageError(
+            f"Got unexpected extra {extra} ({' '.join(map(str, others))}). bushfit batch takes several campaigns.",
+            click.get_current_context(),
+        )
+    return load_campaign(first)
+
+
+def exit_above(max_nrmse: float | None, result: Result) -> None:
+    """Exit with status 1 if the misfit of a result is above the limit of --max-nrmse."""
+    if max_nrmse is not None and result.quality and result.quality.nrmse > max_nrmse:
+        click.echo(f"bushfit: NRMSE {result.quality.nrmse:.4g} is above --max-nrmse {max_nrmse:g}", err=True)
+        click.get_current_context().exit(1)
+
+
+def grid_options(default: str) -> Parameter:
+    """Options of the grid of a prediction, by the keys of [predict]; `default` is the grid without them."""
+    return lambda function: in_order(
+        function,
+        option("--frequencies", "GRID", f'"5:155:10 Hz" or "20, 50 Hz" [{default}].'),
+        option("--amplitudes", "GRID", f'Zero-to-peak, "0.1, 0.5 mm" [{default}].'),
+        option("--torsion-amplitudes", "GRID", 'For --direction torsion ["0.5, 1, 2 deg"].'),
+        option("--strain-amplitudes", "GRID", 'For specimens that give a modulus ["1, 2, 5 %"].'),
+    )
+
+
+def prediction_options(campaign: str) -> Parameter:
+    """Options of where, and at which temperature, a model is predicted; `campaign` is the help of --campaign."""
+    return under(
+        "Where it is predicted",
+        place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
+        grid_options("the campaign's"),
+        option("--temperature", "TEMP", 'Such as "40 degC", if the model knows it [23 degC].'),
+        file_option("--campaign", campaign),
+    )
+
+
+def grid_values(directions: Sequence[str], grids: Mapping[str, str | None]) -> dict[str, Any]:
+    """Directions, and the values of the options of a grid in SI, as keyword arguments; None for a default."""
+    axes = {key: parse_grid(grids[key], option_of(key), unit) for key, unit in _UNITS.items()}
+    return {"directions": tuple(directions) or None, **axes}
+
+
+def positive(text: str | None, option: str, unit: str) -> float | None:
+    """Value of an option in SI, above zero; None if it was not given.
+
+    Args:
+        text: text of the option.
+        option: name of the option, for errors.
+        unit: SI unit.
+
+    Raises:
+        UnitError: no value with a unit, or one that is not positive.
+    """
+    if text is None:
+        return None
+    with error_location(place=option):
+        value = parse_quantity(text, unit)
+        if not value > 0.0:
+            raise UnitError("this is not positive", found=f'"{text}"', expected="a value above zero")
+    return value
+
+
+def kelvin(text: str | None) -> float | None:
+    """Value of --temperature [K]; None if it was not given."""
+    from bushfit.units import parse_temperature
+
+    with error_location(place="--temperature"):
+        return None if text is None else parse_temperature(text)
+
+
+def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | None:
+    """Values of an option such as "5:155:10 Hz" or "0.1, 0.2, 0.5 mm" in SI; None if it was not given.
+
+    Args:
+        text: text of the option.
+        option: name of the option, for errors.
+        unit: SI unit.
+
+    Raises:
+        UnitError: no numbers, no unit, or a unit of another dimension.
+    """
+    if text is None:
+        return None
+    expected = 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'
+    with error_location(place=option):
+        if re.search(r"\d,\d", text):
+            raise UnitError(
+                "a comma between two digits may part numbers or be a decimal comma",
+                found=repr(text),
+                expected=expected,
+                hint='write decimals with a point, "0.5", and numbers of a list apart, "1, 5"',
+            )
+        parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.][^,]*)", text)
+        if not parts or parts[1].count(":") not in (0, 2):
+            hint = "write the step, too: start:stop:step" if text.count(":") == 1 else None
+            raise UnitError("these are no values with a unit", found=repr(text), expected=expected, hint=hint)
+        is_range = ":" in parts[1]
+        values = tuple(
+            parse_quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if is_range else ",")
+        )
+        if is_range:
+            values = tuple(regular_steps(*values))
+            if not values:
+                raise UnitError("start:stop:step does not count upward", found=text, expected=expected)
+        elif min(values) <= 0.0:
+            raise UnitError("frequencies and amplitudes are above zero", found=text, expected=expected)
+    return values

@@ -1,0 +1,378 @@
+"""compare: several results beside the first, or model families on one campaign."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property, partial
+from itertools import combinations
+from string import ascii_uppercase
+from typing import Any
+
+import numpy as np
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import PredictSettings
+from bushfit.commands.fit import fit, prepare_tests
+from bushfit.commands.loading import HasResult, as_result
+from bushfit.commands.predict import Numbers, columns_of, grid_of
+from bushfit.diagnosis.evidence import result_of
+from bushfit.diagnosis.families import FittedFamily, fit_families
+from bushfit.effects import Level
+from bushfit.errors import BushfitError, ModelError
+from bushfit.fitting.assess import lack_of_fit
+from bushfit.geometry import Direction, Place, Specimen
+from bushfit.model.document import BushingTable
+from bushfit.model.file import model_document, versions
+from bushfit.model.result import Result
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.comparison import Comparison, holm, with_holm
+from bushfit.prediction.comparison import compare as compare_two
+from bushfit.prediction.grid import asked_or, common_grid
+from bushfit.reading.measurement import Source, Sweep
+from bushfit.report import plots
+from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, Family, Pair
+from bushfit.report.compared import SideBySide
+from bushfit.report.page import comparison_page
+from bushfit.report.results import ResultFile, figure_file, json_file, page_file, table_file
+from bushfit.report.tables import contrast_table
+from bushfit.units import format_range, number
+from bushfit.validation import to_json_data
+from bushfit.version import __version__
+
+#: Largest number of results: the colours of a figure, and the columns of a table.
+MOST = 8
+#: Compound of a result, whose modulus over strain is compared if no direction is common to all.
+_COMPOUND = Specimen("compound", "modulus")
+#: Probability from which on a family counts as a possible explanation.
+_LIKELY = 0.05
+#: Relative difference of moduli below which families agree: the scatter of bushings of one batch.
+_AGREED = 0.05
+#: Factor beyond the tested range over which families are compared, and number of points there.
+_BEYOND, _POINTS = 10.0, 400
+#: `asdict` for records whose type the type checker does not know.
+_plain: Callable[[Any], Any] = asdict
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedResult:
+    """One of the results that are compared.
+
+    Args:
+        name: name in tables.
+        source: file or folder as it was given.
+        result: the result.
+        sweeps: sweeps of its campaign, which set the grid.
+        sha256: SHA-256 of the model file or campaign.
+    """
+
+    name: str
+    source: str
+    result: Result
+    sweeps: Sequence[Sweep] = ()
+    sha256: str | None = None
+
+
+#: What can be compared.
+Comparable = Result | HasResult | Campaign | ComparedResult
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ComparisonOutput:
+    """Results of a comparison.
+
+    Args:
+        entries: the results, the reference first.
+        comparisons: each result but the first against the first.
+        families: model families, if these are compared.
+        notes: further warnings.
+        command: command that gives the same comparison.
+    """
+
+    entries: Sequence[ComparedResult]
+    comparisons: Sequence[Comparison]
+    families: Sequence[FittedFamily] = ()
+    notes: Sequence[str] = ()
+    command: str = ""
+
+    def __repr__(self) -> str:
+        return f"Comparison of {', '.join(entry.name for entry in self.entries)}"
+
+    @property
+    def labels(self) -> list[str]:
+        """Letters of the results in tables and sentences: A, B and so on."""
+        return list(ascii_uppercase[: len(self.entries)])
+
+    @cached_property
+    def words(self) -> list[str]:
+        """Sentences on what differs, one for each result and direction."""
+        pairs = zip(self.labels[1:], self.comparisons, strict=True)
+        return [f"{label} against A, {line}" for label, comparison in pairs for line in comparison.words()]
+
+    @cached_property
+    def advice(self) -> list[str]:
+        """Sentences on which family to use, and on how each family predicts what was held out."""
+        pairs = list(zip(self.labels, self.families, strict=False))
+        best = [_family_to_use(self.families, self.entries)] if self.families else []
+        return [*best, *(f"{label}, {family.name}: {family.words}" for label, family in pairs[1:])]
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """Warnings, each once, with the letters of the results that it is about."""
+        contrasts = [comparison.contrasts for comparison in self.comparisons]
+        predictions = [[pair.reference for pairs in contrasts for pair in pairs]]
+        predictions += [[pair.other for pair in pairs] for pairs in contrasts]
+        labels_of: dict[str, list[str]] = {}
+        for label, entry, predicted in zip(self.labels, self.entries, predictions, strict=True):
+            for line in warnings_of(entry.result, [prediction.warnings for prediction in predicted]):
+                labels_of.setdefault(line, []).append(label)
+        own = [f"{', '.join(labels)}: {line}" for line, labels in labels_of.items()]
+        return [*self.notes, *self._shared_tests(), *own]
+
+    def _shared_tests(self) -> list[str]:
+        """Warnings that results were fitted to the same files."""
+        if self.families:
+            return [
+                "families are fitted to the same tests: intervals of their differences take them as independent and "
+                "are too wide as a rule; their odds, and what was held out, compare them"
+            ]
+        pairs = zip(self.labels[1:], self.comparisons, strict=True)
+        return [
+            f"A and {label} were fitted to the same {', '.join(comparison.shared)}: intervals of their "
+            "difference take them as independent and are too wide as a rule"
+            for label, comparison in pairs
+            if comparison.shared
+        ]
+
+    @cached_property
+    def document(self) -> ComparisonFile:
+        """Content of compare.json."""
+        entries, comparisons = (
+            zip(self.labels, self.entries, strict=True),
+            zip(self.labels[1:], self.comparisons, strict=True),
+        )
+        families = zip(self.labels, self.families, strict=False)
+        return {
+            "schema": SCHEMA,
+            "compared": [_entry_document(label, entry) for label, entry in entries],
+            "pairs": [_pair_document(label, comparison) for label, comparison in comparisons],
+            "families": [_family_document(label, family) for label, family in families] or None,
+            "words": [*self.advice, *self.words],
+            "warnings": self.warnings,
+            "command": self.command,
+            "versions": {"bushfit": __version__, **versions()},
+        }
+
+    @cached_property
+    def files(self) -> Sequence[ResultFile]:
+        """Document, tables, figure and page."""
+        shown = SideBySide.of(self.document)
+        names = ("parameters", *(["families"] if self.families else []), "differences")
+        files = [json_file("compare", self.document)]
+        files += [table_file(name, partial(lambda name: shown.tables()[name], name)) for name in names]
+        files.append(figure_file("compare", lambda: plots.batch.comparison_figure(shown)))
+        return [*files, page_file("compare", comparison_page, files)]
+
+
+def compare(
+    reference: Comparable,
+    *others: Comparable,
+    families: Sequence[str] | None = None,
+    directions: Sequence[str] | None = None,
+    frequencies: Numbers | None = None,
+    amplitudes: Numbers | None = None,
+    torsion_amplitudes: Numbers | None = None,
+    strain_amplitudes: Numbers | None = None,
+    command: str = "",
+) -> ComparisonOutput:
+    """Compare results with the first: what differs, by how much, and whether by more than chance.
+
+    Args:
+        reference: result, output with a result, or campaign, which is fitted as by `fit`; also a `ComparedResult`.
+        others: results, outputs or campaigns that are compared with it.
+        families: with one campaign alone, model families to fit to it, such as "sliders" or "kraus+inertia"; () is all.
+        directions: directions or specimens; default those in which all were fitted.
+        frequencies: [Hz]; default those at which all were measured, as also of the amplitudes.
+        amplitudes: zero-to-peak displacements [m].
+        torsion_amplitudes: zero-to-peak rotations [rad].
+        strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
+        command: command that the document states.
+
+    Raises:
+        BushfitError: too few results or too many, or directions and points that one of them cannot be predicted at.
+    """
+    grid = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
+    if families is not None and isinstance(reference, Campaign) and not others:
+        entries, fitted, notes = _fit_families(reference, families, directions)
+        return _compared(entries, grid, families=fitted, notes=notes, command=command)
+    if families is not None or not 1 <= len(others) < MOST:
+        raise BushfitError(
+            "this cannot be compared",
+            found=f"{1 + len(others)} results{' and families' if families is not None else ''}",
+            expected=f"2 to {MOST} results, or one campaign and families",
+        )
+    entries = [compared_result(source, directions=directions or ()) for source in (reference, *others)]
+    return _compared(entries, grid, command=command)
+
+
+def compared_result(
+    source: Comparable, name: str | None = None, sha256: str | None = None, directions: Sequence[str] = ()
+) -> ComparedResult:
+    """Result of a model or output, or of a campaign, which is fitted as by `fit`.
+
+    Args:
+        source: result, output with a result, campaign, or compared result, which is returned as it is.
+        name: file or folder that the source was read from.
+        sha256: SHA-256 of the model file.
+        directions: directions of a campaign whose tests are fitted.
+    """
+    if isinstance(source, ComparedResult):
+        return source
+    if isinstance(source, Campaign):
+        result = fit(source, directions=directions).result
+        return ComparedResult(source.name, name or str(source.path), result, source.sweeps, source.sha256)
+    result = as_result(source)
+    return ComparedResult(result.name, name or result.name, result, sha256=sha256)
+
+
+def _compared(
+    entries: Sequence[ComparedResult],
+    grid: PredictSettings,
+    *,
+    families: Sequence[FittedFamily] = (),
+    notes: Sequence[str] = (),
+    command: str = "",
+) -> ComparisonOutput:
+    """Compare each result with the first, in the directions and on the grid asked for."""
+    results = [entry.result for entry in entries]
+    columns = _common_places(results, grid.directions)
+    grids = []
+    for places in columns:
+        if len({place.motion for place in places}) > 1:
+            found = ", ".join(f"{place}: {place.motion.words[0]}" for place in places)
+            raise ModelError("a place that is not one kind of motion in all", found=found, expected="one kind")
+        grids.append(asked_or(common_grid(results, places, entries[0].sweeps), grid, places[0]))
+    comparisons = [
+        compare_two(results[0], result, [(places[0], places[index]) for places in columns], grids)
+        for index, result in enumerate(results[1:], start=1)
+    ]
+    return ComparisonOutput(entries, with_holm(comparisons), families, notes, command)
+
+
+def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> list[list[Place]]:
+    """Directions and specimens to compare, each as every result has it; the compound if none is common to all."""
+    if names:
+        return [[result.place(name) for result in results] for name in names]
+    known = [_fitted_places(result) for result in results]
+    common = [name for name in known[0] if all(name in names for names in known)]
+    places = [[result.place(name) for result in results] for name in common]
+    same = [place for place in places if all(one.motion is other.motion for one, other in combinations(place, 2))]
+    return same or [[_COMPOUND] * len(results)]
+
+
+def _fitted_places(result: Result) -> list[str]:
+    """Directions and specimens that a result was fitted to; all that it has if it does not state them."""
+    if result.measured and result.measured.directions:
+        return list(result.measured.directions)
+    directions = [Direction.AXIAL, Direction.RADIAL] if result.model.bushing else []
+    return [*map(str, directions), *(specimen.name for specimen in result.specimens)]
+
+
+def _fit_families(
+    campaign: Campaign, names: Sequence[str], directions: Sequence[str] | None
+) -> tuple[list[ComparedResult], list[FittedFamily], list[str]]:
+    """Fit model families to a campaign, the model of its [fit] first; all that the library has unless named."""
+    data = prepare_tests(campaign)
+    data_sets = [data_set.with_weight() for data_set in data.chosen(directions or None)]
+    model = data.started(data.effects, data_sets, {})
+    fixed = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]
+    families, unlikely = fit_families(model, data_sets, names, fixed, data.bounds)
+    adjusted = iter(holm([family.p for family in families if family.p is not None]))
+    families = [family if family.p is None else replace(family, p=next(adjusted)) for family in families]
+    entries = []
+    for family in families:
+        result = replace(result_of(family.evidence, data.bounds, model.effects), specimens=campaign.specimens)
+        entries.append(ComparedResult(family.name, str(campaign.path), result, campaign.sweeps, campaign.sha256))
+    first, notes = families[0].evidence, list[str]()
+    if lack_of_fit(first.model, data_sets, first.parameters) is None:
+        notes.append("the first family meets these tests within their noise: nothing in them asks for another")
+    if unlikely:
+        percent = number(100.0 * sum(unlikely.values()), 2)
+        notes.append(f"{len(unlikely)} more families have odds of {percent} % together: {', '.join(unlikely)}")
+    return entries, families, notes
+
+
+def _family_to_use(families: Sequence[FittedFamily], entries: Sequence[ComparedResult]) -> str:
+    """Sentence that names the most probable family, and the range over which all probable ones agree."""
+    rows = list(zip(ascii_uppercase, families, entries, strict=False))
+    label, family, entry = max(rows, key=lambda row: row[1].probability)
+    likely = [row for row in rows if row[1].probability >= _LIKELY and row[0] != label]
+    sentence = f"use {label}, {family.name}: odds {number(100.0 * family.probability, 2)} %"
+    if not likely or entry.result.measured is None:
+        return f"{sentence}, no other has {100.0 * _LIKELY:g} %"
+    models = [row.result.model.without(Level.INSTRUMENT) for row in (entry, *(row[2] for row in likely))]
+    ends = np.array([entry.result.measured.frequency, entry.result.measured.strain])
+    ends[1] /= entry.result.model.unit_strain(_COMPOUND)  # as laboratories state strain
+    middle, reach = np.sqrt(ends.prod(axis=1)), []
+    for axis, (low, high) in enumerate(ends):
+        points = np.repeat(middle[:, None], _POINTS, axis=1)
+        values = points[axis] = np.geomspace(low / _BEYOND, high * _BEYOND, _POINTS)
+        moduli = np.abs([model.stiffness(_COMPOUND, *points) for model in models])
+        apart = values[moduli.max(axis=0) > (1.0 + _AGREED) * moduli.min(axis=0)]
+        below, above = apart[apart < middle[axis]], apart[apart > middle[axis]]
+        reach.append((below.max(initial=values[0]), above.min(initial=values[-1])))
+    frequencies, strains = format_range("Hz", *reach[0]), format_range("%", *(100.0 * end for end in reach[1]))
+    return (
+        f"{sentence}; {', '.join(row[0] for row in likely)}, of {100.0 * _LIKELY:g} % or more, have its modulus within "
+        f"{100.0 * _AGREED:g} % over {frequencies} and {strains} shear strain; beyond, these tests do not tell "
+        "which is right"
+    )
+
+
+def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
+    """One of the results as compare.json has it."""
+    result, bushing = entry.result, model_document(entry.result.model)["bushing"]
+    return {
+        "label": label,
+        "name": entry.name,
+        "source": entry.source,
+        "sha256": entry.sha256,
+        "bushing": bushing and _plain(BushingTable(**bushing)),
+        "effects": list(result.model.effects),
+        "reduced_chi_square": result.quality.reduced_chi_square if result.quality else None,
+        "nrmse": result.quality.nrmse if result.quality else None,
+        "measured": result.measured and _plain(result.measured),
+        "inputs": to_json_data(result.inputs, tuple[Source, ...]),
+    }
+
+
+def _pair_document(label: str, comparison: Comparison) -> Pair:
+    """Numbers of one result against the first as compare.json has them."""
+    return {
+        "reference": "A",
+        "other": label,
+        "shared_inputs": list(comparison.shared),
+        "joint": {"p": comparison.joint[0], "parameters": comparison.joint[1]} if comparison.joint else None,
+        "parameters": [_plain(row) for row in comparison.parameters],
+        "places": {
+            str(contrast.place): columns_of(contrast_table(comparison, contrast)) for contrast in comparison.contrasts
+        },
+    }
+
+
+def _family_document(label: str, family: FittedFamily) -> Family:
+    """Fit and held-out error of a family as compare.json has them."""
+    evidence, held_out = family.evidence, family.held
+    return {
+        "label": label,
+        "name": family.name,
+        "parameters": evidence.parameters,
+        "reduced_chi_square": evidence.reduced,
+        "bic": evidence.bic,
+        "heldout": held_out.after,
+        "first_there": held_out.before,
+        "gain": family.gain,
+        "p": family.p,
+        "probability": family.probability,
+        "parts": [{"part": part.part, "first": part.before, "heldout": part.after} for part in held_out.parts],
+        "skipped": [_plain(skipped) for skipped in held_out.skipped],
+        "words": family.words if label != "A" else "",
+    }

@@ -1,0 +1,128 @@
+"""diagnose: where model and tests disagree, and which effect is missing."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.commands.fit import FitOutput, fit, prepare_tests
+from bushfit.commands.loading import HasResult, as_result
+from bushfit.commands.provenance import campaign_document, option_words, result_document
+from bushfit.diagnosis import workflow
+from bushfit.diagnosis.document import DiagnosisFile
+from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.errors import FitError, quote_path
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import NEXT
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.planning.knowledge import look_alikes
+from bushfit.report import plots, tables
+from bushfit.report.page import report_page
+from bushfit.report.results import ResultFile, figure_file, json_file, page_file, table_file
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DiagnosisOutput:
+    """Results of a diagnosis.
+
+    Args:
+        name: name of the campaign.
+        data: the campaign, prepared for a fit.
+        diagnosis: the diagnosis.
+        document: content of diagnosis.json.
+        files: documents, tables, figure and page.
+    """
+
+    name: str
+    data: Data
+    diagnosis: Diagnosis
+    document: DiagnosisFile
+    files: Sequence[ResultFile]
+
+    def __repr__(self) -> str:
+        return f"{self.name}: {self.headline}\n  {self.diagnosis.summary}"
+
+    @property
+    def headline(self) -> str:
+        """Verdict, and the parameters that the tests leave unknown by 100 %."""
+        return "; ".join(filter(None, (self.diagnosis.verdict, self.result.left_open)))
+
+    @property
+    def result(self) -> Result:
+        """Model to use: the joint fit, or the model with the effects that were added."""
+        return self.diagnosis.result
+
+
+def diagnose(
+    campaign: Campaign | Data,
+    *,
+    model: Result | HasResult | None = None,
+    adopt: Sequence[str] = (),
+    without: Sequence[str] = (),
+    max_effects: int = Settings.max_effects,
+    tolerance: float = Settings.tolerance,
+    joint: FitOutput | None = None,
+) -> DiagnosisOutput:
+    """Find where model and tests disagree, name the missing effect, and add it to the model.
+
+    Args:
+        campaign: the campaign, or a campaign prepared by `prepare_tests`.
+        model: result, or output with a result, whose effects are the start; default the paper's three.
+        adopt: effects that are added, and mistakes that are corrected, whatever the evidence.
+        without: effects and mistakes that are not considered.
+        max_effects: largest number of effects that are added.
+        tolerance: gap below which model and tests agree, as a share of the stiffness magnitude.
+        joint: plain fit of the campaign, if it was made before.
+
+    Raises:
+        BushfitError: tests or settings that cannot support the diagnosis.
+    """
+    data, start = prepare_tests(campaign), as_result(model) if model else None
+    settings = Settings(max_effects, tolerance, tuple(adopt), tuple(without), start.unresolved if start else ())
+    _require_free_parameter(data, start.model if start else None, settings)
+    diagnosis = _with_plan(workflow.diagnose(data, start.model if start else None, settings), data.campaign)
+    if not (diagnosis.changed or start or adopt):  # the model to use is that of fit
+        plain = (joint or fit(data)).result
+        plain = replace(plain, warnings=tuple(line.removesuffix(NEXT) for line in plain.warnings))
+        diagnosis = replace(diagnosis, result=diagnosis.odds.averaged(plain))
+    numbers = {"max_effects": max_effects, "tolerance": tolerance}
+    changed = {key: f"{number:g}" for key, number in numbers.items() if number != getattr(Settings, key)}
+    options = option_words(model="MODEL.json" if start else None, adopt=adopt, without=without, **changed)
+    document = diagnosis.to_document()
+    origin = campaign_document(data, "diagnose", options)
+    files = [json_file("diagnosis", document), json_file("model", result_document(diagnosis.result, origin))]
+    files += diagnosis_files(diagnosis, document, data.campaign.name)
+    files.append(page_file("report", report_page, files))
+    return DiagnosisOutput(data.campaign.name, data, diagnosis, document, files)
+
+
+def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -> list[ResultFile]:
+    """Tables of the gap and of the candidates, and the figure of the gap."""
+    gap = table_file("gap", partial(tables.gap_table, diagnosis))
+    figure = figure_file("gap", lambda: plots.gap.gap_figure(gap.make(), diagnosis.result, document, title))
+    return [gap, figure, table_file("candidates", partial(tables.candidates_table, diagnosis))]
+
+
+def _require_free_parameter(data: Data, model: Model | None, settings: Settings) -> None:
+    """Raise a FitError if no parameter is free and no effect is to be added."""
+    model = model or Model.started(data.campaign.bushing, data.effects, {})
+    if not (settings.adopt or data.free(tuple(model.parameters))):
+        raise FitError(
+            "there is nothing to fit, and so nothing to diagnose",
+            file=data.campaign.path,
+            place="[fit]",
+            found="every parameter is held with vary = false",
+            hint="bushfit fit says how well the values given meet the tests; free one to diagnose",
+        )
+
+
+def _with_plan(diagnosis: Diagnosis, campaign: Campaign) -> Diagnosis:
+    """Diagnosis whose next test names the plan that separates its look-alikes, if there are any."""
+    path = campaign.path
+    if diagnosis.verdict != "ambiguous" or path.suffix != ".toml" or not (sets := look_alikes(diagnosis)):
+        return diagnosis
+    shown = Path(path.name) if path.is_absolute() else path  # results hold no path of a machine
+    command = f"bushfit plan {quote_path(shown)} --rivals {','.join(sets[0])}"
+    return replace(diagnosis, next_test=f"{diagnosis.next_test}; {command} chooses tests that tell them apart")

@@ -1,0 +1,115 @@
+"""export: a fitted model in the files of other programs."""
+
+import importlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.commands.loading import model_source
+from bushfit.commands.predict import PredictionOutput, arms_files, predict
+from bushfit.export.contract import Dialect, Exported, Order, UnitSystem
+from bushfit.model.arms import ACCURACY
+from bushfit.model.file import load_result
+from bushfit.progress import track
+from bushfit.report.results import ResultFile, raw_file
+
+#: Module below bushfit and function that write each format; imported when the format is asked for.
+FORMATS = {
+    "fmu": "export.fmu:export",
+    "nastran": "export.nastran:export",
+    "abaqus": "export.abaqus:export",
+    "adams": "export.adams:export",
+    "csv": "report.spreadsheets:csv",
+    "xlsx": "report.spreadsheets:xlsx",
+}
+
+
+class FormatEntry(TypedDict):
+    """One format."""
+
+    files: Annotated[list[str], Field(description="Names of its files.")]
+    left_out: Annotated[list[str], Field(description="Properties that it cannot hold, with the error that this makes.")]
+
+
+class ExportDocument(TypedDict):
+    """Content of `export --json`."""
+
+    formats: Annotated[dict[str, FormatEntry], Field(description="Formats by name.")]
+    warnings: Annotated[list[str], Field(description="Limits of the numbers.")]
+
+
+@dataclass(frozen=True, eq=False)
+class ExportOutput:
+    """Results of an export.
+
+    Args:
+        predicted: prediction over the exported grid.
+        exported: files and losses of each format, by name.
+        files: files of all formats, and table and figure of the Maxwell arms.
+    """
+
+    predicted: PredictionOutput
+    exported: Mapping[str, Exported]
+    files: Sequence[ResultFile]
+
+    @property
+    def document(self) -> ExportDocument:
+        """Content of `export --json`."""
+        formats: dict[str, FormatEntry] = {
+            name: {"files": list(exported.files), "left_out": list(exported.losses)}
+            for name, exported in self.exported.items()
+        }
+        return {"formats": formats, "warnings": self.predicted.warnings}
+
+
+def export(
+    model: Path,
+    formats: Sequence[str],
+    campaign: Campaign | None = None,
+    *,
+    accuracy: float = ACCURACY,
+    units: UnitSystem | None = None,
+    dialect: Dialect = "nastran",
+    decimal_comma: bool = False,
+    **grid: Any,
+) -> ExportOutput:
+    """Write a fitted model in the formats of other programs.
+
+    Args:
+        model: model file.
+        formats: names of formats: "fmu", "nastran", "abaqus", "adams", "csv", "xlsx".
+        campaign: campaign whose grid is the default.
+        accuracy: largest relative error of the modulus in an FMU.
+        units: units of length, mass, time and force; default those usual for each format.
+        dialect: dialect of the format nastran.
+        decimal_comma: whether CSV files have decimal commas.
+        grid: directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes and temperature, as of
+            `predict`; all directions share one list of frequencies.
+
+    Raises:
+        ModelError: a model that a format cannot hold, or a grid that it cannot have.
+    """
+    result = load_result(model)
+    predicted = predict(result, campaign, **grid)
+    frequencies = [np.unique(prediction.frequency) for prediction in predicted.predictions]
+    if not all(np.array_equal(axis, frequencies[0]) for axis in frequencies):
+        predicted = predict(result, campaign, **{**grid, "frequencies": np.unique(np.concatenate(frequencies))})
+    settings = (accuracy, units, dialect, decimal_comma, grid.get("temperature"))
+    today = datetime.now(UTC).date().isoformat()
+    order = Order(result, model_source(model), tuple(predicted.predictions), *settings, today)
+    exported: dict[str, Exported] = {}
+    for name in track("formats written", formats):
+        module, _, function = FORMATS[name].partition(":")
+        exported[name] = getattr(importlib.import_module(f"bushfit.{module}"), function)(order)
+    contents = {name: content for written in exported.values() for name, content in written.files.items()}
+    arms = tuple(part for written in exported.values() for part in written.arms)
+    places = [prediction.direction for prediction in predicted.predictions]
+    files = [raw_file(name, content) for name, content in contents.items()]
+    return ExportOutput(replace(predicted, arms=arms), exported, [*files, *arms_files(result, arms, places)])

@@ -1,0 +1,167 @@
+"""fit, fit-static and fit-dynamic: parameters from loops and sweeps."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import Any
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import Loss
+from bushfit.commands.loading import HasResult, as_result
+from bushfit.commands.provenance import campaign_document, option_words, result_document
+from bushfit.effects import with_base
+from bushfit.errors import FitError
+from bushfit.fitting import procedures
+from bushfit.fitting.data import Data
+from bushfit.fitting.master_curve import can_shift, master_curve
+from bushfit.model.result import Result
+from bushfit.report import plots, tables
+from bushfit.report.results import ResultFile, figure_file, json_file, table_file
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FitOutput:
+    """Results of a fit.
+
+    Args:
+        data: the campaign, prepared for the fit.
+        steps: title and result of each step; the last is the result of the fit.
+        document: content of the model file.
+        files: model file, tables and figures.
+    """
+
+    data: Data
+    steps: tuple[tuple[str, Result], ...]
+    document: Mapping[str, Any]
+    files: Sequence[ResultFile]
+
+    def __repr__(self) -> str:
+        return repr(self.result)
+
+    @property
+    def result(self) -> Result:
+        """Result of the last step."""
+        return self.steps[-1][1]
+
+
+def fit(
+    campaign: Campaign | Data,
+    *,
+    directions: Sequence[str] = (),
+    effects: Sequence[str] = (),
+    profile: bool = False,
+    loss: Loss | None = None,
+) -> FitOutput:
+    """Fit all parameters to the loops and sweeps of a campaign together: the fit to use.
+
+    Args:
+        campaign: the campaign, or a campaign prepared by `prepare_tests`.
+        directions: directions or specimens whose tests are fitted; default axial, and all specimens.
+        effects: effects added to the paper's three, such as "inertia".
+        profile: whether to add 95 % intervals by profile likelihood, which takes some seconds.
+        loss: "soft_l1" reduces the weight of distant points and leaves outliers out; default the campaign's.
+
+    Raises:
+        BushfitError: tests or settings that cannot support the fit.
+    """
+    data = prepare_tests(campaign, loss)
+    names = with_base(dict.fromkeys((*data.campaign.fit.effects, *effects)))
+    result = procedures.fit_joint(data, effects=names, directions=directions or None, profile=profile)
+    options = option_words(direction=directions, effect=effects, profile=profile)
+    document = result_document(result, campaign_document(data, "fit", options))
+    files = [json_file("model", document), *campaign_files(data, result)]
+    return FitOutput(data, (("joint fit", result),), document, files)
+
+
+def fit_static(
+    campaign: Campaign | Data, *, dynamic: Result | HasResult | None = None, loss: Loss | None = None
+) -> FitOutput:
+    """Fit mu, sigma_fmax and eps_half to the loops of a campaign.
+
+    Args:
+        campaign: the campaign, or a campaign prepared by `prepare_tests`.
+        dynamic: result whose m and alpha are kept fixed.
+        loss: "soft_l1" or "linear"; default the campaign's.
+    """
+    data = prepare_tests(campaign, loss)
+    result = procedures.fit_static(data, as_result(dynamic) if dynamic else None)
+    options = ("--dynamic", "DYNAMIC.json") if dynamic else ()
+    document = result_document(result, campaign_document(data, "fit-static", options))
+    files = [json_file("static", document), *campaign_files(data, result, ["loop"])]
+    return FitOutput(data, (("static fit of the loops", result),), document, files)
+
+
+def fit_dynamic(
+    campaign: Campaign | Data, *, static: Result | HasResult | None = None, loss: Loss | None = None
+) -> FitOutput:
+    """Fit m and alpha to the sweep of smallest amplitude of a campaign.
+
+    Args:
+        campaign: the campaign, or a campaign prepared by `prepare_tests`.
+        static: result whose mu, sigma_fmax and eps_half are kept fixed; default the values of the campaign, or a fit of
+            its loops.
+        loss: "soft_l1" or "linear"; default the campaign's.
+
+    Raises:
+        FitError: no result, no values in the campaign, and no loops.
+    """
+    data, steps = prepare_tests(campaign, loss), []
+    fixed = as_result(static) if static else procedures.given_static(data)
+    if fixed is None:
+        if not data.loops:
+            raise FitError(
+                "nothing says at which mu, sigma_fmax and eps_half to hold the fit",
+                file=data.campaign.path,
+                found="no --static, no [[loops]], and no values of all three in [fit]",
+                hint="give --static static.json, add a loop, or run bushfit fit for all five parameters together",
+            )
+        fixed = procedures.fit_static(data)
+        steps.append(("static fit of the loops, because no --static was given", fixed))
+    result = procedures.fit_dynamic(data, fixed)
+    options = ("--static", "STATIC.json") if static else ()
+    document = result_document(result, campaign_document(data, "fit-dynamic", options))
+    files = [json_file("dynamic", document), *campaign_files(data, result, ["sweep"])]
+    return FitOutput(data, (*steps, ("dynamic fit of the smallest sweep", result)), document, files)
+
+
+def prepare_tests(campaign: Campaign | Data, loss: Loss | None = None) -> Data:
+    """Campaign prepared for a fit: a data set with its noise for each test.
+
+    Args:
+        campaign: the campaign; one that is prepared already is returned as it is.
+        loss: "soft_l1" or "linear" in place of the campaign's.
+    """
+    if isinstance(campaign, Data):
+        return campaign
+    return Data.of(replace(campaign, fit=replace(campaign.fit, loss=loss)) if loss else campaign)
+
+
+def campaign_files(data: Data, result: Result, kinds: Collection[str] = ("loop", "sweep")) -> list[ResultFile]:
+    """Tables and figures of the tests beside the model; outliers that the fit left out have no weight.
+
+    Sweeps at several temperatures add a master curve, if the model has the effect of temperature.
+    """
+    marked, model = data.without(result.outliers), result.model
+    title = model.name if model.bushing else data.campaign.name
+    files = list[ResultFile]()
+    if "loop" in kinds and marked.loops:
+        loops = table_file("loops", lambda: tables.loops_table(model, marked.loops))
+        files += [loops, figure_file("loops", lambda: plots.fits.loops_figure(result, loops.make(), title))]
+    if "sweep" in kinds and marked.sweeps:
+        sweeps = table_file("sweeps", lambda: tables.sweeps_table(model, marked.sweeps))
+        files += [sweeps, figure_file("sweeps", lambda: plots.fits.sweeps_figure(result, sweeps.make(), title))]
+        if "temperature" in model.effects and any(map(can_shift, data.campaign.sweeps)):
+            files += temperature_files(data, result, title)
+    return files
+
+
+def temperature_files(data: Data, result: Result, title: str) -> list[ResultFile]:
+    """Master curve and shift factors of sweeps at several temperatures, each a table and a figure."""
+    sweeps, model = data.without(result.outliers).sweeps, result.model
+    shifted = cache(partial(master_curve, result, sweeps))
+    return [
+        table_file("master_curve", lambda: tables.master_curve_table(shifted())),
+        figure_file("master_curve", lambda: plots.master_curve.master_curve_figure(model, shifted(), title)),
+        table_file("shift_factors", lambda: tables.shift_factors_table(shifted())),
+        figure_file("shift_factors", lambda: plots.master_curve.shift_factors_figure(result, shifted(), title)),
+    ]

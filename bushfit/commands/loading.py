@@ -1,0 +1,70 @@
+"""Models and campaigns as a user names them: a model file, a results folder, or a campaign file."""
+
+from pathlib import Path
+from typing import Protocol
+
+from bushfit.campaign.campaign import TEST_FILES, Campaign, load_campaign
+from bushfit.errors import ModelError, quote_path
+from bushfit.model.file import load_result
+from bushfit.model.result import Result
+from bushfit.reading.files import sha256, view_bytes
+from bushfit.reading.measurement import Source
+
+
+class HasResult(Protocol):
+    """Output of a command with a result."""
+
+    @property
+    def result(self) -> Result:
+        """Model with its uncertainty."""
+
+
+def as_result(model: Result | HasResult) -> Result:
+    """Result that is given itself or as part of the output of a command."""
+    return model if isinstance(model, Result) else model.result
+
+
+def load_model(path: str | Path) -> Result:
+    """Load the fitted model of a model file or of a results folder, with its uncertainty.
+
+    Args:
+        path: a model file such as model.json, or a folder that holds a model.json.
+
+    Raises:
+        ModelError: no such file, or no model.
+    """
+    return load_result(model_file(Path(path)))
+
+
+def model_file(path: Path) -> Path:
+    """Model file that a path names: the file itself, or model.json of a results folder.
+
+    Raises:
+        ModelError: a campaign, a test file, or a folder without a model.
+    """
+    ending = path.suffix.lower()
+    if path.is_dir() and (path / "model.json").is_file():
+        return path / "model.json"
+    if path.is_dir() or (path.is_file() and ending in (".toml", *TEST_FILES)):
+        found = "a folder without model.json" if path.is_dir() else "a campaign" if ending == ".toml" else "a test file"
+        command = f"run {quote_path(path)}" if ending == ".toml" else f"init {quote_path(path)} ..., then bushfit run"
+        raise ModelError(
+            "a fitted model is needed",
+            file=path,
+            found=found,
+            expected="a .json file, as bushfit run, the fits and diagnose write it, or its folder",
+            hint=f"bushfit {command} makes one",
+        )
+    return path
+
+
+def load_source(path: Path) -> Campaign | Result:
+    """Load a campaign file, a model file, or the model of a results folder."""
+    if path.suffix.lower() == ".toml" and not path.is_dir():
+        return load_campaign(path)
+    return load_model(path)
+
+
+def model_source(path: Path) -> Source:
+    """Name and SHA-256 of a model file."""
+    return Source(Path(path.name), sha256(view_bytes(path, ModelError)).result())

@@ -1,0 +1,320 @@
+"""predict: stiffness and loss factor of a fitted model over frequency and amplitude."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import PredictSettings
+from bushfit.campaign.session import measured_session
+from bushfit.commands.loading import HasResult, as_result
+from bushfit.effects import Level
+from bushfit.effects.contract import Array, Circumstances
+from bushfit.effects.temperature import REFERENCE
+from bushfit.errors import ModelError
+from bushfit.fitting.agreement import met_within, misfits
+from bushfit.fitting.data_sets import SweepData, sweep_data
+from bushfit.geometry import Bushing, Direction, Place, Specimen, place_named
+from bushfit.model.arms import Arms, model_arms
+from bushfit.model.result import Misfit, Result, Usable, carried
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.grid import asked_or, default_grid, grid_settings
+from bushfit.prediction.stiffness import PredictedResonance, Prediction, predict_resonance
+from bushfit.prediction.stiffness import predict as predict_stiffness
+from bushfit.reading.measurement import SAME_TEMPERATURE, Loop, Sweep
+from bushfit.report import plots, tables
+from bushfit.report.results import ResultFile, figure_file, place_names, table_file
+from bushfit.units import CELSIUS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Frequencies, amplitudes or other numbers of a grid.
+Numbers = Sequence[float] | Array
+#: Content of `predict --json`: columns of each table by header, null in an empty cell; and warnings.
+PredictionDocument = dict[str, dict[str, list[float | None]] | list[str]]
+#: Directions that are predicted by default: those of the paper.
+_DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PredictionOutput:
+    """Prediction of a model.
+
+    Args:
+        result: the model with its uncertainty.
+        predictions: stiffness over the grid, of each direction or specimen.
+        measured: sweeps of the campaign that the model can predict.
+        notes: further warnings.
+        resonances: resonance of a mass at each direction or specimen, if a mass was given.
+        arms: Maxwell arms, if they were asked for.
+        files: tables and figures.
+    """
+
+    result: Result
+    predictions: Sequence[Prediction]
+    measured: Sequence[SweepData] = ()
+    notes: Sequence[str] = ()
+    resonances: Sequence[PredictedResonance] = ()
+    arms: Sequence[Arms] = ()
+    files: Sequence[ResultFile] = ()
+
+    def __repr__(self) -> str:
+        return f"Prediction of {self.result.name}: {', '.join(str(found.direction) for found in self.predictions)}"
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        """Content of `predict --json`."""
+        document: dict[str, Any] = {str(p.direction): columns_of(tables.prediction_table(p)) for p in self.predictions}
+        for resonance in self.resonances:
+            document[f"{resonance.place}_resonance"] = tables.shaken_table(resonance).to_dict(orient="list")
+        if self.arms:
+            document["arms"] = [_arms_document(part) for part in self.arms]
+        return {**document, "warnings": self.warnings}
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings of the model, of each prediction and of each resonance, without repetition."""
+        predicted = [prediction.warnings for prediction in self.predictions]
+        predicted += [resonance.warnings for resonance in self.resonances]
+        return warnings_of(self.result, predicted, self.notes)
+
+    @cached_property
+    def tests(self) -> tuple[Misfit, ...]:
+        """Misfit of each measured sweep."""
+        return misfits(self.result.model, *split_by_fit(self.result, self.measured))
+
+    @cached_property
+    def usable(self) -> tuple[Usable, ...]:
+        """Expected error of the prediction at each direction or specimen, from the measured sweeps."""
+        return met_within(self.result.model, *split_by_fit(self.result, self.measured))
+
+
+def predict(
+    model: Result | HasResult,
+    campaign: Campaign | None = None,
+    *,
+    directions: Sequence[str] | None = None,
+    frequencies: Numbers | None = None,
+    amplitudes: Numbers | None = None,
+    torsion_amplitudes: Numbers | None = None,
+    strain_amplitudes: Numbers | None = None,
+    temperature: float | None = None,
+    bushing: Bushing | None = None,
+    mass: float | None = None,
+    base_acceleration: float | None = None,
+    wide: bool = False,
+    arms: float | None = None,
+    notes: Sequence[str] = (),
+) -> PredictionOutput:
+    """Predict stiffness and loss factor over a grid, with 95 % bands.
+
+    Args:
+        model: result, or output with a result.
+        campaign: campaign whose sweeps are shown beside, and whose grid is the default.
+        directions: directions or specimens; default axial and radial, and all specimens.
+        frequencies: [Hz].
+        amplitudes: zero-to-peak displacements [m].
+        torsion_amplitudes: zero-to-peak rotations [rad].
+        strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
+        temperature: [K], if the model has the effect of temperature.
+        bushing: another bushing of the same compound.
+        mass: mass [kg] on the bushing, whose resonance is predicted.
+        base_acceleration: zero-to-peak acceleration of the base under the mass [m/s^2].
+        wide: whether to add tables with amplitudes across.
+        arms: largest relative error of Maxwell arms, which are added if it is given.
+        notes: further warnings.
+
+    Raises:
+        ModelError: a direction, frequency, amplitude or temperature that the model cannot have.
+    """
+    result = as_result(model)
+    if bushing:
+        result, note = carried(result, bushing)
+        notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
+    if temperature is not None and not result.model.knows_temperature:
+        raise ModelError(
+            "the model knows no temperature",
+            found=f"{temperature - CELSIUS:.4g} degC asked for",
+            expected="a model with the effect of temperature",
+            hint="fit tests at several temperatures with --effect temperature",
+        )
+    asked = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
+    settings, sweeps = grid_settings(asked, campaign), campaign.sweeps if campaign else ()
+    measured = _predictable_sweeps(result, campaign) if campaign else []
+    at_temperature = [sweep for sweep in measured if _is_at(result, sweep, temperature)]
+    places = _places(result, campaign, settings)
+    predictions = [
+        predict_stiffness(
+            result,
+            place,
+            *asked_or(default_grid(result, place, sweeps), settings, place),
+            sweeps=at_temperature if campaign else None,
+            temperature=temperature,
+        )
+        for place in places
+    ]
+    resonances = [
+        predict_resonance(result, place, mass, base_acceleration, settings.frequencies, temperature=temperature)
+        for place in places
+        if mass and base_acceleration
+    ]
+    output = PredictionOutput(
+        result,
+        predictions,
+        measured,
+        (*notes, *(f"{sweep.name}: {note}" for sweep in measured for note in sweep.notes)),
+        resonances,
+        _maxwell_arms(result, predictions, arms, temperature) if arms else (),
+    )
+    return replace(output, files=_files(output, at_temperature, wide=wide))
+
+
+def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
+    """Grid of a prediction, of which None is left to its default.
+
+    Args:
+        directions: directions or specimens by name.
+        axes: frequencies [Hz], amplitudes [m], torsion amplitudes [rad] and strain amplitudes.
+    """
+    frequencies, amplitudes, rotations, strains = (
+        None if axis is None else tuple(float(value) for value in axis) for axis in axes
+    )
+    places = None if directions is None else tuple(directions)
+    return PredictSettings(frequencies, amplitudes, rotations, places, strains)
+
+
+def _places(result: Result, campaign: Campaign | None, settings: PredictSettings) -> list[Place]:
+    """Directions and specimens to predict."""
+    specimens = {specimen.name: specimen for specimen in (*result.specimens, *(campaign.specimens if campaign else ()))}
+    if settings.directions:
+        return [place_named(name, specimens.values()) for name in settings.directions]
+    return [*(_DIRECTIONS if result.model.bushing or not specimens else ()), *specimens.values()]
+
+
+def _predictable_sweeps(result: Result, campaign: Campaign) -> list[SweepData]:
+    """Sweeps of a campaign in directions that the model knows, each with what it was measured under."""
+    tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
+    circumstances = measured_session(result.model.bushing, tests)[len(campaign.loops) :]
+    return [
+        replace(sweep, under=under)
+        for sweep, under in zip(sweep_data(campaign.sweeps), circumstances, strict=True)
+        if result.model.bushing or isinstance(sweep.direction, Specimen)
+    ]
+
+
+def _is_at(result: Result, sweep: SweepData, temperature: float | None) -> bool:
+    """Whether a sweep was made at the temperature of the prediction [K], as far as it is known."""
+    tested = sweep.circumstances.temperature
+    if tested is None or not result.model.knows_temperature:
+        return True
+    return bool(abs(np.mean(tested) - (temperature or REFERENCE)) <= SAME_TEMPERATURE)
+
+
+def split_by_fit(result: Result, sweeps: Sequence[SweepData]) -> tuple[list[SweepData], list[SweepData]]:
+    """Sweeps whose files the model was fitted to, and the other ones."""
+    digests = {source.sha256 for source in result.inputs}
+    fitted = [sweep for sweep in sweeps if sweep.source and sweep.source.sha256 in digests]
+    return fitted, [sweep for sweep in sweeps if sweep not in fitted]
+
+
+def _maxwell_arms(
+    result: Result, predictions: Sequence[Prediction], error: float, temperature: float | None
+) -> tuple[Arms, ...]:
+    """Maxwell arms within a relative error over the frequencies of all predictions."""
+    frequencies = [prediction.frequency for prediction in predictions]
+    band = float(min(map(min, frequencies))), float(max(map(max, frequencies)))
+    arms = model_arms(result.model.without(Level.INSTRUMENT), band, error, Circumstances(temperature))
+    if not arms:
+        raise ModelError(
+            "there is nothing that Maxwell arms could stand for",
+            place="--arms",
+            expected="a model whose stiffness depends on frequency, as by a springpot",
+        )
+    return arms
+
+
+def _files(output: PredictionOutput, at_temperature: Sequence[SweepData], *, wide: bool) -> list[ResultFile]:
+    """Tables and figures of a prediction; `at_temperature` are the sweeps that figures show."""
+    predictions = output.predictions
+    places = [prediction.direction for prediction in predictions]
+    names = place_names(places)
+    files = list[ResultFile]()
+    for name, prediction in zip(names, predictions, strict=True):
+        figure = partial(prediction_figure, output.result, prediction, at_temperature, output.notes)
+        files += [table_file(name, partial(tables.prediction_table, prediction)), figure_file(name, figure)]
+    if wide:
+        files += _suffixed_tables(names, "wide", tables.wide_table, predictions)
+    files += arms_files(output.result, output.arms, places)
+    files += _suffixed_tables(names, "resonance", tables.shaken_table, output.resonances)
+    return [*files, *measured_files(output.result, output.measured)]
+
+
+def prediction_figure(
+    result: Result, prediction: Prediction, sweeps: Sequence[SweepData], notes: Sequence[str]
+) -> Figure:
+    """Figure of a prediction with the measured sweeps."""
+    place = prediction.direction
+    measured = [sweep for sweep in sweeps if sweep.direction == place]
+    table = tables.sweeps_table(result.model, measured) if measured else None
+    title = result.name if isinstance(place, Direction) else str(place)
+    note = plots.style.first_sentences(warnings_of(result, [], (*prediction.warnings, *notes)))
+    return plots.prediction.prediction_figure(result, prediction, table, title, note)
+
+
+def _suffixed_tables(
+    names: Sequence[str], suffix: str, table: Callable[[Any], pd.DataFrame], results: Sequence[Any]
+) -> list[ResultFile]:
+    """Further tables of directions, such as axial_wide, under names that no specimen has."""
+    files = []
+    for name, result in zip(names, results, strict=False):
+        stem = f"{name}_{suffix}"
+        while stem in names:
+            stem += "_"
+        files.append(table_file(stem, partial(table, result)))
+    return files
+
+
+def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) -> list[ResultFile]:
+    """Table of Maxwell arms, and figure of their modulus and its error; nothing without arms."""
+    if not arms:
+        return []
+    return [
+        table_file("arms", lambda: tables.arms_table(result.model, arms, places)),
+        figure_file("arms", lambda: plots.master_curve.arms_figure(result.model, arms, result.name)),
+    ]
+
+
+def measured_files(result: Result, sweeps: Sequence[SweepData]) -> list[ResultFile]:
+    """Table of the measured sweeps beside the model; nothing without sweeps."""
+
+    def table() -> pd.DataFrame:
+        fitted, others = split_by_fit(result, sweeps)
+        shown = tables.sweeps_table(result.model, [*fitted, *others])
+        counts = [sum(sweep.frequency.size for sweep in part) for part in (fitted, others)]
+        shown["fitted"] = np.repeat(["yes", "no"], counts)
+        return shown
+
+    return [table_file("measured", table)] if sweeps else []
+
+
+def _arms_document(arms: Arms) -> dict[str, Any]:
+    """Maxwell arms as `predict --json` prints them."""
+    return {
+        "in_place_of": arms.stands_for,
+        "shear_modulus_Pa": arms.modulus.tolist(),
+        "relaxation_time_s": arms.time.tolist(),
+        "band_Hz": arms.band,
+        "largest_relative_error": arms.error,
+    }
+
+
+def columns_of(table: pd.DataFrame) -> dict[str, list[Any]]:
+    """Columns of a table by header, None in an empty cell."""
+    return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}

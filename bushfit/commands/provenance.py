@@ -1,0 +1,91 @@
+"""Origin of a result: the campaign, its tests and the command, as result files state them; and files that were read."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.errors import quote_path
+from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import DataSet, SweepData
+from bushfit.model.file import to_document
+from bushfit.model.result import Result
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.grid import measured_levels
+from bushfit.reading.measurement import Loop, Sweep
+
+
+def result_document(result: Result, campaign: Mapping[str, Any]) -> dict[str, Any]:
+    """Content of a model file: the result, all its warnings, and the campaign that it comes from."""
+    return {**to_document(result), "warnings": warnings_of(result), "campaign": campaign}
+
+
+def campaign_document(data: Data, command: str, options: Iterable[str] = ()) -> dict[str, Any]:
+    """Campaign as result files state it, with its tests and the command that gives the same numbers.
+
+    Args:
+        data: the campaign, prepared for a fit.
+        command: name of the command.
+        options: words of the options that change the numbers.
+    """
+    campaign = data.campaign
+    loss = () if campaign.fit.loss == "linear" else ("--loss", campaign.fit.loss)
+    return {
+        "name": campaign.name,
+        "file": campaign.path.name,
+        "sha256": campaign.sha256,
+        "command": command_line(command, campaign.path.name, *options, *loss),
+        "tests": [_test_document(data_set) for data_set in data.data_sets],
+        "report": campaign.report.lines,
+        "logo": campaign.logo,
+    }
+
+
+def command_line(command: str, *words: str) -> str:
+    """Command of bushfit as it is typed into a terminal."""
+    return " ".join(["bushfit", command, *(quote_path(Path(word)) for word in words)])
+
+
+def option_words(**options: str | bool | Iterable[str] | None) -> list[str]:
+    """Words of options on a command line.
+
+    Args:
+        options: value of each option by its key: a text, several texts, or whether a flag is set; None leaves it out.
+    """
+    words = list[str]()
+    for key, value in options.items():
+        name = "--" + key.replace("_", "-")
+        if isinstance(value, bool | None):
+            words += [name] if value else []
+        else:
+            words += [word for text in ([value] if isinstance(value, str) else value) for word in (name, text)]
+    return words
+
+
+def input_files(campaign: Campaign) -> list[Path]:
+    """Files that were read for a campaign: its own, its tests and its logo."""
+    folder, logo = campaign.path.parent, campaign.report.logo
+    tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
+    files = [test.source.file for test in tests if test.source]
+    return [campaign.path, *(folder / file for file in files), *([folder / logo] if logo else [])]
+
+
+def _test_document(data_set: DataSet) -> dict[str, Any]:
+    """Test as result files state it: direction or specimen, range [SI], file, and stated conditions."""
+    source, sweep = data_set.test.source, data_set.sweep if isinstance(data_set, SweepData) else None
+    return {
+        "test": data_set.name,
+        "kind": data_set.kind,
+        "place": str(data_set.direction),
+        "stepped": sweep and sweep.stepped,
+        "frequency_Hz": [float(data_set.frequency.min()), float(data_set.frequency.max())],
+        "amplitude": [float(data_set.amplitude.min()), float(data_set.amplitude.max())],
+        "frequencies_Hz": measured_levels([sweep], "frequency").tolist() if sweep else [],
+        "amplitudes": measured_levels([sweep], "amplitude").tolist() if sweep else [],
+        "unit": data_set.direction.motion.displacement_unit,
+        "repeats": int(sweep.repeat.max()) if sweep else 1,
+        "rows": data_set.size // data_set.parts,
+        "file": source and str(source.file),
+        "sha256": source and source.sha256,
+        "conditions": dict(source.conditions) if source else {},
+    }

@@ -1,0 +1,92 @@
+"""Tables, figures, parameters and files of the output of a command."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from bushfit.commands.loading import HasResult, as_result
+from bushfit.commands.provenance import input_files
+from bushfit.errors import BushfitError, did_you_mean
+from bushfit.report.results import Formats, Kind, ResultFile, write_results
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from bushfit.model.result import Result
+
+
+class CommandOutput(Protocol):
+    """Output of a command."""
+
+    @property
+    def files(self) -> Sequence[ResultFile]:
+        """Result files."""
+
+
+def table(output: CommandOutput, name: str) -> pd.DataFrame:
+    """Table of an output by the name of its file: "axial" of a prediction, "sweeps" of a fit."""
+    return _content(output, name, "table")
+
+
+def picture(output: CommandOutput, name: str) -> Figure:
+    """Figure of an output by the name of its file, as a figure of matplotlib."""
+    return _content(output, name, "figure")
+
+
+def parameters(model: Result | HasResult) -> pd.DataFrame:
+    """Parameters of a result, or of an output with a result, in SI.
+
+    Returns:
+        Table with a row for each parameter: value, std error, ends of the 95 % interval, unit, and whether it was
+        fitted.
+    """
+    from bushfit.report.spreadsheets import parameters_table
+
+    ends = {"95 %, low": "low", "95 %, high": "high"}
+    rows = parameters_table(as_result(model)).set_index("parameter").rename_axis(None)
+    rows = rows.rename(columns=ends)
+    rows["fitted"] = rows["fitted"] == "yes"
+    columns = ["value", "std error", "low", "high"]
+    return rows[[*columns, "unit", "fitted"]].astype(dict.fromkeys(columns, float))
+
+
+def save(
+    output: CommandOutput,
+    folder: str | Path,
+    *,
+    tables: bool = True,
+    pictures: bool = True,
+    force: bool = False,
+) -> Path:
+    """Write an output into a folder, as the command would.
+
+    Args:
+        output: output of a command.
+        folder: results folder.
+        tables: whether to write tables.
+        pictures: whether to write figures.
+        force: whether to replace files of an earlier result.
+
+    Returns:
+        The folder.
+
+    Raises:
+        OutputError: the folder cannot be written, or holds a file that must not be replaced.
+    """
+    data = getattr(output, "data", None)
+    inputs = input_files(data.campaign) if data else []
+    write_results(Path(folder), output.files, Formats(tables, pictures), overwrite=force, inputs=inputs)
+    return Path(folder)
+
+
+def _content(output: CommandOutput, name: str, kind: Kind) -> Any:
+    """Content of a result file."""
+    known = {file.name: file for file in output.files if file.kind == kind}
+    if name not in known:
+        word = {"figure": "picture"}.get(kind, kind)
+        expected = "one of " + ", ".join(known) if known else f"an outcome with a {word}"
+        raise BushfitError(f"there is no such {word}", found=name, expected=expected, hint=did_you_mean(name, known))
+    return known[name].make()

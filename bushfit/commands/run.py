@@ -1,0 +1,127 @@
+"""run: every fit, the diagnosis, and the prediction of the model to use."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Required
+
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import Loss
+from bushfit.commands.diagnose import DiagnosisOutput, diagnose, diagnosis_files
+from bushfit.commands.fit import FitOutput, campaign_files, fit, fit_static, prepare_tests
+from bushfit.commands.predict import PredictionOutput, predict
+from bushfit.commands.provenance import campaign_document, result_document
+from bushfit.diagnosis.document import DiagnosisFile
+from bushfit.errors import FitError
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import TwoStep, fit_two_step
+from bushfit.model.document import ModelFile
+from bushfit.model.model import FIVE
+from bushfit.model.result import Result
+from bushfit.report.page import report_page
+from bushfit.report.results import ResultFile, json_file, page_file
+
+
+class RunDocument(TypedDict, total=False):
+    """Documents of the whole chain, as `bushfit run --json` prints them."""
+
+    static: Annotated[ModelFile, Field(description="Fit of the loops, if there are loops.")]
+    dynamic: Annotated[ModelFile, Field(description="Two-step procedure, if there are loops and sweeps.")]
+    joint: Annotated[ModelFile, Field(description="Joint fit, if the model to use is another one.")]
+    model: Required[
+        Annotated[ModelFile, Field(description="Model to use: the joint fit, or the model with the effects added.")]
+    ]
+    diagnosis: Annotated[DiagnosisFile, Field(description="Diagnosis, if a parameter is free.")]
+    warnings: Annotated[list[str], Field(description="Limits of the model to use and of its prediction.")]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RunOutput:
+    """Results of the whole chain.
+
+    Args:
+        data: the campaign, prepared for the fits.
+        static: fit of the loops, the first of the paper's two steps; None without loops.
+        two_step: the paper's procedure; None if it was left out.
+        reason_left_out: reason why the two-step procedure was left out.
+        joint: fit of all parameters together.
+        diagnosed: the diagnosis; None if no parameter is free.
+        predicted: prediction of the model to use.
+        document: all documents, as `--json` prints them.
+        files: documents, tables, figures and page.
+    """
+
+    data: Data
+    static: FitOutput | None
+    two_step: TwoStep | None
+    reason_left_out: str
+    joint: FitOutput
+    diagnosed: DiagnosisOutput | None
+    predicted: PredictionOutput
+    document: Mapping[str, Any]
+    files: Sequence[ResultFile]
+
+    def __repr__(self) -> str:
+        return "\n".join(repr(output) for output in (self.diagnosed, self.result) if output)
+
+    @property
+    def result(self) -> Result:
+        """Model to use: the joint fit, or the model with the effects that were added."""
+        return self.predicted.result
+
+    @property
+    def added(self) -> bool:
+        """Whether the diagnosis added an effect to the model to use."""
+        return bool(self.diagnosed and self.diagnosed.diagnosis.added)
+
+
+def run(campaign: Campaign | Data, *, loss: Loss | None = None) -> RunOutput:
+    """Fit a campaign in every way, diagnose it, and predict from the model to use.
+
+    Args:
+        campaign: the campaign, or a campaign prepared by `prepare_tests`.
+        loss: "soft_l1" or "linear"; default the campaign's.
+    """
+    data = prepare_tests(campaign, loss)
+    static = fit_static(data) if data.loops else None
+    two_step, reason = _two_step(data)
+    joint = fit(data)
+    diagnosed = diagnose(data, joint=joint) if joint.result.fitted else None
+    notes = diagnosed.diagnosis.notes if diagnosed else ()
+    predicted = predict((diagnosed or joint).result, data.campaign, notes=notes)
+    added = bool(diagnosed and diagnosed.diagnosis.added)
+    results = {
+        "static": static and static.result,
+        "dynamic": two_step and two_step.result,
+        "joint": joint.result if added else None,
+        "model": predicted.result,
+    }
+    origin = campaign_document(data, "run")
+    documents: dict[str, Mapping[str, Any]] = {
+        name: result_document(result, origin if name == "model" else {**origin, "logo": None})
+        for name, result in results.items()
+        if result
+    }
+    if diagnosed:
+        documents["diagnosis"] = diagnosed.document
+    files = [json_file(name, document) for name, document in documents.items()]
+    files += campaign_files(data, predicted.result)
+    files += diagnosis_files(diagnosed.diagnosis, diagnosed.document, data.campaign.name) if diagnosed else []
+    files += [file for file in predicted.files if file.name != "measured"]
+    files.append(page_file("report", report_page, files))
+    document = {**documents, "warnings": predicted.warnings}
+    return RunOutput(data, static, two_step, reason, joint, diagnosed, predicted, document, files)
+
+
+def _two_step(data: Data) -> tuple[TwoStep | None, str]:
+    """The paper's procedure, or the reason why it is left out."""
+    if not (data.loops and data.sweeps):
+        return None, f"no {'sweeps' if data.loops else 'loops'}"
+    if not data.free(FIVE):
+        return None, "every parameter is held"
+    try:
+        return fit_two_step(data), ""
+    except FitError as error:
+        return None, error.problem

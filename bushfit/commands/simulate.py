@@ -1,0 +1,87 @@
+"""simulate: a model on the virtual rig, as a campaign of raw tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from bushfit.campaign.campaign import Campaign, load_campaign, model_of
+from bushfit.campaign.schema import SimulateSettings
+from bushfit.commands.loading import HasResult, as_result
+from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.model.file import to_document
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.reading.tablefile import Form
+from bushfit.report.results import ResultFile, raw_file, write_results
+from bushfit.simulation.files import to_files
+from bushfit.simulation.measured import Simulated
+from bushfit.simulation.measured import simulate as simulate_tests
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationOutput:
+    """Results of a simulation.
+
+    Args:
+        simulated: the simulated tests and the model behind them.
+        files: campaign file, tables, and truth.json.
+        warnings: what the simulation leaves out.
+    """
+
+    simulated: Simulated
+    files: Sequence[ResultFile]
+    warnings: Sequence[str] = ()
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        """Content of `simulate --json`."""
+        return {"truth": to_document(self.simulated.result), "files": sorted(file.name for file in self.files)}
+
+
+def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "csv") -> SimulationOutput:
+    """Simulate the tests of a campaign.
+
+    Args:
+        truth: the model; its correction without a name is left out, since it has no law in time.
+        settings: tests, noise and errors of the rig.
+        form: format of the tables.
+    """
+    warnings = []
+    if truth.unnamed:
+        warnings.append("what has no name is a correction of steady states, without a law in time: it is left out here")
+        truth = truth.without(UNNAMED)
+    simulated = simulate_tests(truth, settings)
+    contents = to_files(simulated, form)
+    files = [raw_file(name, content) for name, content in contents.items()]
+    return SimulationOutput(simulated, files, warnings)
+
+
+def simulate(
+    source: Model | Result | HasResult | Campaign, folder: str | Path, *, force: bool = False, **settings: Any
+) -> Campaign:
+    """Put a model on the virtual rig, write the campaign of its simulated tests, and load it.
+
+    Args:
+        source: model, result or output with a result, which is tested as the paper's bushing was; or a campaign with a
+            [simulate] table.
+        folder: folder for campaign.toml, the test files, and the model behind them in truth.json.
+        force: whether to replace files of an earlier simulation.
+        settings: further keys of [simulate], such as noise = 0.005, repeats = 3 or seed = 1.
+
+    Raises:
+        BushfitError: no model, or files that would be replaced.
+    """
+    if isinstance(source, Campaign):
+        truth, tests = model_of(source), source.simulate or SimulateSettings()
+    else:
+        truth, tests = (
+            source if isinstance(source, Model) else as_result(source).model,
+            SimulateSettings(),
+        )
+    output = simulate_campaign(truth, replace(tests, **settings))
+    inputs = [source.path] if isinstance(source, Campaign) else []
+    write_results(Path(folder), output.files, overwrite=force, inputs=inputs)
+    return load_campaign(Path(folder) / "campaign.toml")

@@ -1,0 +1,306 @@
+"""Result files: their content, the formats they are written in, and the folder they go to.
+
+A results folder is a plain folder. Each file is written under a temporary name beside its predecessor and then moved
+over it, so that a command that is killed leaves each file old or new, never torn. Nothing else in the folder is
+touched. bushfit replaces a file only if the record `.bushfit.sha256` of the folder lists its present content.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import re
+import uuid
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from bushfit.errors import CONTROL, OutputError
+from bushfit.progress import track
+from bushfit.reading.tablefile import Form, ending, folder_name, to_bytes
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from bushfit.geometry import Place
+
+#: JSON documents by name.
+Documents = Mapping[str, Mapping[str, Any]]
+#: Tables by name.
+Tables = Mapping[str, "pd.DataFrame"]
+#: Formats of a picture.
+Picture = Literal["png", "svg", "pdf"]
+#: Kinds of result file in the order in which they are written: numbers first, so that a failing picture loses none.
+Kind = Literal["json", "raw", "table", "page", "figure"]
+_KINDS: tuple[Kind, ...] = ("json", "raw", "table", "page", "figure")
+#: Record of the files that bushfit wrote into a folder: lines of SHA-256 and name, as of the program sha256sum.
+_RECORD = ".bushfit.sha256"
+#: Control characters that a JSON document must not hold; the ends of its lines are allowed.
+_STEERING = re.compile(rf"(?!\n){CONTROL.pattern}")
+
+
+@dataclass(frozen=True)
+class ResultFile:
+    """One file of a result.
+
+    Args:
+        name: name of the file without its ending; of a raw file with it.
+        kind: "json", "table", "figure", "page" (HTML) or "raw".
+        make: function without arguments that makes the content: a mapping, a pandas table, a matplotlib figure, a text,
+            or bytes.
+    """
+
+    name: str
+    kind: Kind
+    make: Callable[[], Any]
+
+
+def json_file(name: str, document: Mapping[str, Any]) -> ResultFile:
+    """JSON file with a document."""
+    return ResultFile(name, "json", lambda: document)
+
+
+def table_file(name: str, make: Callable[[], pd.DataFrame]) -> ResultFile:
+    """Table, made once however often it is asked for."""
+    return ResultFile(name, "table", cache(make))
+
+
+def figure_file(name: str, make: Callable[[], Figure]) -> ResultFile:
+    """Figure."""
+    return ResultFile(name, "figure", make)
+
+
+def raw_file(name: str, content: bytes) -> ResultFile:
+    """File whose name has its ending and whose content is given."""
+    return ResultFile(name, "raw", lambda: content)
+
+
+def page_file(name: str, page: Callable[[Documents, Tables], str], files: Sequence[ResultFile]) -> ResultFile:
+    """HTML page of the documents and tables among other result files."""
+
+    def make() -> str:
+        documents, tables = (
+            {file.name: file.make() for file in files if file.kind == kind} for kind in _KINDS[::2][:2]
+        )
+        return page(documents, tables)
+
+    return ResultFile(name, "page", make)
+
+
+def place_names(places: Iterable[Place]) -> list[str]:
+    """File names, without an ending, of the results of directions and specimens; safe on every system, and unique."""
+    names: list[str] = []
+    for place in places:
+        name = folder_name(str(place))
+        names.append(name if name not in names else f"{name}_{len(names) + 1}")
+    return names
+
+
+@dataclass(frozen=True)
+class Formats:
+    """Formats of result files, and the kinds to leave out.
+
+    Args:
+        tables, pictures, pages: whether files of the kind are written.
+        table_form: "csv", "decimal-comma" (CSV for German Excel) or "xlsx".
+        picture_forms: one or more of "png", "svg" and "pdf".
+    """
+
+    tables: bool = True
+    pictures: bool = True
+    pages: bool = True
+    table_form: Form = "csv"
+    picture_forms: tuple[Picture, ...] = ("png",)
+
+    def table(self, name: str) -> str:
+        """Name of the file of a table."""
+        return f"{name}.{ending(self.table_form)}"
+
+    def names(self, file: ResultFile) -> list[str]:
+        """Names of the files that a result file becomes: none if its kind is left out, one for each picture format."""
+        pictures = [f"{file.name}.{form}" for form in self.picture_forms] if self.pictures else []
+        return {
+            "json": [f"{file.name}.json"],
+            "raw": [file.name],
+            "table": [self.table(file.name)] if self.tables else [],
+            "page": [f"{file.name}.html"] if self.pages else [],
+            "figure": pictures,
+        }[file.kind]
+
+    def encode(self, file: ResultFile) -> dict[str, bytes]:
+        """Bytes of the files that a result file becomes, by their names.
+
+        Raises:
+            OutputError: a table that is too large for its format.
+        """
+        names = self.names(file)
+        if not names:
+            return {}
+        content = file.make()
+        if file.kind == "figure":
+            from bushfit.report import plots
+
+            return {f"{file.name}.{form}": plots.style.to_image(content, form) for form in self.picture_forms}
+        encoders: Mapping[Kind, Callable[[Any], bytes]] = {
+            "json": to_json,
+            "raw": bytes,
+            "table": lambda table: to_bytes(file.name, table, self.table_form),
+            "page": str.encode,
+        }
+        return {names[0]: encoders[file.kind](content)}
+
+
+def encode_all(files: Iterable[ResultFile], formats: Formats) -> dict[str, bytes]:
+    """Bytes of all files of a result, by their names."""
+    return {name: content for file in files for name, content in formats.encode(file).items()}
+
+
+def to_json(document: Mapping[str, Any]) -> bytes:
+    """Bytes of a JSON file, in which no character steers a terminal."""
+    text = json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False)
+    return (_STEERING.sub(lambda sign: f"\\u{ord(sign[0]):04x}", text) + "\n").encode()
+
+
+def write_results(
+    folder: Path,
+    files: Iterable[ResultFile],
+    formats: Formats | None = None,
+    *,
+    overwrite: bool = False,
+    inputs: Iterable[Path] = (),
+) -> list[str]:
+    """Write the files of a result into a folder.
+
+    Numbers are written first and figures last: if a figure fails, all else has been saved.
+
+    Args:
+        folder: results folder, made if it does not exist.
+        files: files of the result.
+        formats: formats to write, and kinds to leave out.
+        overwrite: whether to replace files of an earlier result.
+        inputs: files that the run has read; none of them is replaced.
+
+    Returns:
+        Names of the files written, in their order.
+
+    Raises:
+        OutputError: the folder cannot be written, or holds a file that must not be replaced.
+    """
+    formats = formats or Formats()
+    ordered = sorted(files, key=lambda file: _KINDS.index(file.kind))
+    names = [name for file in ordered for name in formats.names(file)]
+    check_free(folder, names, overwrite=overwrite, inputs=inputs)
+    made = track("files made", (formats.encode(file) for file in ordered), len(ordered))
+    for contents in made:
+        write_files(folder, contents)
+    return names
+
+
+def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write files into a folder, each under a temporary name that is then moved over the file of an earlier result.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in contents.items():
+            part = folder / f".{uuid.uuid4().hex}.part"
+            try:
+                with part.open("xb") as stream:
+                    stream.write(content)
+                    stream.flush()
+                    os.fsync(stream.fileno())
+                with (folder / _RECORD).open("ab") as record:  # before the move: a killed command leaves no stranger
+                    record.write(f"{hashlib.sha256(content).hexdigest()}  {name}\n".encode())
+                part.replace(folder / name)
+            finally:
+                part.unlink(missing_ok=True)
+    except OSError as error:
+        raise unwritable(folder, error) from error
+
+
+def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
+    """Check that files of these names may be written into a folder; nothing is written.
+
+    Args:
+        folder: results folder, which need not exist.
+        names: names of the files.
+        overwrite: whether files of an earlier result may be replaced.
+        inputs: files that the run reads.
+
+    Raises:
+        OutputError: the folder is a file or allows no writing; or a name is that of a folder, of an input, of a file
+            that bushfit did not write, or, unless `overwrite`, of an earlier result.
+    """
+    elsewhere = "name another folder with -o/--output"
+    try:
+        nearest = next(path for path in (folder.absolute(), *folder.absolute().parents) if os.path.lexists(path))
+        if not nearest.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(nearest))
+        if not os.access(nearest, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, "no right to write there", str(nearest))
+        existing = [name for name in names if os.path.lexists(folder / name)]
+        for name in existing:
+            if (folder / name).is_dir():
+                raise OutputError(
+                    "a folder stands where a file goes", file=folder / name, hint=f"move it away, or {elsewhere}"
+                )
+            if any(_is_same(folder / name, file) for file in inputs):
+                raise OutputError("a result would replace an input of this run", file=folder / name, hint=elsewhere)
+        known = _recorded(folder) if existing else set()
+        foreign = [name for name in existing if not _is_recorded(folder / name, known)]
+    except OSError as error:
+        raise unwritable(folder, error) from error
+    if foreign:
+        raise OutputError(
+            "a result would replace a file that is not as bushfit wrote it",
+            file=folder,
+            found=", ".join(foreign),
+            hint=f"move it away, or {elsewhere}",
+        )
+    if existing and not overwrite:
+        raise OutputError(
+            "results stand there already",
+            file=folder,
+            found=", ".join(existing),
+            hint="--force replaces them; -o/--output names another folder",
+        )
+
+
+def _is_same(file: Path, other: Path) -> bool:
+    """Whether two paths lead to one file, if both exist."""
+    with suppress(OSError):
+        return file.samefile(other)
+    return False
+
+
+def _recorded(folder: Path) -> set[tuple[str, str]]:
+    """SHA-256 and name of each file that bushfit wrote into a folder."""
+    with suppress(FileNotFoundError):
+        lines = (folder / _RECORD).read_text(encoding="utf-8", errors="replace").splitlines()
+        return {(digest, name) for digest, _, name in (line.partition("  ") for line in lines)}
+    return set()
+
+
+def _is_recorded(file: Path, known: set[tuple[str, str]]) -> bool:
+    """Whether a file is, byte for byte, one that bushfit wrote."""
+    return (
+        file.is_file() and not file.is_symlink() and (hashlib.sha256(file.read_bytes()).hexdigest(), file.name) in known
+    )
+
+
+def unwritable(folder: Path, error: OSError) -> OutputError:
+    """Error for a folder that cannot be written."""
+    return OutputError(
+        "the results cannot be written",
+        file=folder,
+        found=error.strerror or str(error),
+        hint="free some space or rights there, or name another folder with -o/--output",
+    )
