@@ -153,7 +153,7 @@ class Output:
         document: Mapping[str, Any] | None = None,
         inputs: Iterable[Path] = (),
     ) -> None:
-        """Write result files, print the document if --json is given, and print the names of the files.
+        """Write result files, then print the document if --json is given, and the names of the files.
 
         Args:
             folder: results folder.
@@ -161,12 +161,9 @@ class Output:
             document: content of --json.
             inputs: files that the command has read, none of which is replaced.
         """
-        files = list(files)
-        names = [name for file in files for name in self.formats.names(file)]
-        check_free(folder, names, overwrite=self.force, inputs=inputs)
+        written = write_results(folder, files, self.formats, overwrite=self.force, inputs=inputs)
         if document is not None:
             self.print_json(document)
-        written = write_results(folder, files, self.formats, overwrite=self.force, inputs=inputs)
         self.print(f"wrote {', '.join(written)} to {folder}")
 
 

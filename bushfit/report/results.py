@@ -223,6 +223,8 @@ def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
             finally:
                 part.unlink(missing_ok=True)
     except OSError as error:
+        with suppress(OSError):  # a folder that holds nothing yet
+            folder.rmdir()
         raise unwritable(folder, error) from error
 
 
@@ -241,6 +243,8 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
     """
     elsewhere = "name another folder with -o/--output"
     try:
+        if folder.exists() and not folder.is_dir():
+            raise OutputError("the output is not a folder", file=folder, hint="name another -o/--output")
         nearest = next(path for path in (folder.absolute(), *folder.absolute().parents) if os.path.lexists(path))
         if not nearest.is_dir():
             raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(nearest))

@@ -86,7 +86,6 @@ USAGE = [
     ("fit|loop.csv|sweep.csv", "loop.csv: a campaign is needed", "found: test files", "try: bushfit init loop.csv sweep.csv --inner-radius"),
     ("fit|campaign.toml|more.toml", "Got unexpected extra argument (more.toml). bushfit batch takes several campaigns."),
     ("batch|loop.csv|sweep.csv", "loop.csv: this is no campaign", "try: bushfit init FILE... makes a campaign of test files"),
-    ("predict|.", ".: a fitted model is needed", "found: a folder", "try: name the file: model.json"),
     ("predict|model.json|--direction|torsional", "no such direction or specimen", "found: torsional", 'did you mean "torsion"?'),
     ("fit|campaign.toml|--effect|sleeve", "unknown effect", 'did you mean "sleeve_compliance"?'),
     ("predict|..", "..: a fitted model is needed", "try: bushfit init .. ..., then bushfit run makes one"),

@@ -63,14 +63,37 @@ def test_json_alone_on_standard_output_and_quiet_is_quiet(
     ids=lambda value: value[0] if isinstance(value, tuple) else "",
 )
 def test_results_are_not_replaced_unasked(bushfit: Run, tmp_path: Path, arguments: tuple[str, ...], file: str) -> None:
+    """Nor ever a file that bushfit did not write, which --force does not change."""
     (tmp_path / file).write_text("mine")
+    for more in ((), ("--force",)):
+        refused = bushfit(*arguments, "-o", tmp_path, *more, status=2)
+        assert f"found: {file}" in refused.stderr
+        assert "move it away" in refused.stderr
+        assert names(tmp_path) == {file}
+        assert (tmp_path / file).read_text() == "mine"
+    (tmp_path / file).unlink()
+    bushfit(*arguments, "-o", tmp_path)
     refused = bushfit(*arguments, "-o", tmp_path, status=2)
-    assert f"{file}" in refused.stderr
     assert "--force" in refused.stderr
-    assert names(tmp_path) == {file}
-    assert (tmp_path / file).read_text() == "mine"
     bushfit(*arguments, "-o", tmp_path, "--force")
-    assert (tmp_path / file).read_bytes() != b"mine"
+
+
+def test_an_input_of_the_run_is_not_replaced(own: Path, typed: Run) -> None:
+    """Measurements named as results are; a model that is where the new one goes; a campaign that is simulated."""
+    for test in ("loop_axial_1", "sweep_axial"):
+        (own / f"data/cmp_15961/{test}.csv").rename(own / f"{test.partition('_')[0]}s.csv")
+    text = (own / CAMPAIGN).read_text(encoding="utf-8")
+    for test in ("loop_axial_1", "sweep_axial"):
+        text = text.replace(f"../data/cmp_15961/{test}.csv", f"{test.partition('_')[0]}s.csv")
+    (own / "campaign.toml").write_text(text.replace("../data", "data"), encoding="utf-8")
+    before = {file.name: file.read_bytes() for file in own.glob("*.*")}
+    for command in (("fit", "campaign.toml"), ("simulate", "campaign.toml")):
+        refused = typed(*command, "-o", ".", "--force", "--no-plots", status=2)
+        assert "an input of this run" in refused.stderr or "nothing says what to simulate" in refused.stderr
+    typed("fit", "campaign.toml", "-o", "x", "--no-plots")
+    refused = typed("diagnose", "campaign.toml", "--model", "x/model.json", "-o", "x", "--force", status=2)
+    assert "x/model.json: a result would replace an input of this run" in refused.stderr
+    assert {file.name: file.read_bytes() for file in own.glob("*.*")} == before
 
 
 def test_a_missed_limit_is_status_1_and_results_go_to_a_folder_of_the_campaign(
@@ -220,17 +243,16 @@ def test_a_full_device(arguments: tuple[str, ...], folder: Path) -> None:
         done = subprocess.run([*BUSHFIT, *arguments], stdout=full, stderr=subprocess.PIPE, check=False)
     assert_one_line(done.returncode, done.stderr)
     assert b"standard output cannot be written: No space left on device" in done.stderr
-    assert not list(folder.glob("x/*.*")), "the rows of a batch alone are kept, for --resume"
 
 
 def test_a_pipe_that_nobody_reads(folder: Path) -> None:
-    """Nothing is written where the result cannot be printed; what people are told besides is not needed."""
+    """The result is written before it is printed; what people are told besides is not needed."""
     read, write = os.pipe()
     os.close(read)
     done = subprocess.run([*BUSHFIT, *PREDICT], stdout=write, stderr=subprocess.PIPE, check=False)
     assert_one_line(done.returncode, done.stderr)
-    assert not (folder / "x").exists()
-    done = subprocess.run([*BUSHFIT, *PREDICT[:-2]], stdout=subprocess.PIPE, stderr=write, check=False)
+    assert (folder / "x" / "axial.csv").exists()
+    done = subprocess.run([*BUSHFIT, *PREDICT[:-2], "--force"], stdout=subprocess.PIPE, stderr=write, check=False)
     assert done.returncode == 0
     assert (folder / "x" / "axial.csv").exists()
     missed = subprocess.run([*BUSHFIT, "predict", "lost.json"], stdout=subprocess.PIPE, stderr=write, check=False)

@@ -18,7 +18,6 @@ from shell import refused
 from spoiled import CAMPAIGN, FILES, ROWS, Spoiled
 
 from bushfit.cli import cli
-from bushfit.report import folder as results
 
 ERROR = re.compile(r"^(bushfit: error: |Error: )", re.MULTILINE)
 
@@ -61,10 +60,10 @@ def test_one_error_and_nothing_written(row: Spoiled, folder: Path) -> None:
 
 @pytest.mark.parametrize("command", ["predict", "simulate"])
 def test_a_disk_that_fills_up_after_the_work(command: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(files: list[int]) -> None:
+    def full(_: int) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(results, "flush", full)
+    monkeypatch.setattr("os.fsync", full)
     row = Spoiled(
         command, (command, "model.json", "--json", "-q"), ("x: the results cannot be written", "free some space")
     )
