@@ -15,7 +15,17 @@ def _share(p: Values, omega: Array | float) -> Value:
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K at the amplitude X (1 - c (f/155 Hz)^2) [N/m].
+    """Complex stiffness with a rig that falls short of the amplitude at high frequency.
+
+    Args:
+        p: values of c [1].
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N/m or N m/rad].
+
+    Notes:
+        K at the amplitude X (1 - c (f/155 Hz)^2).
 
     >>> reached = stiffness({"c": 0.05}, lambda omega, amplitude: amplitude, 2.0 * np.pi * 155.0, 1e-3, sweep)
     >>> float(reached)
@@ -25,6 +35,17 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F of the true motion, scaled as the rig's stiffness is: by the motion asked for over the true one [N]."""
+    """Force with a rig that falls short of the amplitude at high frequency.
+
+    Args:
+        p: values of c [1].
+        below, history, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
+
+    Notes:
+        F of the true motion, scaled as the rig's stiffness is: by the motion asked for over the true one.
+    """
     share = _share(p, history.omega)
     return below(history.with_value(history.value * share)) / share

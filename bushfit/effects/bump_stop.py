@@ -5,7 +5,17 @@ from bushfit.effects.dead_zone import dead_zone, first_harmonic
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K + k N(gap/X) [N/m], N of `dead_zone.first_harmonic`; exactly K up to the gap, and in torsion.
+    """Complex stiffness with a stop on both sides beyond a gap.
+
+    Args:
+        p: values of gap [m], stiffness [N/m].
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N/m or N m/rad].
+
+    Notes:
+        K + k N(gap/X) [N/m], N of `dead_zone.first_harmonic`; exactly K up to the gap, and in torsion.
 
     >>> stiffness({"gap": 1e-3, "stiffness": 1e6}, spring, 1.0, np.array([1e-3, 2e-3, 1.0]), sweep).round()
     array([ 500000.,  891002., 1498727.])
@@ -14,5 +24,16 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F + k (x - gap) above the gap, k (x + gap) below -gap [N]."""
+    """Force with a stop on both sides beyond a gap.
+
+    Args:
+        p: values of gap [m], stiffness [N/m].
+        below, history, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
+
+    Notes:
+        F + k (x - gap) above the gap, k (x + gap) below -gap.
+    """
     return below(history) + p["stiffness"] * dead_zone(history.value, p["gap"])

@@ -13,9 +13,18 @@ FIRST = 2.0 / SAMPLES * np.exp(-2j * np.pi * np.arange(SAMPLES) / SAMPLES)
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K(omega, X - delta) N(delta/X) + what friction makes of the bent waveform [N/m]; 0 within the play.
+    """Complex stiffness with play between the bushing and its drive.
+
+    Args:
+        p: values of delta [m].
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N/m or N m/rad].
 
     Notes:
+        K(omega, X - delta) N(delta/X) + what friction makes of the bent waveform; 0 within the play.
+
         The bushing is moved by what a sine reaches beyond the play, a motion of first harmonic X N (N of
         `dead_zone.first_harmonic`) and peak X - delta. The first term is exact where the bushing is linear. Friction
         answers to the path, not to its first harmonic (0.5 to 3 % of K at delta/X = 0.2). The second term is that
@@ -38,7 +47,17 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """The force of the bushing moved by what exceeds +-delta [N].
+    """Force with play between the bushing and its drive.
+
+    Args:
+        p: values of delta [m].
+        below, history, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
+
+    Notes:
+        The force of the bushing moved by what exceeds +-delta.
 
     >>> motion = History.steady(np.array([0.2, 1.0, -1.0]), 1.0)
     >>> force({"delta": 0.25}, lambda history: 2.0 * history.value, motion, loop)

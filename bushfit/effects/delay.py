@@ -6,7 +6,17 @@ from bushfit.effects.contract import Array, ForceBelow, History, Setting, Stiffn
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K exp(-i omega tau) [N/m].
+    """Complex stiffness with a delay between force and displacement.
+
+    Args:
+        p: values of tau [s].
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N/m or N m/rad].
+
+    Notes:
+        K exp(-i omega tau).
 
     >>> float(np.angle(stiffness({"tau": 1e-4}, spring, 1000.0, 1e-4, sweep)).round(6))
     -0.1
@@ -15,9 +25,19 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F(t - tau) [N]: every harmonic turned in a steady cycle, straight lines between samples from rest.
+    """Force with a delay between force and displacement.
 
-    What an early force (tau < 0) does after the last sample is taken from the same phase of the last cycle.
+    Args:
+        p: values of tau [s].
+        below, history, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
+
+    Notes:
+        F(t - tau): every harmonic turned in a steady cycle, straight lines between samples from rest.
+
+        What an early force (tau < 0) does after the last sample is taken from the same phase of the last cycle.
     """
     undelayed = below(history)
     if history.periodic:

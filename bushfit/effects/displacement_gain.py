@@ -8,7 +8,17 @@ from bushfit.effects.contract import Array, ForceBelow, History, Setting, Stiffn
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """scale K(scale X) [N/m]: the force of the true motion, over the motion that was read.
+    """Complex stiffness with a wrong gain of the displacement transducer.
+
+    Args:
+        p: values of scale [1].
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N/m or N m/rad].
+
+    Notes:
+        scale K(scale X): the force of the true motion, over the motion that was read.
 
     >>> stiffness({"scale": 1.02}, spring, 1.0, 1e-4, sweep)
     510000.0
@@ -17,5 +27,16 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F of scale times the motion that was read [N]."""
+    """Force with a wrong gain of the displacement transducer.
+
+    Args:
+        p: values of scale [1].
+        below, history, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
+
+    Notes:
+        F of scale times the motion that was read.
+    """
     return below(history.with_value(p["scale"] * history.value))

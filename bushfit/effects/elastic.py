@@ -6,7 +6,17 @@ from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = mu [Pa], whatever the frequency and the amplitude.
+    """Complex modulus of the elastic branch.
+
+    Args:
+        p: values of mu [Pa].
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        mu^ = mu [Pa], whatever the frequency and the amplitude.
 
     >>> float(modulus({"mu": 1.09e6}, 100.0, 0.01))
     1090000.0
@@ -15,15 +25,48 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
-    """d/dmu = 1."""
+    """Derivatives of the complex modulus of the elastic branch by its parameters.
+
+    Args:
+        p: values of mu [Pa].
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        Array (..., n) by parameter.
+
+    Notes:
+        d/dmu = 1.
+    """
     return {"mu": np.ones(1)}
 
 
 def stress(p: Values, history: History) -> Array:
-    """s_e = 2 mu e (Eq. 1) [Pa]."""
+    """Stress of the elastic branch.
+
+    Args:
+        p: values of mu [Pa].
+        history: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        s_e = 2 mu e (Eq. 1).
+    """
     return 2.0 * p["mu"] * history.value
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
-    """d/dmu = 2 e."""
+    """Derivatives of the stress of the elastic branch by its parameters.
+
+    Args:
+        p: values of mu [Pa].
+        history: see `contract.Branch`.
+
+    Returns:
+        Array (..., n) by parameter.
+
+    Notes:
+        d/dmu = 2 e.
+    """
     return {"mu": 2.0 * history.value}

@@ -6,7 +6,17 @@ from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = 5/8 c5 mu e0^4 [Pa]: the first harmonic of cos^5 is 5/8.
+    """Complex modulus of the fifth-power elastic term.
+
+    Args:
+        p: values of c5 [1]; and mu.
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        mu^ = 5/8 c5 mu e0^4: the first harmonic of cos^5 is 5/8.
 
     >>> round(modulus({"mu": 1e6, "c5": 2000.0}, 100.0, 0.1))
     125000
@@ -15,5 +25,16 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """s = 2 mu c5 e^5 [Pa]."""
+    """Stress of the fifth-power elastic term.
+
+    Args:
+        p: values of c5 [1]; and mu.
+        history: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        s = 2 mu c5 e^5.
+    """
     return 2.0 * p["mu"] * p["c5"] * np.square(np.square(history.value)) * history.value

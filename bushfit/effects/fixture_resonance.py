@@ -19,14 +19,35 @@ def fixture(p: Values, omega: Array) -> Array:
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K - M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr) [N/m]; does not act in torsion."""
+    """Complex stiffness with a resonant fixture between bushing and load cell.
+
+    Args:
+        p: values of mass [kg], frequency [Hz], damping [1].
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N/m or N m/rad].
+
+    Notes:
+        K - M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr); does not act in torsion.
+    """
     return below(omega, amplitude) + fixture(p, omega)
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F + the fixture's force y: y'' + 2 zeta wr y' + wr^2 y = wr^2 M x'' [N].
+    """Force with a resonant fixture between bushing and load cell.
 
-    From rest the mode rings for 1/(2 pi zeta frequency) seconds before it has fallen to 37 %.
+    Args:
+        p: values of mass [kg], frequency [Hz], damping [1].
+        below, history, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
+
+    Notes:
+        F + the fixture's force y: y'' + 2 zeta wr y' + wr^2 y = wr^2 M x''.
+
+        From rest the mode rings for 1/(2 pi zeta frequency) seconds before it has fallen to 37 %.
     """
     if history.periodic:
         return below(history) + history.response(partial(fixture, p))

@@ -14,9 +14,18 @@ _NEAR = 0.5
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K - share (K N(level/(|K| X)) + what the bent waveform of the force makes of it) [N/m].
+    """Complex stiffness with a saturating force channel.
+
+    Args:
+        p: values of level [N], share [1].
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N/m or N m/rad].
 
     Notes:
+        K - share (K N(level/(|K| X)) + what the bent waveform of the force makes of it).
+
         The first term is exact for a force that is a sine (N of `dead_zone.first_harmonic`). The second is the first
         harmonic of what one steady cycle of the force has beyond the level, less the first term from as many samples.
     """
@@ -41,7 +50,17 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F, less a share of what of it lies beyond +-level [N]; the torque cell is another one, so not in torsion.
+    """Force with a saturating force channel.
+
+    Args:
+        p: values of level [N], share [1].
+        below, history, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
+
+    Notes:
+        F, less a share of what of it lies beyond +-level; the torque cell is another one, so not in torsion.
 
     >>> motion = History.steady(np.array([1.0, -3.0]), 1.0)
     >>> force({"level": 2.0, "share": 1.0}, lambda history: history.value, motion, sweep)

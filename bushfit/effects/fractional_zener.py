@@ -18,7 +18,17 @@ def _scaled(p: Values) -> Array:
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """What the spring takes off the springpot: -m/2 w z/(1 + z), w = (i omega)^alpha, z = tau^alpha w [Pa].
+    """Complex modulus of the spring in series with the springpot.
+
+    Args:
+        p: values of c [1]; and m, alpha.
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        What the spring takes off the springpot: -m/2 w z/(1 + z), w = (i omega)^alpha, z = tau^alpha w.
 
     >>> modulus({"m": 2.0, "alpha": 0.5, "c": 1.0}, 2.0 * np.pi * np.array([1.0, 25.0]), 0.01).round(1)
     array([-0.1-0.4j, -2.6-6.3j])
@@ -52,7 +62,18 @@ def _kernel(alpha: Array, scaled: Array, count: int, step: Array) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """s + tau^alpha D^alpha s = m D^alpha e, less the springpot's own m D^alpha e (Eqs. 1, 3) [Pa]."""
+    """Stress of the spring in series with the springpot.
+
+    Args:
+        p: values of c [1]; and m, alpha.
+        history: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        s + tau^alpha D^alpha s = m D^alpha e, less the springpot's own m D^alpha e (Eqs. 1, 3).
+    """
     if history.periodic:
         return linear_stress(modulus, p, history)
     count = history.value.shape[-1]

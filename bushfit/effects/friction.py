@@ -107,7 +107,17 @@ def mean_stress_decay(x: Array) -> Array:
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """(A + iB)/(2 e0) of the steady loop of strain amplitude e0 [Pa].
+    """Complex modulus of the friction branch.
+
+    Args:
+        p: values of sigma_fmax [Pa], eps_half [1].
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        (A + iB)/(2 e0) of the steady loop of strain amplitude e0.
 
     >>> modulus({"sigma_fmax": 2e4, "eps_half": 0.01}, 1.0, np.array([0.0, 0.01])).round()
     array([1000000.     +0.j,  394736.+151040.j])
@@ -116,7 +126,18 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
-    """d/dsigma_fmax = h/eps_half and d/deps_half = -sigma_fmax/eps_half^2 (h + x h')."""
+    """Derivatives of the complex modulus of the friction branch by its parameters.
+
+    Args:
+        p: values of sigma_fmax [Pa], eps_half [1].
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        Array (..., n) by parameter.
+
+    Notes:
+        d/dsigma_fmax = h/eps_half and d/deps_half = -sigma_fmax/eps_half^2 (h + x h').
+    """
     x = strain / p["eps_half"]
     shape = harmonic_shape(x)
     return {
@@ -194,7 +215,17 @@ def _at_samples(eps_half: Array, history: History) -> tuple[Array, Array, Array,
 
 
 def stress(p: Values, history: History) -> Array:
-    """s_f along the history (Eq. 5): from (0, 0) at rest, or on the steady loop [Pa].
+    """Stress of the friction branch.
+
+    Args:
+        p: values of sigma_fmax [Pa], eps_half [1].
+        history: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        s_f along the history (Eq. 5): from (0, 0) at rest, or on the steady loop.
 
     >>> stress({"sigma_fmax": 2e4, "eps_half": 0.01}, History(np.array([0.01, 0.0, 0.01]), 1.0, False, 1.0)).round()
     array([10000., -2000.,  8476.])
@@ -204,7 +235,18 @@ def stress(p: Values, history: History) -> Array:
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
-    """d/dsigma_fmax = u and d/deps_half = sigma_fmax du/deps_half."""
+    """Derivatives of the stress of the friction branch by its parameters.
+
+    Args:
+        p: values of sigma_fmax [Pa], eps_half [1].
+        history: see `contract.Branch`.
+
+    Returns:
+        Array (..., n) by parameter.
+
+    Notes:
+        d/dsigma_fmax = u and d/deps_half = sigma_fmax du/deps_half.
+    """
     start, slope, sense, distance = _at_samples(p["eps_half"], history)
     u, *room_and_reach = _stroke(history.turning.at_samples(start), sense, distance)
     by_start, by_distance = _stroke_slopes(sense, distance, *room_and_reach)

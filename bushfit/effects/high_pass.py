@@ -19,7 +19,17 @@ def _leak(p: Values, omega: Array) -> Value:
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K i omega T/(1 + i omega T) of a sweep [N/m].
+    """Complex stiffness with a leaking charge amplifier.
+
+    Args:
+        p: values of corner [Hz].
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N/m or N m/rad].
+
+    Notes:
+        K i omega T/(1 + i omega T) of a sweep.
 
     >>> round(abs(stiffness({"corner": 1.0}, spring, 2.0 * np.pi, 1e-4, sweep)))
     353553
@@ -28,7 +38,18 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """y of T dy/dt + y = T dF/dt [N]: exact in every harmonic of a steady cycle, for straight lines from rest."""
+    """Force with a leaking charge amplifier.
+
+    Args:
+        p: values of corner [Hz].
+        below, history, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
+
+    Notes:
+        y of T dy/dt + y = T dF/dt: exact in every harmonic of a steady cycle, for straight lines from rest.
+    """
     felt = below(history)
     if setting.kind != "sweep":
         return felt

@@ -6,7 +6,17 @@ from bushfit.effects.contract import Array, Values, harmonic_stress
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = i eta mu [Pa].
+    """Complex modulus of the constant-loss branch.
+
+    Args:
+        p: values of eta [1]; and mu.
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        mu^ = i eta mu.
 
     >>> modulus({"mu": 1e6, "eta": 0.02}, 100.0, 0.01)
     20000j

@@ -12,7 +12,17 @@ def _force(p: Values, setting: Setting) -> Value:
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K + i 4 Fc/(pi X) [N/m].
+    """Complex stiffness with dry friction at the sleeve.
+
+    Args:
+        p: values of force [N].
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N/m or N m/rad].
+
+    Notes:
+        K + i 4 Fc/(pi X).
 
     >>> stiffness({"force": np.pi}, spring, 1.0, np.array([1e-4, 1e-3]), sweep).round()
     array([500000.+40000.j, 500000. +4000.j])
@@ -22,5 +32,16 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F + Fc sgn(dx/dt) [N]."""
+    """Force with dry friction at the sleeve.
+
+    Args:
+        p: values of force [N].
+        below, history, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
+
+    Notes:
+        F + Fc sgn(dx/dt).
+    """
     return below(history) + _force(p, setting) * history.sense

@@ -8,7 +8,17 @@ from bushfit.effects.contract import Array, Values, harmonic_stress
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """delta (1 + 2 i r x^n)/(1 + x^2n), x = e0/e_c [Pa].
+    """Complex modulus of the Kraus branch.
+
+    Args:
+        p: values of delta [Pa], r [1], e_c [1], n [1].
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        delta (1 + 2 i r x^n)/(1 + x^2n), x = e0/e_c.
 
     >>> modulus({"delta": 5e5, "r": 0.2, "e_c": 0.01, "n": 0.6}, 1.0, np.array([1e-4, 0.01, 1.0])).round(-3)
     array([498000. +13000.j, 250000.+100000.j,   2000. +13000.j])

@@ -6,7 +6,17 @@ from bushfit.effects.contract import Array, History, Value, Values, linear_stres
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = mu1 i omega tau / (1 + i omega tau) [Pa].
+    """Complex modulus of a Maxwell arm.
+
+    Args:
+        p: values of mu1 [Pa], tau [s].
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        mu^ = mu1 i omega tau / (1 + i omega tau).
 
     >>> complex(modulus({"mu1": 5e4, "tau": 0.01}, 100.0, 0.01))
     (25000+25000j)
@@ -34,7 +44,18 @@ def relax(rate: Value, values: Array, step: Value) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """s + tau ds/dt = 2 mu1 tau de/dt [Pa]."""
+    """Stress of a Maxwell arm.
+
+    Args:
+        p: values of mu1 [Pa], tau [s].
+        history: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        s + tau ds/dt = 2 mu1 tau de/dt.
+    """
     if history.periodic:
         return linear_stress(modulus, p, history)
     return 2.0 * p["mu1"] * relax(1.0 / p["tau"], history.value, history.step)

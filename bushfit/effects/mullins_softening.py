@@ -6,14 +6,35 @@ from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = 0 [Pa]: nothing is left of it in the steady state."""
+    """Complex modulus of the stiffening of the first cycles.
+
+    Args:
+        p: values of share [1], cycles [1]; and mu.
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        mu^ = 0: nothing is left of it in the steady state.
+    """
     return np.zeros(1)
 
 
 def stress(p: Values, history: History) -> Array:
-    """s = 2 mu share exp(-N/cycles) e [Pa], N = f t the cycles since the record began.
+    """Stress of the stiffening of the first cycles.
 
-    A single steady cycle has forgotten its beginning, and gets none.
+    Args:
+        p: values of share [1], cycles [1]; and mu.
+        history: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        s = 2 mu share exp(-N/cycles) e [Pa], N = f t the cycles since the record began.
+
+        A single steady cycle has forgotten its beginning, and gets none.
 
     >>> strain = History.steady(np.full(4, 0.01), 1.0, cycles=2)
     >>> stress({"mu": 1e6, "share": 0.05, "cycles": 1.0}, strain).round()

@@ -20,9 +20,18 @@ _REMEMBERED = 3
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K/(1 + c K) [N/m] with K at the amplitude X e^v that reaches the bushing; does not act in torsion.
+    """Complex stiffness with a compliance in series.
+
+    Args:
+        p: values of compliance [m/N].
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N/m or N m/rad].
 
     Notes:
+        K/(1 + c K) [N/m] with K at the amplitude X e^v that reaches the bushing; does not act in torsion.
+
         v + ln|1 + c K(X e^v)| = 0, by secants. Near the solution the last secant also gives K there, unasked.
 
     >>> spring = lambda omega, amplitude: np.full(1, 1e6 + 0j)
@@ -54,16 +63,25 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """Force F [N] of the motion x - c F that reaches the bushing.
+    """Force with a compliance in series.
+
+    Args:
+        p: values of compliance [m/N].
+        below, history, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
 
     Notes:
+        Force F [N] of the motion x - c F that reaches the bushing.
+
         Solved for the whole history at once. Each round asks what answers the motion x - c F, and adds what that force
         is more than F, times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse: a poor K costs rounds,
-        not accuracy. So K and F of the last model that was asked about this motion are where the next one starts.
-        What gives way beneath starts each round from its solution of the round before.
-        Friction below that turns sharply would make it many rounds: so those before tell the next. Where a round does
-        not bring F nearer, the next steps are halved, and doubled again where one does. Dry friction below turns its
-        sense with the imposed motion: that it sticks for a moment is neglected.
+        not accuracy. So K and F of the last model that was asked about this motion are where the next one starts. What
+        gives way beneath starts each round from its solution of the round before. Friction below that turns sharply
+        would make it many rounds: so those before tell the next. Where a round does not bring F nearer, the next steps
+        are halved, and doubled again where one does. Dry friction below turns its sense with the imposed motion: that
+        it sticks for a moment is neglected.
     """
     compliance = p["compliance"]
     if not np.any(compliance):

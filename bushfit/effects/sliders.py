@@ -24,12 +24,21 @@ def _ends(p: Values) -> tuple[Array, Array]:
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """(A + iB)/(2 e0) [Pa] of the steady loop of strain amplitude e0.
+    """Complex modulus of the springs with sliders.
+
+    Args:
+        p: values of sigma [Pa], e_s [1], spread [1].
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
 
     Notes:
-        A slider that slips, r = e_y/e0 < 1 and cos t = 1 - 2r, gives A = s (t - sin(2t)/2)/(pi r) and
-        B = 4 s (1 - r)/pi; one that does not gives A = s/r. Of these over e_y the integrals over ln e_y are
-        (4 (t + sin t) - (t - sin(2t)/2)/r + 4i (ln r - r))/(pi e0) and -1/e_y.
+        (A + iB)/(2 e0) [Pa] of the steady loop of strain amplitude e0.
+
+        A slider that slips, r = e_y/e0 < 1 and cos t = 1 - 2r, gives A = s (t - sin(2t)/2)/(pi r) and B = 4 s (1 -
+        r)/pi; one that does not gives A = s/r. Of these over e_y the integrals over ln e_y are (4 (t + sin t) - (t -
+        sin(2t)/2)/r + 4i (ln r - r))/(pi e0) and -1/e_y.
 
     >>> modulus({"sigma": 2e4, "e_s": 0.01, "spread": 1.0}, 1.0, np.array([1e-3, 0.01, 0.1])).round(-3)
     array([1175000.     +0.j,  826000.+234000.j,   54000.+112000.j])
@@ -55,9 +64,18 @@ def _loaded(strain: Array, low: Value, high: Value) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Sum of the sliders' stresses, elastic up to their slip strain and constant beyond, from rest or steady [Pa].
+    """Stress of the springs with sliders.
+
+    Args:
+        p: values of sigma [Pa], e_s [1], spread [1].
+        history: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
 
     Notes:
+        Sum of the sliders' stresses, elastic up to their slip strain and constant beyond, from rest or steady.
+
         On a steady motion to and fro each branch of the loop is the first loading at twice its size (G. Masing, Proc.
         2nd Int. Congr. Appl. Mech., 1926). Along any other motion some sliders stand for all, each followed by itself.
     """

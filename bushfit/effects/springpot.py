@@ -15,7 +15,17 @@ def power_of_rate(alpha: Array, omega: Array) -> Array:
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = m/2 (i omega)^alpha [Pa].
+    """Complex modulus of the springpot.
+
+    Args:
+        p: values of m [Pa*s^alpha], alpha [1].
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        mu^ = m/2 (i omega)^alpha.
 
     >>> abs(modulus({"m": 2e5, "alpha": 0.24}, np.array([1.0, 2.0 * np.pi * 100.0]), 0.01)).round()
     array([100000., 469422.])
@@ -24,7 +34,18 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
-    """d/dm = (i omega)^alpha / 2 and d/dalpha = m/2 (i omega)^alpha ln(i omega)."""
+    """Derivatives of the complex modulus of the springpot by its parameters.
+
+    Args:
+        p: values of m [Pa*s^alpha], alpha [1].
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        Array (..., n) by parameter.
+
+    Notes:
+        d/dm = (i omega)^alpha / 2 and d/dalpha = m/2 (i omega)^alpha ln(i omega).
+    """
     by_m = modulus({"m": 1.0, "alpha": p["alpha"]}, omega, strain)
     safe = np.where(omega > 0.0, omega, 1.0)
     return {"m": by_m, "alpha": p["m"] * by_m * (np.log(safe) + 0.5j * np.pi)}
@@ -55,14 +76,36 @@ def fractional_derivative(alpha: Value, values: Array, step: float) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """s_v = m D^alpha e (Eqs. 1, 3) [Pa]."""
+    """Stress of the springpot.
+
+    Args:
+        p: values of m [Pa*s^alpha], alpha [1].
+        history: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        s_v = m D^alpha e (Eqs. 1, 3).
+    """
     if history.periodic:
         return linear_stress(modulus, p, history)
     return p["m"] * fractional_derivative(p["alpha"], history.value, history.step)
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
-    """By m and by alpha: harmonic by harmonic on a steady cycle, by differences of the order from rest."""
+    """Derivatives of the stress of the springpot by its parameters.
+
+    Args:
+        p: values of m [Pa*s^alpha], alpha [1].
+        history: see `contract.Branch`.
+
+    Returns:
+        Array (..., n) by parameter.
+
+    Notes:
+        By m and by alpha: harmonic by harmonic on a steady cycle, by differences of the order from rest.
+    """
     if not history.periodic:
         alpha, step = p["alpha"], history.step
         ahead, behind = (fractional_derivative(alpha + h, history.value, step) for h in (_ORDER_STEP, -_ORDER_STEP))

@@ -4,7 +4,17 @@ from bushfit.effects.contract import Array, ForceBelow, History, Setting, Stiffn
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K at the amplitude scale X [N/m].
+    """Complex stiffness with another strain than that of the formula.
+
+    Args:
+        p: values of scale [1].
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N/m or N m/rad].
+
+    Notes:
+        K at the amplitude scale X.
 
     >>> stiffness({"scale": 2.0}, lambda omega, amplitude: amplitude, 1.0, 1e-4, sweep)  # the amplitude counted
     0.0002
@@ -13,5 +23,16 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F of scale times the motion, over scale [N]: the stiffness is as it was, at another strain."""
+    """Force with another strain than that of the formula.
+
+    Args:
+        p: values of scale [1].
+        below, history, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
+
+    Notes:
+        F of scale times the motion, over scale: the stiffness is as it was, at another strain.
+    """
     return below(history.with_value(p["scale"] * history.value)) / p["scale"]

@@ -6,7 +6,17 @@ from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = 3/4 c3 mu e0^2 [Pa]: the first harmonic of cos^3 is 3/4.
+    """Complex modulus of the cubic elastic term.
+
+    Args:
+        p: values of c3 [1]; and mu.
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        mu^ = 3/4 c3 mu e0^2: the first harmonic of cos^3 is 3/4.
 
     >>> round(modulus({"mu": 1e6, "c3": 20.0}, 100.0, 0.1))
     150000
@@ -15,5 +25,16 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """s = 2 mu c3 e^3 [Pa]."""
+    """Stress of the cubic elastic term.
+
+    Args:
+        p: values of c3 [1]; and mu.
+        history: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        s = 2 mu c3 e^3.
+    """
     return 2.0 * p["mu"] * p["c3"] * np.square(history.value) * history.value  # a general power takes 20 times as long

@@ -6,7 +6,17 @@ from bushfit.effects.contract import Array, History, Values, linear_stress
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """mu^ = i omega eta [Pa].
+    """Complex modulus of the dashpot.
+
+    Args:
+        p: values of eta [Pa*s].
+        omega, strain: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        mu^ = i omega eta.
 
     >>> complex(modulus({"eta": 100.0}, 10.0, 0.01))
     1000j
@@ -15,5 +25,16 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """s = 2 eta de/dt [Pa]; exact in every harmonic of a steady cycle, central differences from rest."""
+    """Stress of the dashpot.
+
+    Args:
+        p: values of eta [Pa*s].
+        history: see `contract.Branch`.
+
+    Returns:
+        (..., n) [Pa].
+
+    Notes:
+        s = 2 eta de/dt; exact in every harmonic of a steady cycle, central differences from rest.
+    """
     return linear_stress(modulus, p, history) if history.periodic else 2.0 * p["eta"] * history.rate
