@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import bushfit
-from bushfit.effects import LIBRARY, Effect, effect_named, qualified
+from bushfit.effects import LIBRARY, Effect, get_effect, qualified_name
 from bushfit.effects.mistakes import MISTAKES
 
 #: The page, and the comments between which its tables stand.
@@ -32,7 +32,7 @@ def _tables() -> Iterator[str]:
     )
     yield _table(
         ("named and proposed", "its twins, which no test of this kind tells from it"),
-        ((f"`{e.name}`", ", ".join(f"`{twin}` ({effect_named(twin).level})" for twin in e.twins)) for e in twinned),
+        ((f"`{e.name}`", ", ".join(f"`{twin}` ({get_effect(twin).level})" for twin in e.twins)) for e in twinned),
     )
     yield _table(
         ("name", "source", "cheapest test that would prove it"), ((_link(e), e.source, e.confirmed_by) for e in library)
@@ -58,9 +58,10 @@ def _link(effect: Effect) -> str:
 
 
 def _parameters(effect: Effect) -> str:
+    units = {"1": "-"}
     return "; ".join(
-        f"`{qualified(effect, parameter)}` [{'-' if parameter.unit == '1' else parameter.unit}] {parameter.meaning}"
-        for parameter in effect.parameters
+        f"`{qualified_name(effect, each)}` [{units.get(each.unit, each.unit)}] {each.meaning}"
+        for each in effect.parameters
     )
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bushfit.effects import BASE, LIBRARY, qualified
+from bushfit.effects import BASE, LIBRARY, qualified_name
 from bushfit.effects.contract import Circumstances
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
@@ -51,7 +51,7 @@ def sized(model: Model, name: str, direction: Direction, amplitude: float, rng: 
     }
     values = {}
     for parameter in LIBRARY[name].parameters:
-        key = qualified(LIBRARY[name], parameter)
+        key = qualified_name(LIBRARY[name], parameter)
         share = rng.uniform(0.5, 1.5)
         values[key] = by_hand[key] * share if key in by_hand else parameter.sized(share)
     return model.with_effect(name, values)

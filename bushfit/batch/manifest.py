@@ -19,8 +19,8 @@ from pydantic import BeforeValidator, ConfigDict, Field
 
 from bushfit.batch.quantities import At, Point
 from bushfit.campaign.toml import read_toml
-from bushfit.effects import Effect, effect_named
-from bushfit.effects.mistakes import candidate_named
+from bushfit.effects import Effect, get_effect
+from bushfit.effects.mistakes import get_candidate
 from bushfit.errors import CampaignError
 from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import folder_name
@@ -55,8 +55,8 @@ def _words(raw: object) -> object:
 
 
 Words = BeforeValidator(_words)
-Effects = Annotated[tuple[Annotated[str, converter(partial(_known, effect_named))], ...], Words]
-Candidates = Annotated[tuple[Annotated[str, converter(partial(_known, candidate_named))], ...], Words]
+Effects = Annotated[tuple[Annotated[str, converter(partial(_known, get_effect))], ...], Words]
+Candidates = Annotated[tuple[Annotated[str, converter(partial(_known, get_candidate))], ...], Words]
 
 
 @dataclass(frozen=True, kw_only=True)

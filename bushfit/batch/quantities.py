@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from bushfit.effects import is_parameter, parameter_named, parameter_names
+from bushfit.effects import get_parameter, is_parameter, parameter_names
 from bushfit.errors import UnitError, did_you_mean
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion
 from bushfit.reading.measurement import Sweep
@@ -87,7 +87,7 @@ class Quantity:
     @property
     def tabled(self) -> Quantity:
         """The same as tables have it: a parameter in the unit for its usual size, whatever it is in this batch."""
-        return self.for_people(parameter_named(self.name).typical) if is_parameter(self.name) else self
+        return self.for_people(get_parameter(self.name).typical) if is_parameter(self.name) else self
 
     @property
     def header(self) -> str:
@@ -112,7 +112,7 @@ def at_point(point: Point, what: str) -> Quantity:
 def parameter_quantities(names: Collection[str]) -> list[Quantity]:
     """Parameters of the library that are among the names, in its order."""
     in_order = dict.fromkeys([*parameter_names(), *sorted(filter(is_parameter, names))])
-    units = {name: parameter_named(name).unit for name in in_order if name in names}
+    units = {name: get_parameter(name).unit for name in in_order if name in names}
     return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
 
 

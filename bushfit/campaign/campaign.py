@@ -12,9 +12,9 @@ from bushfit.campaign.copies import without_copied_repeats, without_copied_tests
 from bushfit.campaign.quantities import Compound, ReportSettings, embedded
 from bushfit.campaign.schema import CampaignFile, FitSettings, PredictSettings, RigSettings, SimulateSettings
 from bushfit.campaign.toml import read_toml
-from bushfit.effects import effect_of, place_of, with_base
+from bushfit.effects import effect_name_of, place_suffix, with_base
 from bushfit.errors import CampaignError, error_location, quote_path
-from bushfit.geometry import Bushing, Specimen, place_named
+from bushfit.geometry import Bushing, Specimen, get_place
 from bushfit.model.model import FIVE, Model
 from bushfit.progress import track
 from bushfit.reading.instruments import RECORDINGS
@@ -131,13 +131,13 @@ def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
         raise CampaignError("two specimens have one name", place="[[specimens]]", found=", ".join(sorted(doubles)))
     with error_location(place="predict.directions"):
         for name in content.predict.directions or ():
-            place_named(name, specimens)
+            get_place(name, specimens)
     simulated = content.simulate.effects if content.simulate else {}
     own = [f"{effect}.{name}" for effect, table in simulated.items() for name in table]
     for name in (*content.fit.effects, *content.fit.parameters, *own):
-        if place := place_of(name):
+        if place := place_suffix(name):
             with error_location(place=name):
-                place_named(place, specimens)
+                get_place(place, specimens)
 
 
 def model_of(campaign: Campaign) -> Model:
@@ -167,8 +167,8 @@ def model_of(campaign: Campaign) -> Model:
     effects = campaign.simulate.effects
     own = {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
     with error_location(campaign.path):
-        names = with_base(dict.fromkeys(map(effect_of, own)))
-        kept = {name: value for name, value in values.items() if effect_of(name) in names}
+        names = with_base(dict.fromkeys(map(effect_name_of, own)))
+        kept = {name: value for name, value in values.items() if effect_name_of(name) in names}
         return Model(campaign.bushing, names, {**kept, **own})
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from bushfit.effects import is_parameter, parameter_named, parameter_names
+from bushfit.effects import get_parameter, is_parameter, parameter_names
 from bushfit.errors import CampaignError, UnitError, error_location
 from bushfit.reading.files import view_bytes
 from bushfit.units import check_size, parse_quantity
@@ -37,7 +37,7 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
     with error_location(place=place):
         if not is_parameter(name):
             raise unknown_key(name, parameter_names())
-        stated = parameter_named(name).unit
+        stated = get_parameter(name).unit
         unit = _S_TO_ALPHA.sub("", stated)
         is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
         if is_number and (unit == "1" or "." in name) and abs(raw) <= LARGEST_NUMBER:
@@ -83,7 +83,7 @@ def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
     for name, table in settings.items():
         if isinstance(table, dict):
             ordered = [table[key] for key in keys if key in table]
-            parameter = parameter_named(name)
+            parameter = get_parameter(name)
             low, high = parameter.bounds
             ends = np.clip([table.get("min", low), table.get("max", high)], low, high)
             if ordered != sorted(ordered) or ends[0] == ends[1]:

@@ -94,9 +94,9 @@ def command(
     from bushfit.batch.quantities import parse_point
     from bushfit.batch.run import check_free, run
     from bushfit.batch.work import Orders
-    from bushfit.effects import effect_named
+    from bushfit.effects import get_effect
 
-    names = tuple(effect_named(name).name for name in effects)
+    names = tuple(get_effect(name).name for name in effects)
     of_all = Settings(commands=commands or None, directions=directions or None, effects=names or None)
     read = read_manifest(manifest[0], of_all, *manifest[1:])
     judged_by = read_limits(limits) if limits else None

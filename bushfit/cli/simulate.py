@@ -82,11 +82,11 @@ def _with_options(tests: SimulateSettings, settings: dict[str, Any]) -> Simulate
 
 
 def _with_effect(model: Model, text: str) -> Model:
-    from bushfit.effects import effect_named, effect_of, is_parameter, qualified
+    from bushfit.effects import effect_name_of, get_effect, is_parameter, qualified_name
 
     name, found, value = text.replace(" ", "").partition("=")
     known = "." in name and is_parameter(name)
-    effect = effect_named(effect_of(name) if known else name.partition(".")[0])
+    effect = get_effect(effect_name_of(name) if known else name.partition(".")[0])
     if not (found and known):
         raise ModelError(
             "not an effect with a value",
@@ -95,7 +95,7 @@ def _with_effect(model: Model, text: str) -> Model:
             expected='such as "inertia.mass=0.1 kg"; parameters of '
             + f"{effect.name}: {', '.join(parameter.name for parameter in effect.parameters)}",
         )
-    unit = next(parameter.unit for parameter in effect.parameters if qualified(effect, parameter) == name)
+    unit = next(parameter.unit for parameter in effect.parameters if qualified_name(effect, parameter) == name)
     with error_location(place="--effect"):
         size = (
             float(value) if is_number(value) and unit == "1" else parse_quantity(text.partition("=")[2].strip(), unit)

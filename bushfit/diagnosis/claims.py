@@ -13,7 +13,7 @@ import numpy as np
 
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.effects.mistakes import MISTAKES, SEPARATOR, Mistake, file_or_name, labelled, mistake_named
+from bushfit.effects.mistakes import MISTAKES, SEPARATOR, Mistake, file_or_name, get_mistake, labelled
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, SweepData, loop_data, with_gain_errors
@@ -106,7 +106,7 @@ def adopted(data: Data, names: Collection[str]) -> tuple[Data, list[str]]:
 
 def _claimed(data: Data, name: str) -> Claim:
     """What one --adopt claims."""
-    mistake, test = mistake_named(name), name.partition(SEPARATOR)[2]
+    mistake, test = get_mistake(name), name.partition(SEPARATOR)[2]
     every: list[DataSet] = [*data.loops, *data.sweeps]
     possible = [place for place, one in enumerate(every) if mistake and _is_possible(mistake, one, data)]
     tests = tuple(place for place in possible if every[place].name == test)
@@ -229,7 +229,7 @@ def _columns(bushing: Bushing | None, direction: Place, frequency: Array, amplit
     """Stiffness for each unit of mu, m and sigma_fmax at every alpha and eps_half of the grid, (g, 3, n)."""
     names = ("mu", "m", "sigma_fmax")
     alpha, eps_half = (axis.reshape(-1, 1) for axis in np.meshgrid(_ALPHA, _EPS_HALF))
-    model = Model.started(bushing, BASE, {})
+    model = Model.with_defaults(bushing, BASE, {})
     none = {**dict.fromkeys(names, 0.0), "alpha": alpha, "eps_half": eps_half}
     each = [
         np.broadcast_to(

@@ -11,7 +11,7 @@ from scipy.special import logsumexp, ndtr
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.holdout import HoldOut, Predicted, parts, predicted_parts
 from bushfit.diagnosis.laplace import laplace
-from bushfit.effects import BASE, effect_named
+from bushfit.effects import BASE, get_effect
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import apart_in_temperature
 from bushfit.fitting.coordinates import Bounds
@@ -87,12 +87,12 @@ def known_families(model: Model, data_sets: Sequence[DataSet]) -> tuple[str, ...
 
 def _clash(names: Sequence[str]) -> bool:
     """Whether one of some effects is none beside another."""
-    return any({*effect_named(name).never_with} & {*names} for name in names)
+    return any({*get_effect(name).never_with} & {*names} for name in names)
 
 
 def _fits(model: Model, name: str) -> bool:
     """Whether a model has not an effect yet, and what it stands in place of."""
-    return name not in model.effects and effect_named(name).replaces in (None, *model.effects)
+    return name not in model.effects and get_effect(name).replaces in (None, *model.effects)
 
 
 def fit_families(
@@ -143,7 +143,7 @@ def _chain(
     """The fits of a family's effects one after the other, from the longest beginning that was fitted before."""
     before, _, last = name.rpartition("+")
     chain = [first] if not before else chains.get(before) or _chain(chains, first, before, held, bounds)
-    effect, present = effect_named(last), chain[-1].model.effects
+    effect, present = get_effect(last), chain[-1].model.effects
     if not _fits(chain[-1].model, last):
         has = "the model has this effect already"
         problem = has if last in present else "what this effect stands in place of is not in the model"

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.effects import effect_of
+from bushfit.effects import effect_name_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.agreement import LeaveOut
@@ -180,7 +180,7 @@ class _Fitted:
         rows, clusters = part.rows(evidence.data_sets), _clusters(evidence.data_sets)
         if left_open := [names[self.free[i]] for i in np.flatnonzero(self.whole.open(rows))]:
             reason = f"the rest does not tell {', '.join(left_open)}"
-            return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_of, left_open))))
+            return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_name_of, left_open))))
         if self.whole.step(rows) is not None:
             return _with_pull(self.whole, rows, clusters, stepped=True)
         refitted = _refitted(evidence, part, bounds)

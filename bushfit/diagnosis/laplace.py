@@ -7,7 +7,7 @@ from scipy.special import logsumexp
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import LARGEST, SIZES
-from bushfit.effects import effect_named, qualified
+from bushfit.effects import get_effect, qualified_name
 from bushfit.fitting.design import probes
 
 #: Sizes over which the prior of an amount is averaged, and the least relative error that they resolve.
@@ -23,7 +23,7 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
     how much of it counts. Of an effect in place of a branch each parameter beyond the branch's two is uniform over a
     factor of 20.
     """
-    effect, names = effect_named(name), evidence.solution.coordinates.names
+    effect, names = get_effect(name), evidence.solution.coordinates.names
     data_sets, model = evidence.data_sets, evidence.model
     other = model.without(name) if effect.replaces is None else before.model
     size = max(each.change(model, other) for each in data_sets)
@@ -32,10 +32,10 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
     variances = np.diag(np.linalg.pinv(jacobian @ jacobian.T, rcond=1e-12, hermitian=True))
     if effect.replaces is not None:
         count = max(len(effect.parameters) - 2, 0)
-        own = {qualified(effect, parameter): 0.5 for parameter in effect.parameters}
+        own = {qualified_name(effect, parameter): 0.5 for parameter in effect.parameters}
         return count * (0.5 * log(2.0 * np.pi) - log(3.0)), own, size
     for parameter in effect.parameters:
-        coordinate = qualified(effect, parameter)
+        coordinate = qualified_name(effect, parameter)
         if coordinate not in names:
             continue
         count += 1

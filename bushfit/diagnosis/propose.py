@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.effects import Branch, Effect, at_places, qualified, twins_of
+from bushfit.effects import Branch, Effect, effects_for_places, qualified_name, twins_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data_sets import DataSet
@@ -73,7 +73,7 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
         possible_gains = np.where((amounts[first:last] > 0.0) | (sense == 0), gains[first:last], 0.0)
         best = int(np.argmax(possible_gains))
         suggested = float(np.clip(amounts[first + best] * amount.typical, *amount.bounds))
-        shape = shapes[best] | ({qualified(effect, amount): suggested} if amount.log else {})
+        shape = shapes[best] | ({qualified_name(effect, amount): suggested} if amount.log else {})
         model = evidence.model.with_effect(effect.name, shape)
         visible = bool(seen[first:last].any())
         found.append(Proposal(effect.name, model, float(possible_gains[best]), columns, sense, visible))
@@ -110,7 +110,7 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
     present = (None, *model.effects)
     told = {name for known in (*model.effects, *excluded) for name in twins_of(known)}
     there = {*told, *(effect.replaces for effect in model.records)}
-    possible = [effect for effect in at_places(places).values() if has_what_it_uses(effect, model)]
+    possible = [effect for effect in effects_for_places(places).values() if has_what_it_uses(effect, model)]
     missing = [effect for effect in possible if effect.name not in there]
     series = {name for effect in model.records for name in effect.never_with}
     series |= {effect.name for effect in missing if {*effect.never_with} & {*present}}
@@ -131,7 +131,7 @@ def _replacing(evidence: Evidence, effect: Effect, held: Sequence[str]) -> Propo
     if not fits:
         return None
     best = min(fits, key=_promised)
-    own = [qualified(effect, parameter) for parameter in effect.parameters]
+    own = [qualified_name(effect, parameter) for parameter in effect.parameters]
     columns = best.jacobian[[best.coordinates.names.index(name) for name in own]]
     score = max(evidence.chi_square - _promised(best), 0.0)
     return Proposal(effect.name, best.model, score, columns, 0, visible=True, together=True)
@@ -150,12 +150,12 @@ def sensitivity(model: Model, data_sets: Sequence[DataSet], effect: Effect) -> t
     """
     bare, model = model, model.with_effect(effect.name)
     axes = {
-        qualified(effect, parameter): probes(data_sets, model, parameter)
+        qualified_name(effect, parameter): probes(data_sets, model, parameter)
         for parameter in effect.parameters
         if parameter.neutral is None
     }
     shapes = [dict(zip(axes, point, strict=True)) for point in product(*axes.values())]
-    amount = qualified(effect, effect.amount)
+    amount = qualified_name(effect, effect.amount)
     none = model.values[amount]
 
     def answers(shapes: Sequence[Mapping[str, float]]) -> Array:

@@ -18,8 +18,8 @@ from bushfit.diagnosis.document import (
 )
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut
-from bushfit.effects import effect_of, parameter_named
-from bushfit.effects.mistakes import candidate_named, labelled
+from bushfit.effects import effect_name_of, get_parameter
+from bushfit.effects.mistakes import get_candidate, labelled
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place
 from bushfit.model.model import Model
@@ -230,7 +230,7 @@ class Diagnosis:
         }
 
     def _effect(self, named: Named) -> EffectEntry:
-        effect, model = candidate_named(named.name), self.result.model
+        effect, model = get_candidate(named.name), self.result.model
         judged = {judged.name: judged.parameters for judged in self.candidates}
         values = model.values if named.name in model.effects else judged.get(named.name, {})
         return {
@@ -242,7 +242,9 @@ class Diagnosis:
             "sentence": named.sentence or effect.sentence,
             "correction": named.correction or None,
             "parameters": {
-                name: self._parameter(name, value) for name, value in values.items() if effect_of(name) == named.name
+                name: self._parameter(name, value)
+                for name, value in values.items()
+                if effect_name_of(name) == named.name
             },
             "evidence": named.evidence,
             "alternatives": list(named.alternatives),
@@ -255,7 +257,7 @@ class Diagnosis:
             "value": value,
             "stderr": self.result.covariance.stderr(name) if held else None,
             "ci95": None if interval is None else list(interval),
-            "unit": parameter_named(name).unit,
+            "unit": get_parameter(name).unit,
         }
 
 
@@ -287,7 +289,7 @@ def odds_in_words(found: Mapping[str, Any]) -> list[str]:
 def level_of(name: str) -> str:
     """The level of an effect or mistake that is not in the model yet; "unresolved" where the
     rig has a twin of it, or it has no name."""
-    candidate = candidate_named(name)
+    candidate = get_candidate(name)
     return "unresolved" if candidate.twins or name == UNNAMED else str(candidate.level)
 
 

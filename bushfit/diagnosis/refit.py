@@ -8,7 +8,7 @@ import numpy as np
 
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
 from bushfit.diagnosis.propose import Proposal
-from bushfit.effects import qualified
+from bushfit.effects import qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.common_error import CommonError, Joined
@@ -74,7 +74,9 @@ def _goes_on(fit: Descent, best: float) -> bool:
 def within_reach(model: Model, data_sets: Sequence[DataSet]) -> Bounds:
     """Limits of the shapes of a model's effects to what the tests can show: a stop that is always met is no stop, and a
     resonance far above all frequencies is a mass."""
-    shapes = [(qualified(effect, each), each) for effect in model.records for each in effect.parameters if each.scale]
+    shapes = [
+        (qualified_name(effect, each), each) for effect in model.records for each in effect.parameters if each.scale
+    ]
     tried = {name: probes(data_sets, model, each) for name, each in shapes}
     return {name: (float(values.min()), float(values.max())) for name, values in tried.items() if np.ptp(values) > 0.0}
 

@@ -20,7 +20,7 @@ from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where, chances
 from bushfit.diagnosis.words import Composition, Finding
-from bushfit.effects import effect_named
+from bushfit.effects import get_effect
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import parted, with_gains
@@ -167,7 +167,7 @@ class Told:
         """A composition as it is told to people: what each of its parts is, with its name."""
         best = each.best
         parts = [best.claim.words(self.data)] if best.claim else []
-        parts += [f"{effect_named(name).phrase} ({name})" for name in best.effects]
+        parts += [f"{get_effect(name).phrase} ({name})" for name in best.effects]
         parts += [f"the tests are off: {place.name}" for place in best.places]
         *most, last = (*parts, *_nameless(best))
         return ", and ".join(filter(None, (", ".join(most), last)))
@@ -199,7 +199,7 @@ class Told:
         base, after, bounds = self._fitted(self.base), self._fitted(after), self.search.asked.bounds
         spots = list(places.places) if places else []
         if not next_test and names:
-            next_test = effect_named(names[0].name).confirmed_by
+            next_test = get_effect(names[0].name).confirmed_by
         if spots:
             next_test = f"measure again: {spots[0].name}"
         lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
@@ -275,7 +275,7 @@ class Told:
     def _notes(self) -> tuple[str, ...]:
         """What these tests could not show at all."""
         unseen = [each.name for each in self.search.root.effects if not each.proposal.visible]
-        blind = [name for name in unseen if not effect_named(name).under]  # what no test states is not asked for
+        blind = [name for name in unseen if not get_effect(name).under]  # what no test states is not asked for
         return (f"not identifiable from these tests: {', '.join(blind)}",) if blind else ()
 
 

@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.priors import DOES_NOT_FIT, MOST_TOLD, MOSTLY, NAMED, NOTHING
-from bushfit.effects import effect_named
+from bushfit.effects import get_effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,4 +157,4 @@ def _within(one: _Parts, other: _Parts) -> bool:
 
 
 def _limit(name: str) -> str:
-    return effect_named(name).limit or name
+    return get_effect(name).limit or name

@@ -16,8 +16,8 @@ from bushfit.diagnosis.hypotheses import Asked
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.verdict import Told
 from bushfit.diagnosis.words import judged
-from bushfit.effects import effect_named, qualified
-from bushfit.effects.mistakes import candidate_named, mistake_named
+from bushfit.effects import get_effect, qualified_name
+from bushfit.effects.mistakes import get_candidate, get_mistake
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import parted, with_gains
 from bushfit.fitting.design import fit_from
@@ -44,8 +44,8 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     """
     settings = settings or Settings()
     for name in (*settings.adopt, *settings.without):
-        candidate_named(name)
-    mended = [name for name in settings.adopt if mistake_named(name)]
+        get_candidate(name)
+    mended = [name for name in settings.adopt if get_mistake(name)]
     data, said = adopted(data, mended)
     data, begun, left = _without_wild(data, model, settings)
     whole, (data, fewer) = data, condensed(data)
@@ -117,10 +117,10 @@ def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
     model = model or data.started(data.effects, data_sets, {})
     start = {name: value for name, value in start.items() if name in model.values and name not in held}
     for name in settings.adopt:
-        if mistake_named(name) is None and name not in (model := model.with_twin(name)).effects:
+        if get_mistake(name) is None and name not in (model := model.with_twin(name)).effects:
             # at a tenth of its typical size: at its neutral value a fit may not see it
-            amount = (effect := effect_named(name)).amount
-            little = {} if effect.replaces else {qualified(effect, amount): amount.sized(0.1)}
+            amount = (effect := get_effect(name)).amount
+            little = {} if effect.replaces else {qualified_name(effect, amount): amount.sized(0.1)}
             model = model.with_effect(name, little)
     outliers: tuple[Outlier, ...] = ()
     if data.robust:

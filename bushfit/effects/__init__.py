@@ -83,33 +83,33 @@ def with_base(names: Iterable[str]) -> tuple[str, ...]:
     ('elastic', 'springpot', 'sliders', 'inertia')
     """
     own = tuple(names)
-    replaced = {effect_named(name).replaces for name in own}
+    replaced = {get_effect(name).replaces for name in own}
     return (*(name for name in BASE if name not in replaced), *own)
 
 
-def effect_named(name: str) -> Effect:
+def get_effect(name: str) -> Effect:
     """The effect of that name.
 
     Raises:
         ModelError: there is none; the nearest name is suggested.
 
-    >>> effect_named("inertia").phrase
+    >>> get_effect("inertia").phrase
     'moving mass between bushing and load cell'
     """
     if name in LIBRARY:
         return LIBRARY[name]
     if name == unnamed.NAME:
         return unnamed.EFFECT
-    if place := place_of(name):
+    if place := place_suffix(name):
         return FAMILIES[name.partition(".")[0]].of_place(place)
     near = did_you_mean(name, LIBRARY, similarity=0.5)
     raise ModelError("unknown effect", found=name, expected="one of " + ", ".join(LIBRARY), hint=near)
 
 
-def place_of(name: str) -> str | None:
+def place_suffix(name: str) -> str | None:
     """The place in the name of an effect that belongs to one, and of its parameter: `stiffness_factor.radial`.
 
-    >>> place_of("stiffness_factor.radial"), place_of("inertia.mass")
+    >>> place_suffix("stiffness_factor.radial"), place_suffix("inertia.mass")
     ('radial', None)
     """
     family, _, place = name.partition(".")
@@ -123,18 +123,19 @@ def twins_of(name: str) -> tuple[str, ...]:
     >>> twins_of("guide_friction")
     ('interface_slip', 'guide_friction')
     """
-    place = place_of(name)
+    place = place_suffix(name)
     known = [*LIBRARY.values(), *(family.of_place(place) for family in FAMILIES.values() if place)]
     sets = ((effect.name, *effect.twins) for effect in known if effect.twins)
     return next((names for names in sets if name in names), (name,))
 
 
-def qualified(effect: Effect, parameter: Parameter) -> str:
+def qualified_name(effect: Effect, parameter: Parameter) -> str:
     """Name of a parameter in files and reports: plain for the paper's three, `<effect>.<name>` for the rest.
 
     An effect that belongs to a place, such as `stiffness_factor.radial`, is named like its one parameter.
 
-    >>> [qualified(LIBRARY[name], LIBRARY[name].amount) for name in ("elastic", "inertia", "stiffness_factor.radial")]
+    >>> names = ("elastic", "inertia", "stiffness_factor.radial")
+    >>> [qualified_name(LIBRARY[name], LIBRARY[name].amount) for name in names]
     ['mu', 'inertia.mass', 'stiffness_factor.radial']
     """
     if effect.name in BASE:
@@ -142,13 +143,13 @@ def qualified(effect: Effect, parameter: Parameter) -> str:
     return effect.name if "." in effect.name else f"{effect.name}.{parameter.name}"
 
 
-def effect_of(name: str) -> str:
+def effect_name_of(name: str) -> str:
     """The name of the effect that a parameter belongs to, by the name of the parameter in files and reports.
 
-    >>> effect_of("inertia.mass"), effect_of("alpha")
+    >>> effect_name_of("inertia.mass"), effect_name_of("alpha")
     ('inertia', 'springpot')
     """
-    if place_of(name):
+    if place_suffix(name):
         return name
     effect, dot, _ = name.partition(".")
     return effect if dot else next(base for base in BASE for own in LIBRARY[base].parameters if own.name == name)
@@ -157,7 +158,9 @@ def effect_of(name: str) -> str:
 @cache
 def _parameters() -> dict[str, Parameter]:
     """Every parameter of the library by its name in files and reports."""
-    return {qualified(effect, parameter): parameter for effect in LIBRARY.values() for parameter in effect.parameters}
+    return {
+        qualified_name(effect, parameter): parameter for effect in LIBRARY.values() for parameter in effect.parameters
+    }
 
 
 def parameter_names() -> tuple[str, ...]:
@@ -167,19 +170,19 @@ def parameter_names() -> tuple[str, ...]:
 
 def is_parameter(name: str) -> bool:
     """Whether a name in files and reports is that of a parameter."""
-    return name in _parameters() or place_of(name) is not None
+    return name in _parameters() or place_suffix(name) is not None
 
 
-def parameter_named(name: str) -> Parameter:
+def get_parameter(name: str) -> Parameter:
     """A parameter by its name in files and reports; `is_parameter` tells whether there is one.
 
-    >>> parameter_named("inertia.mass").meaning
+    >>> get_parameter("inertia.mass").meaning
     'moving mass'
     """
-    return _parameters()[name] if name in _parameters() else effect_named(name).parameters[0]
+    return _parameters()[name] if name in _parameters() else get_effect(name).parameters[0]
 
 
-def at_places(places: Iterable[str]) -> dict[str, Effect]:
+def effects_for_places(places: Iterable[str]) -> dict[str, Effect]:
     """The library for tests at these places: of each kind that belongs to a place, those that are to be sought there.
 
     Of twins that of the bushing is there alone.
@@ -187,11 +190,13 @@ def at_places(places: Iterable[str]) -> dict[str, Effect]:
     Args:
         places: directions, or specimens by name; one that is axial counts as the first, which the moduli go by.
 
-    >>> [name for name in at_places(["axial", "mount"]) if name.endswith("mount")]
+    >>> [name for name in effects_for_places(["axial", "mount"]) if name.endswith("mount")]
     ['elastic_preload.mount', 'strain_scale.mount', 'stiffness_factor.mount', 'displacement_gain.mount']
     """
     known = list(dict.fromkeys(sorted(places, key=lambda place: place != Direction.AXIAL)))
     found = [family.of_place(place) for family in FAMILIES.values() for place in sorted(family.places(known))]
     of_places = {effect.name: effect for effect in found}
-    sought = {name: effect for name, effect in LIBRARY.items() if not place_of(name) or name in of_places} | of_places
+    sought = {
+        name: effect for name, effect in LIBRARY.items() if not place_suffix(name) or name in of_places
+    } | of_places
     return {name: effect for name, effect in sought.items() if name == twins_of(name)[0]}

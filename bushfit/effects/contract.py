@@ -128,7 +128,7 @@ class Circumstances:
     left: Array | float | None = None
     rested: Array | float | None = None
 
-    def at(self, points: Any) -> Circumstances:
+    def select(self, points: Any) -> Circumstances:
         """The circumstances of some operating points, by an index; numbers stay."""
         known = (self.temperature, self.turn, self.strained, self.left, self.rested)
         return Circumstances(*(each[points] if isinstance(each, np.ndarray) else each for each in known))

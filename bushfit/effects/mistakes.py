@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from bushfit.effects import effect_named
+from bushfit.effects import get_effect
 from bushfit.effects.contract import Effect, Level
 from bushfit.errors import ModelError
 from bushfit.geometry import ROTATION, TRANSLATION, Bushing, Direction, Motion, Place
@@ -209,22 +209,22 @@ def labelled(name: str, test: str | None) -> str:
     return name if test is None else f"{name}{SEPARATOR}{test}"
 
 
-def mistake_named(name: str) -> Mistake | None:
+def get_mistake(name: str) -> Mistake | None:
     """The mistake of a name such as peak_to_peak, or peak_to_peak:sweep_axial with its test; None where none is."""
     return MISTAKES.get(name.partition(SEPARATOR)[0])
 
 
-def candidate_named(name: str) -> Effect:
+def get_candidate(name: str) -> Effect:
     """The effect of the library, or the mistake, of that name; a mistake may have its test behind a colon.
 
     Raises:
         ModelError: there is none; the nearest name is suggested.
 
-    >>> candidate_named("peak_to_peak:sweep_axial").sentence
+    >>> get_candidate("peak_to_peak:sweep_axial").sentence
     'the amplitudes of {files} are peak-to-peak'
     """
-    mistake = mistake_named(name)
+    mistake = get_mistake(name)
     if mistake is None and SEPARATOR in name:
         expected = f"MISTAKE{SEPARATOR}TEST with one of {', '.join(MISTAKES)}"
         raise ModelError("unknown mistake", found=name, expected=expected)
-    return mistake or effect_named(name)
+    return mistake or get_effect(name)

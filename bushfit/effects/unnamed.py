@@ -1,9 +1,8 @@
-"""Unnamed: a smooth correction over log frequency and log strain for what no effect of the library explains.
+"""Unnamed: a smooth relative correction of the stiffness for a gap that no effect of the library explains.
 
-It is a share of the stiffness. Its data are values at some nodes; between these it is what a Gaussian process with a
-Matern 5/2 kernel makes of them, see `gaussian_process`. Beyond their range it fades to 0 within the size of what it
-corrects. Standard deviations at the nodes go over from node to node just as smoothly: errors of neighbours are nearly
-one, their covariance would add little.
+The correction is a function of ln frequency and ln strain, given by its values at nodes and interpolated by a Gaussian
+process with a Matern 5/2 kernel (see `gaussian_process`). Outside the range of the nodes it fades to 0. The standard
+deviations at the nodes are interpolated in the same way, because errors of neighbouring nodes are nearly equal.
 """
 
 from dataclasses import dataclass
@@ -28,13 +27,13 @@ from bushfit.errors import ModelError
 from bushfit.gaussian_process import condition, coordinates, in_lengths, matern
 from bushfit.validation import Name, Number
 
-#: The name in files and reports.
+#: Name of the effect in files and reports.
 NAME = "unnamed"
-#: Length, in ln frequency and ln strain, over which a correction fades beyond its nodes: chosen, all but gone at a
-#: fourfold frequency, because nothing was measured there.
-_FADES = 0.5
-#: Standard deviations beyond the nodes that make up the size of the gap; chosen: a band of 95 % then holds what was
-#: corrected where the tests end.
+#: Length in ln frequency and ln strain over which a correction fades outside its nodes; chosen: it is almost 0 at four
+#: times the largest frequency.
+_FADE_LENGTH = 0.5
+#: Largest correction over the standard deviation far from the nodes; chosen: a 95 % band there contains the correction
+#: at the ends of the tests.
 _DEVIATIONS = 2.0
 
 Row = tuple[Number, ...]
@@ -42,15 +41,15 @@ Row = tuple[Number, ...]
 
 @dataclass(frozen=True)
 class Patch:
-    """A correction in some directions, as values at nodes.
+    """A correction at m nodes, shared by some directions.
 
     Args:
-        directions: that share it, by name.
-        frequency_Hz: of the nodes, (m,).
-        strain: of the nodes, equivalent, zero-to-peak, (m,).
-        in_phase, in_quadrature: shares of the stiffness at the nodes, (m,) each.
-        in_phase_error, in_quadrature_error: standard deviations there, (m,) each.
-        temperature_K: of the nodes, (m,); none where it is not told apart.
+        directions: names of the directions and specimens.
+        frequency_Hz: frequency at the nodes [Hz], (m,).
+        strain: equivalent strain amplitude at the nodes, (m,).
+        in_phase, in_quadrature: parts of the correction at the nodes, relative to the stiffness, (m,) each.
+        in_phase_error, in_quadrature_error: standard deviations of the two parts, (m,) each.
+        temperature_K: temperature at the nodes [K], (m,); empty if the correction does not depend on temperature.
     """
 
     directions: tuple[Name, ...]
@@ -64,7 +63,7 @@ class Patch:
 
     def __post_init__(self) -> None:
         lists = (self.frequency_Hz, self.strain, self.in_phase, self.in_quadrature, self.temperature_K or self.strain)
-        sizes = {len(each) for each in (*lists, self.in_phase_error, self.in_quadrature_error)}
+        sizes = {len(values) for values in (*lists, self.in_phase_error, self.in_quadrature_error)}
         if len(sizes) > 1 or sizes == {0}:
             found = f"lists of {' and '.join(map(str, sorted(sizes)))} values"
             raise ValueError(ModelError("no values at nodes", found=found, expected="one value a node, and a node"))
@@ -75,20 +74,21 @@ class Patch:
 
     @cached_property
     def nodes(self) -> Array:
-        """Places of the nodes, (m, 2 or 3)."""
+        """Coordinates of the nodes, (m, 2), or (m, 3) with temperature."""
         kelvin = np.array(self.temperature_K) if self.temperature_K else None
         return coordinates(np.array(self.frequency_Hz), np.array(self.strain), kelvin)
 
 
 @dataclass(frozen=True)
 class Unnamed:
-    """A smooth correction of the stiffness, as a share of it.
+    """A smooth correction, relative to the stiffness.
 
     Args:
-        size: standard deviation between nodes that lie far apart.
-        lengths: over which it changes, in ln frequency and ln strain; over temperature, as over the frequency that the
-            time scale shifts by.
-        patches: by direction; what is in none has no correction, within the size of the gap.
+        size: standard deviation of the Gaussian process.
+        lengths: correlation lengths in ln frequency and ln strain; a change of temperature counts as the change of
+            frequency that shifts the time scale equally.
+        patches: corrections of the directions; a direction without a patch has the correction 0, with an error of the
+            size of the gap.
     """
 
     size: Number
@@ -103,69 +103,100 @@ class Unnamed:
 
     @cached_property
     def _at_nodes(self) -> tuple[Array, Array]:
-        """Squares of the values at all nodes, and of their errors, (m,) each."""
-        values = [np.square((each.in_phase, each.in_quadrature)).sum(axis=0) for each in self.patches]
-        errors = [np.square((each.in_phase_error, each.in_quadrature_error)).sum(axis=0) for each in self.patches]
+        """Squared magnitudes of the correction at all nodes, and of its standard deviation, (m,) each."""
+        values = [np.square((patch.in_phase, patch.in_quadrature)).sum(axis=0) for patch in self.patches]
+        errors = [np.square((p.in_phase_error, p.in_quadrature_error)).sum(axis=0) for p in self.patches]
         return np.concatenate(values), np.concatenate(errors)
 
     @property
     def largest(self) -> float:
-        """The size of the gap: the largest correction at a node, as a share of the stiffness."""
+        """Largest magnitude of the correction at a node, relative to the stiffness."""
         return float(np.sqrt(self._at_nodes[0].max()))
 
     @property
     def typical(self) -> float:
-        """Root mean square of what it may be at the nodes, as a share of the stiffness."""
+        """Root mean square of the correction at the nodes including its errors, relative to the stiffness."""
         return float(np.sqrt(np.mean(self._at_nodes[0] + self._at_nodes[1])))
 
     @property
     def uncertainty(self) -> float:
-        """Its standard deviation at the nodes over its values, both as root mean squares."""
+        """Root mean square error of the correction at the nodes, relative to its root mean square."""
         values, errors = self._at_nodes
         return float(np.sqrt(errors.mean() / max(values.mean(), np.finfo(float).tiny)))
 
     @property
     def beyond(self) -> float:
-        """Standard deviation of each part of the correction where nothing was measured."""
+        """Standard deviation of each part of the correction far from the nodes."""
         return self.largest / _DEVIATIONS
 
-    def at(self, setting: Setting, omega: Array, amplitude: Array) -> tuple[Array, Array, Array]:
-        """The correction, complex (..., n), the standard deviations of its two parts, (2, ..., n), and what share of it
-        stands, (..., n): 1 among the nodes, 0 far beyond.
+    def evaluate(self, setting: Setting, omega: Array, amplitude: Array) -> tuple[Array, Array, Array]:
+        """Evaluate the correction at operating points.
 
-        Angular frequencies are in rad/s, amplitudes in m or rad.
+        Args:
+            setting: test that the points belong to.
+            omega: angular frequency [rad/s], (..., n).
+            amplitude: zero-to-peak displacement [m or rad], (..., n).
+
+        Returns:
+            Complex correction, (..., n); standard deviations of its two parts, (2, ..., n); and weight of the
+            correction, (..., n): 1 within the range of the nodes, 0 far outside.
         """
         strain = amplitude * geometry.unit_strain(setting.bushing, setting.direction)
         patch = next((patch for patch in self.patches if str(setting.direction) in patch.directions), None)
         if patch is None:
-            nothing = np.zeros(np.broadcast_shapes(np.shape(omega), strain.shape))
-            return nothing.astype(complex), np.full((2, *nothing.shape), self.beyond), nothing
-        warm = REFERENCE if setting.under.temperature is None else setting.under.temperature
-        kelvin = np.asarray(warm) if patch.temperature_K else None
+            zero = np.zeros(np.broadcast_shapes(np.shape(omega), strain.shape))
+            return zero.astype(complex), np.full((2, *zero.shape), self.beyond), zero
+        temperature = REFERENCE if setting.under.temperature is None else setting.under.temperature
+        kelvin = np.asarray(temperature) if patch.temperature_K else None
         points = coordinates(omega / (2.0 * np.pi), strain, kelvin)
         inside = np.clip(points, patch.nodes.min(axis=0), patch.nodes.max(axis=0))
-        stays = matern((points - inside) / _FADES, np.zeros((1, points.shape[-1])))[..., 0]
+        fade = matern((points - inside) / _FADE_LENGTH, np.zeros((1, points.shape[-1])))[..., 0]
         weight, variance = condition(in_lengths(inside, self.lengths), in_lengths(patch.nodes, self.lengths))
         value = weight @ (np.array(patch.in_phase) + 1j * np.array(patch.in_quadrature))
-        at_nodes = np.array([patch.in_phase_error, patch.in_quadrature_error])
-        between = [np.clip(weight @ error, error.min(), error.max()) for error in at_nodes]
-        known = np.square(self.size) * variance + np.square(between)
-        variance = np.square(stays) * known + (1.0 - np.square(stays)) * np.square(self.beyond)
-        return stays * value, np.sqrt(np.maximum(variance, 0.0)), stays
+        node_errors = np.array([patch.in_phase_error, patch.in_quadrature_error])
+        interpolated = [np.clip(weight @ error, error.min(), error.max()) for error in node_errors]
+        inner = np.square(self.size) * variance + np.square(interpolated)
+        variance = np.square(fade) * inner + (1.0 - np.square(fade)) * np.square(self.beyond)
+        return fade * value, np.sqrt(np.maximum(variance, 0.0)), fade
 
 
 def _correction(setting: Setting, omega: Array, amplitude: Array) -> Array:
     assert setting.unnamed is not None  # a model with this effect has its data
-    return setting.unnamed.at(setting, omega, amplitude)[0]
+    return setting.unnamed.evaluate(setting, omega, amplitude)[0]
 
 
 def response(values: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K (1 + c), complex (..., n) [N/m or N m/rad]."""
+    """Complex stiffness with the correction.
+
+    Args:
+        values: not used; the data of the correction are in the setting.
+        below, omega, amplitude, setting: see `contract.Layer`.
+
+    Returns:
+        K (1 + c), (..., n) [N/m or N m/rad].
+    """
     return below(omega, amplitude) * (1.0 + _correction(setting, omega, amplitude))
 
 
 def first_harmonic(values: Values, below: ForceBelow, displacement: History, setting: Setting) -> Array:
-    """The force below, and the correction's share of its first harmonic, (..., n) [N or N m]."""
+    """Force with the correction of its first harmonic.
+
+    Args:
+        values: not used; the data of the correction are in the setting.
+        below, displacement, setting: see `contract.Layer`.
+
+    Returns:
+        (..., n) [N or N m].
+
+    >>> from dataclasses import replace
+    >>> patch = Patch(("axial",), (5.0,), (0.01,), (0.1,), (0.0,), (0.0,), (0.0,))
+    >>> amplitude = 0.01 / geometry.unit_strain(loop.bushing, loop.direction)
+    >>> motion = History.steady(amplitude * np.array([0.0, 1.0, 0.0, -1.0]), 5.0)
+    >>> test = replace(loop, unnamed=Unnamed(0.1, (1.0, 1.0), (patch,)))
+    >>> force = first_harmonic({}, lambda history: 1e5 * history.value, motion, test)
+    >>> round(force[1] / (1e5 * amplitude), 6)
+    1.1
+    """
     force = below(displacement)
     share = _correction(setting, np.atleast_1d(displacement.omega), displacement.amplitude)
     return force + harmonic_response(share, displacement.with_value(force))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bushfit.effects import Branch, Effect, Level, Modifier, place_of, qualified
+from bushfit.effects import Branch, Effect, Level, Modifier, place_suffix, qualified_name
 from bushfit.effects.contract import Array, Circumstances
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
@@ -106,7 +106,7 @@ def band(order: Order) -> tuple[float, float]:
 
 def _kind(effect: Effect) -> str:
     """The key of an effect in FIELDS."""
-    return f"{effect.name.partition('.')[0]}." if place_of(effect.name) else effect.name
+    return f"{effect.name.partition('.')[0]}." if place_suffix(effect.name) else effect.name
 
 
 def _check(effect: Effect) -> None:
@@ -138,7 +138,7 @@ def _values(
     names = [dict[str, str]() for _ in places]
     for effect in model.records:
         for parameter in () if isinstance(effect, Modifier) else effect.parameters:
-            name = qualified(effect, parameter)
+            name = qualified_name(effect, parameter)
             of_arms = effect.size if isinstance(effect, Branch) else None
             if isinstance(effect, Branch) and effect.size and qualified_size(effect) not in sizes:
                 continue
@@ -171,8 +171,8 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
         fields[f"size[{k}]"] = names[part.size]
     for effect in model.records:
         here = isinstance(effect, Branch) or effect in layers
-        if here and _kind(effect) in FIELDS and place_of(effect.name) in (None, str(place)):
-            own = (names[qualified(effect, parameter)] for parameter in effect.parameters)
+        if here and _kind(effect) in FIELDS and place_suffix(effect.name) in (None, str(place)):
+            own = (names[qualified_name(effect, parameter)] for parameter in effect.parameters)
             fields |= dict(zip(FIELDS[_kind(effect)], own, strict=True))
     return fields
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.session import measured_session
-from bushfit.effects import BASE, effect_named, effect_of, with_base
+from bushfit.effects import BASE, effect_name_of, get_effect, with_base
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError, error_location
 from bushfit.fitting.assess import refuse_strain
@@ -19,7 +19,7 @@ from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, s
 from bushfit.fitting.design import designed
 from bushfit.fitting.rig_class import class_words
 from bushfit.fitting.starts import start_values
-from bushfit.geometry import Direction, Specimen, place_named
+from bushfit.geometry import Direction, Specimen, get_place
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.reading.measurement import Sweep
@@ -48,7 +48,7 @@ class Data:
             ModelError: [fit] effects has an unknown effect, or one twice.
         """
         with error_location(campaign.path, place="[fit] effects"):
-            Model.started(None, with_base(campaign.fit.effects), {})
+            Model.with_defaults(None, with_base(campaign.fit.effects), {})
         data = cls(
             campaign,
             tuple(loop_data(campaign.loops, campaign.rig, without_outliers=campaign.fit.loss != "linear")),
@@ -62,7 +62,7 @@ class Data:
     def in_session(self) -> "Data":
         """The same data, each point with what it was measured under."""
         under = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
-        loops = tuple(replace(loop, under=next(under).at(0)) for loop in self.loops)
+        loops = tuple(replace(loop, under=next(under).select(0)) for loop in self.loops)
         return replace(self, loops=loops, sweeps=tuple(replace(sweep, under=next(under)) for sweep in self.sweeps))
 
     @property
@@ -132,16 +132,16 @@ class Data:
         for known in (self.given, fixed):
             with error_location(self.campaign.path):
                 values = start_values(bushing, data_sets, {**known, **held})
-            every.append((Model.started(bushing, effects, values), values))
+            every.append((Model.with_defaults(bushing, effects, values), values))
         model, values = every[0] if fixed == self.given else min(every, key=lambda pair: _misfit(pair[0], data_sets))
-        given = {effect_of(name) for name in self.given}
+        given = {effect_name_of(name) for name in self.given}
         added = [name for name in effects if name not in BASE and name not in given]
-        added = [name for name in added if effect_named(name).replaces not in effects]
+        added = [name for name in added if get_effect(name).replaces not in effects]
         if not added:
             return model
-        replaced = {effect_named(name).replaces for name in added}
+        replaced = {get_effect(name).replaces for name in added}
         kept = [name for name in (*BASE, *effects) if name in replaced or (name in effects and name not in added)]
-        plain = Model.started(bushing, [*dict.fromkeys(kept)], values)
+        plain = Model.with_defaults(bushing, [*dict.fromkeys(kept)], values)
         still = [name for name in (*model.parameters, *plain.parameters) if name in held or not self.free((name,))]
         return designed(model, plain, data_sets, still, self.bounds)
 
@@ -169,7 +169,7 @@ class Data:
         if places is None:
             return [*_compound(self.loops), *_compound(self.sweeps)]
         with error_location(self.campaign.path):
-            wanted = [place_named(str(place), self.campaign.specimens) for place in places]
+            wanted = [get_place(str(place), self.campaign.specimens) for place in places]
         chosen = [data_set for data_set in data_sets if data_set.direction in wanted]
         if not chosen:
             raise FitError(

@@ -5,7 +5,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from bushfit.effects import Effect, Parameter, effect_named, qualified
+from bushfit.effects import Effect, Parameter, get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import Bounds, Solution
@@ -38,7 +38,7 @@ def designed(model: Model, plain: Model, data_sets: Sequence[DataSet], held: Seq
         plain: the same without the effects that are to be added, and with the branches that they replace.
         held: parameters that do not move.
     """
-    added = [effect_named(name) for name in model.effects if name not in plain.effects]
+    added = [get_effect(name) for name in model.effects if name not in plain.effects]
     ends = []
     with suppress(FitError, ModelError):  # no response, or too few points; the fit then says what is wrong
         ends.append(fit_from(model, data_sets, held, bounds).finished(_MOST).solution)
@@ -84,12 +84,12 @@ def _starts(fitted: Model, data_sets: Sequence[DataSet], effect: Effect) -> Iter
     What has a neutral amount starts at a tenth of its typical one: at its neutral value a fit may not see its shape.
     """
     amount = effect.amount
-    little = {} if effect.replaces else {qualified(effect, amount): amount.sized(0.1)}
+    little = {} if effect.replaces else {qualified_name(effect, amount): amount.sized(0.1)}
     model, *others = [fitted.with_effect(effect.name, little | start) for start in fitted.starts(effect)]
     yield from (model, *others)
     for parameter in effect.parameters:
         if parameter.neutral is None:
-            name = qualified(effect, parameter)
+            name = qualified_name(effect, parameter)
             factors = model.values[name] * np.array(_FACTORS)
             values = probes(data_sets, model, parameter) if parameter.scale else factors
             for value in np.clip(values, *parameter.bounds).tolist():

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bushfit.effects import effect_of
+from bushfit.effects import effect_name_of
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.common_error import Joined
 from bushfit.fitting.coordinates import Coordinates
@@ -103,12 +103,14 @@ def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], 
     groups = _groups(known)
     zero = [name for group in groups for name in group if _is_zero(model, name, covariance)]
     amounts = [name for name in names if model.parameters[name].neutral is not None]
-    shown = {effect_of(name) for name in amounts if not _is_zero(model, name, covariance)}
-    idle = {effect_of(name) for name in zero} - shown
-    unseen = {name: f": these tests do not show {effect_of(name)}" for name in zero if effect_of(name) in idle}
+    shown = {effect_name_of(name) for name in amounts if not _is_zero(model, name, covariance)}
+    idle = {effect_name_of(name) for name in zero} - shown
+    unseen = {
+        name: f": these tests do not show {effect_name_of(name)}" for name in zero if effect_name_of(name) in idle
+    }
     lines = [f"{name} is no different from zero{unseen.get(name, '')}" for name in zero]
     if zero:
-        rest = [name for name in names if name not in zero and effect_of(name) not in idle]
+        rest = [name for name in names if name not in zero and effect_name_of(name) not in idle]
         if not rest:
             return lines
         known = Information.of(model, data_sets, rest)

@@ -327,7 +327,7 @@ def _alive(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
     model, moved = solution.model, solution.coordinates.names
     known = {name: value for name, value in model.values.items() if name not in moved}
     with suppress(FitError):  # tests that no rubber gives
-        paper = Model.started(model.bushing, BASE, start_values(model.bushing, data_sets, known))
+        paper = Model.with_defaults(model.bushing, BASE, start_values(model.bushing, data_sets, known))
         others = [paper.starts(effect)[0].items() for effect in model.records]
         values = {**paper.values, **dict(chain.from_iterable(others))}
         return [model.with_values({name: values[name] for name in moved if name in values})]

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from bushfit.effects import BASE, effect_named
+from bushfit.effects import BASE, get_effect
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.agreement import misfits, usable
@@ -32,7 +32,7 @@ from bushfit.fitting.profile import limit95, profile95
 from bushfit.fitting.rig_class import largest_error, words_of
 from bushfit.fitting.robust import Estimate, estimate, outlier_warnings
 from bushfit.fitting.solve import solve, solve_with_lmfit
-from bushfit.geometry import place_named
+from bushfit.geometry import get_place
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import End, Result
@@ -84,9 +84,9 @@ def fit_joint(
     Raises:
         FitError: no test in those directions, or data that cannot support the fit.
     """
-    for effect in map(effect_named, effects or ()):
+    for effect in map(get_effect, effects or ()):
         if effect.corrects:
-            place_named(effect.corrects, data.campaign.specimens)
+            get_place(effect.corrects, data.campaign.specimens)
     data_sets = data.chosen(directions)
     left = [data_set for data_set in data.data_sets if data_set not in data_sets]
     effects = data.effects if effects is None else effects
@@ -140,7 +140,7 @@ def given_static(data: Data) -> Result | None:
     held = {name: data.given[name] for name in STATIC if name in data.given and name not in data.free(STATIC)}
     if len(held) < len(STATIC):
         return None
-    return Result(Model.started(data.campaign.bushing, ("elastic", "friction"), held))
+    return Result(Model.with_defaults(data.campaign.bushing, ("elastic", "friction"), held))
 
 
 @lru_cache(maxsize=1)  # `run` asks for it, and so does what its static fit says of the springpot

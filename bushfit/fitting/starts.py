@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bushfit.effects import parameter_named
+from bushfit.effects import get_parameter
 from bushfit.effects.contract import Array
 from bushfit.effects.friction import harmonic_shape
 from bushfit.errors import FitError
@@ -68,7 +68,7 @@ def start_values(bushing: Bushing | None, data_sets: Sequence[DataSet], known: M
         m, alpha = _springpot(log_omega, modulus.real[smallest], viscous_loss[smallest], _LEAST * mu)
     found = {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half}
     found = {name: value for name, value in found.items() if name not in known}
-    inside = {name: float(np.clip(value, *parameter_named(name).bounds)) for name, value in found.items()}
+    inside = {name: float(np.clip(value, *get_parameter(name).bounds)) for name, value in found.items()}
     if inside != found and (reasons := implausible(bushing, data_sets)):
         raise FitError(
             "the tests are of a size that no rubber shows",

@@ -191,7 +191,7 @@ class SweepData(MeasuredTest):
 
     @cached_property
     def circumstances(self) -> Circumstances:
-        return self.under.at(self.order)
+        return self.under.select(self.order)
 
     @cached_property
     def held(self) -> Array:

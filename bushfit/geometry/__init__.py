@@ -236,13 +236,13 @@ class Specimen(_Tested):
 Place = Direction | Specimen
 
 
-def place_named(name: str, specimens: Iterable[Specimen]) -> Place:
+def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
     """The specimen of this name, or else the direction.
 
     Raises:
         ModelError: it is neither.
 
-    >>> place_named("mount", [Specimen("mount", "shear", area=1e-3, thickness=0.01)]).motion.words
+    >>> get_place("mount", [Specimen("mount", "shear", area=1e-3, thickness=0.01)]).motion.words
     ('displacement', 'force', 'stiffness')
     """
     known: dict[str, Place] = {str(place): place for place in (*Direction, *specimens)}
@@ -284,10 +284,10 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
     return 3.0 if place.strain == "tension" else 1.0
 
 
-def stated_strain(place: Place) -> float:
+def strain_factor_of_files(place: Place) -> float:
     """What one unit of displacement or strain in a test's file is as it is counted: 2 of the tensor's shear, else 1.
 
-    >>> stated_strain(Specimen("coupon", "modulus", "tensor")), stated_strain(Direction.AXIAL)
+    >>> strain_factor_of_files(Specimen("coupon", "modulus", "tensor")), strain_factor_of_files(Direction.AXIAL)
     (2.0, 1.0)
     """
     return 2.0 if isinstance(place, Specimen) and place.strain == "tensor" else 1.0

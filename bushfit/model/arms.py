@@ -11,7 +11,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from bushfit.effects import Branch, Modifier, qualified
+from bushfit.effects import Branch, Modifier, qualified_name
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.errors import ModelError
 from bushfit.geometry import Specimen
@@ -154,7 +154,7 @@ def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float
 
 def qualified_size(branch: Branch) -> str:
     """The parameter that a branch's modulus goes with, as files and reports name it."""
-    own = {parameter.name: qualified(branch, parameter) for parameter in branch.parameters}
+    own = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
     assert branch.size is not None
     return own.get(branch.size, branch.size)
 

@@ -10,7 +10,7 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from bushfit import geometry
-from bushfit.effects import BASE, Branch, Effect, Layer, Level, Parameter, Setting, effect_named, qualified, twins_of
+from bushfit.effects import BASE, Branch, Effect, Layer, Level, Parameter, Setting, get_effect, qualified_name, twins_of
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Condition, ForceBelow, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
@@ -24,7 +24,7 @@ from bushfit.units import display_unit
 Kind = Literal["sweep", "loop"]
 
 #: Names of the paper's five parameters.
-FIVE = tuple(parameter.name for name in BASE for parameter in effect_named(name).parameters)
+FIVE = tuple(parameter.name for name in BASE for parameter in get_effect(name).parameters)
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Model:
         return replace(self, values={**self.values, **values})
 
     @classmethod
-    def started(
+    def with_defaults(
         cls,
         bushing: Bushing | None,
         effects: Sequence[str],
@@ -125,12 +125,12 @@ class Model:
     ) -> "Model":
         """A model with the values given; other parameters have their neutral value, or a typical one.
 
-        >>> Model.started(paper.bushing, ["elastic", "viscous"], {"mu": 1e6}).values["viscous.eta"]
+        >>> Model.with_defaults(paper.bushing, ["elastic", "viscous"], {"mu": 1e6}).values["viscous.eta"]
         0.0
         """
         defaults = {
-            qualified(effect, parameter): parameter.typical if parameter.neutral is None else parameter.neutral
-            for effect in map(effect_named, effects)
+            qualified_name(effect, parameter): parameter.typical if parameter.neutral is None else parameter.neutral
+            for effect in map(get_effect, effects)
             for parameter in effect.parameters
         }
         found = {name: values.get(name, default) for name, default in defaults.items()}
@@ -144,16 +144,16 @@ class Model:
         >>> paper.with_effect("sliders").effects
         ('elastic', 'springpot', 'sliders')
         """
-        effect = effect_named(name)
+        effect = get_effect(name)
         kept = [other for other in self.effects if other != effect.replaces]
         known = {**self.values, **self.starts(effect)[0], **(values or {})}
-        return Model.started(self.bushing, (*kept, name), known, self.unnamed)
+        return Model.with_defaults(self.bushing, (*kept, name), known, self.unnamed)
 
     def starts(self, effect: Effect) -> list[dict[str, float]]:
         """Where a fit of an effect may begin in place of the branch that it replaces; of any other, with no values."""
         if effect.replaces not in self.effects or not effect.in_place_of:
             return [{}]
-        own = [(qualified(effect, each), each) for each in effect.parameters]
+        own = [(qualified_name(effect, each), each) for each in effect.parameters]
         return [
             {key: float(np.clip(suggested[each.name], *each.bounds)) for key, each in own}
             for suggested in effect.in_place_of(self.values)
@@ -164,14 +164,14 @@ class Model:
         twins = [effect for effect in self.records if effect.name in twins_of(name) and effect.name != name]
         effects = [effect.name for effect in self.records if effect not in twins]
         moved = {
-            qualified(effect_named(name), new): self.values[qualified(twin, old)]
+            qualified_name(get_effect(name), new): self.values[qualified_name(twin, old)]
             for twin in twins
-            for old, new in zip(twin.parameters, effect_named(name).parameters, strict=True)
+            for old, new in zip(twin.parameters, get_effect(name).parameters, strict=True)
         }
         added = [name] if twins and name not in effects else []
         if not twins:
             return self
-        return Model.started(self.bushing, [*effects, *added], {**self.values, **moved}, self.unnamed)
+        return Model.with_defaults(self.bushing, [*effects, *added], {**self.values, **moved}, self.unnamed)
 
     def without(self, *left: Level | str) -> "Model":
         """The model without the effects of these levels and names.
@@ -180,7 +180,7 @@ class Model:
         ('elastic', 'springpot', 'friction')
         """
         kept = [effect.name for effect in self.records if not {effect.level, effect.name} & {*left}]
-        return Model.started(self.bushing, kept, self.values, self.unnamed if UNNAMED in kept else None)
+        return Model.with_defaults(self.bushing, kept, self.values, self.unnamed if UNNAMED in kept else None)
 
     def equation(self) -> str:
         """The model as text: the formula of its first-harmonic stiffness, other effects, and values in common units.
@@ -303,7 +303,7 @@ class Model:
 
         def below(count: int) -> StiffnessBelow:
             def cycle(omega: Array, motion: Array, points: Any) -> Array:
-                cycles = replace(setting, under=setting.under.at(points).at((..., None)))
+                cycles = replace(setting, under=setting.under.select(points).select((..., None)))
                 force = self._stack_force(cycles, per_sample, [layer for group in groups[:count] for layer in group])
                 return force(History.steady(motion, cast(float, omega[..., None] / (2.0 * np.pi))))
 

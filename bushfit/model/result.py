@@ -11,7 +11,7 @@ from pydantic import Field
 from bushfit.effects import Level
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
-from bushfit.geometry import Bushing, Place, Specimen, place_named
+from bushfit.geometry import Bushing, Place, Specimen, get_place
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Source, Stepped
@@ -290,7 +290,7 @@ class Result:
 
     def place(self, name: str) -> Place:
         """The specimen of this name, or else the direction; a ModelError where it is neither."""
-        return place_named(name, self.specimens)
+        return get_place(name, self.specimens)
 
     def interval(self, name: str) -> tuple[float, float] | None:
         """95 % interval of a parameter [its SI unit], cut at its bounds; None where it was held at an exact value.
@@ -323,7 +323,7 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
 
     def moved(model: Model) -> Model:
         kept = [each.name for each in model.records if each.level is Level.MATERIAL or each.corrects in names]
-        return Model.started(bushing, kept, model.values)
+        return Model.with_defaults(bushing, kept, model.values)
 
     model = moved(result.model)
     measured = result.measured

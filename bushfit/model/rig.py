@@ -135,4 +135,4 @@ def dynamic_stiffness(
     """
     measured = partial(record, model, direction, cycles=1, run_in=run_in, steps_per_cycle=steps_per_cycle)
     points = enumerate(zip(np.atleast_1d(frequency), np.atleast_1d(amplitude), strict=True))
-    return np.array([lock_in(measured(f, x, under=under.at(number)), f) for number, (f, x) in points])
+    return np.array([lock_in(measured(f, x, under=under.select(number)), f) for number, (f, x) in points])

@@ -12,7 +12,7 @@ from typing import cast
 
 import numpy as np
 
-from bushfit.effects import Branch, Parameter, place_of, qualified
+from bushfit.effects import Branch, Parameter, place_suffix, qualified_name
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Value, Values
 from bushfit.effects.history import History
 from bushfit.geometry import Place
@@ -79,7 +79,7 @@ def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tup
     row = {name: i for i, name in enumerate(names)}
     for branch in model.records:
         assert isinstance(branch, Branch)
-        own = {parameter.name: qualified(branch, parameter) for parameter in branch.parameters}
+        own = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
         moved = [name for name in (*own.values(), *branch.uses) if name in row]
         if not moved:
             continue
@@ -96,7 +96,7 @@ def _differences_at(
     place: Place, model: Model, names: Sequence[str], respond: Callable[[Values], Array]
 ) -> tuple[Array, Array]:
     """As `differences`; parameters that belong to another place are not moved, as nothing comes of it here."""
-    here = [i for i, name in enumerate(names) if place_of(name) in (None, str(place))]
+    here = [i for i, name in enumerate(names) if place_suffix(name) in (None, str(place))]
     response, moved = differences(model, [names[i] for i in here], respond)
     slopes = np.zeros((len(names), response.size), dtype=response.dtype)
     slopes[here] = moved

@@ -6,7 +6,7 @@ from functools import lru_cache
 from itertools import groupby
 from types import MappingProxyType
 
-from bushfit.effects import BASE, LIBRARY, Branch, Effect, Layer, Modifier, Parameter, effect_named, qualified
+from bushfit.effects import BASE, LIBRARY, Branch, Effect, Layer, Modifier, Parameter, get_effect, qualified_name
 from bushfit.effects.contract import Values
 from bushfit.errors import ModelError
 
@@ -45,17 +45,17 @@ class Structure:
             kind = effect.name.partition(".")[0]
             return effect.level, kinds.index(kind) if kind in kinds else len(kinds), effect.name
 
-        records = tuple(sorted(map(effect_named, names), key=outward))
+        records = tuple(sorted(map(get_effect, names), key=outward))
         branches = tuple(effect for effect in records if isinstance(effect, Branch))
         return cls(
             records,
-            MappingProxyType({qualified(effect, each): each for effect in records for each in effect.parameters}),
+            MappingProxyType({qualified_name(effect, each): each for effect in records for each in effect.parameters}),
             branches,
             tuple(branch for branch in branches if branch.size),
             tuple(branch for branch in branches if not branch.size),
             tuple(effect for effect in records if isinstance(effect, Modifier)),
             tuple(effect for effect in records if isinstance(effect, Layer)),
-            tuple(qualified(b, each) for b in branches for each in b.parameters if each.unit.startswith("Pa")),
+            tuple(qualified_name(b, each) for b in branches for each in b.parameters if each.unit.startswith("Pa")),
         )
 
 
@@ -74,4 +74,4 @@ def seen_by(effect: Effect, values: Values) -> Values:
     """The values that an effect reads: all by their full names, and its own by short ones, too."""
     if effect.name in BASE:
         return values
-    return {**values, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}
+    return {**values, **{parameter.name: values[qualified_name(effect, parameter)] for parameter in effect.parameters}}

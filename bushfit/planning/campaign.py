@@ -19,7 +19,7 @@ from threadpoolctl import threadpool_limits
 
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.campaign.toml import body_lines, place_line, toml_value
-from bushfit.effects import BASE, qualified
+from bushfit.effects import BASE, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import Coordinates
@@ -87,7 +87,7 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
     for record in known.model.records:
         lines += [] if record.name in BASE else ["", f"[simulate.effects.{toml_value(record.name)}]"]
         for parameter in record.parameters:
-            value = _number(known.model.values[qualified(record, parameter)])
+            value = _number(known.model.values[qualified_name(record, parameter)])
             text = value if parameter.unit == "1" else toml_value(f"{value} {parameter.unit}")
             lines.append(f"{parameter.name} = {text}")
     for kind, tests in (("loops", settings.loops), ("sweeps", settings.sweeps)):

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.campaign.schema import SimulatedSweep
-from bushfit.effects import qualified
+from bushfit.effects import qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.repeats import FEWEST_STEPS
@@ -285,7 +285,10 @@ class _Planner:
             if self.least[best] > 0.0:
                 amount = effect.amount
                 yield Visible(
-                    effect.name, qualified(effect, amount), amount.unit, amount.typical * smallest_found(reached[best])
+                    effect.name,
+                    qualified_name(effect, amount),
+                    amount.unit,
+                    amount.typical * smallest_found(reached[best]),
                 )
         yield Visible("drift", "drift.gain", "1", smallest_found(drifting))
 

@@ -5,7 +5,7 @@ from itertools import chain
 
 import numpy as np
 
-from bushfit.effects import Level, effect_named
+from bushfit.effects import Level, get_effect
 from bushfit.effects.contract import Array
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Z95
@@ -35,7 +35,7 @@ def caveats(result: Result) -> list[str]:
     own = {*Direction, *(specimen.name for specimen in result.specimens)}  # a compound was fitted on other bodies
     lines = [line for name in fitted if name in own for line in unfitted(result, result.place(name))]
     for name in result.unresolved:
-        twins = " or ".join(effect_named(name).twins)
+        twins = " or ".join(get_effect(name).twins)
         lines.append(f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}")
     lines += result.undecided
     if "springpot" not in result.model.effects:
@@ -60,7 +60,7 @@ def caveats(result: Result) -> list[str]:
 
 def rig_effects(result: Result) -> list[str]:
     """Effects of a model that belong to the rig."""
-    return [name for name in result.model.effects if effect_named(name).level is Level.INSTRUMENT]
+    return [name for name in result.model.effects if get_effect(name).level is Level.INSTRUMENT]
 
 
 def unfitted(result: Result, direction: Place) -> Iterator[str]:

@@ -182,7 +182,7 @@ def _open_to(
     found = model.unnamed or result.model_error
     if found is None:
         return np.zeros((0, frequency.size)), np.ones(frequency.size)
-    share, off, stands = found.at(setting, 2.0 * np.pi * frequency, amplitude)
+    share, off, stands = found.evaluate(setting, 2.0 * np.pi * frequency, amplitude)
     parts = np.array([[1.0], [1.0j]])
     if model.unnamed:
         return parts * off * stiffness / (1.0 + share), np.sqrt(1.0 - np.square(stands))

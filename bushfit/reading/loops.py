@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bushfit.geometry import Place, stated_strain
+from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.headers import LOOP_COLUMNS, Column
 from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.source import LEAST_VALUE
@@ -79,7 +79,7 @@ def _check_not_swapped(table: Table, direction: Place) -> None:
 def _loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Column]:
     """The columns of a loop with their units; only one with a rate or frequency that is stated lacks time."""
     displacement = table.column("displacement", direction.motion.displacement_unit)
-    displacement = replace(displacement, scale=stated_strain(direction) * displacement.scale)
+    displacement = replace(displacement, scale=strain_factor_of_files(direction) * displacement.scale)
     force = table.column("force", direction.motion.force_unit)
     wanted = {"displacement": displacement, "force": replace(force, scale=test.force_sign * force.scale)}
     if "time" in table.roles:

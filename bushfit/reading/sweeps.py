@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit import units as si
-from bushfit.geometry import Place, stated_strain
+from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.headers import OF_MOTION, SWEEP_COLUMNS, AmplitudeConvention, Column
 from bushfit.reading.measurement import SAME_TEMPERATURE, Complex, Floats, Sweep
 from bushfit.reading.runs import runs_of
@@ -82,7 +82,7 @@ def read_sweep(
     to_peak = _ZERO_TO_PEAK[_convention(table, wanted.get("amplitude"), test.amplitude)]
     if at_amplitude is not None:  # as the file counts
         at["amplitude"] = (
-            at_amplitude * stated_strain(direction) * _ZERO_TO_PEAK[test.amplitude or "zero-to-peak"] / to_peak
+            at_amplitude * strain_factor_of_files(direction) * _ZERO_TO_PEAK[test.amplitude or "zero-to-peak"] / to_peak
         )
     values = table.read(wanted, fewest_rows=_FEWEST_SWEEP_ROWS)
     table.check_positive(_POSITIVE, wanted, values)
@@ -155,7 +155,7 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Ma
     found = {role: table.column(role, units[role], _HINTS.get(role)) for role in wanted}
     for role in ("amplitude", "amplitude_reached"):
         if role in found:
-            found[role] = replace(found[role], scale=stated_strain(direction) * found[role].scale)
+            found[role] = replace(found[role], scale=strain_factor_of_files(direction) * found[role].scale)
     return found if degrees is None else {"temperature": degrees, **found}
 
 

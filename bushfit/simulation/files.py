@@ -12,7 +12,7 @@ from typing_extensions import Doc, TypedDict
 
 from bushfit.campaign.toml import body_lines, table_lines
 from bushfit.errors import quote_path
-from bushfit.geometry import STRAINING, Display, Place, Specimen, Unit, stated_strain
+from bushfit.geometry import STRAINING, Display, Place, Specimen, Unit, strain_factor_of_files
 from bushfit.model.document import ModelFile
 from bushfit.model.file import to_document
 from bushfit.reading.measurement import Loop, Sweep, loss_factor
@@ -117,5 +117,5 @@ def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
 def _as_stated(place: Place) -> Display:
     """The units in which files of a place have displacement, force and stiffness; tensor strain is half of gamma."""
     (unit, factor), force, stiffness = place.display
-    stated = stated_strain(place)
+    stated = strain_factor_of_files(place)
     return Display(Unit(unit, factor / stated), force, stiffness)

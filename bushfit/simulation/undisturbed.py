@@ -85,7 +85,7 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
     return Undisturbed(
         truth,
         tuple(
-            (test, _clean_loop(truth, test, own.at(0)))
+            (test, _clean_loop(truth, test, own.select(0)))
             for test, own in track("loops simulated", list(zip(loops, under, strict=False)))
         ),
         tuple((test, _clean_sweep(truth, test, steps_per_cycle)) for test in track("sweeps simulated", sweeps)),

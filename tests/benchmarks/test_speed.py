@@ -240,7 +240,7 @@ def test_growth_with_effects(benchmark: BenchmarkFixture, paper_model: Model, ta
     grid, added = sweep(paper_model, 1000, 10), ("viscous", "second_friction", "inertia", "delay")
 
     def asked(*names: str) -> Callable[[], object]:
-        model = Model.started(paper_model.bushing, (*BASE, *names), paper_model.values)
+        model = Model.with_defaults(paper_model.bushing, (*BASE, *names), paper_model.values)
         return lambda: [model.stiffness(Direction.AXIAL, grid.frequency, grid.amplitude) for _ in range(5)]
 
     works = [asked(), *map(asked, added), asked(*added)]

@@ -14,7 +14,7 @@ import pytest
 from commandline import Done
 from shell import Run, document, names, typing
 
-from bushfit.effects import BASE, at_places
+from bushfit.effects import BASE, effects_for_places
 from bushfit.effects.mistakes import MISTAKES
 
 #: An inertia is hidden here.
@@ -95,7 +95,7 @@ def test_every_residual_and_every_candidate_is_in_a_table(found: Path) -> None:
     assert table[table.kind == "sweep"].groupby("test").size().to_dict() == {"sweep_axial": 144, "sweep_radial": 144}
     assert set(table[table.kind == "loop"].test) == {"loop_axial_1", "loop_axial_2"}
     table = pd.read_csv(found / "candidates.csv")
-    asked = {name for name, effect in at_places(("axial", "radial")).items() if effect.after in (None, *BASE)}
+    asked = {name for name, effect in effects_for_places(("axial", "radial")).items() if effect.after in (None, *BASE)}
     mistakes = table.effect.str.partition(":")[0].isin(MISTAKES)
     assert set(table.effect[~mistakes]) == asked - set(BASE)
     assert table.probability[mistakes].max() < 1e-6

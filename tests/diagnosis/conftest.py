@@ -15,7 +15,7 @@ from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.rig_errors import scattering_alone
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import BASE, effect_named
+from bushfit.effects import BASE, get_effect
 from bushfit.fitting.data import Data
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import Model
@@ -72,9 +72,9 @@ def fitted() -> Fitted:
         data = Data.of(campaign)
         data_sets = [*data.loops, *data.sweeps]
         start = start_values(campaign.bushing, data_sets, {})
-        gone = {effect_named(name).replaces for name in effects}
+        gone = {get_effect(name).replaces for name in effects}
         kept = [name for name in BASE if name not in gone]
-        return fit(Model.started(campaign.bushing, (*kept, *effects), start), data_sets, (), {})
+        return fit(Model.with_defaults(campaign.bushing, (*kept, *effects), start), data_sets, (), {})
 
     return evidence
 

@@ -18,7 +18,7 @@ from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.reading.measurement import Sweep
 
-PAPER = Model.started(
+PAPER = Model.with_defaults(
     Bushing("paper's", 0.010, 0.018, 0.034),
     ("elastic", "springpot", "friction"),
     dict(zip(FIVE, (1.09e6, 0.2e6, 0.24, 14.6e3, 0.013), strict=True)),

@@ -15,7 +15,7 @@ from tries import some
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting
 from bushfit.diagnosis.families import FittedFamily, fit_families, known_families
-from bushfit.effects import BASE, LIBRARY, qualified, twins_of, with_base
+from bushfit.effects import BASE, LIBRARY, qualified_name, twins_of, with_base
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.procedures import fit_joint
@@ -50,7 +50,7 @@ def test_known_effects_are_recovered(name: str) -> None:
 def test_effects_without_a_law_in_time_are_recovered_from_their_first_harmonic(name: str, paper_model: Model) -> None:
     """The rig refuses them: the data are the closed form of the steady state with noise, for loops too."""
     effect = LIBRARY[name]
-    truth = paper_model.with_effect(name, {qualified(effect, effect.amount): effect.amount.sized(1.0)})
+    truth = paper_model.with_effect(name, {qualified_name(effect, effect.amount): effect.amount.sized(1.0)})
     campaign = measure(in_closed_form(truth, PLAN), PLAN).campaign()
     result = fit_joint(Data.of(campaign), effects=(*BASE, name), directions=BOTH)
     assert 0.85 < agrees(result, truth.values) < 1.15
@@ -122,7 +122,7 @@ def begun(model: Model, campaign: Campaign) -> tuple[Model, list[DataSet]]:
     """The plain model as a fit begins, and the tests."""
     data = Data.of(campaign)
     tests = [*data.loops, *data.sweeps]
-    return Model.started(model.bushing, BASE, data.start(tests, {})), tests
+    return Model.with_defaults(model.bushing, BASE, data.start(tests, {})), tests
 
 
 def families(model: Model, truth: str, values: Mapping[str, float]) -> dict[str, FittedFamily]:

@@ -19,7 +19,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
 from bushfit.diagnosis.propose import proposals, scores, sensitivity
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
-from bushfit.effects import BASE, LIBRARY, effect_named
+from bushfit.effects import BASE, LIBRARY, get_effect
 from bushfit.effects.contract import Array, Values
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.model.model import Model
@@ -105,7 +105,7 @@ def test_effects_are_sized_by_what_they_change(bare: Evidence) -> None:
     assert group is not None
     assert (group.sense, found["inertia"].family) == (1, "inertia")
     assert found["stiffness_factor.radial"].family == "stiffness_factor"
-    effect = effect_named("inertia")
+    effect = get_effect("inertia")
     heavy = bare.model.with_effect("inertia", {"inertia.mass": effect.amount.sized(0.01)})
     largest = max(each.change(heavy, bare.model) for each in bare.data_sets)
     assert 0.01 * group.unit[0] == pytest.approx(largest, rel=0.1)
@@ -136,7 +136,7 @@ class Gapped:
 
 def test_shapes_without_a_response_are_left_out(paper_model: Model) -> None:
     """The widest gap, at which no stop is asked for its stiffness either, is one of them."""
-    stop = effect_named("bump_stop")
+    stop = get_effect("bump_stop")
     shapes, columns = sensitivity(paper_model, cast(Sequence[DataSet], [Gapped()]), stop)
     assert 0 < len(shapes) == len(columns)
     assert all(shape["bump_stop.gap"] <= 5e-4 for shape in shapes)

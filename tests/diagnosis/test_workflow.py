@@ -85,7 +85,7 @@ def test_a_radial_stiffness_off_the_formula_is_not_blamed_on_the_rig(
 def test_a_branch_of_the_paper_that_a_model_lacks_is_named(measured: Measured, fitted: Fitted) -> None:
     """What has no neutral logarithm to begin at begins at the amount that its score suggests."""
     campaign = measured({}, SHARED)
-    lacking = Model.started(campaign.bushing, ("elastic", "friction"), {"eps_half": 0.01})
+    lacking = Model.with_defaults(campaign.bushing, ("elastic", "friction"), {"eps_half": 0.01})
     diagnosis = asked(campaign, lacking)
     assert said(diagnosis) == "named springpot"
     for name, value in fitted(campaign).model.values.items():

@@ -19,9 +19,9 @@ from bushfit.effects import (
     Level,
     Modifier,
     Parameter,
-    at_places,
-    effect_named,
-    qualified,
+    effects_for_places,
+    get_effect,
+    qualified_name,
     twins_of,
 )
 from bushfit.effects.contract import Circumstances
@@ -62,7 +62,7 @@ def drawn(rng: np.random.Generator, *names: str) -> tuple[Model, Model, Directio
 def beside(plain: Model, name: str) -> Model:
     """The model that an effect is added to: without the branch that it replaces."""
     kept = [other for other in plain.effects if other != LIBRARY[name].replaces]
-    return Model.started(plain.bushing, kept, plain.values)
+    return Model.with_defaults(plain.bushing, kept, plain.values)
 
 
 def steady_sine(amplitude: float, frequency: float, samples: int = SAMPLES) -> History:
@@ -96,7 +96,7 @@ def test_record_is_complete(effect: Effect) -> None:
 def test_neutral_value_gives_the_plain_model_back(effect: Effect, rng: np.random.Generator) -> None:
     """Of the effect of temperature, but for the spring of a network, which goes with the absolute temperature."""
     plain = random_model(rng)
-    neutral = plain.with_effect(effect.name, {qualified(effect, effect.amount): effect.amount.sized(0.0)})
+    neutral = plain.with_effect(effect.name, {qualified_name(effect, effect.amount): effect.amount.sized(0.0)})
     plain = beside(plain, effect.name)
     if effect.name == "temperature":
         plain = plain.with_values({"mu": plain.values["mu"] * (UNDER.temperature / 296.15)})
@@ -224,11 +224,11 @@ def test_sensitivities_match_finite_differences(effect: Effect, rng: np.random.G
 def test_twins_answer_alike_in_both_faces_and_only_the_bushings_is_proposed(rng: np.random.Generator) -> None:
     sets = [twins_of(name) for name, each in LIBRARY.items() if each.twins]
     assert len(sets) == 5
-    proposed = at_places(["radial", "axial", "mount", "torsion"])
+    proposed = effects_for_places(["radial", "axial", "mount", "torsion"])
     for names in (*sets, twins_of("stiffness_factor.mount"), twins_of("sleeve_compliance.axial")):
         assert all(twins_of(name) == names for name in names)
         assert [name for name in names if name in proposed] == [names[0]]
-        levels = [effect_named(name).level for name in names]
+        levels = [get_effect(name).level for name in names]
         assert levels[0] is Level.COMPONENT
         assert Level.INSTRUMENT in levels
     for name, *twins in sets:
@@ -293,7 +293,7 @@ def test_a_stack_of_values_equals_one_after_the_other(
     assert both.shape == (3, 4)
     for row, each in zip(both, models, strict=True):
         for i, one in enumerate(row):
-            under = each_point.at(i)
+            under = each_point.select(i)
             alone = each.stiffness(direction, frequency[i], amplitudes[i], kind="loop", under=under)
             np.testing.assert_allclose(one, alone, rtol=1e-12)
     phase = np.arange(600) / 200
@@ -313,7 +313,7 @@ def test_a_stack_of_values_equals_one_after_the_other(
 def test_a_stack_of_its_amount_alone_does_so_in_sweeps(effect: Effect, other: str, rng: np.random.Generator) -> None:
     """What bends the waveform asks whole cycles, in which the amount may act where it does not in the stiffness."""
     _, model, direction, _, amplitude = drawn(rng, effect.name, other)
-    amount = qualified(effect, effect.amount)
+    amount = qualified_name(effect, effect.amount)
     amounts = model.values[amount] * np.array([0.9, 1.0, 1.1])
     frequency, amplitudes = np.array([0.1, 40.0, 155.0, 155.0]), amplitude * np.array([1.0, 0.5, 1.5, 0.0])
     at = (direction, frequency, amplitudes)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from bushfit.effects import BASE, LIBRARY, Effect, History, distributed_sliders, qualified, sliders
+from bushfit.effects import BASE, LIBRARY, Effect, History, distributed_sliders, qualified_name, sliders
 from bushfit.effects.contract import Circumstances
 from bushfit.effects.dead_zone import first_harmonic
 from bushfit.effects.temperature import log_shift
@@ -109,7 +109,7 @@ def test_instrument_masses_springs_and_offsets_do_not_act_in_torsion() -> None:
 @pytest.mark.parametrize("effect", [effect for effect in LIBRARY.values() if effect.corrects], ids=lambda one: one.name)
 def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effect) -> None:
     (parameter,) = effect.parameters
-    model = PLAIN.with_effect(effect.name, {qualified(effect, parameter): parameter.sized(1.0)})
+    model = PLAIN.with_effect(effect.name, {qualified_name(effect, parameter): parameter.sized(1.0)})
     for direction in Direction:
         factor = parameter.sized(1.0) if direction == effect.corrects else 1.0
         plain = PLAIN.stiffness(direction, FREQUENCY, AMPLITUDE)
@@ -215,7 +215,7 @@ def test_circumstances_of_each_point_reach_the_rubber_through_a_bent_waveform(mo
     under = Circumstances(np.array([290.0, 300.0, 305.0]), np.array([0.0, 0.3, 1.0]), np.array([0.0, 0.02, 0.05]))
     together = model.stiffness(*AXIAL, under=under)
     points = enumerate(zip(FREQUENCY, AMPLITUDE, strict=True))
-    alone = [model.stiffness("axial", f, x, under=under.at(i)) for i, (f, x) in points]
+    alone = [model.stiffness("axial", f, x, under=under.select(i)) for i, (f, x) in points]
     np.testing.assert_allclose(together, alone, rtol=1e-12)
 
 

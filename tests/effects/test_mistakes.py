@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.effects import LIBRARY
-from bushfit.effects.mistakes import MISTAKES, candidate_named, file_or_name, mistake_named
+from bushfit.effects.mistakes import MISTAKES, file_or_name, get_candidate, get_mistake
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -96,10 +96,10 @@ def test_a_correction_names_file_table_and_line() -> None:
 
 
 def test_a_name_with_its_test_is_known_and_another_refused() -> None:
-    assert candidate_named("peak_to_peak:sweep_axial") is candidate_named("peak_to_peak") is MISTAKES["peak_to_peak"]
-    assert candidate_named("inertia") is LIBRARY["inertia"]
-    assert mistake_named("inertia") is None
+    assert get_candidate("peak_to_peak:sweep_axial") is get_candidate("peak_to_peak") is MISTAKES["peak_to_peak"]
+    assert get_candidate("inertia") is LIBRARY["inertia"]
+    assert get_mistake("inertia") is None
     with pytest.raises(ModelError, match="unknown mistake"):
-        candidate_named("peak_to_pique:sweep_axial")
+        get_candidate("peak_to_pique:sweep_axial")
     with pytest.raises(ModelError, match="unknown effect"):
-        candidate_named("peak_to_pique")
+        get_candidate("peak_to_pique")

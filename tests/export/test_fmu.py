@@ -12,7 +12,7 @@ import pytest
 from fmpy.validation import validate_fmu
 from fmus import LEVELS, Running, off, order_of, wandering, written
 
-from bushfit.effects import LIBRARY, Branch, Layer, Level, qualified
+from bushfit.effects import LIBRARY, Branch, Layer, Level, qualified_name
 from bushfit.effects.contract import Array, Circumstances
 from bushfit.export.in_time import FIELDS
 from bushfit.geometry import Bushing, Direction
@@ -76,7 +76,7 @@ def test_force_follows_the_rig_in_every_direction(paper: Running, paper_model: M
 def every(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> tuple[Model, Running]:
     """A model with every law at its neutral values, and its FMU."""
     folder = tmp_path_factory.mktemp("every")
-    model = Model.started(paper_model.bushing, (*paper_model.effects, *SETTABLE), paper_model.values)
+    model = Model.with_defaults(paper_model.bushing, (*paper_model.effects, *SETTABLE), paper_model.values)
     return model, Running(written(order_of(model), folder), folder / "open")
 
 
@@ -86,7 +86,7 @@ def test_each_effect_follows_the_rig(every: tuple[Model, Running], name: str) ->
     samples do not count."""
     neutral, running = every
     effect = LIBRARY[name]
-    values = {qualified(effect, parameter): parameter.sized(1.0) for parameter in effect.parameters}
+    values = {qualified_name(effect, parameter): parameter.sized(1.0) for parameter in effect.parameters}
     values |= {key: 1.5e-4 for key in values if key.endswith(".gap")}
     model = neutral.with_values(values)
     motion, step, frequency = motions("random", 1)
@@ -104,7 +104,7 @@ def test_each_effect_follows_the_rig(every: tuple[Model, Running], name: str) ->
 
 def test_what_fades_with_memory_or_a_preload_follows_the_rig(paper_model: Model, tmp_path: Path) -> None:
     names = tuple(dict.fromkeys(name.partition(".")[0] for name in FADING))
-    model = Model.started(paper_model.bushing, (*paper_model.effects, *names), {**paper_model.values, **FADING})
+    model = Model.with_defaults(paper_model.bushing, (*paper_model.effects, *names), {**paper_model.values, **FADING})
     running = Running(written(order_of(model, accuracy=2e-3), tmp_path), tmp_path / "fading")
     assert worst(running, model, "random") < LARGEST
     doubled = {"maxwell.mu1": 2.0 * FADING["maxwell.mu1"]}

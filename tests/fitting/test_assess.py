@@ -214,7 +214,7 @@ def test_a_run_held_out_is_a_refit_without_it(levelled: Campaign) -> None:
     """One Gauss-Newton step against the real refit: the same to a tenth of the standard errors."""
     data = Data.of(replace(levelled, loops=()))
     (sweep,) = data.chosen(None)
-    best = solve(Model.started(levelled.bushing, ("elastic", "springpot", "friction"), {}), [sweep], FIVE)
+    best = solve(Model.with_defaults(levelled.bushing, ("elastic", "springpot", "friction"), {}), [sweep], FIVE)
     errors = np.sqrt(np.diag(np.linalg.inv(best.jacobian @ best.jacobian.T)))
     for level in LEVELS:
         rows = np.flatnonzero(np.tile(sweep.amplitude == level, 2))

@@ -112,7 +112,7 @@ def test_random_starts_end_at_one_minimum(measured: Data, axial: list[DataSet], 
 
 def started(paper_model: Model, data_sets: list[DataSet], *effects: str) -> Model:
     start = start_values(paper_model.bushing, data_sets, {})
-    return Model.started(paper_model.bushing, (*BASE, *effects), start)
+    return Model.with_defaults(paper_model.bushing, (*BASE, *effects), start)
 
 
 @pytest.mark.parametrize("effects", [(), ("delay",), ("viscous", "strain_stiffening")], ids="+".join)

@@ -70,7 +70,7 @@ def test_the_springpot_and_the_spring_in_series_are_one_part(paper_model: Model)
 
 
 def test_a_model_without_memory_has_none(paper_model: Model) -> None:
-    still = Model.started(paper_model.bushing, BASE, {**paper_model.values, "m": 0.0})
+    still = Model.with_defaults(paper_model.bushing, BASE, {**paper_model.values, "m": 0.0})
     assert model_arms(still, (5.0, 155.0)) == ()
     assert arm_rows(still, ()) == [("elastic", 1.09e6, pytest.approx(float("nan"), nan_ok=True))]
 

@@ -10,7 +10,7 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
-from bushfit.effects import BASE, LIBRARY, effect_named, qualified
+from bushfit.effects import BASE, LIBRARY, get_effect, qualified_name
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import loop_data, sources
 from bushfit.fitting.procedures import fit_joint
@@ -59,9 +59,9 @@ def test_an_ideal_rig_measures_the_closed_form_at_every_point(clean: Undisturbed
 def test_a_small_loop_is_that_of_the_closed_form_with_any_effect(paper_model: Model, name: str) -> None:
     """What went before a loop is gone from it: the rig's first harmonic is the closed form's, within its own error."""
     model = paper_model.with_effect(name)
-    effect = effect_named(name)
+    effect = get_effect(name)
     if not effect.replaces:
-        model = model.with_values({qualified(effect, effect.amount): effect.amount.sized(0.1)})
+        model = model.with_values({qualified_name(effect, effect.amount): effect.amount.sized(0.1)})
     small = SimulatedLoop(Direction.AXIAL, 2e-6, 1.0, cycles=1)
     ((_, record),) = undisturbed(model, SimulateSettings(loops=(small,))).loops
     closed = model.stiffness(Direction.AXIAL, 1.0, 2e-6, kind="loop")

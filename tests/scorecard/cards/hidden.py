@@ -15,7 +15,7 @@ from numpy.random import Generator
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.diagnosis.evidence import fit
-from bushfit.effects import BASE, LIBRARY, Effect, effect_named, qualified
+from bushfit.effects import BASE, LIBRARY, Effect, get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet
@@ -101,7 +101,7 @@ def hidden_campaign(
     for _ in range(30):  # the worst effect needs a dozen bushings until one shows it at a size in range
         plain = random_bushing(random)
         plan = plan_of(plain, random, seed, directions)
-        if any("temperature" in effect_named(name).under for name in hidden):
+        if any("temperature" in get_effect(name).under for name in hidden):
             plan = _at_temperatures(plan, random)
         with suppress(_OutOfReachError):
             model, least = _with_hidden(plain, hidden, plan, random, visible)
@@ -172,7 +172,7 @@ def _with_hidden(
     model, sizes = plain, []
     for name in hidden:
         wanted = float(np.exp(random.uniform(*np.log(visible))))
-        sized, size = _sized(plain, effect_named(name), wanted, plan, random, visible)
+        sized, size = _sized(plain, get_effect(name), wanted, plan, random, visible)
         model = model.with_effect(name, sized)
         sizes.append(size)
     return model, min(sizes, default=0.0)
@@ -188,12 +188,12 @@ def _sized(
 ) -> tuple[dict[str, float], float]:
     """Values of an effect of which about the wanted size stays visible after a plain fit, and that size."""
     values = {
-        qualified(effect, parameter): _shape(plain, plan, parameter.scale, parameter.typical, random)
+        qualified_name(effect, parameter): _shape(plain, plan, parameter.scale, parameter.typical, random)
         for parameter in effect.parameters
         if parameter.neutral is None
     }
     amount, share = effect.amount, 1.0
-    amounts = {qualified(effect, each): each for each in effect.parameters if each.neutral is not None}
+    amounts = {qualified_name(effect, each): each for each in effect.parameters if each.neutral is not None}
     if amount.bounds[0] < amount.sized(0.0) and random.random() < 0.5:
         share = -share
     size = 0.0

@@ -25,8 +25,8 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.locate import largest_smooth_misfit
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import effect_of
-from bushfit.effects.mistakes import mistake_named
+from bushfit.effects import effect_name_of
+from bushfit.effects.mistakes import get_mistake
 from bushfit.errors import MeasurementError, ModelError
 from bushfit.fitting.data import Data
 from bushfit.planning.campaign import settings_of
@@ -141,7 +141,7 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
     result, document = diagnosis.result, diagnosis.to_document()
     heldout = document["gap"]["heldout"] or {"before": None, "after": None}
     added = {name for name in task.hidden if name in result.model.effects}
-    asked = [name for name in truth.values if effect_of(name) in added]
+    asked = [name for name in truth.values if effect_name_of(name) in added]
     intervals = {name: result.interval(name) for name in asked}
     (_, odds), leader = next(zip(diagnosis.odds.told, diagnosis.odds.labels, strict=True), (("", 0.0), ""))
     covered = [ends[0] <= truth.values[name] <= ends[1] for name, ends in intervals.items() if ends is not None]
@@ -150,7 +150,7 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
         truth,
         diagnosis.verdict,
         tuple(tuple(dict.fromkeys((effect.label, *_names(effect.alternatives)))) for effect in diagnosis.effects),
-        max((judged.gain or 0.0 for judged in diagnosis.candidates if not mistake_named(judged.name)), default=0.0),
+        max((judged.gain or 0.0 for judged in diagnosis.candidates if not get_mistake(judged.name)), default=0.0),
         heldout["after"],
         tuple(covered),
         seconds,
