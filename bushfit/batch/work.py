@@ -15,7 +15,7 @@ from bushfit.batch.quantities import Point, curve_of
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.commands.diagnose import DiagnosisOutput, diagnose
 from bushfit.diagnosis.record import Diagnosis
-from bushfit.effects import effect_named
+from bushfit.effects import get_effect
 from bushfit.errors import BatchError, BushfitError
 from bushfit.fitting.data import Data
 from bushfit.model.file import load_result
@@ -152,7 +152,7 @@ def _verdict(diagnosis: Diagnosis) -> Found:
         "effects": [named.label for named in diagnosis.effects],
         "alternatives": [
             *(name for named in diagnosis.effects for name in named.alternatives),
-            *(twin for name in diagnosis.result.unresolved for twin in effect_named(name).twins),
+            *(twin for name in diagnosis.result.unresolved for twin in get_effect(name).twins),
         ],
         "warnings": list(diagnosis.notes),
     }

@@ -59,7 +59,7 @@ def command(
     from bushfit.commands.compare import MOST, compare
     from bushfit.commands.loading import model_file
     from bushfit.commands.provenance import command_line, option_words
-    from bushfit.effects import effect_named
+    from bushfit.effects import get_effect
 
     if families is None and not 2 <= len(sources) <= MOST:
         raise click.UsageError(f"2 to {MOST} results are compared; one campaign alone with '--families' after it.")
@@ -72,7 +72,7 @@ def command(
         names = () if families == _ALL else tuple(name.replace(" ", "") for name in families.split(","))
         with error_location(place="--families"):
             for name in names:
-                all(map(effect_named, name.split("+")))
+                all(map(get_effect, name.split("+")))
         campaign = load_campaign(sources[0])
         folder = output.free_folder(campaign.name, "compare.json", form="{} families")
         compared = compare(campaign, families=names, **settings)

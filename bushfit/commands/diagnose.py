@@ -107,7 +107,7 @@ def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -
 
 def _require_free_parameter(data: Data, model: Model | None, settings: Settings) -> None:
     """Raise a FitError if no parameter is free and no effect is to be added."""
-    model = model or Model.started(data.campaign.bushing, data.effects, {})
+    model = model or Model.with_defaults(data.campaign.bushing, data.effects, {})
     if not (settings.adopt or data.free(tuple(model.parameters))):
         raise FitError(
             "there is nothing to fit, and so nothing to diagnose",

@@ -17,7 +17,7 @@ from bushfit.commands.fit import prepare_tests
 from bushfit.commands.predict import Numbers, grid_of
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, did_you_mean
-from bushfit.geometry import Direction, Place, place_named
+from bushfit.geometry import Direction, Place, get_place
 from bushfit.model.result import Result
 from bushfit.planning.campaign import Check, campaign_toml
 from bushfit.planning.contract import (
@@ -287,7 +287,7 @@ def plan(
                 hint=did_you_mean(name, known.names),
             )
     default = [Direction.AXIAL, Direction.RADIAL] if known.model.bushing else list(known.specimens)
-    places = tuple(place_named(name, known.specimens) for name in test_directions) or tuple(default)
+    places = tuple(get_place(name, known.specimens) for name in test_directions) or tuple(default)
     grid = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
     points = tuple(_wanted_points(Result(known.model, specimens=known.specimens), grid, campaign, default))
     rig = rig_of(campaign.rig if campaign else RigSettings(), known.noise)
@@ -319,7 +319,7 @@ def _wanted_points(
 ) -> Iterator[Points]:
     """Operating points of the wanted predictions: as asked for, as [predict] states, or the grid of `predict`."""
     settings = grid_settings(grid, campaign)
-    places = [place_named(name, result.specimens) for name in settings.directions or ()]
+    places = [get_place(name, result.specimens) for name in settings.directions or ()]
     for place in places or default:
         usual = default_grid(result, place, campaign.sweeps if campaign else ())
         frequencies, amplitudes = asked_or(usual, settings, place)

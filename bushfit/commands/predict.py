@@ -20,7 +20,7 @@ from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
 from bushfit.fitting.data_sets import SweepData, sweep_data
-from bushfit.geometry import Bushing, Direction, Place, Specimen, place_named
+from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
 from bushfit.model.arms import Arms, model_arms
 from bushfit.model.result import Misfit, Result, Usable, carried
 from bushfit.prediction.caveats import warnings_of
@@ -194,7 +194,7 @@ def _places(result: Result, campaign: Campaign | None, settings: PredictSettings
     """Directions and specimens to predict."""
     specimens = {specimen.name: specimen for specimen in (*result.specimens, *(campaign.specimens if campaign else ()))}
     if settings.directions:
-        return [place_named(name, specimens.values()) for name in settings.directions]
+        return [get_place(name, specimens.values()) for name in settings.directions]
     return [*(_DIRECTIONS if result.model.bushing or not specimens else ()), *specimens.values()]
 
 

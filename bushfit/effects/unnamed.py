@@ -194,7 +194,7 @@ def first_harmonic(values: Values, below: ForceBelow, displacement: History, set
     >>> motion = History.steady(amplitude * np.array([0.0, 1.0, 0.0, -1.0]), 5.0)
     >>> test = replace(loop, unnamed=Unnamed(0.1, (1.0, 1.0), (patch,)))
     >>> force = first_harmonic({}, lambda history: 1e5 * history.value, motion, test)
-    >>> round(force[1] / (1e5 * amplitude), 6)
+    >>> round(float(force[1]) / (1e5 * amplitude), 6)
     1.1
     """
     force = below(displacement)
