@@ -63,7 +63,7 @@ def written(root: Path, folder: Path) -> Documents:
     (folder / "broken.toml").write_text("[bushing]\n")
     batch = ("batch", "configs/cmp_15961.toml", "data/practice/case_001/bushing.toml", "broken.toml")
     asked = ("--command", "fit", "--command", "diagnose", "--at", "axial 25 Hz 0.1 mm", "--jobs", "1")
-    run("summary", *batch, *asked, "--limits", "configs/limits.toml", "-o", "batch", status=1)
+    run("batch", *batch, *asked, "--limits", "configs/limits.toml", "-o", "batch", status=1)
     run("simulation", "simulate", "run/model.json", "-o", "simulated")
     run("export", "export", "run/model.json", "--format", "nastran", "--format", "xlsx", "-o", "exported")
     loop, sweep = ("data/cmp_15961/loop_axial_1.csv", "data/cmp_15961/sweep_axial.csv")

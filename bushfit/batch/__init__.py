@@ -1,4 +1,4 @@
-"""Many campaigns at once: a manifest's rows through the jobs of the single commands, on cores or on a cluster.
+"""Many campaigns at once: the rows of a manifest through the commands of a single campaign, on cores or on a cluster.
 
-manifest (rows) -> pool (workers) -> work (one row) -> ledger (its folder) -> outcome (table, limits, picture, page).
+manifest (rows) -> executor (workers) -> row (one part) -> store (its folder) -> summary (table, limits, page).
 """

@@ -1,153 +1,70 @@
-"""What a batch writes as JSON, key by key: row.json of a bushing, and the summary that `--json` prints.
+"""The JSON file of one part of a batch, `row.json`; that of the whole batch is in `report.batch_document`."""
 
-Their JSON Schemas are made of these types, and the type checker holds to them what is written.
-"""
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
-from typing import Annotated, Literal, NotRequired
+from pydantic import Field
 
-from typing_extensions import Doc, TypedDict
-
-from bushfit.diagnosis.document import Verdict
+from bushfit.diagnosis import document
 from bushfit.model.result import End
-from bushfit.report.process import Process
+
+#: Value of the key `schema`, which names the layout of the file; a row of another layout is done again.
+ROW_SCHEMA: Literal["bushfit/row/3"] = "bushfit/row/3"
 
 
-class Found(TypedDict, total=False):
-    """What was found of one bushing of a batch."""
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A value with its 95 % interval and standard error; null where the tests do not determine them."""
 
-    campaign_name: Annotated[str, Doc("of the campaign.")]
-    inputs: Annotated[dict[str, str], Doc("SHA-256 of the campaign, its tests and a model, by file.")]
-    verdict: Annotated[Verdict, Doc("of diagnose, where it was asked.")]
-    effects: Annotated[list[str], Doc("that diagnose named.")]
-    alternatives: Annotated[list[str], Doc("what the tests cannot tell the effects from.")]
-    warnings: Annotated[list[str], Doc("what a user must know before using the numbers.")]
-    parameters: Annotated[
-        dict[str, list[float | str | None]],
-        Doc(
-            "by name: value, least and largest of the 95 % interval, standard error, and the SI unit that all four "
-            "are in; null what is not known."
-        ),
-    ]
-    at_bound: Annotated[
-        dict[str, End],
-        Doc("parameters that came to rest on the least or largest value that they may have."),
-    ]
-    nrmse: Annotated[
-        float | None,
-        Doc("root mean square difference of model and tests, relative; null where nothing was fitted."),
-    ]
-    reduced_chi_square: Annotated[
-        float | None,
-        Doc("mean square residual in units of noise; null where nothing was fitted."),
-    ]
-    points: Annotated[
-        dict[str, dict[str, list[float | None]]],
-        Doc(
-            'by operating point, then "stiffness" [N/m, or N m/rad, or Pa] and "loss factor" [1]: value, least and '
-            "largest of the 95 % band."
-        ),
-    ]
-    date: Annotated[str | None, Doc("of the first test for which the campaign states one.")]
+    value: Annotated[float, Field(description="Value.")]
+    low: Annotated[float | None, Field(description="Lower end of the 95 % interval.")] = None
+    high: Annotated[float | None, Field(description="Upper end of the 95 % interval.")] = None
+    stderr: Annotated[float | None, Field(description="Standard error.")] = None
+    unit: Annotated[str, Field(description="SI unit of all four numbers.")] = "1"
+
+    @classmethod
+    def of(cls, value: float, low: float | None, high: float | None, stderr: float | None, unit: str) -> "Estimate":
+        """An estimate in which numbers that are not finite are None."""
+        low, high, stderr = (x if x is not None and math.isfinite(x) else None for x in (low, high, stderr))
+        return cls(value, low, high, stderr, unit)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RowFile:
+    """Results of one part, and the hashes by which a later run recognises that they still hold."""
+
+    schema: Annotated[Literal["bushfit/row/3"], Field(description="Layout of the file.")] = ROW_SCHEMA
+    status: Annotated[Literal["done", "failed"], Field(description="A failed row has an error and no results.")]
+    error: Annotated[str, Field(description="Why the row failed; empty if it is done.")] = ""
+    seconds: Annotated[float, Field(description="Computing time of the row [s].")] = 0.0
+    key: Annotated[str, Field(description="Hash of the settings of the row and of the version of bushfit.")] = ""
+    inputs: Annotated[Mapping[str, str], Field(description="SHA-256 of campaign, tests and model, by file.")] = field(
+        default_factory=dict
+    )
+    files: Annotated[Mapping[str, str], Field(description="SHA-256 of the result files beside this one.")] = field(
+        default_factory=dict
+    )
+    campaign_name: Annotated[str, Field(description="Name that the campaign gives the part.")] = ""
+    verdict: Annotated[document.Verdict | None, Field(description="Verdict of diagnose; null without it.")] = None
+    effects: Annotated[Sequence[str], Field(description="Effects that diagnose named.")] = ()
+    alternatives: Annotated[
+        Sequence[str], Field(description="Effects that the tests cannot distinguish from them.")
+    ] = ()
+    warnings: Annotated[Sequence[str], Field(description="Warnings of the fit and of the predictions.")] = ()
+    quantities: Annotated[
+        Mapping[str, Estimate],
+        Field(description="Parameters, NRMSE, reduced chi-square, stiffness and loss factor at the points, by name."),
+    ] = field(default_factory=dict)
+    measured: Annotated[
+        Mapping[str, Estimate],
+        Field(description="Stiffness and loss factor as measured at the points, where a sweep has the point."),
+    ] = field(default_factory=dict)
+    at_bound: Annotated[Mapping[str, End], Field(description="Parameters at a bound of their fit.")] = field(
+        default_factory=dict
+    )
     curve: Annotated[
-        dict[str, float],
-        Doc("|K| [N/m, N m/rad or Pa] by operating point, as the first sweep measured it at the level in its middle."),
-    ]
-
-
-class Record(Found):
-    """What was found of one bushing of a batch, and the hashes by which a later run can tell whether it still holds."""
-
-    schema: Annotated[Literal["bushfit/row/2"], Doc("of this file.")]
-    status: Annotated[Literal["done", "failed"], Doc("done, or failed; of a failed row nothing was found.")]
-    seconds: Annotated[float, Doc("that the row took [s].")]
-    error: NotRequired[Annotated[str, Doc("why the row failed, in words.")]]
-    key: NotRequired[Annotated[str, Doc("hash of what was asked, and of the version that answers.")]]
-    files: NotRequired[Annotated[dict[str, str], Doc("SHA-256 of the result files beside this one, by name.")]]
-    kept: NotRequired[Annotated[bool, Doc("whether the record was taken over from an earlier run; in memory only.")]]
-
-
-class Failure(TypedDict):
-    """A bushing that came to nothing."""
-
-    name: Annotated[str, Doc("of the bushing.")]
-    error: Annotated[str, Doc("why, in words.")]
-
-
-class Scatter(TypedDict):
-    """The middle and the scatter of a quantity over the batch."""
-
-    median: Annotated[float, Doc("in the unit.")]
-    sigma: Annotated[float, Doc("robust standard deviation, in the unit.")]
-    unit: Annotated[str, Doc("of both.")]
-
-
-class Control(TypedDict):
-    """The middle and the scatter of a column of the table, and what is allowed."""
-
-    median: Annotated[float, Doc("in the unit of the column.")]
-    sigma: Annotated[float, Doc("robust standard deviation, in the unit of the column.")]
-    allowed: Annotated[
-        list[float | None],
-        Doc("least and largest, in the unit of the column; null where there is no limit."),
-    ]
-    process: Annotated[Process, Doc("what the order of test tells of it.")]
-
-
-class Differing(TypedDict):
-    """A bushing that differs from the others of its batch by more than chance."""
-
-    name: Annotated[str, Doc("of the bushing.")]
-    row: Annotated[int, Doc("of the table, from 1.")]
-    by: Annotated[
-        dict[str, float],
-        Doc("robust z, by quantity: parameters before what follows from them, each the clearest first."),
-    ]
-    p: Annotated[float, Doc("probability by chance of the clearest, all bushings and quantities counted (Holm).")]
-    words: Annotated[str, Doc("the same in words.")]
-
-
-class Counts(TypedDict):
-    """What came of a batch, row by row."""
-
-    schema: Annotated[Literal["bushfit/batch/1"], Doc("of this document.")]
-    rows: Annotated[int, Doc("how many there are.")]
-    done: Annotated[int, Doc("how many of them are done.")]
-    failed: Annotated[list[Failure], Doc("the others, and why.")]
-    limits: Annotated[dict[str, int], Doc("bushings by how they meet the limits.")]
-    missed: Annotated[list[str], Doc("names of the bushings that miss a limit.")]
-    conditional: Annotated[
-        list[str],
-        Doc("names of those that pass on condition: the value is within, its interval reaches over the limit."),
-    ]
-    warnings: Annotated[list[str], Doc("what could not be judged, and other things to know.")]
-    differ: Annotated[list[Differing], Doc("bushings that differ from the others by more than chance.")]
-
-
-class BatchFile(Counts):
-    """What came of a batch, beside its table.
-
-    Args:
-        title: of the batch.
-        quantities: by column of the table.
-        order: what the order of test is taken from.
-        least_told: standard deviations by which a bushing has to differ to be told; null where none can be.
-    """
-
-    title: str
-    quantities: dict[str, Control]
-    order: str
-    least_told: float | None
-
-
-class BatchSummary(Counts):
-    """What came of a batch in this run.
-
-    Args:
-        kept: how many rows were taken over from an earlier run.
-        scatter: by quantity.
-        seconds: that the batch took [s].
-    """
-
-    kept: int
-    scatter: dict[str, Scatter]
-    seconds: float
+        Mapping[str, float],
+        Field(description="|K| [SI] of the first sweep at its middle level, by operating point."),
+    ] = field(default_factory=dict)

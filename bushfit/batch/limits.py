@@ -1,19 +1,20 @@
-"""Limits: a TOML file of bounds, fixed or relative to the batch, and the verdict on each bushing.
+"""Limits: a TOML file of fixed limits and of limits relative to the batch, and the result of each part.
 
-A bushing is as good as the worst of its quantities. What is not known of it fails. A parameter that rests on a bound of
-its fit is not settled by the tests: it passes on condition at best.
+A part is as good as the worst of its quantities.
 
 Notes:
-    A value with its 95 % interval meets a limit in one of four ways, in the words of ILAC-G8:09/2019 for statements of
-    conformity. Pass: the whole interval is within. Conditional pass: the value is within, but the interval reaches
-    over the limit. Conditional fail: the value is outside, but the interval reaches back. Fail: all of it is outside.
+    A value with its 95 % interval meets a limit in one of four ways, named as in ILAC-G8:09/2019, statements of
+    conformity. Pass: the whole interval is within the limits. Conditional pass: the value is within, the interval is
+    not. Conditional fail: the value is outside, a part of the interval is within. Fail: the whole interval is outside.
+    A quantity that is not known fails. A parameter at a bound of its fit is a conditional pass at best, because the
+    tests do not determine it. Where the model misses the tests, the limits are held against the measured points; a
+    limit without a measured point is not judged.
 """
 
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import IntEnum
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -21,29 +22,34 @@ from typing import Annotated
 import numpy as np
 from pydantic import ConfigDict, Field, ValidationInfo
 
-from bushfit.batch.document import Record
+from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.manifest import Row
-from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, At, Point, Quantity, at_point
+from bushfit.batch.quantities import (
+    FIT_QUALITY,
+    LOSS_FACTOR,
+    STIFFNESS,
+    Point,
+    PointText,
+    Quantity,
+    point_quantity,
+)
 from bushfit.campaign.quantities import with_sizes
 from bushfit.campaign.toml import read_toml
 from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.reduction.arrays import scatter
+from bushfit.report.batch_document import LimitResult
 from bushfit.units import number, parse_quantity
 from bushfit.validation import ParameterValue, Share, converter, table, text
 
-
-class Verdict(IntEnum):
-    """How a value meets its limits, better before worse."""
-
-    PASS = 0
-    CONDITIONAL_PASS = 1
-    CONDITIONAL_FAIL = 2
-    FAIL = 3
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
+#: Results in the order from good to bad.
+RESULTS: Sequence[LimitResult] = ("pass", "conditional pass", "not judged", "conditional fail", "fail")
+#: NRMSE above which a fit that misses its tests by more than noise is no basis for a limit, unless the limits file
+#: states another with `nrmse`. Chosen: half of the tolerance that drawings usually give a stiffness.
+POOR_FIT = 0.05
+#: Reduced chi-square from which a misfit is not noise alone.
+_BEYOND_NOISE = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,9 +59,9 @@ class Bounds:
     Args:
         min, max: least and largest allowed value.
         nominal: the middle of the allowed values.
-        tolerance: how far a value may lie from nominal, as a share of it.
-        sigma: how many robust standard deviations of the batch a value may lie from its median.
-        at_least: bushings that the batch must have for sigma to be judged.
+        tolerance: largest allowed deviation from nominal, as a share of it.
+        sigma: largest allowed deviation from the median of the batch, in its standard deviations.
+        at_least: number of parts that the batch must have for sigma to be judged.
     """
 
     min: ParameterValue | None = None
@@ -74,60 +80,63 @@ class Bounds:
             raise ValueError(CampaignError("these limits hold no value", expected="min below max"))
 
     @property
-    def stated(self) -> tuple[float, float]:
-        """Lowest and highest allowed value, whatever the batch is like."""
+    def fixed(self) -> tuple[float, float]:
+        """Lowest and highest allowed value apart from `sigma`; infinite without a limit."""
         low, high = -math.inf if self.min is None else self.min, math.inf if self.max is None else self.max
         if self.nominal is not None and self.tolerance is not None:
             half = abs(self.nominal) * self.tolerance
             low, high = max(low, self.nominal - half), min(high, self.nominal + half)
         return low, high
 
-    def resolve(self, values: Array) -> tuple[float, float]:
-        """Lowest and highest allowed value; `values` are those of the batch, (n,)."""
-        ranges = [self.stated]
-        if self.sigma is not None and not self.idle(values):
-            middle, spread = scatter(values)
-            ranges.append((middle - self.sigma * spread, middle + self.sigma * spread))
-        return max(low for low, _ in ranges), min(high for _, high in ranges)
+    def resolve(self, values: Array) -> tuple[float, float, str]:
+        """Lowest and highest allowed value, with `sigma` held against the batch.
 
-    def idle(self, values: Array) -> str | None:
-        """Why `sigma` cannot be held against these values, or None."""
-        if self.sigma is not None and values.size < self.at_least:
-            return f"{values.size} bushings, and at_least = {self.at_least}: the batch's own scatter is not judged"
-        if self.sigma is not None and scatter(values)[1] == 0.0:
-            return "more than half of the bushings agree to the digit: the batch's own scatter is not judged"
-        return None
+        Args:
+            values: of the parts, (n,), without NaN.
+
+        Returns:
+            Both limits, and the reason why `sigma` cannot be judged, or an empty text.
+        """
+        low, high = self.fixed
+        if self.sigma is None:
+            return low, high, ""
+        if values.size < self.at_least:
+            return low, high, f"{values.size} parts, and at_least = {self.at_least}: sigma is not judged"
+        median, deviation = scatter(values)
+        if deviation == 0.0:
+            return low, high, "more than half of the parts agree to the digit: sigma is not judged"
+        return max(low, median - self.sigma * deviation), min(high, median + self.sigma * deviation), ""
 
 
-def _stiffness(raw: object, info: ValidationInfo) -> object:
+def _read_stiffness(raw: object, info: ValidationInfo) -> object:
     point = info.data.get("at")
     return parse_quantity(raw, point.motion.stiffness_unit) if isinstance(point, Point) else 0.0
 
 
-def _ratio(raw: object, _: ValidationInfo) -> object:
+def _read_ratio(raw: object, _: ValidationInfo) -> object:
     return raw if isinstance(raw, int | float) and not isinstance(raw, bool) else parse_quantity(raw, "1")
 
 
 _LIMIT = Field(ge=0, allow_inf_nan=False)
-Ratio = Annotated[float, converter(_ratio, text("a share, or a number") | {"type": ["string", "number"]}), _LIMIT]
+Ratio = Annotated[float, converter(_read_ratio, text("a share, or a number") | {"type": ["string", "number"]}), _LIMIT]
 Stiffness = Annotated[
-    float, converter(_stiffness, text("a number with a unit of N/m, N*m/rad or Pa, by the point")), _LIMIT
+    float, converter(_read_stiffness, text("a number with a unit of N/m, N*m/rad or Pa, by the point")), _LIMIT
 ]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Located:
-    """A table with a point; the last base, so that the point is read first and settles the units.
+class AtPoint:
+    """Limits at an operating point; the last base of a table, so that the point is read before the values with units.
 
     Args:
         at: the operating point.
     """
 
-    at: At
+    at: PointText
 
 
 @dataclass(frozen=True, kw_only=True)
-class StiffnessBounds(Bounds, Located):
+class StiffnessBounds(Bounds, AtPoint):
     """[[stiffness]]: limits of |K| at a point."""
 
     min: Stiffness | None = None
@@ -136,7 +145,7 @@ class StiffnessBounds(Bounds, Located):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LossFactorBounds(Bounds, Located):
+class LossFactorBounds(Bounds, AtPoint):
     """[[loss_factor]]: limits of the loss factor at a point."""
 
     min: Ratio | None = None
@@ -146,7 +155,7 @@ class LossFactorBounds(Bounds, Located):
 
 @dataclass(frozen=True)
 class Limits:
-    """A whole limits file.
+    """A limits file.
 
     Args:
         parameters: by name, in the file's units of a campaign's [fit].
@@ -176,9 +185,8 @@ class Limits:
 
     @property
     def _at_points(self) -> list[tuple[str, StiffnessBounds | LossFactorBounds]]:
-        """Limits at points, by the name of the quantity."""
-        both = ((STIFFNESS, self.stiffness), (LOSS_FACTOR, self.loss_factor))
-        return [(at_point(bounds.at, what).name, bounds) for what, found in both for bounds in found]
+        pairs = ((STIFFNESS, self.stiffness), (LOSS_FACTOR, self.loss_factor))
+        return [(point_quantity(bounds.at, name).name, bounds) for name, tables in pairs for bounds in tables]
 
     @property
     def points(self) -> tuple[Point, ...]:
@@ -186,14 +194,14 @@ class Limits:
 
     @property
     def bounds(self) -> dict[str, Bounds]:
-        """By the name of the quantity."""
-        most = {quantity.name: getattr(self, key) for key, quantity in OF_FIT.items()}
-        of_fit = {name: Bounds(max=limit) for name, limit in most.items() if limit is not None}
+        """Limits by the name of the quantity."""
+        largest = {quantity.name: getattr(self, key) for key, quantity in FIT_QUALITY.items()}
+        of_fit = {name: Bounds(max=limit) for name, limit in largest.items() if limit is not None}
         return {**self.parameters, **dict(self._at_points), **of_fit}
 
 
 def read_limits(path: Path) -> Limits:
-    """A limits file.
+    """Read a limits file.
 
     Raises:
         CampaignError: keys or values that are not understood, or no limit at all.
@@ -204,13 +212,13 @@ def read_limits(path: Path) -> Limits:
     return limits
 
 
-def check_judged(limits: Limits, path: Path, rows: Iterable[Row]) -> None:
-    """Refuse limits that no work on these rows could answer.
+def check_limits(limits: Limits, path: Path, rows: Iterable[Row]) -> None:
+    """Check that these rows can be judged by the limits.
 
     Raises:
         CampaignError: `verdicts`, and a row without diagnose or run.
     """
-    silent = [row.name for row in rows if not row.settings.diagnosed] if limits.verdicts else []
+    silent = [row.name for row in rows if not row.settings.diagnoses] if limits.verdicts else []
     if silent:
         more = f" and {len(silent) - 1} more" if len(silent) > 1 else ""
         raise CampaignError(
@@ -222,75 +230,113 @@ def check_judged(limits: Limits, path: Path, rows: Iterable[Row]) -> None:
         )
 
 
+def describe_poor_fit(record: RowFile, limits: Limits | None) -> str:
+    """Sentence on a fit that misses its tests by more than noise and by more than the allowed NRMSE; else empty."""
+    nrmse, chi_square = (record.quantities.get(quantity.name) for quantity in FIT_QUALITY.values())
+    largest = POOR_FIT if limits is None or limits.nrmse is None else limits.nrmse
+    if not nrmse or nrmse.value <= largest or (chi_square and chi_square.value < _BEYOND_NOISE):
+        return ""
+    return f"the model misses the tests: NRMSE {number(100 * nrmse.value, 3)} %, above {number(100 * largest, 3)} %"
+
+
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict on a bushing: its worst; what misses a limit and what is only just within, in words by name."""
-
-    verdict: Verdict
-    missed: Mapping[str, str]
-    edge: Mapping[str, str]
-
-
-class Judge:
-    """Limits held against the values of a whole batch, ready for each bushing.
+    """Result of a part, the limits it misses, and those that it passes conditionally or that were not judged.
 
     Args:
-        limits: the file.
-        columns: values of each quantity over the batch, (n,), NaN where a bushing has none.
-        quantities: how each is written.
+        result: the worst of all.
+        misses, doubtful: sentences by the name of the quantity.
     """
 
-    def __init__(self, limits: Limits, columns: Mapping[str, Array], quantities: Mapping[str, Quantity]) -> None:
-        self._limits, self._quantities = limits, quantities
-        self._missed_from = Verdict.CONDITIONAL_PASS if limits.guard else Verdict.CONDITIONAL_FAIL
-        self.allowed: dict[str, tuple[float, float]] = {}
-        self.notes: list[str] = []
-        for name, bounds in limits.bounds.items():
-            values = columns.get(name, np.empty(0))
-            values = values[np.isfinite(values)]
-            self.allowed[name] = bounds.resolve(values)
-            if idle := bounds.idle(values):
-                self.notes.append(f"{name}: {idle}")
+    result: LimitResult = "pass"
+    misses: Mapping[str, str] = field(default_factory=dict)
+    doubtful: Mapping[str, str] = field(default_factory=dict)
 
-    def __call__(self, known: Mapping[str, Sequence[float]], record: Record) -> Judgement:
-        """On one bushing: value, low and high of the 95 % interval of all that is known of it, and its record."""
-        worst, missed, edge = Verdict.PASS, dict[str, str](), dict[str, str]()
-        at_bound = record.get("at_bound", {})
-        for name in dict.fromkeys((*self.allowed, *at_bound)):
-            if (found := known.get(name)) is None:
-                worst, missed[name] = Verdict.FAIL, f"{name} is not known: fail"
+
+def judge_part(
+    record: RowFile, limits: Limits, allowed: Mapping[str, tuple[float, float]], quantities: Mapping[str, Quantity]
+) -> Judgement:
+    """Judge a part by the limits.
+
+    Args:
+        record: results of the part.
+        limits: the limits file.
+        allowed: lowest and highest allowed value by the name of the quantity, as the whole batch resolves them.
+        quantities: how each is written.
+    """
+    poor, results = describe_poor_fit(record, limits), list[LimitResult]()
+    misses, doubtful = dict[str, str](), dict[str, str]()
+    missed_from = RESULTS.index("conditional pass" if limits.guard else "conditional fail")
+
+    def add(name: str, result: LimitResult, sentence: str) -> None:
+        results.append(result)
+        if result == "not judged" or 0 < RESULTS.index(result) < missed_from:
+            doubtful[name] = sentence
+        elif result != "pass":
+            misses[name] = sentence
+
+    for name in dict.fromkeys((*allowed, *record.at_bound)):
+        low, high = allowed.get(name, (-math.inf, math.inf))
+        estimate, bound, source = record.quantities.get(name), record.at_bound.get(name), ""
+        if estimate is None:
+            add(name, "fail", f"{name} is not known")
+            continue
+        if poor and name not in {quantity.name for quantity in FIT_QUALITY.values()}:
+            if name not in record.measured:
+                add(name, "not judged", f"{name} not judged: poor fit")
                 continue
-            verdict = judge(found, *self.allowed.get(name, (-math.inf, math.inf)))
-            if name in at_bound:
-                verdict = max(verdict, Verdict.CONDITIONAL_PASS)
-            worst = max(worst, verdict)
-            if verdict is not Verdict.PASS:
-                chosen = missed if verdict >= self._missed_from else edge
-                chosen[name] = self._words(name, found, verdict, at_bound.get(name))
-        said = record.get("verdict", "is not known")
-        if self._limits.verdicts and said not in self._limits.verdicts:
-            worst = Verdict.FAIL
-            missed["verdict"] = f"verdict {said}, allowed {', '.join(self._limits.verdicts)}"
-        return Judgement(worst, missed, edge)
-
-    def _words(self, name: str, found: Sequence[float], verdict: Verdict, bound: str | None) -> str:
-        (low, high), (value, least, most) = self.allowed.get(name, (-math.inf, math.inf)), found[:3]
-        quantity = self._quantities[name].for_people(value)
-
-        def shown(x: float) -> str:
-            return number(x * quantity.factor, 4)
-
-        unit = "" if quantity.unit == "-" else f" {quantity.unit}"
-        span = "" if math.isnan(least + most) else f" ({shown(least)} to {shown(most)})"
-        ends = [f"{word} {shown(x)}" for word, x in (("min", low), ("max", high)) if math.isfinite(x)]
-        said = [" ".join(ends)] * bool(ends) + [f"at the {bound} of its fit"] * bool(bound)
-        return f"{name} = {shown(value)}{span}{unit}, {', '.join(said)}: {verdict}"
+            estimate, bound, source = record.measured[name], None, "measured "
+        result = judge_value(estimate, low, high)
+        if bound:
+            result = max(result, "conditional pass", key=RESULTS.index)
+        add(name, result, source + _limit_sentence(quantities[name], estimate, (low, high), result, bound))
+    if limits.verdicts and record.verdict not in limits.verdicts:
+        add("verdict", "fail", f"verdict {record.verdict or 'not known'}, allowed {', '.join(limits.verdicts)}")
+    return Judgement(max(results, key=RESULTS.index, default="pass"), misses, doubtful)
 
 
-def judge(figures: Sequence[float], low: float, high: float) -> Verdict:
-    """How a value and its 95 % interval, NaN where it is not known, lie to the lowest and highest allowed."""
-    value, *ends = figures[:3]
-    least, most = (value if math.isnan(end) else end for end in ends)
-    if low <= value <= high:
-        return Verdict.PASS if low <= least and most <= high else Verdict.CONDITIONAL_PASS
-    return Verdict.FAIL if most < low or least > high else Verdict.CONDITIONAL_FAIL
+def judge_value(estimate: Estimate, low: float, high: float) -> LimitResult:
+    """Compare a value and its 95 % interval, if known, with the lowest and highest allowed value."""
+    least, most = (estimate.value if end is None else end for end in (estimate.low, estimate.high))
+    if low <= estimate.value <= high:
+        return "pass" if low <= least and most <= high else "conditional pass"
+    return "fail" if most < low or least > high else "conditional fail"
+
+
+def _limit_sentence(
+    quantity: Quantity, estimate: Estimate, allowed: tuple[float, float], result: LimitResult, bound: str | None
+) -> str:
+    """Value, interval and the nearer limit in words: "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail"."""
+    shown = quantity.displayed(estimate.value)
+
+    def written(x: float) -> str:
+        return number(x * shown.factor, 4)
+
+    unit = "" if shown.unit == "-" else f" {shown.unit}"
+    interval = (
+        ""
+        if estimate.low is None or estimate.high is None
+        else f" ({written(estimate.low)} to {written(estimate.high)})"
+    )
+    finite = [limit for limit in allowed if math.isfinite(limit)]
+    nearest = min(finite, key=lambda limit: abs(limit - estimate.value), default=None)
+    parts = [f"{quantity.name} {written(estimate.value)}{unit}{interval}"]
+    parts += [f"limit {written(nearest)}"] if nearest is not None else []
+    parts += [f"at the {bound} of its fit"] if bound else []
+    return ", ".join(parts) + (f": {result}" if result.startswith("conditional") else "")
+
+
+def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[str, tuple[float, float]], list[str]]:
+    """Lowest and highest allowed value of each quantity, and notes on limits that the batch cannot be judged by.
+
+    Args:
+        limits: the limits file.
+        values: of each quantity over the batch, (n,), NaN where a part has none.
+    """
+    allowed, notes = dict[str, tuple[float, float]](), list[str]()
+    for name, bounds in limits.bounds.items():
+        known = values.get(name, np.empty(0))
+        low, high, idle = bounds.resolve(known[np.isfinite(known)])
+        allowed[name] = low, high
+        notes += [f"{name}: {idle}"] if idle else []
+    return allowed, notes

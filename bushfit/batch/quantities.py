@@ -1,35 +1,41 @@
-"""What is asked of a bushing: operating points in words, and the quantities that are tabled, judged and drawn."""
+"""Operating points in words, and the quantities of a part that are tabled, judged and drawn."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
+from bushfit.batch.document import Estimate
 from bushfit.effects import get_parameter, is_parameter, parameter_names
 from bushfit.errors import UnitError, did_you_mean
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion
-from bushfit.reading.measurement import Sweep
+from bushfit.model.covariance import Z95
+from bushfit.reading.measurement import Sweep, loss_factor
 from bushfit.units import display_unit, is_compatible, parse_quantity
 from bushfit.validation import converter
 
 #: A direction or a specimen, a frequency and an amplitude, each number with its unit.
-_WORDS = re.compile(r"\s*(\S.*?)[\s,]+([-+\d.eE]+\s*[A-Za-z]+)[\s,]+([-+\d.eE]+\s*[^\d\s.]+)\s*")
-#: What is known of a quantity, in order, by the end of its column's header: the value [SI], low and high of its 95 %
-#: interval, and standard error.
-PARTS = {"": 0, ", std error": 3, ", low": 1, ", high": 2}
+_POINT = re.compile(r"\s*(\S.*?)[\s,]+([-+\d.eE]+\s*[A-Za-z]+)[\s,]+([-+\d.eE]+\s*[^\d\s.]+)\s*")
+#: Relative distance in frequency and in amplitude within which a measured point is the point asked for. Chosen: rigs
+#: miss their set points by less, and the stiffness of filled rubber changes by less than 1 % over it.
+_SAME_FREQUENCY, _SAME_AMPLITUDE = 0.02, 0.05
+#: Most points of a measured curve.
+_CURVE_POINTS = 12
 
 
 @dataclass(frozen=True)
 class Point:
-    """An operating point at a direction, or at a specimen by its name, which each campaign has to know.
+    """An operating point in a direction, or at a specimen that each campaign has to have.
 
     Args:
+        place: direction, or name of the specimen.
         frequency: [Hz].
-        amplitude, unit: zero-to-peak [m or rad], or strain, and its SI unit.
+        amplitude: zero-to-peak [m or rad], or strain.
+        unit: SI unit of the amplitude.
     """
 
     place: str
@@ -39,7 +45,7 @@ class Point:
 
     @property
     def motion(self) -> Motion:
-        """That of the direction, or as the unit of the amplitude tells."""
+        """Translation, rotation or straining, by the unit of the amplitude."""
         return next(motion for motion in (TRANSLATION, ROTATION, STRAINING) if motion.displacement_unit == self.unit)
 
     def __str__(self) -> str:
@@ -48,13 +54,13 @@ class Point:
 
 
 def parse_point(text: str) -> Point:
-    """The point of a text such as "axial 25 Hz 0.1 mm"; what is like no direction is the name of a specimen.
+    """Read a text such as "axial 25 Hz 0.1 mm"; a place that resembles no direction is the name of a specimen.
 
     Raises:
         UnitError: no direction, no numbers, or units that do not fit.
     """
     expected = 'direction, frequency and amplitude, such as "axial 25 Hz 0.1 mm" or "torsion 10 Hz 1 deg"'
-    match = _WORDS.fullmatch(text)
+    match = _POINT.fullmatch(text)
     if not match or (match[1] not in set(Direction) and did_you_mean(match[1].lower(), list(Direction))):
         hint = "write numbers with a decimal point" if re.search(r"\d,\d", text) else None
         raise UnitError("this is no operating point", found=repr(text), expected=expected, hint=hint)
@@ -67,81 +73,96 @@ def parse_point(text: str) -> Point:
     return Point(match[1], frequency, amplitude, motion.displacement_unit)
 
 
-_WRITTEN = {"type": "string", "description": 'a place, a frequency and an amplitude: "axial 25 Hz 0.1 mm"'}
-#: A point as a key of a TOML file.
-At = Annotated[Point, converter(lambda raw, _: parse_point(raw) if isinstance(raw, str) else raw, _WRITTEN)]
+_POINT_SCHEMA = {"type": "string", "description": 'a place, a frequency and an amplitude: "axial 25 Hz 0.1 mm"'}
+#: A point as a value in a TOML file.
+PointText = Annotated[Point, converter(lambda raw, _: parse_point(raw) if isinstance(raw, str) else raw, _POINT_SCHEMA)]
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One number of a bushing: what it is called, its unit and the factor from SI to it."""
+    """A quantity of a part: its name, a unit, and the factor from SI to that unit."""
 
     name: str
     unit: str
     factor: float = 1.0
 
-    def for_people(self, size: float) -> Quantity:
-        """The same in the unit in which people read numbers of that size [SI]."""
-        return Quantity(self.name, *display_unit(self.unit, self.factor, size))
+    def displayed(self, value: float) -> Quantity:
+        """The quantity in the unit in which engineers write a value of that magnitude [SI]."""
+        return Quantity(self.name, *display_unit(self.unit, self.factor, value))
 
     @property
     def tabled(self) -> Quantity:
-        """The same as tables have it: a parameter in the unit for its usual size, whatever it is in this batch."""
-        return self.for_people(get_parameter(self.name).typical) if is_parameter(self.name) else self
+        """The quantity as tables write it: a parameter in the unit of its typical value, the same in every batch."""
+        return self.displayed(get_parameter(self.name).typical) if is_parameter(self.name) else self
 
     @property
     def header(self) -> str:
         return f"{self.name} [{self.unit}]"
 
 
-#: Of the fit, by key of a record: root mean square difference of model and tests, relative, and mean square residual in
-#: units of noise.
-OF_FIT = {"nrmse": Quantity("NRMSE", "-"), "reduced_chi_square": Quantity("reduced chi-square", "-")}
-#: What is told of an operating point: |K| ...
-STIFFNESS = "stiffness"
-#: ... and K''/K'.
-LOSS_FACTOR = "loss factor"
+#: Quality of the fit: NRMSE is the relative root mean square difference of model and tests, reduced chi-square the mean
+#: square residual in units of noise. The keys are those of a limits file.
+FIT_QUALITY = {"nrmse": Quantity("NRMSE", "-"), "reduced_chi_square": Quantity("reduced chi-square", "-")}
+#: Quantities at an operating point: |K|, and K''/K'.
+STIFFNESS, LOSS_FACTOR = "stiffness", "loss factor"
 
 
-def at_point(point: Point, what: str) -> Quantity:
+def point_quantity(point: Point, name: str) -> Quantity:
     """Stiffness or loss factor at an operating point."""
-    unit, factor = point.motion.display.stiffness if what == STIFFNESS else ("-", 1.0)
-    return Quantity(f"{what} {point}", unit, factor)
+    unit, factor = point.motion.display.stiffness if name == STIFFNESS else ("-", 1.0)
+    return Quantity(f"{name} {point}", unit, factor)
 
 
-def parameter_quantities(names: Collection[str]) -> list[Quantity]:
-    """Parameters of the library that are among the names, in its order."""
-    in_order = dict.fromkeys([*parameter_names(), *sorted(filter(is_parameter, names))])
-    units = {name: get_parameter(name).unit for name in in_order if name in names}
-    return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
+def list_quantities(known: Collection[str], points: Iterable[Point]) -> dict[str, Quantity]:
+    """Quantities by name: parameters among the known ones in the order of the library, quality of the fit, points."""
+    in_order = dict.fromkeys([*parameter_names(), *sorted(filter(is_parameter, known))])
+    units = {name: get_parameter(name).unit for name in in_order if name in known}
+    parameters = [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
+    at_points = [point_quantity(point, name) for point in points for name in (STIFFNESS, LOSS_FACTOR)]
+    return {quantity.name: quantity for quantity in (*parameters, *FIT_QUALITY.values(), *at_points)}
 
 
-def curve_of(sweeps: Iterable[Sweep]) -> dict[str, float]:
-    """|K| [SI] by operating point, of at most twelve steps of the first sweep that holds a level, the middle one.
+def measured_at(sweeps: Iterable[Sweep], point: Point, noise: float) -> dict[str, Estimate]:
+    """Stiffness and loss factor as measured at a point, by quantity; empty if no sweep has the point.
 
-    Levels and steps have three digits, so that bushings of which a rig reached a little more are told alike.
+    Args:
+        sweeps: of one part.
+        point: operating point.
+        noise: standard deviation of the real and imaginary part of one measured point, relative to |K|.
     """
     for sweep in sweeps:
-        held, step = (np.array([float(f"{x:.3g}") for x in each]) for each in (sweep.held, sweep.step))
-        levels = [level for level in np.unique(held) if sweep.stepped and np.unique(step[held == level]).size >= 3]
-        if levels:
-            there = held == levels[(len(levels) - 1) // 2]
-            steps = np.unique(step[there])
-            found = {}
-            for x in steps[np.linspace(0, steps.size - 1, min(steps.size, 12)).round().astype(int)].tolist():
-                pair = (x, held[there][0]) if sweep.stepped == "frequency" else (held[there][0], x)
-                point = Point(str(sweep.direction), *pair, sweep.direction.motion.displacement_unit)
-                found[str(point)] = float(np.abs(sweep.stiffness[there & (step == x)]).mean())
-            return found
+        frequency, amplitude = sweep.frequency / point.frequency - 1.0, sweep.amplitude / point.amplitude - 1.0
+        near = (np.abs(frequency) <= _SAME_FREQUENCY) & (np.abs(amplitude) <= _SAME_AMPLITUDE)
+        if str(sweep.direction) == point.place and near.any():
+            mean = sweep.stiffness[near].mean(keepdims=True)
+            stiffness, loss, error = abs(complex(mean[0])), float(loss_factor(mean)[0]), noise / near.sum() ** 0.5
+            values = (
+                (STIFFNESS, stiffness, stiffness * error, point.motion.stiffness_unit),
+                (LOSS_FACTOR, loss, (1.0 + loss**2) * error, "1"),
+            )
+            return {
+                f"{name} {point}": Estimate(value, value - Z95 * stderr, value + Z95 * stderr, stderr, unit)
+                for name, value, stderr, unit in values
+            }
     return {}
 
 
-def figures(record: Mapping[str, Any]) -> Iterator[tuple[str, tuple[float | None, ...]]]:
-    """All quantities of a row's record that are known, by name: value, low, high and standard error."""
-    for name, (value, low, high, stderr, _) in record.get("parameters", {}).items():
-        yield name, (value, low, high, stderr)
-    for key, of_fit in OF_FIT.items():
-        yield of_fit.name, (record.get(key), None, None, None)
-    for point, pair in record.get("points", {}).items():
-        for what, (value, low, high) in pair.items():
-            yield f"{what} {point}", (value, low, high, None)
+def measured_curve(sweeps: Iterable[Sweep]) -> dict[str, float]:
+    """|K| [SI] by operating point, at most twelve, of the first sweep that holds a level, at its middle level.
+
+    Levels and steps are rounded to three digits, so that parts have common points although a rig reaches its set points
+    with some error.
+    """
+    for sweep in sweeps:
+        held, step = (np.array([float(f"{x:.3g}") for x in values]) for values in (sweep.held, sweep.step))
+        levels = [level for level in np.unique(held) if sweep.stepped and np.unique(step[held == level]).size >= 3]
+        if levels:
+            level = levels[(len(levels) - 1) // 2]
+            steps = np.unique(step[held == level])
+            curve = {}
+            for x in steps[np.linspace(0, steps.size - 1, min(steps.size, _CURVE_POINTS)).round().astype(int)].tolist():
+                frequency, amplitude = (x, float(level)) if sweep.stepped == "frequency" else (float(level), x)
+                point = Point(str(sweep.direction), frequency, amplitude, sweep.direction.motion.displacement_unit)
+                curve[str(point)] = float(np.abs(sweep.stiffness[(held == level) & (step == x)]).mean())
+            return curve
+    return {}

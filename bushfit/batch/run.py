@@ -1,62 +1,69 @@
-"""The whole batch: rows to workers, records to disk, then the table, the verdicts and the picture."""
+"""A whole batch: rows to the workers, their records to the disk, then table, picture, summary and page."""
 
 import shutil
 import time
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import cast, get_args
+from typing import get_args
 
-import numpy as np
-
-from bushfit.batch import ledger, pool
-from bushfit.batch.document import Record
-from bushfit.batch.outcome import Outcome, Plan
-from bushfit.batch.pool import Pool
-from bushfit.batch.quantities import PARTS, figures
-from bushfit.batch.work import failed, work
-from bushfit.effects.contract import Array
+from bushfit.batch import store
+from bushfit.batch.document import RowFile
+from bushfit.batch.executor import Workers, run_rows
+from bushfit.batch.row import failed_row
+from bushfit.batch.summary import BatchPlan, BatchResult
 from bushfit.errors import OutputError
 from bushfit.progress import track
-from bushfit.report.results import Picture, encode_all, unwritable, write_files
-from bushfit.report.results import check_free as check_writable
+from bushfit.report.batch_document import BatchFile
+from bushfit.report.results import (
+    Picture,
+    ResultFile,
+    check_free,
+    encode_all,
+    figure_file,
+    json_file,
+    page_file,
+    table_file,
+    unwritable,
+    write_files,
+)
+from bushfit.validation import to_json_data
 
-#: The files of these in whatever form, in the batch's folder.
-FILES = ["index.html", *(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture)))]
-#: Keys of a record that are not held in memory: the figures have its numbers, and a later run asks for the files.
-_NOT_HELD = {"parameters", "points", "inputs", "files"}
+#: Files of the whole batch, in whatever form.
+FILES = [*(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture))), "index.html"]
 
 
-def check_free(plan: Plan, *, force: bool) -> None:
-    """Refuse to replace results that stand, unless asked to go on or to replace.
+def check_output(plan: BatchPlan, *, force: bool) -> None:
+    """Check before the work that the results can be written and replace none that somebody wants to keep.
 
     Raises:
-        OutputError: the folder cannot be written or holds a batch, or the report cannot be written.
+        OutputError: the folder cannot be written or holds a batch, or the JUnit report cannot be written.
     """
-    output, over = plan.orders.output, force or plan.orders.resume
-    check_writable(output, [], overwrite=True)
-    found = [name for name in (*FILES, ledger.ROWS) if (output / name).exists()]
-    if found and not over:
+    output, replaces = plan.task.output, force or plan.task.resume
+    check_free(output, [], overwrite=True)
+    existing = [name for name in (*FILES, store.ROWS_FOLDER) if (output / name).exists()]
+    if existing and not replaces:
         raise OutputError(
             "results stand there already",
             file=output,
-            found=", ".join(found),
+            found=", ".join(existing),
             hint="--resume does what is missing; --force does all again; -o/--output names another folder",
         )
     if plan.junit:
-        with _blamed_on(plan.junit):
-            place, own = plan.junit.resolve(), output.resolve()
-            if place in [own / name for name in FILES] or own / ledger.ROWS in (place, *place.parents):
+        with _naming_junit(plan.junit):
+            report, folder = plan.junit.resolve(), output.resolve()
+            if report in [folder / name for name in FILES] or folder / store.ROWS_FOLDER in (report, *report.parents):
                 problem = "the report cannot stand among the results of the rows, nor in place of the table"
                 raise OutputError(problem, file=plan.junit)
-            check_writable(plan.junit.parent, [plan.junit.name], overwrite=over)
+            check_free(plan.junit.parent, [plan.junit.name], overwrite=replaces)
 
 
 @contextmanager
-def _blamed_on(junit: Path) -> Iterator[None]:
-    """Errors of the report's own folder name the option that chose it."""
+def _naming_junit(junit: Path) -> Iterator[None]:
+    """Let errors of writing the JUnit report name the option --junit."""
     try:
         yield
     except OutputError as error:
@@ -66,62 +73,72 @@ def _blamed_on(junit: Path) -> Iterator[None]:
         raise
 
 
-def run(plan: Plan, workers: Pool, tell: Callable[[Outcome], None]) -> Outcome:
-    """Do every row, then write the table, the picture, the summary, the page and the JUnit report.
+def run_batch(
+    plan: BatchPlan,
+    workers: Workers,
+    before_writing: Callable[[BatchResult], None],
+    warn: Callable[[str], object] = lambda _: None,
+) -> BatchResult:
+    """Do all rows, then write the files of the whole batch.
 
     Args:
-        plan, workers: the batch, and where its rows are done.
-        tell: called with what came of it when all is on the disk and only stands elsewhere; if it raises, the rows are
-            kept, and nothing is written of the whole.
+        plan: the batch.
+        workers: of this machine or of a cluster.
+        before_writing: called with the result when all files are ready; if it raises, the rows are kept, and no file of
+            the whole batch is written.
+        warn: called with a sentence when a cluster has no workers.
 
     Raises:
-        BatchError: the workers are gone for good; what was done is kept.
+        BatchError: the workers are lost; finished rows are kept.
         OutputError: the results cannot be written, or another batch is at work in the folder.
     """
-    output = plan.orders.output
+    output = plan.task.output
     try:
-        with ledger.held(output):
-            for name in FILES:  # from here on they tell of results that are replaced
+        with store.batch_folder(output):
+            for name in FILES:  # they belong to the results that are about to be replaced
                 (output / name).unlink(missing_ok=True)
-            outcome = _worked(plan, workers)
-            ready = output / ledger.STAGE / "whole"
-            ready.mkdir()
-            for name, content in encode_all(outcome.files, plan.formats).items():
-                (ready / name).write_bytes(content)
+            result = _run_rows(plan, workers, warn)
+            files = encode_all(_files(result), plan.formats)
+            before_writing(result)
             if plan.junit:
-                with _blamed_on(plan.junit):
-                    tell(outcome)
-                    write_files(plan.junit.parent, {plan.junit.name: outcome.junit()})
-            else:
-                tell(outcome)
-            for file in sorted(ready.iterdir()):
-                file.replace(output / file.name)
-            return outcome
+                with _naming_junit(plan.junit):
+                    write_files(plan.junit.parent, {plan.junit.name: result.junit()})
+            for name, content in files.items():
+                staged = output / store.STAGE / name
+                staged.write_bytes(content)
+                staged.replace(output / name)
+            return result
     except OSError as error:
         raise unwritable(output, error) from error
 
 
-def _worked(plan: Plan, workers: Pool) -> Outcome:
-    """Do every row, and take over its record and its numbers."""
-    begin, count = time.perf_counter(), len(plan.rows)
-    earlier = list[str]()
-    if folders := ledger.left_over(plan.orders.output, plan.rows):  # they are removed unless it goes on
-        fate = "are still in bushings/ (--force removes them)"
-        if not plan.orders.resume:
-            fate = "were removed from bushings/"
+def _run_rows(plan: BatchPlan, workers: Workers, warn: Callable[[str], object]) -> BatchResult:
+    start, count, notes = time.perf_counter(), len(plan.rows), list[str]()
+    if folders := store.list_earlier(plan.task.output, plan.rows):
+        outcome = "are still in bushings/ (--force removes them)" if plan.task.resume else "were removed from bushings/"
+        if not plan.task.resume:
             for folder in folders:
                 shutil.rmtree(folder)
-        earlier = [f"results of {len(folders)} bushings of an earlier batch, no rows of this one, {fate}"]
-    records: list[Record] = [failed("") for _ in plan.rows]
-    numbers = defaultdict[str, Array](lambda: np.full((len(PARTS), count), np.nan))
-    count_of = Counter[str]()
-    come = pool.run(plan.rows, partial(work, orders=plan.orders), failed, workers)
-    for number, record in track(
-        "bushings", come, count, lambda: f"{count_of['failed']} failed" if count_of["failed"] else ""
+        notes = [f"results of {len(folders)} bushings of an earlier batch, no rows of this one, {outcome}"]
+    records: list[RowFile] = [failed_row("")] * count
+    kept, failed = 0, Counter[bool]()
+    finished = run_rows(plan.rows, plan.task, lambda why: (failed_row(why), False), workers, warn)
+    for number, (record, was_kept) in track(
+        "bushings", finished, count, lambda: f"{failed[True]} failed" if failed[True] else ""
     ):
-        for name, known in figures(record):
-            if known[0] is not None:
-                numbers[name][:, number] = np.array(known, dtype=float)
-        records[number] = cast("Record", {key: entry for key, entry in record.items() if key not in _NOT_HELD})
-        count_of[record["status"]] += 1
-    return Outcome(plan, records, dict(numbers), time.perf_counter() - begin, earlier)
+        records[number] = replace(record, inputs={}, files={})  # only a later run asks for these
+        kept += was_kept
+        failed[record.status == "failed"] += 1
+    return BatchResult(plan, records, kept, time.perf_counter() - start, notes)
+
+
+def _files(result: BatchResult) -> list[ResultFile]:
+    """Document, table, picture and page of the whole batch."""
+    from bushfit.report.page.index import page_of
+    from bushfit.report.plots.batch import batch_figure
+
+    plan, panels = result.plan, result.panels() if result.plan.formats.pictures else []
+    names = [row.name for row in plan.rows]
+    files = [json_file("batch", to_json_data(result.document, BatchFile)), table_file("batch", result.table)]
+    files += [page_file("index", page_of(plan.task.output), files[:1])] if plan.formats.pages else []
+    return files + ([figure_file("batch", partial(batch_figure, panels, plan.title, names))] if panels else [])

@@ -12,14 +12,13 @@ import click
 from bushfit.cli.options import command_called, effect_option, file_option, flag, option, place_option, under
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import error_location
-from bushfit.units import display_unit, format_aligned
+from bushfit.units import format_aligned, number, split_header
 
 if TYPE_CHECKING:
     from bushfit.batch.manifest import Command
-    from bushfit.batch.outcome import Outcome
-    from bushfit.batch.pool import Pool
+    from bushfit.batch.summary import BatchResult
 
-#: Bushings of a kind (failed, out of limits, on the edge) that the terminal names; batch.csv has all.
+#: Parts of a kind (failed, not judged, different) that the terminal names at most; batch.csv has all.
 _MOST_SHOWN = 10
 
 
@@ -72,7 +71,7 @@ def command(
     reports: bool,
     output: Output,
 ) -> None:
-    """Fit (diagnose, predict, run) many campaigns, with a row each in one table.
+    """Fit (diagnose, predict, run) many campaigns and tabulate them in one table.
 
     MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or campaigns, be it one:
 
@@ -80,74 +79,86 @@ def command(
         [[bushings]]
         campaign = "batch_7/*/campaign.toml"   # from the list's folder
 
-    Named are bushings that differ from the others by more than chance, what drifts, and with limits the capability.
-    --force also removes results of bushings that are no longer listed. Exit status 1 where a row failed or a limit is
-    missed. Writes batch.csv, batch.png, batch.json, index.html (control charts), and bushings/<name>/model.json.
+    The command names parts that miss a limit, with value and limit, and parts that differ from the others by more than
+    chance, with the parameter that differs. --force also removes results of parts that are no longer listed. The exit
+    status is 1 if a row failed, a limit is missed or a part was not judged. The command writes batch.csv, batch.png,
+    batch.json, index.html, and bushings/<name>/model.json.
     """
-    from bushfit.batch.pool import DaskPool, LocalPool
+    from bushfit.batch.executor import dask_workers, local_workers
 
-    # Workers import what they need while this process does.
-    workers: Pool = DaskPool(scheduler) if scheduler else LocalPool(jobs or os.cpu_count() or 1)
-    from bushfit.batch.limits import check_judged, read_limits
+    # Workers import their modules while this process reads the manifest.
+    workers = local_workers(jobs or os.cpu_count() or 1) if scheduler is None else dask_workers(scheduler)
+    from bushfit.batch.limits import check_limits, read_limits
     from bushfit.batch.manifest import Settings, read_manifest
-    from bushfit.batch.outcome import Plan
     from bushfit.batch.quantities import parse_point
-    from bushfit.batch.run import check_free, run
-    from bushfit.batch.work import Orders
+    from bushfit.batch.row import RowTask
+    from bushfit.batch.run import check_output, run_batch
+    from bushfit.batch.summary import BatchPlan
     from bushfit.effects import get_effect
 
     names = tuple(get_effect(name).name for name in effects)
-    of_all = Settings(commands=commands or None, directions=directions or None, effects=names or None)
-    read = read_manifest(manifest[0], of_all, *manifest[1:])
+    settings = Settings(commands=commands or None, directions=directions or None, effects=names or None)
+    listed = read_manifest(manifest[0], settings, *manifest[1:])
     judged_by = read_limits(limits) if limits else None
     if limits and judged_by:
-        check_judged(judged_by, limits, read.rows)
+        check_limits(judged_by, limits, listed.rows)
     with error_location(place="--at"):
-        points = (*read.points, *map(parse_point, at), *(judged_by.points if judged_by else ()))
+        points = (*listed.points, *map(parse_point, at), *(judged_by.points if judged_by else ()))
     formats = replace(output.formats, tables=tables, pictures=plots and output.formats.pictures, pages=reports)
-    orders = Orders(output.folder(read.stem).absolute(), tuple(dict.fromkeys(points)), formats, resume)
-    plan = Plan(read.stem, read.rows, orders, judged_by, junit, output.formats)
-    check_free(plan, force=output.force)
-    outcome = run(plan, workers, lambda outcome: output.print_json(outcome.summary))
-    _tell(output, outcome, output.folder(read.stem))
-    if outcome.status["failed"] or outcome.missed:
+    folder = output.folder(listed.title)
+    task = RowTask(folder.absolute(), tuple(dict.fromkeys(points)), formats, resume)
+    plan = BatchPlan(listed.title, listed.rows, task, judged_by, junit, output.formats)
+    check_output(plan, force=output.force)
+    warn, show = (lambda line: output.print_warnings([line])), (lambda result: output.print_json(result.summary))
+    result = run_batch(plan, workers, show, warn)
+    _print_result(output, result, folder)
+    if result.document.failed or result.document.missed or result.document.not_judged:
         click.get_current_context().exit(1)
 
 
-def _tell(output: Output, outcome: Outcome, folder: Path) -> None:
-    """Counts, the batch's own scatter, what failed, what misses limits and what passes on condition."""
-    status, plan = outcome.status, outcome.plan
-    if outcome.scatter:
-        rows = []
-        for quantity, (middle, spread) in outcome.scatter.items():
-            unit, factor = display_unit(quantity.unit, 1.0, middle)
-            scatter = format_aligned([spread * factor], 2)[0] if spread else ""  # one value tells of none
-            rows.append((quantity.name, format_aligned([middle * factor], 4)[0], scatter, unit))
-        columns = ("quantity", "median", "robust std dev", "unit")
-        output.print_table(f"{plan.title}: {status['done']} bushing{'s' * (status['done'] > 1)}", columns, rows)
-    rate = status.total() / max(outcome.seconds, 1e-9)
-    kept = f", {outcome.kept} of them from before" if outcome.kept else ""
+def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
+    """Verdict, parts that need attention, then the scatter and capability of each quantity."""
+    from bushfit.batch.run import FILES
+
+    document, table = result.document, output.formats.table("batch")
+    output.print(f"{document.title}: {document.headline}")
+    parts = document.parts
+    sentences = {
+        "fail": [f"{part.name} fails: {'; '.join(part.misses.values())}" for part in parts if part.misses],
+        "are not judged": [
+            f"{part.name} is not judged: {part.poor_fit}" for part in parts if part.result == "not judged"
+        ],
+        "failed": [f"{part.name} could not be evaluated: {part.error}" for part in parts if part.error],
+        "differ": [f"{part.name} differs from the others: {part.differs}" for part in parts if part.differs],
+        "pass conditionally": [
+            f"{part.name} passes conditionally: {'; '.join(part.doubtful.values())}"
+            for part in parts
+            if part.name in document.conditional
+        ],
+    }
+    for what, lines in sentences.items():
+        for line in lines[:_MOST_SHOWN]:
+            output.print(line)
+        if len(lines) > _MOST_SHOWN:
+            output.print(f"... and {len(lines) - _MOST_SHOWN} more that {what}: see {table}")
+    output.print_warnings(document.warnings)
+    rows = []
+    for header, quantity in document.quantities.items():
+        name, unit = split_header(header)
+        scatter = format_aligned([quantity.sigma], 2)[0] if quantity.parts > 1 and quantity.sigma else ""
+        indices = ["" if index is None else number(index[0], 3) for index in (quantity.cp, quantity.cpk)]
+        rows.append((name, format_aligned([quantity.median], 4)[0], scatter, unit or "-", *indices))
+    columns = ("quantity", "median", "robust std dev", "unit", "Cp", "Cpk")
+    shown = len(columns) if any(row[-1] for row in rows) else 4
+    if rows:
+        counted = f"{document.title}: {document.done} bushing{'s' * (document.done > 1)}"
+        output.print_table(counted, columns[:shown], [row[:shown] for row in rows])
+    kept = f", {result.kept} of them from before" if result.kept else ""
+    rate = len(parts) / max(result.seconds, 1e-9)
     output.print(
-        f"{status['done']} done{kept}, {status['failed']} failed; {outcome.seconds:.1f} s, {rate:.1f} a second"
+        f"{document.done} done{kept}, {len(document.failed)} failed; {result.seconds:.1f} s, {rate:.1f} a second"
     )
-    if plan.limits:
-        output.print(
-            "limits: " + (", ".join(f"{count} {word}" for word, count in outcome.limits.items()) or "none judged")
-        )
-    output.print_warnings(outcome.notes)
-    for name, each in outcome.together.process.items():
-        if each["capability"]:
-            output.print(f"capability: {name}: {each['capability']}")
-    for word, names in (
-        ("failed", [f"{name}: {'; '.join(map(str.strip, error.splitlines()))}" for name, error in outcome.errors]),
-        ("out of limits", [f"{name}: {words}" for name, words in outcome.missed]),
-        ("conditional pass", [f"{name}: {words}" for name, words in outcome.edge]),
-        ("differs", [f"{each['name']}: {each['words']}" for each in outcome.together.differ]),
-    ):
-        for name in names[:_MOST_SHOWN]:
-            output.print(f"{word}: {name}")
-        if len(names) > _MOST_SHOWN:
-            output.print(f"... and {len(names) - _MOST_SHOWN} more {word}: see {output.formats.table('batch')}")
-    names = [name for file in outcome.files for name in output.formats.names(file)]
-    written = [*(name for name in names if (folder / name).exists()), "bushings/"]
+    if document.limits:
+        output.print("limits: " + ", ".join(f"{count} {word}" for word, count in document.limits.items()))
+    written = [*(name for name in FILES if (folder / name).exists()), "bushings/"]
     output.print(f"wrote {', '.join(written)} to {folder}")

@@ -13,14 +13,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bushfit.batch.limits import Judge, Limits, Verdict, judge, read_limits
+from bushfit.batch.document import Estimate, RowFile
+from bushfit.batch.limits import RESULTS, Limits, judge_part, judge_value, read_limits, resolve_limits
 from bushfit.batch.manifest import Manifest, Settings, read_manifest
-from bushfit.batch.quantities import at_point, parameter_quantities, parse_point
-from bushfit.batch.work import numbers_of
+from bushfit.batch.quantities import list_quantities, measured_at, parse_point
+from bushfit.batch.row import estimate_quantities
 from bushfit.errors import BatchError, CampaignError, ModelError, UnitError
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result
+from bushfit.reading.measurement import Sweep
 from bushfit.reduction.arrays import scatter
 
 
@@ -45,7 +47,7 @@ def test_toml_rows_take_what_they_do_not_say_from_the_top(tmp_path: Path) -> Non
     assert (other.name, other.settings.commands, other.settings.tolerance) == ("B", ("diagnose",), 0.02)
     assert one.campaign == str(tmp_path / "a.toml")
     assert manifest.points == (parse_point("axial 25 Hz 0.1 mm"),)
-    assert manifest.stem == "m"
+    assert manifest.title == "m"
     rows = '[[bushings]]\ncampaign = "b.toml"\ncommands = ["predict"]\n' + ROW + 'commands = ["diagnose"]\n'
     manifest = read(tmp_path, 'model = "m.json"\ntolerance = "2 %"\neffects = ["inertia"]\n' + rows + ROW)
     assert [row.settings.commands for row in manifest.rows] == [("predict",), ("diagnose",), ("fit",)]
@@ -66,7 +68,7 @@ def test_a_pattern_takes_every_match_and_names_by_folder_where_files_share_a_nam
     assert [row.name for row in manifest.rows] == ["b0", "b1", "b2", "b3", "b4"]
     inside = read(shop, '[[bushings]]\ncampaign = "bushings/b[0-2]/*.toml"\n[[bushings]]\ncampaign = "x.toml"\n')
     assert [row.name for row in inside.rows] == ["b0", "b1", "b2", "x"]
-    assert inside.stem == "m"
+    assert inside.title == "m"
 
 
 @pytest.mark.parametrize(
@@ -121,27 +123,26 @@ def test_a_manifest_of_many_rows_is_read_once_and_small(tmp_path: Path) -> None:
     assert held / count < 1000
 
 
-NAN = math.nan
 finite = st.floats(-1e3, 1e3)
 
 
 @pytest.mark.parametrize(
-    ("value", "half", "verdict"),
+    ("value", "half", "result"),
     [(1.0, 0.5, "pass"), (1.8, 0.5, "conditional pass"), (2.2, 0.5, "conditional fail"), (-0.6, 0.5, "fail")],
 )
-def test_four_verdicts(value: float, half: float, verdict: str) -> None:
-    assert str(judge((value, value - half, value + half), 0.0, 2.0)) == verdict
+def test_four_results(value: float, half: float, result: str) -> None:
+    assert judge_value(Estimate(value, value - half, value + half), 0.0, 2.0) == result
 
 
 @given(finite, st.floats(0, 1e3), finite, st.floats(0, 1e3))
-def test_verdicts_follow_value_and_interval(value: float, half: float, low: float, width: float) -> None:
+def test_results_follow_value_and_interval(value: float, half: float, low: float, width: float) -> None:
     high = low + width
-    verdict = judge((value, value - half, value + half), low, high)
-    assert (verdict <= Verdict.CONDITIONAL_PASS) == (low <= value <= high)
-    assert judge((-value, -value - half, -value + half), -high, -low) is verdict
-    assert judge((value, NAN, NAN), low, high) in (Verdict.PASS, Verdict.FAIL)
-    wider = judge((value, value - 2 * half, value + 2 * half), low, high)
-    assert (wider in (Verdict.PASS, Verdict.FAIL)) <= (verdict is wider)
+    result = judge_value(Estimate(value, value - half, value + half), low, high)
+    assert (result in ("pass", "conditional pass")) == (low <= value <= high)
+    assert judge_value(Estimate(-value, -value - half, -value + half), -high, -low) == result
+    assert judge_value(Estimate(value), low, high) in ("pass", "fail")
+    wider = judge_value(Estimate(value, value - 2 * half, value + 2 * half), low, high)
+    assert (wider in ("pass", "fail")) <= (wider == result)
 
 
 def limits(folder: Path, text: str) -> Limits:
@@ -165,55 +166,99 @@ sigma_fmax = { sigma = 3, at_least = 5 }
 """
 
 
-def test_limits_of_every_kind_and_of_the_batch_s_own_scatter(tmp_path: Path) -> None:
-    read = limits(tmp_path, ALL)
+def test_limits_of_every_kind_and_of_the_scatter_of_the_batch(tmp_path: Path) -> None:
     values = np.array([1.0, 1.01, 0.99, 1.02, 0.98, 7.0]) * 1e4
-    columns = {"sigma_fmax": values}
-    quantities = {q.name: q for q in parameter_quantities(["mu", "alpha", "sigma_fmax"])}
-    judged = Judge(read, columns, quantities | {q.name: q for q in (at_point(p, "stiffness") for p in read.points)})
-    assert judged.allowed["mu"] == (1e6, 1.2e6)
-    assert judged.allowed["alpha"] == pytest.approx((0.228, 0.252))
-    assert judged.allowed["stiffness axial 25 Hz 0.1 mm"] == (550e3, 650e3)
-    assert judged.allowed["stiffness torsion 10 Hz 1 deg"] == (-math.inf, 100.0)
-    assert judged.allowed["loss factor axial 25 Hz 0.1 mm"] == (-math.inf, 0.12)
-    assert judged.allowed["NRMSE"] == (-math.inf, 0.02)
+    allowed, notes = resolve_limits(limits(tmp_path, ALL), {"sigma_fmax": values})
+    assert allowed["mu"] == (1e6, 1.2e6)
+    assert allowed["alpha"] == pytest.approx((0.228, 0.252))
+    assert allowed["stiffness axial 25 Hz 0.1 mm"] == (550e3, 650e3)
+    assert allowed["stiffness torsion 10 Hz 1 deg"] == (-math.inf, 100.0)
+    assert allowed["loss factor axial 25 Hz 0.1 mm"] == (-math.inf, 0.12)
+    assert allowed["NRMSE"] == (-math.inf, 0.02)
     middle, spread = scatter(values)
-    assert judged.allowed["sigma_fmax"] == pytest.approx((middle - 3 * spread, middle + 3 * spread))
-    assert judged.allowed["sigma_fmax"][1] < 1.2e4, "one far out must not widen the limits"
-    assert judged.notes == []
-    read = limits(tmp_path, "[parameters.mu]\nsigma = 3\n")
-    few = Judge(read, {"mu": np.array([1.0, 2.0, np.nan])}, {})
-    assert "2 bushings, and at_least = 10" in few.notes[0]
-    same = Judge(read, {"mu": np.ones(12)}, {})
-    assert "agree to the digit" in same.notes[0]
-    assert few.allowed == same.allowed == {"mu": (-math.inf, math.inf)}
+    assert allowed["sigma_fmax"] == pytest.approx((middle - 3 * spread, middle + 3 * spread))
+    assert allowed["sigma_fmax"][1] < 1.2e4, "one far out must not widen the limits"
+    assert notes == []
+    by_sigma = limits(tmp_path, "[parameters.mu]\nsigma = 3\n")
+    few = resolve_limits(by_sigma, {"mu": np.array([1.0, 2.0, np.nan])})
+    assert "2 parts, and at_least = 10" in few[1][0]
+    same = resolve_limits(by_sigma, {"mu": np.ones(12)})
+    assert "agree to the digit" in same[1][0]
+    assert few[0] == same[0] == {"mu": (-math.inf, math.inf)}
 
 
 FEW = """
 verdicts = ["consistent", "named"]
 parameters = { mu = { min = "1 MPa", max = "1.2 MPa" }, alpha = { nominal = 0.24, tolerance = "5 %" } }
 """
-QUANTITIES = {q.name: q for q in parameter_quantities(["mu", "alpha", "eps_half"])}
 
 
-def test_a_bushing_is_as_good_as_its_worst_and_the_words_say_why(tmp_path: Path) -> None:
-    known = {"mu": [1.19e6, 1.17e6, 1.21e6], "alpha": [0.26, 0.25, 0.27]}
-    judged = Judge(limits(tmp_path, FEW), {}, QUANTITIES)
-    found = judged(known, {"verdict": "named"})
-    assert found.verdict is Verdict.CONDITIONAL_FAIL
-    assert dict(found.missed) == {"alpha": "alpha = 0.26 (0.25 to 0.27), min 0.228 max 0.252: conditional fail"}
-    assert dict(found.edge) == {"mu": "mu = 1.19 (1.17 to 1.21) MPa, min 1 max 1.2: conditional pass"}
-    partly = judged(known, {"verdict": "partly"})
-    assert partly.verdict is Verdict.FAIL
-    assert partly.missed["verdict"] == "verdict partly, allowed consistent, named"
-    guarded = Judge(limits(tmp_path, "guard = true\n" + FEW), {}, QUANTITIES)
-    assert set(guarded(known, {"verdict": "named"}).missed) == {"mu", "alpha"}
-    unknown = judged({"mu": [1.1e6, NAN, NAN]}, {})
-    assert unknown.verdict is Verdict.FAIL
-    assert dict(unknown.missed) == {
-        "alpha": "alpha is not known: fail",
-        "verdict": "verdict is not known, allowed consistent, named",
+def judged(read: Limits, **record: object) -> tuple[str, dict[str, str], dict[str, str]]:
+    """Result, misses and doubtful limits of a part."""
+    allowed, _ = resolve_limits(read, {})
+    quantities = list_quantities(["mu", "alpha"], read.points)
+    judgement = judge_part(RowFile(status="done", **record), read, allowed, quantities)  # type: ignore[arg-type]
+    return judgement.result, dict(judgement.misses), dict(judgement.doubtful)
+
+
+def test_a_part_is_as_good_as_its_worst_and_the_words_say_why(tmp_path: Path) -> None:
+    known = {"mu": Estimate(1.19e6, 1.17e6, 1.21e6), "alpha": Estimate(0.26, 0.25, 0.27)}
+    read = limits(tmp_path, FEW)
+    assert judged(read, quantities=known, verdict="named") == (
+        "conditional fail",
+        {"alpha": "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail"},
+        {"mu": "mu 1.19 MPa (1.17 to 1.21), limit 1.2: conditional pass"},
+    )
+    assert judged(read, quantities=known, verdict="partly")[:2] == (
+        "fail",
+        {
+            "alpha": "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail",
+            "verdict": "verdict partly, allowed consistent, named",
+        },
+    )
+    guarded = limits(tmp_path, "guard = true\n" + FEW)
+    assert set(judged(guarded, quantities=known, verdict="named")[1]) == {"mu", "alpha"}
+    assert judged(read, quantities={"mu": Estimate(1.1e6)})[:2] == (
+        "fail",
+        {"alpha": "alpha is not known", "verdict": "verdict not known, allowed consistent, named"},
+    )
+    assert RESULTS.index("not judged") > RESULTS.index("conditional pass"), "what is not judged is no pass"
+
+
+def test_a_part_whose_fit_misses_the_tests_is_judged_on_measured_points(tmp_path: Path) -> None:
+    stiffness = "stiffness axial 25 Hz 0.1 mm"
+    poor = {
+        "NRMSE": Estimate(0.12),
+        "reduced chi-square": Estimate(90.0),
+        stiffness: Estimate(5e5),
+        "mu": Estimate(9e6),
     }
+    read = limits(
+        tmp_path, '[parameters.mu]\nmax = "1 MPa"\n[[stiffness]]\nat = "axial 25 Hz 0.1 mm"\nmin = "440 N/mm"\n'
+    )
+    not_judged = {"mu": "mu not judged: poor fit"}
+    assert judged(read, quantities=poor) == (
+        "not judged", {}, not_judged | {stiffness: f"{stiffness} not judged: poor fit"}
+    )  # fmt: skip
+    measured = {stiffness: Estimate(3.99e5, 3.95e5, 4.03e5)}
+    assert judged(read, quantities=poor, measured=measured) == (
+        "fail", {stiffness: f"measured {stiffness} 399 N/mm (395 to 403), limit 440"}, not_judged
+    )  # fmt: skip
+    noisy = poor | {"reduced chi-square": Estimate(1.1)}
+    assert judged(read, quantities=noisy, measured=measured)[1].keys() == {"mu"}, "noise is in the interval"
+    assert "mu" in judged(limits(tmp_path, 'nrmse = "15 %"\n[parameters.mu]\nmax = "1 MPa"\n'), quantities=poor)[1]
+
+
+def test_the_measured_point_is_the_mean_of_its_repeats_with_the_noise_of_one() -> None:
+    stiffness = np.array([3e5 + 3e4j, 5e5, 3.2e5 + 3.2e4j])
+    sweep = Sweep("s", Direction.AXIAL, np.array([25.2, 50.0, 24.9]), np.array([1e-4, 1e-4, 1.04e-4]), stiffness)
+    point = parse_point("axial 25 Hz 0.1 mm")
+    found = measured_at([sweep], point, noise=0.01)
+    assert found[f"stiffness {point}"].value == pytest.approx(3.1e5 * math.hypot(1, 0.1))
+    assert found[f"stiffness {point}"].stderr == pytest.approx(3.1e5 * math.hypot(1, 0.1) * 0.01 / math.sqrt(2))
+    assert found[f"loss factor {point}"].value == pytest.approx(0.1)
+    assert measured_at([sweep], parse_point("axial 30 Hz 0.1 mm"), 0.01) == {}
+    assert measured_at([sweep], parse_point("radial 25 Hz 0.1 mm"), 0.01) == {}
 
 
 @pytest.mark.parametrize(
@@ -242,10 +287,10 @@ def test_what_is_no_point(text: str) -> None:
 
 def test_a_point_at_a_specimen_is_that_of_the_model(paper_model: Model) -> None:
     result = Result(paper_model, specimens=(coupon := Specimen("DMA", "modulus"),))
-    record = numbers_of(result, [parse_point("DMA 10 Hz 1 %")], ())
+    estimates, _ = estimate_quantities(result, [parse_point("DMA 10 Hz 1 %")])
     modulus = abs(paper_model.stiffness(coupon, 10.0, 0.01))
-    assert record["points"]["DMA 10 Hz 1 %"]["stiffness"][0] == pytest.approx(modulus)
+    assert estimates["stiffness DMA 10 Hz 1 %"].value == pytest.approx(modulus)
     with pytest.raises(BatchError, match=r"this amplitude is none of the place[\s\S]*an amplitude in %"):
-        numbers_of(result, [parse_point("DMA 10 Hz 1 mm")], ())
+        estimate_quantities(result, [parse_point("DMA 10 Hz 1 mm")])
     with pytest.raises(ModelError, match="no such direction or specimen"):
-        numbers_of(result, [parse_point("coupon 10 Hz 1 %")], ())
+        estimate_quantities(result, [parse_point("coupon 10 Hz 1 %")])

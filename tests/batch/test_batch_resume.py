@@ -8,10 +8,11 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import BrokenExecutor
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,11 @@ import openpyxl
 import pytest
 from trees import PATTERN, command, kept, list_many, stamps, tree, wait_for
 
-from bushfit.batch import ledger
+from bushfit.batch import store
+from bushfit.batch.executor import local_workers, run_rows
 from bushfit.batch.manifest import Row, Settings, read_manifest
-from bushfit.batch.pool import LocalPool, run
 from bushfit.batch.quantities import parse_point
-from bushfit.batch.work import Orders, failed, work
+from bushfit.batch.row import RowTask, failed_row
 from bushfit.errors import BatchError
 from bushfit.report.results import Formats
 
@@ -112,8 +113,8 @@ def test_the_key_changes_with_all_that_the_answer_depends_on(shop: Path) -> None
     other, plain = replace(row, settings=replace(row.settings, effects=("inertia",))), Formats(pictures=False)
     points = (parse_point("axial 25 Hz 0.1 mm"),)
     asked = [(row, (), plain), (row, points, plain), (row, (), Formats()), (other, (), plain)]
-    assert len({ledger.key(*each) for each in asked}) == 4
-    assert ledger.key(row, points, plain) == ledger.key(*asked[1])
+    assert len({store.row_key(*each) for each in asked}) == 4
+    assert store.row_key(row, points, plain) == store.row_key(*asked[1])
 
 
 def test_killed_in_mid_run_and_resumed_it_is_as_if_it_had_run_through(typed: Callable[..., Any], shop: Path) -> None:
@@ -140,24 +141,23 @@ def test_killed_in_mid_run_and_resumed_it_is_as_if_it_had_run_through(typed: Cal
 def test_one_batch_holds_a_folder_and_clears_what_a_killed_one_left(
     typed: Callable[..., Any], shop: Path, option: str
 ) -> None:
-    left = shop / "all" / ledger.STAGE / "half"
+    left = shop / "all" / store.STAGE / "half"
     left.mkdir(parents=True)
-    with ledger.held(shop / "all"):
+    with store.batch_folder(shop / "all"):
         assert not left.exists()
         second = typed(*ALL, option)
         assert (second.returncode, second.stdout) == (2, "")
         assert "another batch is at work there" in second.stderr
-    assert not (shop / "all" / ledger.STAGE).exists()
+    assert not (shop / "all" / store.STAGE).exists()
 
 
-def double(rows: Sequence[int], folder: Path, deadly: tuple[int, ...] = (), once: tuple[int, ...] = ()) -> list[str]:
-    """Twice each row; deadly rows kill this process, some only the first time."""
-    for row in rows:
-        mark = folder / f"died at {row}"
-        if row in deadly or (row in once and not mark.exists()):
-            mark.touch()
-            os.kill(os.getpid(), signal.SIGKILL)
-    return [str(2 * row) for row in rows]
+def double(row: int, folder: Path, deadly: tuple[int, ...] = (), once: tuple[int, ...] = ()) -> str:
+    """Twice a row; deadly rows kill this process, some only the first time."""
+    mark = folder / f"died at {row}"
+    if row in deadly or (row in once and not mark.exists()):
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return str(2 * row)
 
 
 @pytest.mark.parametrize(
@@ -166,41 +166,35 @@ def double(rows: Sequence[int], folder: Path, deadly: tuple[int, ...] = (), once
 def test_a_worker_that_dies_costs_a_second_try_and_only_what_always_kills_is_given_up(
     tmp_path: Path, count: int, once: tuple[int, ...], deadly: tuple[int, ...]
 ) -> None:
-    rows = list(range(100, 100 + count))
     task = partial(double, folder=tmp_path, once=once, deadly=deadly)
-    found = list(run(rows, task, lambda why: why, LocalPool(2)))
+    found = list(run_rows(range(100, 100 + count), task, lambda why: why, local_workers(2)))
     assert sorted(number for number, _ in found) == list(range(count)), "each row once"
     for number, result in found:
         if 100 + number in deadly:
-            assert "its worker process died twice" in result
+            assert "its worker process died" in result
         else:
             assert result == str(2 * (100 + number))
     assert len(list(tmp_path.iterdir())) == len(once + deadly)
 
 
-def test_workers_that_die_before_they_are_given_more_are_replaced(tmp_path: Path) -> None:
-    pool = LocalPool(2)
-    found = run(list(range(100, 140)), partial(double, folder=tmp_path), lambda why: why, pool)
+def test_workers_that_die_between_rows_are_replaced(tmp_path: Path) -> None:
+    found = run_rows(range(100, 140), partial(double, folder=tmp_path), lambda why: why, local_workers(2))
     done = [next(found)]
     for worker in multiprocessing.active_children():
         worker.kill()  # once one is gone, the pool itself ends the others
         worker.join()
-    with pytest.raises(BrokenExecutor):
-        pool.executor().submit(double, [1], tmp_path).result()
-    done += found
-    assert dict(done) == {n: str(2 * (100 + n)) for n in range(40)}
+    assert dict([*done, *found]) == {n: str(2 * (100 + n)) for n in range(40)}
 
 
 def test_a_worker_of_another_version_or_none_that_lives_ends_the_batch(tmp_path: Path) -> None:
     row = Row("a", "a", "a.toml", "a.toml", Settings())
-    orders = Orders(tmp_path, (), Formats(False, False), resume=False, version="0.0.0")
+    task = RowTask(tmp_path, (), Formats(False, False), resume=False, version="0.0.0")
     with pytest.raises(BatchError, match=r"another bushfit[\s\S]*0\.0\.0"):
-        list(run([row], partial(work, orders=orders), failed, LocalPool(1)))
+        list(run_rows([row], task, lambda why: (failed_row(why), False), local_workers(1)))
+    dead = replace(local_workers(2), open=partial(ProcessPoolExecutor, 2, get_context("spawn"), initializer=die))
     with pytest.raises(BatchError, match="no worker process starts"):
-        list(run(list(range(100)), die, lambda why: why, LocalPool(2)))
+        list(run_rows([1, 2], str, lambda why: why, dead))
 
 
-def die(rows: Sequence[int]) -> list[str]:
-    """Die, also over nothing."""
+def die() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
-    return []

@@ -85,8 +85,26 @@ def test_a_scheduler_that_is_lost_is_one_error_and_the_work_is_kept(shop: Path, 
     assert kept(shop / "cluster") >= 5
 
 
-def test_nobody_at_the_address(typed: Callable[..., Any], shop: Path) -> None:
-    done = typed("batch", PATTERN, "-o", "all", "--scheduler", free_address())
-    assert done.returncode == 2
-    assert "no cluster answers there" in done.stderr
+def test_the_last_worker_lost_is_a_warning_and_then_an_error(shop: Path, cluster: tuple[str, Processes]) -> None:
+    address, (_, victim, other) = cluster
+    list_many(shop, 20)
+    code = "from bushfit.batch import executor; from bushfit.cli import main; executor.NO_WORKER_SECONDS = 3.0; main()"
+    arguments = ["batch", "many.csv", "-o", "cluster", "--no-plots", "--scheduler", address]
+    running = subprocess.Popen([sys.executable, "-c", code, *arguments], cwd=shop, stderr=subprocess.PIPE)
+    wait_for(running, shop / "cluster", 3)
+    victim.kill()
+    other.kill()
+    _, err = running.communicate(timeout=30)
+    assert (running.returncode, b"Traceback" in err) == (2, False), err.decode()
+    assert err.index(b"waiting 3 s for one") < err.index(b"no Dask worker is left")
+
+
+def test_no_scheduler_at_the_address(typed: Callable[..., Any], shop: Path) -> None:
+    """Nobody, a service that says nothing, an unknown scheme, and no address."""
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        for address in (free_address(), f"tcp://127.0.0.1:{silent.getsockname()[1]}", "foo://x", ""):
+            done = typed("batch", PATTERN, "-o", "all", "--scheduler", address)
+            assert done.returncode == 2
+            assert done.stderr.startswith("bushfit: error: --scheduler: no Dask scheduler answers there")
+            assert "Traceback" not in done.stderr
     assert not (shop / "all").exists()

@@ -19,11 +19,11 @@ from pathlib import Path
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
+from bushfit.batch.executor import local_workers
 from bushfit.batch.manifest import Settings, read_manifest
-from bushfit.batch.outcome import Plan
-from bushfit.batch.pool import LocalPool
-from bushfit.batch.run import run
-from bushfit.batch.work import Orders
+from bushfit.batch.row import RowTask
+from bushfit.batch.run import run_batch
+from bushfit.batch.summary import BatchPlan
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.model.model import Model
 from bushfit.report.results import Formats
@@ -61,16 +61,16 @@ def manifest(bushings: Path, count: int, name: str = "campaign") -> Path:
     return file
 
 
-def plan_of(bushings: Path, count: int, folder: Path) -> Plan:
+def plan_of(bushings: Path, count: int, folder: Path) -> BatchPlan:
     rows, none = read_manifest(str(manifest(bushings, count)), Settings()).rows, Formats(False, False, False)
-    return Plan("benchmark", rows, Orders(folder, (), none, resume=False), None, None, none)
+    return BatchPlan("benchmark", rows, RowTask(folder, (), none, resume=False), None, None, none)
 
 
 def seconds(bushings: Path, count: int, jobs: int, folder: Path) -> float:
     plan = plan_of(bushings, count, folder)
     begin = time.perf_counter()
-    summary = run(plan, LocalPool(jobs), lambda _: None)
-    assert summary.status["done"] == count
+    result = run_batch(plan, local_workers(jobs), lambda _: None)
+    assert result.document.done == count
     return time.perf_counter() - begin
 
 

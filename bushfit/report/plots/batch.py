@@ -1,7 +1,8 @@
 """Pictures of many bushings: the scatter of a batch, its limits and who is out of them; and results side by side."""
 
 import math
-from collections.abc import Collection, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,12 @@ _STROKE = 1.3
 _DASHES = ("-", (0, (4, 1.5)))
 #: Markers on a line, or fewer: they tell lines apart in grey print.
 _MARKS = 5
+#: Curves of single parts in one picture at most.
+_MOST_CURVES = 6
+#: Header of a point of a measured curve.
+_POINT = re.compile(
+    r"measured stiffness (?P<place>.+) (?P<frequency>\S+) Hz (?P<amplitude>\S+) (?P<length>\S+) \[(?P<unit>.+)\]"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,6 +195,33 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
             parse_math=False,
             zorder=1.5,
         )
+
+
+@style.in_own_style
+def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Array]) -> Figure:
+    """Measured stiffness curves of a batch: median and range of the usual parts, and single parts.
+
+    Args:
+        headers: columns of the points, such as "measured stiffness axial 25 Hz 0.1 mm [N/mm]", (k,).
+        usual: stiffness of the parts that do not differ, in the unit of the headers, (n, k).
+        singles: stiffness of the parts that differ, by name, (k,) each; six are drawn.
+    """
+    points = [match.groupdict() for header in headers if (match := _POINT.fullmatch(header))]
+    place, unit, length = (points[0][name] for name in ("place", "unit", "length"))
+    frequency, amplitude = (np.array([float(point[name]) for point in points]) for name in ("frequency", "amplitude"))
+    over_frequency = bool(np.ptp(frequency))
+    x, x_label = (frequency, "frequency [Hz]") if over_frequency else (amplitude, f"amplitude [{length}]")
+    level = f"{number(amplitude[0], 3)} {length}" if over_frequency else f"{number(frequency[0], 3)} Hz"
+    figure = style.new_figure(f"Dynamic stiffness as measured: {place}, {level}", style.ROW + 0.35 * style.FRAME)
+    axes = figure.subplots()
+    axes.fill_between(x, usual.min(axis=0), usual.max(axis=0), color=style.GREY, alpha=0.3, lw=0, label="other parts")
+    axes.plot(x, np.median(usual, axis=0), color=style.INK, lw=_STROKE, label="median")
+    named = dict([*singles.items()][:_MOST_CURVES])
+    for look, (name, values) in zip(style.styles(len(named), "loop"), named.items(), strict=True):
+        axes.plot(x, values, color=look.color, marker=look.marker, lw=_STROKE, **style.POINT, label=shortened(name, 24))
+    style.label_axes(axes, x_label, f"|K| [{unit}]", x)
+    axes.legend(fontsize=style.SMALL, frameon=False)
+    return figure
 
 
 @style.in_own_style

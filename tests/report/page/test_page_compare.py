@@ -129,18 +129,20 @@ def test_a_batch_writes_its_page_and_the_folder_gives_the_same(batch: Path) -> N
     page = written.decode()
     assert loads(page) == []
     found = parsed(page)
-    for words in ("m: 4 bushings", "3 done, 1 failed", "=1+1 <b>", "mu [MPa]", "inertia", "Control charts"):
+    for words in ("1 could not be evaluated", "=1+1 <b>", "mu [MPa]", "inertia", "What 3 parts can show"):
         assert words in found.text
-    links = [value for tag, key, value in found.attributes if (tag, key) == ("a", "href")]
+    links = {value for tag, key, value in found.attributes if (tag, key) == ("a", "href")}
     assert sorted(links) == [f"bushings/c{n}/report.html" for n in range(3)]
     assert all((batch / link).is_file() for link in links)
     summary = json.loads((batch / "batch.json").read_text(encoding="utf-8"))
     mu = summary["quantities"]["mu [MPa]"]
-    assert mu["allowed"] == [1.2, None]
+    assert (mu["min"], mu["max"]) == (1.2, None)
     table = pd.read_csv(batch / "batch.csv")
     assert mu["median"] == pytest.approx(table["mu [MPa]"].median())
-    out = table["mu [MPa]"] < 1.2
-    assert f"{int(out.sum())} out of limits" in page
+    soft = table[table["mu [MPa]"] < 1.2]
+    assert summary["missed"] == list(soft["name"])
+    first = found.text[: found.text.index("What 3 parts can show")]
+    assert all(f"{name} fails: mu " in first and "limit 1.2" in first for name in soft["name"])
     rows = re.findall(r'<tr><th scope="row" align="left">(?:<a [^>]*>)?([^<]*)', page.partition('id="h-rows"')[2])
     assert rows[0] == "=1+1 &lt;b&gt;", "what failed comes first"
     assert len(rows) == 4
@@ -151,7 +153,7 @@ def test_report_makes_it_again_and_elsewhere_with_whole_links(batch: Path, tmp_p
     done = call(tmp_path, "report", batch, "-o", "x")
     assert done.returncode == 0, done.stderr
     links = re.findall(r'href="([^"]*)"', (tmp_path / "x/index.html").read_text(encoding="utf-8"))
-    assert sorted(links) == [f"{batch.resolve().as_uri()}/bushings/c{n}/report.html" for n in range(3)]
+    assert sorted(set(links)) == [f"{batch.resolve().as_uri()}/bushings/c{n}/report.html" for n in range(3)]
 
 
 @SLOW
@@ -159,31 +161,27 @@ def test_the_page_shows_each_curve_against_the_batch_and_who_differs(made: Path)
     page = (made / "out/index.html").read_text(encoding="utf-8")
     assert encode_all(folder_pages(made / "out"), Formats())["index.html"].decode() == page
     found = parsed(page)
-    assert loads(page) == []
+    assert [load for load in loads(page) if not load.startswith("use xlink:href=#")] == []
     alts = [value for tag, key, value in found.attributes if (tag, key) == ("svg", "aria-label")]
     curves = [alt for alt in alts if alt.endswith(" % off the median")]
     assert len(curves) == COUNT
     numbers = [[float(word) for word in alt.split()[:3:2]] for alt in curves]
-    rows = re.findall(r'<tr><th scope="row" align="left"><a [^>]*>([^<]*)', page.partition('id="h-rows"')[2])
+    rows = re.findall(r'<tr><th scope="row" align="left">(?:<a [^>]*>)?([^<]*)', page.partition('id="h-rows"')[2])
     assert max(numbers[rows.index(f"part_{SOFT}")]) < -5.0 < 5.0 < max(numbers[rows.index(f"part_0{LOSSY}")])
     assert {f"part_{SOFT}", f"part_0{LOSSY}"} < set(rows[:8]), "what differs is among those that come first"
     assert any(alt.endswith("single curves: part_07, part_20") for alt in alts)
-    for words in ("2 bushings differ from the others", "SN 907", "moving range: mu [MPa]", "drifts", "Ppk = "):
+    for words in ("2 differ from the others", "SN 907", "part_20 fails: mu 0.", "Differs from the others: mu -3"):
         assert words in found.text
 
 
 @SLOW
 def test_many_bushings_stay_small(made: Path) -> None:
-    contents = read_batch(made / "out")
-    table = contents.tables["batch"]()
-    random = np.random.default_rng(1)
-    ordered = {"mu [MPa]": random.normal(1.1, 0.05, 20_010), "order of test [-]": np.arange(1.0, 20_011.0)}
-    many = table.iloc[[*range(COUNT)] * 667].assign(**ordered).reset_index(drop=True)
-    many["limits"] = ["pass"] * 20_010
-    page = index_page(contents.documents, {"batch": many})
+    document = dict(read_batch(made / "out").documents["batch"])
+    usual = next(part for part in document["parts"] if part["result"] == "pass" and not part["differs"])
+    document |= {"rows": 20_010, "parts": [*document["parts"], *[usual] * 19_980]}
+    page = index_page({"batch": document}, {})
     assert len(page.encode()) < LARGEST
-    assert re.search(r"Here are 2 of 2 that need a look and, evenly taken, (\d+) of the others", page)
-    assert "of 20010; batch.csv has all" in page
+    assert "batch.csv lists all 20010" in page
 
 
 positive = st.floats(1e-6, 1e6)

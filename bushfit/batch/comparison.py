@@ -1,0 +1,103 @@
+"""The parts of a batch compared with each other: outlying parts, and capability against limits."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.special import chdtri, stdtr, stdtrit
+
+from bushfit.effects.contract import Array
+from bushfit.model.covariance import Z95
+
+#: Fewest parts of which a deviation is judged.
+FEWEST = 5
+#: Probability that any part of a batch of like parts is named.
+_LEVEL = 0.05
+
+
+def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Find the parts that differ from the others beyond chance, with the quantities in which they differ.
+
+    Args:
+        quantities: values and standard errors by name, (n,) each; NaN where not known.
+
+    Returns:
+        By name, (n,) each: deviation from the mean of the parts that do not differ, in their standard deviations, NaN
+        where not known; and whether the part differs.
+
+    Notes:
+        Generalised extreme studentised deviate procedure (Rosner, Technometrics 25 (1983) 165) for up to a fifth of
+        the parts, with Bonferroni's correction for the number of quantities. Each value is held against the others
+        without it, so that their deviation has n - 2 degrees of freedom and the limit is that of `smallest_deviation`.
+        A standard error above the usual one widens the deviation that a value may have.
+    """
+    deviations, outliers = dict[str, Array](), dict[str, Array]()
+    for name, (values, errors) in quantities.items():
+        known = np.isfinite(values)
+        removed = list[int]()
+        count, usual = 0, known.copy()
+        for step in range(int(known.sum()) // FEWEST):
+            z = _studentised(values, errors, usual)
+            if not np.isfinite(z[usual]).any():  # the others agree to the digit
+                break
+            worst = int(np.nanargmax(np.where(usual, np.abs(z), np.nan)))
+            chance = 2.0 * float(stdtr(usual.sum() - 2.0, -abs(z[worst]))) * usual.sum() * len(quantities)
+            usual[worst] = False
+            removed.append(worst)
+            count = step + 1 if chance < _LEVEL else count
+        differs = np.zeros(values.size, dtype=bool)
+        differs[removed[:count]] = True
+        deviations[name] = _studentised(values, errors, known & ~differs)
+        outliers[name] = differs
+    return deviations, outliers
+
+
+def _studentised(values: Array, errors: Array, usual: Array) -> Array:
+    """Deviation of each value from the mean of the usual ones without it, in their standard deviations, (n,)."""
+    count, others = usual.sum(), usual.sum() - usual  # (n,): how many others each value is held against
+    if count < FEWEST - 1:
+        return np.full(values.size, np.nan)
+    center = values[usual].mean()  # taken off first, for the digits of the sums
+    shifted, own = values - center, np.where(usual, values - center, 0.0)
+    mean = (shifted[usual].sum() - own) / others
+    variance = ((shifted[usual] ** 2).sum() - own**2 - others * mean**2) / (others - 1)
+    square = errors**2
+    if np.isfinite(square[usual]).any():
+        typical = float(np.nanmean(square[usual]))
+        variance = variance + np.maximum(np.where(np.isfinite(square), square, typical) - typical, 0.0)
+    spread = np.sqrt(np.maximum(variance, 0.0) * (1.0 + 1.0 / others))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(spread > 1e-9 * (np.abs(center) + np.abs(shifted)), (shifted - mean) / spread, np.nan)
+
+
+def smallest_deviation(parts: int, quantities: int) -> float | None:
+    """Smallest deviation by which one of so many parts is named, in standard deviations; None of fewer than five."""
+    if parts < FEWEST or quantities < 1:
+        return None
+    return float(stdtrit(parts - 2.0, 1.0 - _LEVEL / (2.0 * parts * quantities)))
+
+
+def capability(
+    values: Array, low: float, high: float
+) -> tuple[tuple[float, float, float] | None, tuple[float, float, float] | None]:
+    """Cp and Cpk, each with its 95 % interval; None where limits or scatter are missing.
+
+    Args:
+        values: of the parts, (n,), without NaN.
+        low, high: limits; either may be infinite.
+
+    Notes:
+        ISO 22514-2 for normal scatter, from the standard deviation of all parts, so that a process that drifts shows
+        in it. Intervals: chi-square for Cp; Bissell, Applied Statistics 39 (1990) 331, for Cpk.
+    """
+    if values.size < 2 or not (math.isfinite(low) or math.isfinite(high)) or np.ptp(values) == 0.0:
+        return None, None
+    count, mean, sigma = values.size, float(values.mean()), float(values.std(ddof=1))
+    nearest = min(high - mean, mean - low) / (3.0 * sigma)
+    half = Z95 * math.sqrt(1.0 / (9.0 * count) + nearest**2 / (2.0 * (count - 1)))
+    cpk = nearest, nearest - half, nearest + half
+    width = (high - low) / (6.0 * sigma)
+    if not math.isfinite(width):
+        return None, cpk
+    least, most = (width * math.sqrt(float(chdtri(count - 1, p)) / (count - 1)) for p in (0.975, 0.025))
+    return (width, least, most), cpk

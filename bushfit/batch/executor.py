@@ -1,0 +1,217 @@
+"""Workers of a batch: processes of this machine or of a Dask cluster, both behind `concurrent.futures.Executor`.
+
+A process that dies breaks the whole local pool, so the rows that were out are tried again, one at a time; a row that
+fails again and again is given up, and the rest goes on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
+
+from bushfit.errors import BatchError
+
+Task = TypeVar("Task")
+Outcome = TypeVar("Outcome")
+
+#: Rows handed out per worker: one to work on and one to go on with.
+_ROWS_PER_WORKER = 2
+#: Times that a row is tried before it is given up: once with others, then alone.
+_ATTEMPTS = 3
+#: Seconds between two looks at the workers, and for which a cluster may be without any.
+_LOOK_SECONDS, NO_WORKER_SECONDS = 2.0, 30.0
+#: Seconds in which a scheduler has to answer.
+_ANSWER_SECONDS = 4.0
+#: Environment of local workers. The first keeps the current folder off their path. Below the other two numbers of bytes
+#: glibc keeps freed memory for the next row, which saves a tenth of the time.
+_ENVIRONMENT = {"PYTHONSAFEPATH": "1", "MALLOC_TRIM_THRESHOLD_": "134217728", "MALLOC_MMAP_THRESHOLD_": "33554432"}
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Source of executors.
+
+    Args:
+        place: where the workers are, for messages.
+        open: makes an executor; called again if the last one is broken.
+        count: number of workers; raises an OSError if the connection to them is lost.
+        close: called at the end.
+    """
+
+    place: str
+    open: Callable[[], Executor]
+    count: Callable[[], int]
+    close: Callable[[], object] = lambda: None
+
+
+def local_workers(processes: int) -> Workers:
+    """Processes of this machine; a server that forks them starts at once."""
+    os.environ.update(_ENVIRONMENT, PYTHONPATH=os.pathsep.join(sys.path))
+    forks = "forkserver" in multiprocessing.get_all_start_methods()  # this process has threads, so it must not fork
+    context = multiprocessing.get_context("forkserver" if forks else "spawn")
+    if forks:
+        from multiprocessing.forkserver import ensure_running
+
+        context.set_forkserver_preload(["bushfit.batch.row", "pandas"])
+        ensure_running()
+    pool = partial(ProcessPoolExecutor, processes, context, initializer=_start_worker)
+    return Workers("this machine", pool, lambda: processes)
+
+
+def _start_worker() -> None:
+    """Leave Ctrl-C to the parent, and end with it."""
+
+    def follow(parent: Any) -> None:
+        parent.join()
+        os._exit(1)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if parent := multiprocessing.parent_process():
+        threading.Thread(target=follow, args=(parent,), daemon=True).start()
+
+
+def dask_workers(address: str) -> Workers:
+    """Workers of a Dask cluster, which see the same files; they may come and go.
+
+    Args:
+        address: of the scheduler, such as tcp://10.0.0.5:8786.
+
+    Raises:
+        BatchError: Dask is not installed, or no scheduler answers at the address.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise BatchError("Dask is not installed", place="--scheduler", hint='pip install "bushfit[dask]"') from None
+    for name in ("distributed", "distributed.client", "distributed.core", "tornado.application", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported once, in our words
+    try:  # a client waits for ever where something else listens, so a short call comes first
+        if (kind := asyncio.run(asyncio.wait_for(_ask_kind(address), _ANSWER_SECONDS))) != "Scheduler":
+            raise ValueError(f"a Dask {kind.lower()} answers there")
+        client: Any = Client(address, timeout=_ANSWER_SECONDS, set_as_default=False)
+    except Exception as error:  # whatever a foreign service answers
+        raise BatchError(
+            "no Dask scheduler answers there",
+            place="--scheduler",
+            found=address or "an empty address",
+            expected="the address of a Dask scheduler, such as tcp://10.0.0.5:8786",
+            hint=str(error) or "start one with: dask scheduler; dask worker ADDRESS",
+        ) from None
+
+    def count() -> int:
+        if client.status != "running":
+            raise OSError("the connection is lost")
+        return sum(client.nthreads().values())
+
+    return Workers(address, partial(client.get_executor, pure=False), count, partial(client.close, _ANSWER_SECONDS))
+
+
+async def _ask_kind(address: str) -> str:
+    """Kind of Dask server that answers at an address."""
+    from distributed import rpc
+
+    async with rpc(address) as server:
+        return str((await server.identity())["type"])
+
+
+def run_rows(
+    rows: Sequence[Task],
+    work: Callable[[Task], Outcome],
+    give_up: Callable[[str], Outcome],
+    workers: Workers,
+    warn: Callable[[str], object] = lambda _: None,
+) -> Iterator[tuple[int, Outcome]]:
+    """Do work(row) for all rows in any order; yield the number and the result of each as it is finished.
+
+    Args:
+        rows: arguments of `work`.
+        work: must bear to be called again with the same row.
+        give_up: result of a row that the workers do not survive, from a sentence on that.
+        workers: of this machine or of a cluster.
+        warn: called with a sentence when no worker is left.
+
+    Raises:
+        BatchError: no worker starts, or the cluster is lost.
+    """
+    queue, out, failures = deque(range(len(rows))), dict[Future[Outcome], int](), Counter[int]()
+    executor, width, looked, alone_since = workers.open(), 1, 0.0, 0.0
+    try:
+        while queue or out:
+            if time.monotonic() > looked + _LOOK_SECONDS:
+                looked, count = time.monotonic(), _count(workers)
+                width, alone_since = _ROWS_PER_WORKER * max(1, count), 0.0 if count else alone_since or looked
+                if alone_since == looked:
+                    warn(f"no worker at {workers.place}: waiting {NO_WORKER_SECONDS:.0f} s for one")
+                elif alone_since and looked > alone_since + NO_WORKER_SECONDS:
+                    hint = f"dask worker {workers.place}; then the same command with --resume continues from here"
+                    raise BatchError("no Dask worker is left", place="--scheduler", found=workers.place, hint=hint)
+            while queue and len(out) < (1 if failures else width):  # a row that failed runs alone
+                number = queue.popleft()
+                out[_submit(executor, work, rows[number])] = number
+            for future in wait(out, timeout=_LOOK_SECONDS, return_when=FIRST_COMPLETED).done:
+                number = out.pop(future)
+                try:
+                    outcome = future.result()
+                except BatchError:
+                    raise
+                except (Exception, CancelledError) as error:
+                    _count(workers)
+                    if not out:  # all of the broken pool have come back
+                        executor.shutdown(wait=False)
+                        executor = workers.open()
+                    failures[number] += 1
+                    if failures[number] < _ATTEMPTS:
+                        queue.appendleft(number)
+                        continue
+                    _check_alive(executor)
+                    outcome = give_up(f"its worker process died; out of memory, most likely ({error})")
+                failures.pop(number, None)
+                yield number, outcome
+    finally:
+        for future in out:
+            future.cancel()
+        executor.shutdown(wait=False)
+        workers.close()
+
+
+def _submit(executor: Executor, work: Callable[[Task], Outcome], row: Task) -> Future[Outcome]:
+    """Hand a row to the executor; if its pool has just broken, the future has the error."""
+    try:
+        return executor.submit(work, row)
+    except (OSError, RuntimeError) as error:
+        future = Future[Outcome]()
+        future.set_exception(error)
+        return future
+
+
+def _count(workers: Workers) -> int:
+    try:
+        return workers.count()
+    except (OSError, RuntimeError) as error:
+        hint = "the same command with --resume continues from here"
+        raise BatchError("the Dask scheduler is lost", found=str(error) or workers.place, hint=hint) from None
+
+
+def _check_alive(executor: Executor) -> None:
+    """Raise a BatchError if workers fail without a row, too."""
+    try:
+        executor.submit(os.getpid).result(NO_WORKER_SECONDS)
+    except (OSError, RuntimeError, CancelledError) as error:
+        raise BatchError(
+            "no worker process starts",
+            found=str(error) or type(error).__name__,
+            expected="processes that import the same packages as this one",
+            hint="see their messages above; install bushfit and its packages anew",
+        ) from error

@@ -1,0 +1,220 @@
+"""One row, as a worker does it: the commands on a campaign, and a record of their results."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from bushfit.batch import store
+from bushfit.batch.document import Estimate, RowFile
+from bushfit.batch.manifest import Row, Settings
+from bushfit.batch.quantities import (
+    FIT_QUALITY,
+    LOSS_FACTOR,
+    STIFFNESS,
+    Point,
+    measured_at,
+    measured_curve,
+)
+from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.commands.diagnose import diagnose
+from bushfit.commands.fit import fit
+from bushfit.commands.predict import predict
+from bushfit.commands.run import run
+from bushfit.diagnosis.record import Diagnosis
+from bushfit.effects import get_effect
+from bushfit.errors import BatchError, BushfitError, ModelError
+from bushfit.fitting.data import Data
+from bushfit.model.file import load_result
+from bushfit.model.result import End, Result
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.stiffness import Band
+from bushfit.prediction.stiffness import predict as predict_stiffness
+from bushfit.reading.files import view_bytes
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.report.results import Formats, encode_all
+from bushfit.version import __version__
+
+
+@dataclass(frozen=True)
+class RowTask:
+    """Settings that all rows of a batch share.
+
+    Args:
+        output: folder of the batch.
+        points: operating points of stiffness and loss factor.
+        formats: files that each row writes.
+        resume: whether a row that was done before with the same inputs is kept.
+        version: of bushfit, which the worker has to run, too.
+    """
+
+    output: Path
+    points: tuple[Point, ...]
+    formats: Formats
+    resume: bool
+    version: str = __version__
+
+    def __call__(self, row: Row) -> tuple[RowFile, bool]:
+        """Do a row and save its results.
+
+        Returns:
+            The record, and whether it was kept from an earlier run.
+
+        Raises:
+            BatchError: this process runs another version of bushfit.
+        """
+        if self.version != __version__:
+            hint = "install the same version on all workers"
+            raise BatchError("a worker runs another bushfit", found=__version__, expected=self.version, hint=hint)
+        _limit_threads()
+        key = store.row_key(row, self.points, self.formats)
+        if self.resume and (kept := store.load_row(self.output, row, key)):
+            return kept, True
+        start = time.perf_counter()
+        files: Mapping[str, bytes] = {}
+        try:
+            record, files = evaluate(row, self.points, self.formats)
+        except BushfitError as error:
+            record = failed_row(str(error))
+        except Exception as error:  # whatever happens to a row costs that row, and is reported
+            kind = "out of memory" if isinstance(error, MemoryError) else "a fault in bushfit itself"
+            record = failed_row(f"{kind}: {type(error).__name__}: {error}")
+        seconds = round(time.perf_counter() - start, 4)
+        digests = {name: store.digest(content) for name, content in files.items()}
+        record = replace(record, key=key, seconds=seconds, files=digests)
+        try:
+            store.save_row(self.output, row, files, record)
+        except OSError as error:
+            return failed_row(f"the results cannot be written: {error}"), False
+        return record, False
+
+
+def failed_row(error: str) -> RowFile:
+    """Record of a row without results."""
+    return RowFile(status="failed", error=error)
+
+
+@cache
+def _limit_threads() -> Any:
+    """Run linear algebra on one thread in this process: the cores are for rows, and sums keep their order."""
+    from threadpoolctl import threadpool_limits
+
+    return threadpool_limits(1)
+
+
+def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFile, dict[str, bytes]]:
+    """Run the commands of a row.
+
+    Returns:
+        The record of their results, and the files by name.
+
+    Raises:
+        BushfitError: inputs that cannot be used.
+    """
+    campaign = load_campaign(Path(row.campaign))
+    result, diagnosis, files = _run_commands(campaign, row.settings, formats)
+    tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
+    inputs = {Path(row.campaign).name: campaign.sha256}
+    inputs |= {str(test.source.file): test.source.sha256 for test in tests if test.source}
+    if row.settings.model:
+        inputs[row.settings.model] = store.digest(view_bytes(Path(row.settings.model), ModelError))
+    values, warnings = estimate_quantities(result, points)
+    noise = result.quality.noise if result.quality else 0.0
+    measured = [measured_at(campaign.sweeps, point, noise) for point in points]
+    record = RowFile(
+        status="done",
+        inputs=inputs,
+        campaign_name=campaign.name,
+        verdict=diagnosis.verdict if diagnosis else None,
+        effects=[effect.label for effect in diagnosis.effects] if diagnosis else (),
+        alternatives=_alternatives(diagnosis) if diagnosis else (),
+        warnings=warnings_of(result, warnings, diagnosis.notes if diagnosis else ()),
+        quantities=values,
+        measured={name: estimate for table in measured for name, estimate in table.items()},
+        at_bound=_parameters_at_bound(result),
+        curve=measured_curve(campaign.sweeps),
+    )
+    return record, files
+
+
+def _run_commands(
+    campaign: Campaign, settings: Settings, formats: Formats
+) -> tuple[Result, Diagnosis | None, dict[str, bytes]]:
+    """Run fit, diagnose and predict as far as they are asked for, each from the result before; or the whole chain."""
+    commands, with_tables = settings.commands or (), replace(formats, tables=True)
+    if "run" in commands:
+        ran = run(campaign)
+        prediction = [file for file in ran.predicted.files if file.name != "measured"]
+        files = encode_all(ran.files, formats) | encode_all(prediction, with_tables)
+        return ran.result, ran.diagnosed.diagnosis if ran.diagnosed else None, files
+    start = result = load_result(Path(settings.model)) if settings.model else None
+    diagnosis, joint, files = None, None, {}
+    data = Data.of(campaign) if set(commands) - {"predict"} else None
+    if "fit" in commands and data:
+        fitted = fit(data, directions=settings.directions or (), effects=settings.effects or ())
+        result, files = fitted.result, encode_all(fitted.files, formats)
+        joint = None if settings.directions or settings.effects else fitted
+        if "diagnose" in commands:  # as in `run`: model.json is that of diagnose
+            files["joint.json"] = files.pop("model.json")
+    if "diagnose" in commands and data:
+        options = {name: getattr(settings, name) for name in ("max_effects", "tolerance", "adopt", "without")}
+        given = {name: value for name, value in options.items() if value is not None}
+        diagnosed = diagnose(data, model=start, joint=joint, **given)
+        result, diagnosis = diagnosed.result, diagnosed.diagnosis
+        files |= encode_all(diagnosed.files, formats)
+    assert result is not None  # the manifest refuses rows without fit, diagnose or model
+    if "predict" in commands:
+        files |= encode_all(predict(result, campaign).files, with_tables)
+    return result, diagnosis, files
+
+
+def _alternatives(diagnosis: Diagnosis) -> list[str]:
+    """Effects that the tests cannot distinguish from those that were named."""
+    named = [name for effect in diagnosis.effects for name in effect.alternatives]
+    return named + [twin for name in diagnosis.result.unresolved for twin in get_effect(name).twins]
+
+
+def _parameters_at_bound(result: Result) -> dict[str, End]:
+    """Parameters at a bound of their fit, except an added effect whose size is zero, which is an answer."""
+    parameters, values = result.model.parameters, result.model.values
+
+    def is_zero(name: str) -> bool:
+        neutral = parameters[name].neutral if "." in name else None
+        return neutral is not None and abs(values[name] - neutral) <= 1e-3 * parameters[name].typical
+
+    return {name: end for name, end in result.at_bound.items() if not is_zero(name)}
+
+
+def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[str, Estimate], list[Sequence[str]]]:
+    """Parameters, quality of the fit, and stiffness and loss factor at the points.
+
+    Returns:
+        Estimates by the name of the quantity, and the warnings of the prediction at each point.
+
+    Raises:
+        BatchError: an amplitude that does not fit the place, such as an angle in the axial direction.
+    """
+    estimates, warnings = dict[str, Estimate](), list[Sequence[str]]()
+    for name, parameter in result.model.parameters.items():
+        low, high = result.interval(name) or (None, None)
+        stderr = result.covariance.stderr(name)
+        estimates[name] = Estimate.of(result.model.values[name], low, high, stderr, parameter.unit)
+    if result.quality:
+        estimates |= {quantity.name: Estimate(getattr(result.quality, key)) for key, quantity in FIT_QUALITY.items()}
+    for point in points:
+        place = result.place(point.place)
+        if place.motion != point.motion:
+            expected = f"an amplitude in {place.display.displacement.name}"
+            raise BatchError("this amplitude is none of the place", found=str(point), expected=expected)
+        prediction = predict_stiffness(result, place, [point.frequency], [point.amplitude])
+        bands: tuple[tuple[str, Band, str], ...] = (
+            (STIFFNESS, prediction.stiffness, place.motion.stiffness_unit),
+            (LOSS_FACTOR, prediction.loss_factor, "1"),
+        )
+        for name, band, unit in bands:
+            value, low, high = (float(values[0]) for values in (band.value, band.low, band.high))
+            estimates[f"{name} {point}"] = Estimate.of(value, low, high, None, unit)
+        warnings.append(prediction.warnings)
+    return estimates, warnings

@@ -1,0 +1,143 @@
+"""Folder of a row: its result files and `row.json`, whose hashes say whether they still hold.
+
+Notes:
+    A folder is written beside its place and renamed: a process that is killed leaves a whole folder or none. A file
+    that a crash of the machine damages no longer has its hash, and the row is done again.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+import shutil
+import uuid
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from bushfit.batch.document import ROW_SCHEMA, RowFile
+from bushfit.batch.manifest import Row
+from bushfit.batch.quantities import Point
+from bushfit.errors import BushfitError, OutputError
+from bushfit.reading.files import view_bytes
+from bushfit.report.results import Formats
+from bushfit.version import __version__
+
+#: Record of a row, in its folder.
+ROW_FILE = "row.json"
+#: Folder of the rows' folders, in that of the batch.
+ROWS_FOLDER = "bushings"
+#: Folder in which files are prepared, in that of the batch; removed when the batch ends.
+STAGE = ".aside"
+
+
+def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
+    """Hash of the settings of a row, of the files it writes, and of the version of bushfit."""
+    settings = {
+        "settings": asdict(row.settings),
+        "points": [str(point) for point in points],
+        "tables": formats.tables,
+        "table_form": formats.table_form if formats.tables or row.settings.predicts else None,
+        "pictures": formats.picture_forms if formats.pictures else (),
+        "pages": formats.pages and row.settings.diagnoses,
+    }
+    return hashlib.sha256(json.dumps([__version__, ROW_SCHEMA, settings], sort_keys=True).encode()).hexdigest()
+
+
+def load_row(output: Path, row: Row, key: str) -> RowFile | None:
+    """The record of a row that was done with the same settings and inputs and whose files are whole; else None."""
+    folder, campaign_folder = output / ROWS_FOLDER / row.folder, Path(row.campaign).parent
+    with contextlib.suppress(OSError, ValueError, BushfitError):
+        record = row_adapter().validate_json((folder / ROW_FILE).read_bytes())
+        if record.key == key and record.status == "done":
+            files = {campaign_folder / name: sha for name, sha in record.inputs.items()}
+            files |= {folder / name: sha for name, sha in record.files.items()}
+            if all(digest(view_bytes(file, BushfitError)) == sha for file, sha in files.items()):
+                return record
+    return None
+
+
+def save_row(output: Path, row: Row, files: Mapping[str, bytes], record: RowFile) -> None:
+    """Write the files and the record of a row, and remove those of an earlier run.
+
+    Raises:
+        OSError: the disk is full or cannot be written.
+    """
+    folder, staged = output / ROWS_FOLDER / row.folder, output / STAGE / uuid.uuid4().hex
+    staged.mkdir()
+    try:
+        for name, content in files.items():
+            (staged / name).write_bytes(content)
+        (staged / ROW_FILE).write_bytes(row_adapter().dump_json(record) + b"\n")
+        while True:
+            earlier = output / STAGE / uuid.uuid4().hex
+            with contextlib.suppress(FileNotFoundError):
+                folder.rename(earlier)
+                shutil.rmtree(earlier, ignore_errors=True)
+            try:
+                staged.rename(folder)
+                return
+            except OSError:
+                if not folder.exists():  # else a worker that was given up for lost has just written the same row
+                    raise
+    finally:
+        shutil.rmtree(staged, ignore_errors=True)
+
+
+@cache
+def row_adapter() -> TypeAdapter[Any]:
+    """pydantic's reader and writer of `row.json`, built once."""
+    return TypeAdapter(RowFile)
+
+
+def digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def list_earlier(output: Path, rows: Collection[Row]) -> list[Path]:
+    """Folders of rows of an earlier batch that are no rows of this one, sorted."""
+    current = {row.folder for row in rows}
+    records = (output / ROWS_FOLDER).glob(f"*/{ROW_FILE}")
+    return sorted(record.parent for record in records if record.parent.name not in current)
+
+
+@contextlib.contextmanager
+def batch_folder(output: Path) -> Iterator[None]:
+    """Keep other batches out of the folder; files that a killed batch left half written are removed.
+
+    Raises:
+        OutputError: another batch is at work there.
+    """
+    (output / ROWS_FOLDER).mkdir(parents=True, exist_ok=True)
+    descriptor = _lock(output / ROWS_FOLDER)
+    try:
+        shutil.rmtree(output / STAGE, ignore_errors=True)
+        (output / STAGE).mkdir()
+        yield
+    finally:
+        shutil.rmtree(output / STAGE, ignore_errors=True)
+        if descriptor is not None:
+            os.close(descriptor)
+
+
+def _lock(folder: Path) -> int | None:
+    """Lock a folder until the descriptor is closed or this process ends; None where there are no such locks."""
+    if os.name != "posix":
+        return None
+    import fcntl
+
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        hint = "wait for its end, or name another folder with -o"
+        raise OutputError("another batch is at work there", file=folder.parent, hint=hint) from None
+    except OSError:  # a file system without locks
+        os.close(descriptor)
+        return None
+    return descriptor

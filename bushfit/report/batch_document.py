@@ -1,0 +1,84 @@
+"""The JSON file of a batch, `batch.json`, which `bushfit batch --json` prints too and from which the page is made."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+#: Value of the key `schema`, which names the layout of the file.
+BATCH_SCHEMA: Literal["bushfit/batch/2"] = "bushfit/batch/2"
+#: Result of a part against its limits.
+LimitResult = Literal["pass", "conditional pass", "not judged", "conditional fail", "fail"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuantityTable:
+    """Scatter, limits and capability of a quantity over the parts, in the unit of its column."""
+
+    parts: Annotated[int, Field(description="Parts of which the quantity is known.")]
+    median: Annotated[float, Field(description="Median of the parts.")]
+    sigma: Annotated[float, Field(description="Standard deviation from the median absolute deviation.")]
+    detectable: Annotated[
+        float | None,
+        Field(description="Smallest deviation that so many parts show beyond chance; null of fewer than five."),
+    ]
+    min: Annotated[float | None, Field(description="Lower limit; null without one.")]
+    max: Annotated[float | None, Field(description="Upper limit; null without one.")]
+    cp: Annotated[
+        tuple[float, float, float] | None,
+        Field(description="Cp with its 95 % interval; null without two fixed limits."),
+    ]
+    cpk: Annotated[
+        tuple[float, float, float] | None,
+        Field(description="Cpk with its 95 % interval; null without a fixed limit."),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartTable:
+    """One part of a batch."""
+
+    name: Annotated[str, Field(description="Name of the part.")]
+    folder: Annotated[str, Field(description="Folder of its results; empty if the row failed.")]
+    error: Annotated[str, Field(description="Why the row failed; empty if it is done.")]
+    result: Annotated[LimitResult | None, Field(description="Result against the limits; null without limits.")]
+    misses: Annotated[Mapping[str, str], Field(description="Limits that the part misses, by quantity, in words.")]
+    doubtful: Annotated[Mapping[str, str], Field(description="Conditional passes, and limits that were not judged.")]
+    poor_fit: Annotated[str, Field(description="How far the model misses the tests; empty if it meets them.")]
+    deviations: Annotated[
+        Mapping[str, float],
+        Field(description="Quantities by which the part differs beyond chance, in standard deviations of the others."),
+    ]
+    differs: Annotated[str, Field(description="The same in words, relative to the median of the others.")]
+    warnings: Annotated[Sequence[str], Field(description="Warnings of the fit and of the predictions.")]
+    labels: Annotated[Mapping[str, str], Field(description="Further texts of its row in the table, by column.")]
+    values: Annotated[Sequence[float | None], Field(description="In the order of `quantities`.")]
+    curve: Annotated[Sequence[float] | None, Field(description="Measured stiffness, in the order of `curve_points`.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatchFile:
+    """Results of a batch."""
+
+    schema: Annotated[Literal["bushfit/batch/2"], Field(description="Layout of the file.")] = BATCH_SCHEMA
+    title: Annotated[str, Field(description="Title of the batch.")]
+    rows: Annotated[int, Field(description="Rows of the manifest.")]
+    done: Annotated[int, Field(description="Rows that have results.")]
+    kept: Annotated[int | None, Field(description="Rows kept from an earlier run; in `--json` only.")] = None
+    seconds: Annotated[float | None, Field(description="Time of the run [s]; in `--json` only.")] = None
+    failed: Annotated[Sequence[str], Field(description="Names of the rows that failed.")]
+    limits: Annotated[Mapping[str, int], Field(description="Number of parts by result against the limits.")]
+    missed: Annotated[Sequence[str], Field(description="Names of the parts that miss a limit.")]
+    conditional: Annotated[Sequence[str], Field(description="Names of the parts that pass conditionally.")]
+    not_judged: Annotated[Sequence[str], Field(description="Names of the parts that were not judged: poor fit.")]
+    differ: Annotated[Sequence[str], Field(description="Names of the parts that differ from the others.")]
+    headline: Annotated[str, Field(description="Outcome in one sentence.")]
+    warnings: Annotated[Sequence[str], Field(description="Warnings on the batch, the important ones first.")]
+    detectable: Annotated[
+        float | None,
+        Field(description="Standard deviations by which a part must differ to be named; null of fewer than five."),
+    ]
+    quantities: Annotated[Mapping[str, QuantityTable], Field(description="By column of the table.")]
+    curve_points: Annotated[Sequence[str], Field(description="Columns of the measured stiffness curve.")]
+    parts: Annotated[Sequence[PartTable], Field(description="All parts, in the order of the manifest.")]
