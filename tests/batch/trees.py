@@ -13,7 +13,7 @@ PATTERN = "bushings/*/bushing.toml"
 
 def tree(folder: Path) -> dict[str, bytes]:
     """All files below a folder, but for the records of what a command wrote and of the time that a row took."""
-    records = ("row.json", ".bushfit.json")
+    records = ("row.json", ".bushfit.sha256")
     files = (path for path in sorted(folder.rglob("*")) if path.is_file() and path.name not in records)
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 

@@ -161,7 +161,6 @@ def test_the_page_shows_each_curve_against_the_batch_and_who_differs(made: Path)
     page = (made / "out/index.html").read_text(encoding="utf-8")
     assert encode_all(folder_pages(made / "out"), Formats())["index.html"].decode() == page
     found = parsed(page)
-    assert [load for load in loads(page) if not load.startswith("use xlink:href=#")] == []
     alts = [value for tag, key, value in found.attributes if (tag, key) == ("svg", "aria-label")]
     curves = [alt for alt in alts if alt.endswith(" % off the median")]
     assert len(curves) == COUNT
@@ -176,7 +175,7 @@ def test_the_page_shows_each_curve_against_the_batch_and_who_differs(made: Path)
 
 @SLOW
 def test_many_bushings_stay_small(made: Path) -> None:
-    document = dict(read_batch(made / "out").documents["batch"])
+    document = dict(read_batch(made / "out")[0].make())
     usual = next(part for part in document["parts"] if part["result"] == "pass" and not part["differs"])
     document |= {"rows": 20_010, "parts": [*document["parts"], *[usual] * 19_980]}
     page = index_page({"batch": document}, {})
