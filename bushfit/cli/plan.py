@@ -215,12 +215,12 @@ def _print_effects(output: Output, document: PlanFile) -> None:
 
 def _checked(output: Output, outcome: PlanOutput, count: int, seed: int) -> Check:
     """The plan simulated, with a table of what was predicted and found."""
-    from bushfit.batch import pool
+    from bushfit.batch.executor import local_workers, run_rows
     from bushfit.planning.campaign import Found, check
     from bushfit.progress import track
 
-    def every(seeds: Sequence[int], work: Callable[[Sequence[int]], list[Found]]) -> Iterator[tuple[int, Found]]:
-        come = pool.run(seeds, work, lambda _: None, pool.LocalPool(os.cpu_count() or 1))
+    def every(seeds: Sequence[int], work: Callable[[int], Found]) -> Iterator[tuple[int, Found]]:
+        come = run_rows(seeds, work, lambda _: None, local_workers(os.cpu_count() or 1))
         return track("campaigns simulated and fitted", come, count)
 
     found = check(outcome.plan, count, seed, every)

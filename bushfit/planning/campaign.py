@@ -48,7 +48,7 @@ _UNITS: Mapping[str, str | None] = {
 #: Of one campaign what was found less the truth, (k,); None where no fit was possible.
 Found = Array | None
 #: Does work(seeds) for parts of the seeds, in some order, and gives the number and the result of each.
-Every = Callable[[Sequence[int], Callable[[Sequence[int]], list[Found]]], Iterable[tuple[int, Found]]]
+Every = Callable[[Sequence[int], Callable[[int], Found]], Iterable[tuple[int, Found]]]
 
 
 def settings_of(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateSettings:
@@ -156,14 +156,14 @@ def check(plan: Plan, count: int, seed: int, every: Every) -> Check:
 
     Args:
         seed: of the first campaign; the others count on.
-        every: gives work(seeds) of parts of the seeds, each with its number: as `batch.pool.run` does on all cores.
+        every: gives work(seed) of each seed with its number, in any order: as `batch.executor.run_rows` on all cores.
 
     Raises:
         FitError: none of the campaigns could be fitted.
     """
     known = plan.knowledge
     settings = settings_of((*known.tests, *plan.planned.tests), known.noise)
-    work = partial(_several, undisturbed(known.model, settings), settings, plan.wanted.rig, known.names)
+    work = partial(_fit_one, undisturbed(known.model, settings), settings, plan.wanted.rig, known.names)
     found = dict(every(range(seed, seed + count), work))
     fitted = [row for _, row in sorted(found.items()) if row is not None]
     if not fitted:
@@ -172,20 +172,16 @@ def check(plan: Plan, count: int, seed: int, every: Every) -> Check:
     return Check(known.names, predicted, np.array(fitted), count - len(fitted), seed)
 
 
-def _several(
-    clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str], seeds: Sequence[int]
-) -> list[Found]:
-    """Of each seed the parameters found less the true ones, relative; None without a fit."""
-    truth, found = clean.truth, list[Found]()
+def _fit_one(
+    clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str], seed: int
+) -> Found:
+    """Relative errors of the parameters that are fitted to one simulated campaign; None without a fit."""
+    truth = clean.truth
     coordinates, sizes = Coordinates.of(truth, names), relative_sizes(truth, names)
-    with threadpool_limits(1):
-        for seed in seeds:
-            campaign = replace(measure(clean, replace(settings, seed=seed)).campaign(), rig=rig)
-            with suppress(FitError):
-                data = Data.of(campaign)
-                places = list(dict.fromkeys(str(data_set.direction) for data_set in data.data_sets))
-                model = fit_joint(data, effects=truth.effects, directions=places).model
-                found.append((coordinates.point(model.values) - coordinates.point(truth.values)) / sizes)
-                continue
-            found.append(None)
-    return found
+    with threadpool_limits(1), suppress(FitError):
+        campaign = replace(measure(clean, replace(settings, seed=seed)).campaign(), rig=rig)
+        data = Data.of(campaign)
+        places = list(dict.fromkeys(str(data_set.direction) for data_set in data.data_sets))
+        model = fit_joint(data, effects=truth.effects, directions=places).model
+        return np.asarray((coordinates.point(model.values) - coordinates.point(truth.values)) / sizes)
+    return None

@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 from pydantic import TypeAdapter
 from threadpoolctl import threadpool_limits
 
-from bushfit.batch import pool
+from bushfit.batch.executor import local_workers, run_rows
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.commands.diagnose import diagnose as diagnose_campaign
 from bushfit.commands.plan import plan
@@ -64,17 +64,17 @@ def run(
         A campaign that takes its worker down twice is a failure of its own row.
     """
     done: dict[int, Outcome] = {}
-    for number, found in pool.run(chosen, partial(_in_worker, kept=kept, hours=hours), str, pool.LocalPool(jobs)):
+    for number, found in run_rows(chosen, partial(_in_worker, kept=kept, hours=hours), str, local_workers(jobs)):
         outcome = Outcome(chosen[number], None, "failed", error=found) if isinstance(found, str) else found
         progress(outcome)
         done[number] = outcome
     return [done[number] for number in range(len(chosen))]
 
 
-def _in_worker(chosen: Sequence[Task], kept: Path | None, hours: float | None) -> list[Outcome | str]:
-    """A chunk of tasks, with linear algebra on one thread: cores are for campaigns."""
+def _in_worker(task: Task, kept: Path | None, hours: float | None) -> Outcome | str:
+    """A task, with linear algebra on one thread: cores are for campaigns."""
     with threadpool_limits(1):
-        return [work(task, kept, hours) for task in chosen]
+        return work(task, kept, hours)
 
 
 def work(task: Task, kept: Path | None = None, hours: float | None = None) -> Outcome:
