@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 
 import click
 from click.shell_completion import CompletionItem
@@ -134,7 +134,14 @@ class Command(click.Command):
                     formatter.write_text(", ".join(names))
 
 
-class _Place(click.ParamType[str]):
+if TYPE_CHECKING:  # click before 8.2 has no generic types at run time
+    TextType: TypeAlias = click.ParamType[str]
+    NumberType: TypeAlias = click.ParamType[float]
+else:
+    TextType = NumberType = click.ParamType
+
+
+class _Place(TextType):
     """A direction, or a specimen of a campaign, which only the campaign knows."""
 
     name = "place"
@@ -155,7 +162,7 @@ class Folder(click.Path):
         )
 
 
-class Size(click.ParamType[float]):
+class Size(NumberType):
     """A number above zero and below or at `most`, called by what it is of; a share also in per cent."""
 
     def __init__(self, name: str, most: float) -> None:
