@@ -40,7 +40,7 @@ _AS_WRITTEN = {
 #: What test files are not, by their endings.
 _NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
 #: Types of what is stated, by key; else a text.
-TYPES: dict[str, click.ParamType[Any]] = {
+TYPES: dict[str, "click.ParamType[Any]"] = {
     "direction": click.Choice(DIRECTIONS),
     "waveform": click.Choice(["sine", "triangle"]),
     "amplitude": click.Choice(["zero-to-peak", "peak-to-peak"]),
