@@ -60,8 +60,8 @@ _EVERYDAY: dict[str, tuple[float, str]] = {
 }
 #: The letters of one unit.
 _WORD = re.compile(r"[^\W\d_]+|[º˚]")
-#: Position between a unit and a power without a sign: mm2.
-_POWER = re.compile(r"(?<=[^\W\d_])(?=[23](?!\d))")
+#: Position between a unit and a power without a sign: mm2, mm-1.
+_POWER = re.compile(r"(?<=[^\W\d_])(?=(?:[23]|-[123])(?!\d))")
 #: A point or hyphen as the sign of a product: N.m, N-m.
 _JOINT = re.compile(r"(?<=[^\W\d_])[.-](?=[^\W\d_])")
 #: A header's name, and its unit in brackets.

@@ -1,4 +1,4 @@
-"""Workbooks of a few kilobytes that would fill a machine, made part by part."""
+"""Workbooks made part by part, such as one with a forgotten cell far away."""
 
 from __future__ import annotations
 
@@ -43,18 +43,3 @@ def far_apart(last: str = "XFD1048576", sign: str = 'r="{}"') -> str:
     return "".join(
         f"<row><c {sign.format(cell)}><v>{number}</v></c></row>" for number, cell in enumerate(("A1", last), start=1)
     )
-
-
-#: By name: a workbook that takes more memory, or more cells, than one may.
-BOMBS = {
-    "blanks about the place": workbook([far_apart(sign='r = "{}"')]),
-    "lower case": workbook([far_apart("xfd1048576")]),
-    "a sheet elsewhere": workbook([far_apart()], "data/part{}.bin"),
-    "twelve sheets of two cells": workbook([far_apart("T1000000")] * 12),
-    "a text of 1 MB in many cells": workbook(
-        ["<row>" + '<c t="s"><v>0</v></c>' * 16_000 + "</row>"],
-        texts=f'<sst xmlns="{_SHEET}"><si><t>{"x" * 1_000_000}</t></si></sst>',
-    ),
-}
-#: A row of so many cells without anything in them, a thousand times.
-EMPTY = ("<row>" + "<c/>" * 16_000 + "</row>") * 1000

@@ -14,7 +14,7 @@ from bushfit.errors import BushfitError, MeasurementError
 
 #: What a test file does not say itself, as keys of a campaign, with metavar and words: of loops and sweeps, ...
 _OF_TESTS = {
-    "amplitude": ("COUNTING", "zero-to-peak or peak-to-peak [as headers say]."),
+    "amplitude": ("COUNTING", "zero-to-peak, peak-to-peak or rms [header]."),
     "at_amplitude": ("SIZE", '"0.1 mm", without a column [found in the name].'),
     "at_frequency": ("FREQUENCY", '"10 Hz", without a column [found in the name].'),
     "temperature": ("TEMP", '"23 degC": of the test, or of the rows to take.'),
@@ -43,7 +43,7 @@ _NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, 
 TYPES: dict[str, "click.ParamType[Any]"] = {
     "direction": click.Choice(DIRECTIONS),
     "waveform": click.Choice(["sine", "triangle"]),
-    "amplitude": click.Choice(["zero-to-peak", "peak-to-peak"]),
+    "amplitude": click.Choice(["zero-to-peak", "peak-to-peak", "rms"]),
     **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),
 }
 _SAME_NAME = ("force_sign", *_OF_TESTS, *_AS_WRITTEN)
@@ -51,8 +51,9 @@ _SAME_NAME = ("force_sign", *_OF_TESTS, *_AS_WRITTEN)
 STATED = ("direction", *_SAME_NAME)
 #: An inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")
-#: One entry of such a table that is an option here.
-_PAIRED = re.compile(r'(column|unit)s = \{ (\w+) = "([^"]*)"')
+#: Such a table whose entries are options here, and one entry.
+_PAIRED = re.compile(r"(column|unit)s = \{([^}]*)\}")
+_ENTRY = re.compile(r'(\w+) = "([^"]*)"')
 
 
 def with_stated(*, sweeps: bool = True) -> Parameter:
@@ -119,7 +120,8 @@ def options_named() -> Iterator[None]:
         yield
     except BushfitError as error:
         hint = error.hint or ""
-        named = [f'--{kind} "{role}={text}"' for kind, role, text in _PAIRED.findall(hint)]
+        tables = _PAIRED.findall(hint)
+        named = [f'--{kind} "{role}={text}"' for kind, entries in tables for role, text in _ENTRY.findall(entries)]
         keys = _TABLE.sub("", hint)  # in a table, amplitude is a role
         named += [option_of(key) for key in _SAME_NAME if re.search(rf"\b{key} = ", keys)]
         if error.file is None and error.place in _SAME_NAME:

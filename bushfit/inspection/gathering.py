@@ -15,7 +15,7 @@ from bushfit.geometry import Direction
 from bushfit.inspection.labels import temperatures_of
 from bushfit.inspection.opening import inspect, open_table, recognised
 from bushfit.inspection.record import Inspected
-from bushfit.reading.columns import same_text
+from bushfit.reading.cells import same_text
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.measurement import Loop, Sweep

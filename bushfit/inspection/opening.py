@@ -18,16 +18,17 @@ from bushfit.inspection.labels import keys_from_labels, labels_of_file, temperat
 from bushfit.inspection.loops import look_at_history, look_at_loop, look_at_programme
 from bushfit.inspection.record import ColumnSeen, Findings, Inspected, Kind
 from bushfit.inspection.sweeps import look_at_sweep
-from bushfit.reading.columns import Rows
-from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary, of_motion
+from bushfit.reading.cells import Rows
+from bushfit.reading.headers import LOOP_COLUMNS, PAIRS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary, of_motion
 from bushfit.reading.layout import DELIMITERS, FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, direction_of_file
+from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.source import Channels, Sheet
 from bushfit.reading.stated import LoopFile, SweepFile
-from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
+from bushfit.reading.sweeps import read_sweep, refuse_ambiguous_damping
 from bushfit.reading.table import Table
 from bushfit.reduction.programme import programme
 from bushfit.reduction.steps import sines
@@ -52,31 +53,42 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
     """
     opened: list[tuple[Table, bool]] = []
     failed: list[tuple[Mapping[str, Sequence[str]], BushfitError]] = []
-    kinds = [(names, motion) for motion in (TRANSLATION, STRAINING) for names in (LOOP_COLUMNS, SWEEP_COLUMNS)]
+    kinds = [(names, motion) for names in (SWEEP_COLUMNS, LOOP_COLUMNS) for motion in (TRANSLATION, STRAINING)]
+    try:
+        content = open_content(file, stated)
+    except BushfitError as error:
+        raise NoTestError(**vars(error)) from None
     for names, motion in kinds:
         is_sweep = names is SWEEP_COLUMNS
         try:
-            table = open_table(file, names, stated, motion)
+            table = open_table(content, names, stated, motion)
         except BushfitError as error:
             failed.append((of_motion(names, motion), error))
             continue
         opened.append((table, is_sweep))
         if _missing(table, is_sweep=is_sweep) is None:
             return table, is_sweep
+        if is_sweep:
+            refuse_ambiguous_damping(table)
     _refuse_resonance(file, stated)
     if not opened:
-        raise NoTestError(**vars(failed[0][1]))
+        errors = [error for _, error in failed]
+        raise NoTestError(**vars(next((one for one in errors if one.problem != "there is no header"), errors[0])))
     best, is_sweep = max(opened, key=lambda one: len(one[0].roles))
     for usual, failure in failed:
         if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):
             raise failure
     known = ", ".join(role.replace("_", " ") for role in best.roles)
+    lacking = _missing(best, is_sweep=is_sweep) or "force"
+    unit = {"displacement": "m", "force": "N", "stiffness": "N/m", "storage_stiffness": "N/m", "phase": "rad"}.get(
+        lacking, "1"
+    )
     raise best.header_error(
         "the columns do not make a test",
         kind=NoTestError,
         found=", ".join(best.headers) + (f" (understood: {known})" if known else ""),
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
-        hint=f"correct the header, or name the column: --column {_missing(best, is_sweep=is_sweep)}=...",
+        hint=f"correct the header, or name the column: {best.columns_key(lacking, unit)}",
     )
 
 
@@ -146,23 +158,35 @@ def _missing(table: Table, *, is_sweep: bool) -> str | None:
     Of a sweep, frequency or amplitude may be held, and stated outside the table.
     """
     roles = set(table.roles)
-    nearest = max(STIFFNESS_PAIRS, key=lambda pair: len(roles & set(pair)))
-    if is_sweep and not roles & {"frequency", "amplitude"}:
-        return "frequency"
-    needed = nearest if is_sweep else ("displacement", "force")
-    return next((role for role in needed if role not in roles), None)
+    if not is_sweep:
+        return next((role for role in ("displacement", "force") if role not in roles), None)
+    pairs = [pair for pair in PAIRS if pair[0] != "force_amplitude" or {"frequency", "amplitude"} <= roles]
+    nearest = max(pairs, key=lambda pair: len(roles & set(pair)))
+    return next((role for role in nearest if role not in roles), None)
+
+
+def open_content(file: Path, stated: Mapping[str, Any]) -> OpenedFile:
+    """Open a test file with its format as the user states it.
+
+    Raises:
+        MeasurementError: the file cannot be read.
+    """
+    return open_file(file, FileFormat(**{field.name: stated.get(field.name) for field in fields(FileFormat)}))
 
 
 def open_table(
-    file: Path, names: Mapping[str, Sequence[str]], stated: Mapping[str, Any], motion: Motion = TRANSLATION
+    file: Path | OpenedFile,
+    names: Mapping[str, Sequence[str]],
+    stated: Mapping[str, Any],
+    motion: Motion = TRANSLATION,
 ) -> Table:
     """The table of a file if it is that of a test whose columns go by `names`, with what the user states of those."""
     own = {
         key: {role: text for role, text in stated.get(key, {}).items() if role in names} for key in ("columns", "units")
     }
-    written = FileFormat(**{field.name: stated.get(field.name) for field in fields(FileFormat)})
     rows = Rows(stated.get("direction"), stated.get("specimen_number"), stated.get("rows", {}))
-    return Table.open(file, names, own["columns"], own["units"], written, motion, rows if any(rows) else None)
+    opened = file if isinstance(file, OpenedFile) else open_content(file, stated)
+    return Table.open(opened, names, own["columns"], own["units"], None, motion, rows if any(rows) else None)
 
 
 def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) -> Inspected:
@@ -295,7 +319,7 @@ def _look(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findin
 
 def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
     """All columns of a file in order, with the range of their values as the file has them."""
-    of_sweeps = {*chain(*STIFFNESS_PAIRS), "frequency", "amplitude", "temperature", "repeat"}
+    of_sweeps = {*chain(*PAIRS), "frequency", "amplitude", "temperature", "repeat"}
     ranged = of_sweeps if is_sweep else set(table.roles)
     ranged = {role for role in ranged if role in table.roles and table.holds_numbers(table.roles[role].index)}
     wanted = {role: column for role, column in table.roles.items() if role in ranged}

@@ -1,4 +1,4 @@
-"""What the header of a column says in a test file: its role, its unit, and how it counts amplitudes."""
+"""Meaning of column headers: role, unit, amplitude convention and logarithm."""
 
 import re
 import tomllib
@@ -12,96 +12,136 @@ from typing import Literal
 from bushfit import units
 from bushfit.geometry import STRAINING, Motion
 
-#: The words of words.toml, by table and key.
+#: Words of words.toml, by table and key.
 WORDS: Mapping[str, Mapping[str, Sequence[str]]] = tomllib.loads(
     Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
 )
-#: For each column of a loop, the headers it goes by.
+#: Names of the columns of a loop, by role.
 LOOP_COLUMNS = WORDS["loop"]
-#: For each column of a sweep, the headers it goes by.
+#: Names of the columns of a sweep, by role.
 SWEEP_COLUMNS = WORDS["sweep"]
-#: For each column that says which test a row belongs to, by key, the headers it goes by.
-ROW_COLUMNS = {**WORDS["rows"], "specimen_number": WORDS["above"]["specimen_number"], "run": SWEEP_COLUMNS["repeat"]}
-#: For each column of a test of strain and modulus, the headers it goes by in place of those above.
+#: Names of columns that assign rows to tests, by key.
+ROW_COLUMNS = {
+    **WORDS["rows"],
+    "specimen_number": WORDS["above"]["specimen_number"],
+    "run": [*SWEEP_COLUMNS["repeat"], "block"],
+}
+#: Names that replace those above in a test of strain and modulus, by role.
 _STRAINING = {role: names for role, names in WORDS["straining"].items() if role != "amplitude_of"} | {
     "amplitude": [
         *SWEEP_COLUMNS["amplitude"],
         *(
-            way.format(strain)
-            for strain in WORDS["straining"]["displacement"]
-            for way in WORDS["straining"]["amplitude_of"]
+            form.format(name)
+            for name in WORDS["straining"]["displacement"]
+            for form in WORDS["straining"]["amplitude_of"]
         ),
         *WORDS["straining"]["amplitude"],
     ]
 }
-#: The columns of which the headers depend on the motion: those of what moves and of what resists it.
-OF_MOTION = (*_STRAINING, "amplitude_reached")
-#: How an amplitude is counted.
-AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak"]
-#: How the headers of a frequency in radians begin.
+#: Roles whose names depend on the motion: displacement or strain, force or stress, stiffness or modulus.
+OF_MOTION = (*_STRAINING, "amplitude_reached", "force_amplitude", "damping_coefficient")
+#: Definition of an amplitude.
+AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak", "rms"]
+#: Factor to zero-to-peak.
+ZERO_TO_PEAK: dict[AmplitudeConvention, float] = {"zero-to-peak": 1.0, "peak-to-peak": 0.5, "rms": 2.0**0.5}
+#: Pairs of columns that determine a complex stiffness and must agree, in order of preference.
+AGREEING_PAIRS = (
+    *(("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness")),
+    *(("storage_stiffness", "loss_factor"), ("storage_stiffness", "phase")),
+)
+#: All pairs of columns that determine a complex stiffness, in order of preference.
+PAIRS = (
+    *AGREEING_PAIRS,
+    *(("stiffness", "loss_stiffness"), ("storage_stiffness", "damping_coefficient")),
+    *(("stiffness", "damping_coefficient"), ("stiffness", "damping_ratio"), ("storage_stiffness", "damping_ratio")),
+    *(("force_amplitude", "phase"), ("force_amplitude", "loss_factor"), ("force_amplitude", "damping_ratio")),
+)
+#: Starts of the names of an angular frequency.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsation", "角频率")
-#: What a rig writes of a channel in brackets: "Load(Linear:Load) (kN)".
+#: Channel of a test rig in brackets: "Load(Linear:Load) (kN)".
 _CHANNEL = re.compile(r"\([^()]*[:|][^()]*\)")
-#: The loss factor as a function, of which the brackets hold no unit.
+#: Loss factor written as a function, with brackets that hold no unit.
 _TAN = re.compile(r"(?i)\btan\s*\(\s*(delta|d|δ)\s*\)")
-#: A quotation mark that stands for two primes: G".
+#: Logarithm of a quantity: "log10 f [Hz]", "lg(G') [Pa]", "log f". The base of a plain log is not known.
+_LOGARITHM = re.compile(r"\s*(?P<kind>log[\s_]?10|lg|ln|log)(?=[\s_(])[\s_]*(?:\((?P<inner>[^()]*)\))?", re.IGNORECASE)
+#: Quotation mark that stands for two primes: G".
 _TWO_PRIMES = re.compile(r"(?<![^\W_])([A-Za-z])\"")
-#: Words that tell where or how a channel was recorded, but not what it is.
+#: Words that do not change the meaning of a channel.
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
-#: For the roles that the symbol f may stand for, units by which it stands for the other one.
+#: Units by which the symbol f does not stand for a role.
 _UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
-#: Units by which a symbol stands for its role: A for an amplitude and not for an area, K for a stiffness.
-_UNITS_OF = {"a": ("m", "rad"), "k": ("N/m", "N*m/rad")}
-#: Names of an amplitude that count it peak-to-peak by themselves.
+#: Units by which a short or ambiguous name stands for a role, by name and role.
+_UNITS_OF = {
+    ("a", "amplitude"): ("m", "rad"),
+    ("da", "amplitude"): ("m", "rad", "1"),
+    ("k", "stiffness"): ("N/m", "N*m/rad"),
+    **{
+        (name, "damping_coefficient"): ("N*s/m", "N*m*s/rad", "Pa*s")
+        for name in ("c", "damping", "dampfung", "amortissement", "damp")
+    },
+    **{(name, "force_amplitude"): ("N", "N*m", "Pa") for name in ("force", "load", "kraft", "torque", "moment")},
+}
+#: Names of an amplitude that imply peak-to-peak.
 _PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
-#: The word "peak".
 _PEAK = r"(?:peak|pk|spitze|sp\.?|crete|cresta|pico|pic)"
-#: Where a word begins; an underscore parts words.
-_WORD_START = r"(?<![^\W_])"
-#: Where a word ends.
-_WORD_END = r"(?![^\W_])"
-#: A unit that a word may be glued to: "mmpp".
+_START, _END = r"(?<![^\W_])", r"(?![^\W_])"
+#: End of a unit to which a convention may be joined without a blank: "mmpp".
 _AFTER_UNIT = r"(?:(?<=mm)|(?<=[u\u03bc]m)|(?<=deg)|(?<=rad))"
-#: Words that count an amplitude peak-to-peak.
-_PEAK_TO_PEAK = re.compile(
-    rf"{_WORD_START}(?:{_PEAK}[\s_/-]*(?:(?:to|zu|a|2)[\s_-]*)?{_PEAK}|p[\s_./-]?(?:t[\s_./-]?|2[\s_./-]?)?p"
-    rf"|c[\s-]a[\s-]c|s[.-]?s)\.?{_WORD_END}|{_AFTER_UNIT}(?:pk?-?pk?|s-?s){_WORD_END}"
-)
-#: Words that count an amplitude zero-to-peak.
-_ZERO_TO_PEAK = re.compile(
-    rf"{_WORD_START}(?:(?:zero|null|cero|0)[\s_/-]*(?:(?:to|bis|zu|a|2)[\s_-]*)?(?:{_PEAK}|p))\.?{_WORD_END}"
-)
+#: Words for each convention, in the order in which they are tried.
 _CONVENTIONS: tuple[tuple[re.Pattern[str], AmplitudeConvention], ...] = (
-    (_ZERO_TO_PEAK, "zero-to-peak"),
-    (_PEAK_TO_PEAK, "peak-to-peak"),
+    (
+        re.compile(
+            rf"{_START}(?:(?:zero|null|cero|0)[\s_/-]*(?:(?:to|bis|zu|a|2)[\s_-]*)?(?:{_PEAK}|p))\.?{_END}"
+            rf"|{_START}(?:half[\s-]?amplitude|single[\s-]?(?:peak|amplitude))"
+        ),
+        "zero-to-peak",
+    ),
+    (
+        re.compile(
+            rf"{_START}(?:{_PEAK}[\s_/-]*(?:(?:to|zu|a|2)[\s_-]*)?{_PEAK}|p[\s_./-]?(?:t[\s_./-]?|2[\s_./-]?)?p"
+            rf"|c[\s-]a[\s-]c|s[.-]?s|max\.?[\s_./-]*(?:min|to[\s_-]*min)|\(?2\s?[ax](?:_?0)?\)?)\.?{_END}"
+            rf"|{_AFTER_UNIT}(?:pk?-?pk?|s-?s){_END}|\((?:total|double|full)\)|(?<=amplitude)[\s,_-]+total{_END}"
+        ),
+        "peak-to-peak",
+    ),
+    (
+        re.compile(rf"{_START}(?:r\.?m\.?s\.?|eff(?:ektiv|icace|ective)?\.?){_END}|{_AFTER_UNIT}(?:rms|eff){_END}"),
+        "rms",
+    ),
+    (re.compile(rf"\u00b1|\+/?-|(?:{_AFTER_UNIT}[\s_]*|(?<=%)\s*|(?<=[\[(])){_PEAK}{_END}"), "zero-to-peak"),
 )
-#: Characters of the longest header that is compared; chosen: a longer one is a text and no name.
+#: Boundary of words in "AmpPkPk".
+_CAMEL = re.compile(r"(?<=[a-z]{2})(?=[A-Z])")
+#: Characters of the longest header that is compared; chosen: longer texts are no names.
 _LONGEST_HEADER = 200
-#: What is left of brackets that held no more than a convention.
 _EMPTY_BRACKETS = re.compile(r"[\[(]\s*[\])]")
-#: Full-width brackets and typographic primes as their plain signs; quotation marks go.
+#: Full-width brackets and typographic primes as plain signs; quotation marks are dropped.
 _SPELLINGS: dict[int, int | str] = {
     **str.maketrans("\uff08\uff09\uff3b\uff3d\u2032\u2019\u00b4", "()[]'''"),
     **{0x2033: "''", ord('"'): ""},
 }
-#: Where a name may end and a unit begin, other than at a bracket: "force_N", "Kraft in N", "F / kN", "load, N".
+#: End of a name before a unit without brackets: "force_N", "Kraft in N", "F / kN", "load, N".
 _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
 
 
-def _made_of(body: str, quantity: str) -> list[str]:
-    """Every name of a quantity, such as "acceleration", before and after every name of a body, such as "base"."""
+def _combined_names(body: str, quantity: str) -> list[str]:
+    """Names of a quantity, such as "acceleration", before and after names of a body, such as "base"."""
     parts = WORDS["resonance_parts"]
-    return [way for name in parts[body] for word in parts[quantity] for way in (f"{name} {word}", word + name)]
+    return [name for own in parts[body] for word in parts[quantity] for name in (f"{own} {word}", word + own)]
 
 
-#: For each column of a resonance test (a mass on a mount on a shaker), the headers it goes by.
+#: Names of the columns of a resonance test (a mass on a mount on a shaker), by role.
 RESONANCE_COLUMNS: Mapping[str, Sequence[str]] = {
     "frequency": SWEEP_COLUMNS["frequency"],
-    **{f"{body}_{word}": _made_of(body, word) for word in ("acceleration", "phase") for body in ("base", "mass")},
+    **{
+        f"{body}_{word}": _combined_names(body, word) for word in ("acceleration", "phase") for body in ("base", "mass")
+    },
     **WORDS["resonance"],
     **{
         f"{body}_{part}": [
-            f"{name} {word}" for name in _made_of(body, "acceleration") for word in WORDS["resonance_parts"][part]
+            f"{name} {word}"
+            for name in _combined_names(body, "acceleration")
+            for word in WORDS["resonance_parts"][part]
         ]
         for body in ("base", "mass")
         for part in ("real", "imaginary")
@@ -110,15 +150,23 @@ RESONANCE_COLUMNS: Mapping[str, Sequence[str]] = {
 
 
 def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
-    """The headers that columns go by in a test of one kind of motion: G' names a modulus, and no stiffness."""
+    """Names of columns for a kind of motion: G' names a modulus, and no stiffness."""
     return {role: _STRAINING.get(role, usual) if motion is STRAINING else usual for role, usual in names.items()}
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a file, by its index from 0: what it holds, its header cell, and its unit as it is stated, if it is.
+    """Column of a file.
 
-    `scale` is the factor from that unit to SI, `convention` how it counts amplitudes, where header or unit say so.
+    Args:
+        role: quantity that it contains.
+        header: header cell.
+        index: position from 0.
+        unit: unit as stated, if it is stated.
+        scale: factor from the unit to SI.
+        convention: definition of an amplitude, if header or unit state it.
+        logarithm: base of the logarithm whose values the column contains; 0 if the values are plain, NaN if the base is
+            not known.
     """
 
     role: str
@@ -127,84 +175,94 @@ class Column:
     unit: str | None
     scale: float = 1.0
     convention: AmplitudeConvention | None = None
+    logarithm: float = 0.0
 
 
 @dataclass(frozen=True)
 class Heading:
-    """What a header cell says of its column: its role, its unit as written, and how it counts amplitudes."""
+    """Meaning of a header cell: role, unit as written, amplitude convention and base of a logarithm."""
 
     role: str
     unit: str | None = None
     convention: AmplitudeConvention | None = None
+    logarithm: float = 0.0
 
 
 class Vocabulary:
-    """What headers mean: the role, unit and convention that each states.
+    """Meaning of headers.
 
     Args:
-        names: for each role the names it usually goes by.
-        columns: for each role that goes by another name this name; the usual ones then do not count.
+        names: usual names by role.
+        columns: the name that a user states for a role; it replaces the usual ones.
     """
 
     def __init__(self, names: Mapping[str, Sequence[str]], columns: Mapping[str, str]) -> None:
-        self._roles = {
-            plain(name): role
-            for role, usual in names.items()
-            for name in ([columns[role]] if role in columns else usual)
-        }
+        self._stated = {plain(name): role for role, name in columns.items() if role in names}
+        usual = ((plain(name), role) for role, usual in names.items() if role not in columns for name in usual)
+        self._roles: dict[str, list[str]] = {name: [role] for name, role in self._stated.items()}
+        for name, role in usual:
+            if name not in self._stated and role not in self._roles.setdefault(name, []):
+                self._roles[name].append(role)
         self._known: dict[str, Heading | None] = {}
 
     def heading(self, header: str) -> Heading | None:
-        """What a header cell says; None where it names no role."""
+        """Meaning of a header cell; None if it names no role."""
         if header not in self._known:
             self._known[header] = self._read(header) if len(header) <= _LONGEST_HEADER else None
         return self._known[header]
 
     def roles(self, cells: Sequence[str]) -> set[str]:
-        """The roles that some header cells name."""
+        """Roles that header cells name."""
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str) -> Heading | None:
-        whole = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header))).translate(_SPELLINGS)
-        text, convention = split_convention(whole)
-        if plain(header) in self._roles:  # a campaign may name a header with its unit
-            name, unit = units.split_header(text)
-            double = plain(name) in _PEAK_TO_PEAK_NAMES
-            return Heading(self._roles[plain(header)], unit, "peak-to-peak" if double else convention)
-        # and a header with the words that tell its convention
-        for name, unit, certain in (split for way in dict.fromkeys((text, whole)) for split in _splits(way)):
-            bare, without_asides = plain(name), plain(_ASIDES.sub("", _folded(name)))
-            double = bare in _PEAK_TO_PEAK_NAMES
-            counted = "peak-to-peak" if double else convention
-            for candidate in (
-                bare,
-                without_asides,
-                *([bare + "amplitude"] if counted else []),
-                *(["amplitude"] if double else []),
-                *self._said_twice(name),
-            ):
-                role = self._roles.get(candidate)
-                is_unit = units.is_unit if role != "temperature" else units.kelvin_scale
-                if role is None or not (certain or is_unit(unit or "")):
-                    continue
-                if candidate in _UNITS_OF and not any(
-                    units.is_compatible(unit or "", si) for si in _UNITS_OF[candidate]
-                ):
-                    continue
-                if not (candidate == "f" and unit and any(units.is_compatible(unit, si) for si in _UNITS_NOT_F[role])):
-                    return Heading(role, unit, counted)
+        text = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header))).translate(_SPELLINGS)
+        logarithm = 0.0
+        if match := _LOGARITHM.match(text):
+            kind = match["kind"].lower()
+            logarithm = {"ln": 2.718281828459045, "log": float("nan")}.get(kind, 10.0)
+            text = f"{(match['inner'] or '').replace('/', ' in ')} {text[match.end() :]}".strip()
+        if plain(header) in self._stated:  # a campaign may name a header together with its unit
+            without, convention = split_convention(text)
+            name, unit = units.split_header(without)
+            counting = "peak-to-peak" if plain(name) in _PEAK_TO_PEAK_NAMES else convention
+            return Heading(self._stated[plain(header)], unit, counting, logarithm)
+        # or with the words of its convention
+        without, convention = split_convention(text)
+        for name, unit, certain in (split for form in dict.fromkeys((without, text)) for split in _splits(form)):
+            bare = plain(name)
+            implied: AmplitudeConvention | None = "peak-to-peak" if bare in _PEAK_TO_PEAK_NAMES else convention
+            amplitudes = [bare + "amplitude"] * bool(implied) + ["amplitude"] * (bare in _PEAK_TO_PEAK_NAMES)
+            for word in (bare, plain(_ASIDES.sub("", _folded(name))), *amplitudes, *self._twice(name)):
+                for role in self._roles.get(word, ()):
+                    is_unit = units.is_unit if role != "temperature" else units.kelvin_scale
+                    if (certain or is_unit(unit or "")) and fits(word, role, unit):
+                        return Heading(role, unit, implied, logarithm)
         return None
 
-    def _said_twice(self, name: str) -> Iterator[str]:
-        """The word of a header that says one thing in two ways, such as "Storage modulus G'" or "Weg s"."""
+    def _twice(self, name: str) -> Iterator[str]:
+        """Word of a header that names one quantity twice, such as "Storage modulus G'" or "Weg s"."""
         for blank in re.finditer(r"[\s,(]+", name):
             word, symbol = plain(name[: blank.start()]), plain(name[blank.end() :])
-            if word in self._roles and self._roles[word] == self._roles.get(symbol):
+            if word in self._roles and set(self._roles[word]) & set(self._roles.get(symbol, ())):
                 yield word
 
 
+def fits(word: str, role: str, unit: str | None) -> bool:
+    """Return True unless the unit shows that an ambiguous name stands for another role.
+
+    Args:
+        word: name in the spelling of `plain`.
+        role: for which it may stand.
+        unit: of the column; None if it is not known.
+    """
+    if unit and (expected := _UNITS_OF.get((word, role))):
+        return any(units.is_compatible(unit, si) for si in expected)
+    return not (word == "f" and unit and any(units.is_compatible(unit, si) for si in _UNITS_NOT_F.get(role, ())))
+
+
 def is_angular(header: str, unit: str) -> bool:
-    """Whether a frequency counts radians: its unit does, or its header says so and the unit counts nothing (1/s)."""
+    """Return True if a frequency is in radians, by its unit, or by its header if the unit is 1/s."""
     name = plain(header)
     return units.is_compatible(unit, "rad/s") or (
         "hz" not in unit.lower()
@@ -215,31 +273,31 @@ def is_angular(header: str, unit: str) -> bool:
 
 @lru_cache(maxsize=4096)
 def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
-    """A header or unit without the words that tell how amplitudes are counted, and the convention they tell."""
-    folded = _folded(text)
-    for pattern, convention in _CONVENTIONS:
-        if found := pattern.search(folded):
-            rest = text[: found.start()] + " " + text[found.end() :]
-            return _EMPTY_BRACKETS.sub("", rest).strip(), convention
+    """Header or unit without the words for its amplitude convention, and the convention."""
+    for form in dict.fromkeys((text, _CAMEL.sub(" ", text))):
+        for pattern, convention in _CONVENTIONS:
+            if match := pattern.search(_folded(form)):
+                rest = form[: match.start()] + " " + form[match.end() :]
+                return _EMPTY_BRACKETS.sub("", rest).strip(), convention
     return text.strip(), None
 
 
 @lru_cache(maxsize=4096)
 def plain(name: str) -> str:
-    """A name in the one spelling that is compared: letters, digits and ' | * alone, no case, accents or umlauts."""
+    """Spelling of a name for comparison: letters, digits and ' | * alone, without case, accents or umlauts."""
     letters = re.sub(r"[^\w'|*]|_", "", _folded(name.translate(_SPELLINGS)).replace("ß", "ss"))
     return letters.replace("ae", "a").replace("oe", "o").replace("ue", "u")
 
 
 def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
-    """Name and unit for each way to take a header apart, and whether the unit is certain or has yet to be known."""
+    """Name and unit for each way to split a header, and True if the unit is in brackets."""
     name, unit = units.split_header(text)
     yield name, unit, True
     if unit is None:
-        for cut in reversed(list(_NAME_END.finditer(name))):  # strain_dyn_pct is no strain in dyn %
-            yield name[: cut.start()], name[cut.end() :].replace("_", " "), False
+        for end in reversed(list(_NAME_END.finditer(name))):  # strain_dyn_pct is no strain in dyn %
+            yield name[: end.start()], name[end.end() :].replace("_", " "), False
 
 
 def _folded(text: str) -> str:
-    """A text in lower case without accents, of the same length."""
+    """Text in lower case without accents, of the same length."""
     return "".join(unicodedata.normalize("NFKD", letter)[0] for letter in text.lower())

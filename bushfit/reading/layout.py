@@ -1,10 +1,10 @@
-"""Where a table begins in its file, and what parts its columns.
+"""Location of a table in its file: delimiter, header and units row.
 
-The header is the line that names the columns a test must have, with rows of as many numbers below it.
+The header is the line that names the columns of a test and has rows of as many numbers below it.
 
 Notes:
-    Of the dialects in tests/dialects.py csv.Sniffer, clevercsv, DuckDB and polars, each left to itself, read less than
-    half; told the encoding and the decimal mark, clevercsv parts the columns of nearly all.
+    csv.Sniffer, clevercsv, DuckDB and polars, without further information, read fewer than half of the dialects in
+    tests/dialects.py. If encoding and decimal mark are known, clevercsv separates the columns of nearly all.
 """
 
 import csv
@@ -20,31 +20,32 @@ from bushfit.reading.numerals import is_like_number
 
 #: Delimiters by their names in a campaign, in the order in which they are tried.
 DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "blanks": " "}
-#: Filled lines at the start of a file within which its header lies; chosen: far more than preambles have.
+#: Filled lines at the start of a file that can contain the header; chosen: far more than preambles have.
 MOST_HEAD_LINES = 500
 #: Columns of a table; chosen: far more than a test has.
 _MOST_COLUMNS = 1000
+#: Columns whose units are looked up to find the header; chosen: a test has fewer.
+_MOST_HEADINGS = 50
 #: Characters of a line; chosen: a longer one is no row of a table.
 _LONGEST_LINE = 1 << 20
-#: Characters of a header's line; chosen: ten for each of the most columns.
+#: Characters of a header line; chosen: ten for each of the most columns.
 _LONGEST_HEADER = 10_000
-#: Filled lines below a header that may hold its units row and first numbers; chosen: room for comments there.
+#: Filled lines below a header that can contain its units row and first numbers; chosen: room for comments.
 _LINES_BELOW_HEADER = 8
-#: Signs with which a comment begins.
 _COMMENT_SIGNS = ("#", "%", "//")
-#: A number that a # marks as such: "#1".
+#: A number with a number sign: "#1".
 _NUMBERED = re.compile(r"#\s?\d+\b")
-#: Blanks between a name and the bracket of its unit, which part no columns.
-_BLANK_BEFORE_BRACKET = re.compile(r"\s+(?=[\[(])")
-#: What parts columns of which the headers have single blanks.
+#: Blanks between a name and the bracket of its unit, which separate no columns.
+_BLANK_BEFORE_BRACKET = re.compile(r" {1,8}(?=[\[(])")
+#: Gap between columns whose headers contain single blanks.
 _COLUMN_GAP = re.compile(r"\t|\s{2,}")
 
-#: A line of a text, or the cells of a workbook's row: texts and numbers.
+#: A line of a text, or the cells of a row of a workbook: texts and numbers.
 Content = str | Sequence[str | float]
 
 
 class Line(NamedTuple):
-    """A line of a file that holds something: its number from 1, and what it holds."""
+    """Filled line of a file: its number from 1, and its content."""
 
     number: int
     content: Content
@@ -52,13 +53,13 @@ class Line(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class FileFormat:
-    """What a user states of a file's format; None where the file itself settles it.
+    """Format of a file as a user states it; None for what the file itself settles.
 
     Args:
         encoding: by Python's name, such as "cp1252".
-        delimiter: what parts the cells.
+        delimiter: between cells.
         decimal: mark in the numbers.
-        thousands: mark in the numbers.
+        thousands: separator in the numbers.
         header_line: line of the column names, from 1; of a workbook its row.
         sheet: of a workbook.
     """
@@ -73,14 +74,17 @@ class FileFormat:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where a table lies in its file; lines count from 1.
+    """Location of a table in its file; lines count from 1.
 
     Args:
-        delimiter: what parts the cells; " " for runs of blanks; "" where cells come apart by themselves.
-        headers, header_line: cells and line of the header.
-        units, units_line: cells of the units row, "" where a column has none, and its line; None where there is none.
-        written: cells of the header of a wide table that name a quantity, of which `headers` are those of the long one.
-        numbered: whether all rows begin with a number behind a # ("#1"), which then begins no comment.
+        delimiter: between cells; " " for runs of blanks; "" for cells that are separate already.
+        headers: cells of the header; numbers from 1 if the file has no header.
+        header_line: line of the header, or of the first row if the file has none.
+        units: cells of the units row, "" for a column without a unit.
+        units_line: line of the units row; None if there is none.
+        written: header cells of a wide table that name a quantity; `headers` are then those of the long table.
+        numbered: True if all rows begin with a number behind a # ("#1"), which then begins no comment.
+        headerless: True if the table has no header.
     """
 
     delimiter: str
@@ -90,39 +94,36 @@ class Layout:
     units_line: int | None
     written: tuple[str, ...] = ()
     numbered: bool = False
+    headerless: bool = False
 
     @property
     def lines_before_data(self) -> int:
-        """Lines down to the header and its units row."""
-        return self.units_line or self.header_line
+        """Number of the last line before the data."""
+        return self.units_line or self.header_line - self.headerless
 
 
 def split(content: Content, delimiter: str) -> list[str]:
-    """The cells of a line, without blanks around them.
+    """Cells of a line, without blanks around them and without empty cells at the end.
 
     Raises:
-        csv.Error: a line or a quoted cell that is far too long.
+        csv.Error: a line or a quoted cell is far too long.
     """
     if not isinstance(content, str):
         return [cell if isinstance(cell, str) else repr(cell) for cell in content]
-    if len(content) > _LONGEST_LINE:
-        raise csv.Error(f"a line of {len(content)} characters")
+    text = content.rstrip(f" {delimiter}")
+    if len(text) > _LONGEST_LINE:
+        raise csv.Error(f"a line of {len(text)} characters")
     if delimiter == " ":
-        return content.split()
-    if '"' in content:
-        return [cell.strip() for cell in next(csv.reader([content], delimiter=delimiter, skipinitialspace=True), ())]
-    return [cell.strip() for cell in content.split(delimiter)]
+        return text.split()
+    if '"' in text:
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True), ())]
+    return [cell.strip() for cell in text.split(delimiter)]
 
 
 def is_comment(content: Content, delimiter: str) -> bool:
-    """Whether a line is a comment; a semicolon begins one where it does not part columns."""
+    """Return True if a line is a comment; a semicolon begins one unless it is the delimiter."""
     text = content if isinstance(content, str) else next((str(cell) for cell in content if cell != ""), "")
     return text.lstrip().startswith(_COMMENT_SIGNS if delimiter == ";" else (*_COMMENT_SIGNS, ";"))
-
-
-def fits(cells: Sequence[str | float], width: int) -> bool:
-    """Whether a row has as many cells as the header; empty ones may follow."""
-    return len(cells) == width or (len(cells) > width and all(cell == "" for cell in cells[width:]))
 
 
 def find_layout(
@@ -130,10 +131,17 @@ def find_layout(
 ) -> Layout:
     """Find the header of a table: the line that names most columns of a test and has rows of as many cells below it.
 
-    A comment is taken for the header only where no other line names two columns. Where no line at all does, the line
-    above the first rows of numbers is taken, or else the first line, so that an error can show it.
+    A comment is taken for the header only if no other line names two columns. If no line does, the line above the first
+    rows of numbers is taken, or else the first line.
 
-    `delimiter` ("" for a workbook) and the number `header_line` are those that are stated.
+    Args:
+        lines: filled lines at the start of the file.
+        vocabulary: meaning of headers.
+        delimiter: as stated; "" for a workbook.
+        header_line: line number of the header as stated.
+
+    Returns:
+        The layout; without headers if the file has no lines.
     """
     if not lines:
         return Layout(delimiter or ",", (), 1, (), None)
@@ -143,8 +151,8 @@ def find_layout(
         before = [index for index, line in enumerate(lines) if line.number == header_line]
     for commented in (False, True):
         candidates = _candidates(lines, before, delimiters, vocabulary, commented)
-        if found := max(candidates, key=lambda entry: entry[0], default=None):
-            return _layout(lines, *found[1:])
+        if best := max(candidates, key=lambda candidate: candidate[0], default=None):
+            return _layout(lines, *best[1:])
     return _layout(lines, *_likeliest(lines, before, end, delimiters))
 
 
@@ -159,22 +167,32 @@ def _candidates(
                 continue
             if commented and isinstance(content, str):
                 content = content.lstrip().lstrip("#%/ " if delimiter == ";" else "#%/; ")
-            for cells in _header_cells(content, delimiter):
-                roles = vocabulary.roles(cells)
-                if len(roles) > 1 and not any(is_like_number(cell) for cell in cells):
+            for cells in header_cells(content, delimiter):
+                known = len(vocabulary.roles(cells))
+                known += sum(_is_unit_alone(cell, vocabulary) for cell in cells[:_MOST_HEADINGS])
+                if known > 1 and not any(is_like_number(cell) for cell in cells):
                     below = (split(line.content, delimiter) for line in _below(lines, index, delimiter))
-                    followed = next((fits(row, len(cells)) for row in below if _is_row(row)), False)
-                    yield (followed, len(roles), index, -order), index, delimiter, cells
+                    width = next((len(row) for row in below if is_row(row)), 0)
+                    shorter = delimiter != " " and len(cells) < 2 * width < 2 * len(cells)  # empty cells at the end
+                    followed = 2 if width == len(cells) else int(shorter)
+                    yield (followed, known, index, -order), index, delimiter, cells
 
 
-def _header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
-    """The cells of a header, without empty ones at its end, for each way to take it apart."""
-    if len(content) > _LONGEST_HEADER:
+def _is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
+    """Return True if a header without a known name has a unit in brackets."""
+    name, unit = units.split_header(split_convention(header)[0]) if header[-1:] in ("]", ")") else ("", None)
+    return bool(name and unit) and unit != "-" and vocabulary.heading(header) is None and units.is_unit(unit or "")
+
+
+def header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
+    """Cells of a header, without empty ones at its end, for each way to separate them."""
+    if isinstance(content, str) and len(content := content.rstrip(f" \t{delimiter}")) > _LONGEST_HEADER:
         return
-    ways = [split(content, delimiter)]
+    forms = [] if delimiter == " " and "\t" in content else [split(content, delimiter)]
     if delimiter == " " and isinstance(content, str):
-        ways = [_COLUMN_GAP.split(content.strip()), split(_BLANK_BEFORE_BRACKET.sub("", content), delimiter)]
-    for cells in ways:
+        joined = [split(_BLANK_BEFORE_BRACKET.sub("", content), delimiter)] if forms else []
+        forms = [_COLUMN_GAP.split(content.strip()), *joined, *forms]
+    for cells in forms:
         while cells and not cells[-1]:
             cells.pop()
         if 1 < len(cells) <= _MOST_COLUMNS:
@@ -182,35 +200,37 @@ def _header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
 
 
 def _below(lines: Sequence[Line], header: int, delimiter: str) -> Iterator[Line]:
-    """The lines just below a header that are no comments."""
+    """Lines just below a header that are no comments."""
     below = lines[header + 1 : header + 1 + _LINES_BELOW_HEADER]
     return (line for line in below if not is_comment(line.content, delimiter))
 
 
-def _is_row(cells: Sequence[str]) -> bool:
-    """Whether two cells or more, and no fewer than half of them, hold numbers."""
-    numbers = sum(is_like_number(cell) for cell in cells[:_MOST_COLUMNS])
-    return numbers > 1 and 2 * numbers >= len(cells)
+def is_row(cells: Sequence[str]) -> bool:
+    """Return True if at least two cells, and at least half of the filled ones, hold numbers."""
+    filled = [cell for cell in cells[:_MOST_COLUMNS] if cell]
+    numbers = sum(map(is_like_number, filled))
+    return numbers > 1 and 2 * numbers >= len(filled)
 
 
 def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, Sequence[str]]:
-    """Index of the first of three rows of numbers in a row, and what parts them; else the number of lines, and all."""
+    """Index of the first of three consecutive rows of numbers, and their delimiters; else number of lines, and all."""
     last = deque[int](maxlen=3)
     for index in (index for index, line in enumerate(lines) if not is_comment(line.content, ";")):
         last.append(index)
         three = [lines[place].content for place in last]
-        parting = [mark for mark in delimiters if all(_is_row(split(content, mark)) for content in reversed(three))]
-        if len(three) == 3 and parting:
-            return last[0], parting
+        fitting = [mark for mark in delimiters if all(is_row(split(content, mark)) for content in reversed(three))]
+        if len(three) == 3 and fitting:
+            return last[0], fitting
     return len(lines), delimiters
 
 
 def _likeliest(
     lines: Sequence[Line], before: Sequence[int], end: int, delimiters: Sequence[str]
 ) -> tuple[int, str, list[str]]:
-    """Index, delimiter and cells of the line that is likeliest meant as the header, where none names the columns.
+    """Index, delimiter and cells of the likeliest header if no line names the columns of a test.
 
-    That is the last above the first row of numbers with as many cells, or else that row; without rows, the first line.
+    That is the last line above the first row of numbers with as many cells, or else that row; without rows, the first
+    line.
     """
     if end == len(lines):
         first = next(iter(before), 0)
@@ -222,28 +242,44 @@ def _likeliest(
     for delimiter, row in rows:
         for index in reversed(before):
             cells = split(lines[index].content, delimiter)
-            if fits(row, len(cells)) and not _is_units_row([cell.strip("[]() ") for cell in cells]):
+            if len(row) == len(cells) and not is_units_row([cell.strip("[]() ") for cell in cells]):
                 return index, delimiter, cells
     delimiter, row = max(rows, key=lambda entry: len(entry[1]))
     return end, delimiter, row
 
 
 def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence[str]) -> Layout:
-    """The layout of a header, with the units row that may follow it; this may lack empty cells at its end."""
-    units_line, row = None, ("",) * len(headers)
-    if line := next(_below(lines, index, delimiter), None):
-        cells = [cell.strip("[]() ") for cell in split(line.content, delimiter)]
-        if (len(cells) < len(headers) or fits(cells, len(headers))) and _is_units_row(cells):
-            units_line, row = line.number, tuple([*cells, *row][: len(headers)])
-    below = [line.content for line in lines[index + 1 :] if line.number != units_line]
-    numbered = bool(below) and all(
-        _NUMBERED.match(next(filter(None, split(content, delimiter)), "")) for content in below
+    """Layout of a header, with the units row that may follow it, and with unnamed columns of the rows below."""
+    units_line, row, number = None, [""] * len(headers), lines[index].number
+    if all(is_like_number(cell) for cell in headers) and len(headers) > 1:
+        return Layout(delimiter, tuple(map(str, range(1, len(headers) + 1))), number, tuple(row), None, headerless=True)
+    below = [(line.number, split(line.content, delimiter)) for line in _below(lines, index, delimiter)]
+    if below:
+        cells = [cell.strip("[]() ") for cell in below[0][1]]
+        if len(cells) <= len(headers) and is_units_row(cells):
+            units_line, row = below[0][0], [*cells, *row][: len(headers)]
+    widths = {len(cells) for _, cells in below if is_row(cells)}
+    may_be_decimal = delimiter == "," and not any("." in cell for _, cells in below for cell in cells)
+    if len(widths) == 1 and len(headers) < (width := widths.pop()) < 2 * len(headers) and not may_be_decimal:
+        # R writes no header for the names of rows, which come first
+        counts = [cells[0] for line, cells in below if line != units_line and is_row(cells)]
+        first = any(not is_like_number(cell) for cell in counts) or _are_counts(counts)
+        unnamed = [""] * (width - len(headers))
+        headers, row = ([*unnamed, *headers], [*unnamed, *row]) if first else ([*headers, *unnamed], [*row, *unnamed])
+    contents = [line.content for line in lines[index + 1 :] if line.number != units_line]
+    numbered = bool(contents) and all(
+        _NUMBERED.match(next(filter(None, split(content, delimiter)), "")) for content in contents
     )
-    return Layout(delimiter, tuple(headers), lines[index].number, row, units_line, numbered=numbered)
+    return Layout(delimiter, tuple(headers), number, tuple(row), units_line, numbered=numbered)
 
 
-def _is_units_row(cells: Sequence[str]) -> bool:
-    """Whether no cell is a number and half of the filled cells or more are units; a ratio may have the unit "1"."""
+def _are_counts(cells: Sequence[str]) -> bool:
+    """Return True if cells count rows from 0 or 1."""
+    return len(cells) > 2 and any(list(cells) == [str(start + n) for n in range(len(cells))] for start in (0, 1))
+
+
+def is_units_row(cells: Sequence[str]) -> bool:
+    """Return True if at least half of the filled cells are units and no cell is a number, but for the unit 1."""
     filled = [split_convention(cell)[0] for cell in cells if cell]
     has_numbers = any(is_like_number(cell) and cell != "1" for cell in filled)
     return not has_numbers and 0 < len(filled) <= 2 * sum(units.is_unit(cell) for cell in filled)

@@ -1,4 +1,4 @@
-"""Hysteresis loops read from files, or one error that tells why a file cannot be a loop."""
+"""Hysteresis loops read from files."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +11,7 @@ from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
+from bushfit.reading.times import DAY, are_day_numbers, spread, without_midnight
 
 #: Rows of the shortest loop; chosen: fewer do not show a shape.
 _FEWEST_LOOP_ROWS = 10
@@ -21,32 +22,40 @@ def read_loop(file: Path, direction: Place, test: LoopFile, *, name: str | None 
 
     Args:
         file: a table with columns time (optional), displacement and force.
-        direction: direction of the test, or its specimen, which settles the headers and units that fit.
-        test: what the file does not say itself, and the file as the campaign names it.
+        direction: of the bushing, or the specimen; it determines the headers and units that fit.
+        test: what the file does not state.
         name: of the loop; default the stem of the file.
-        shared: whether the file holds other tests, too, so that a column has to tell them apart.
+        shared: True if the file contains other tests too, so that a column has to separate them.
+
+    Returns:
+        The loop in SI.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    rows = test.taken(shared=shared)
+    rows = test.rows_of_test(shared=shared)
     table = Table.open(file, LOOP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
-    _check_not_swapped(table, direction)
-    wanted = _loop_columns(table, direction, test)
-    values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
-    displacement, force, time = values["displacement"], values["force"], values.get("time")
+    wanted = loop_columns(table, direction, test)
+    values, notes = table.read_with_notes(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
+    table = table.needing(wanted)
+    displacement, force = values["displacement"], values["force"]
     for role in ("displacement", "force"):
         if np.ptp(values[role][:_FEWEST_LOOP_ROWS]) < LEAST_VALUE and np.ptp(values[role]) < LEAST_VALUE:
             raise table.error(f"the {role} never changes", column=wanted[role], expected="a loop")
-    _check_sense(table, wanted["force"], displacement, force, test.force_sign)
-    if time is None:
-        time = test.clock(displacement)
+    if displacement @ force < displacement.sum() * force.sum() / force.size:  # a negative covariance
+        raise table.error(
+            "the force falls where the displacement rises",
+            column=wanted["force"],
+            expected="force and displacement counted in the same direction",
+            hint="if the load cell counts the other way round, write force_sign = -1 in the campaign"
+            if test.force_sign == 1
+            else "take force_sign = -1 out of the campaign",
+        )
+    if "time" in values:
+        time, more = increasing_time(table, wanted["time"], values["time"])
+        notes = (*notes, *more)
     else:
-        later, hint = "a later time on every row", "if a column tells runs, bushfit init makes a loop of each"
-        table.refuse(np.append(False, time[1:] <= time[:-1]), wanted["time"], "time does not increase", later, hint)
-        if time[-1] - time[0] < LEAST_VALUE:
-            expected = f"{LEAST_VALUE:g} s or more"
-            raise table.error("the record takes no time", column=wanted["time"], expected=expected)
+        time = test.clock(displacement)
     return Loop(
         name or file.stem,
         direction,
@@ -54,18 +63,27 @@ def read_loop(file: Path, direction: Place, test: LoopFile, *, name: str | None 
         displacement,
         force,
         test.noise,
-        test.source(table.sha256, test.temperature, table.not_understood()),
+        test.source(table.sha256, test.temperature, (*notes, *table.not_understood())),
         "time" in values,
         test.weight,
         temperature=test.temperature,
     )
 
 
-def _check_not_swapped(table: Table, direction: Place) -> None:
-    """Refuse a displacement in units of force beside a force in units of displacement."""
-    if table.agrees("displacement", direction.motion.force_unit) and table.agrees(
-        "force", direction.motion.displacement_unit
-    ):
+def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Column]:
+    """Columns of a loop with their factors to SI.
+
+    Args:
+        table: of the loop.
+        direction: of the bushing, or the specimen.
+        test: what the file does not state; with a rate or a frequency, the time needs no column.
+
+    Raises:
+        MeasurementError: a column is missing, or displacement and force are swapped.
+        UnitError: a unit that does not fit.
+    """
+    length, resistance = direction.motion.displacement_unit, direction.motion.force_unit
+    if table.agrees("displacement", resistance) and table.agrees("force", length):
         displacement, force = (table.roles[role].header for role in ("displacement", "force"))
         raise table.header_error(
             "displacement and force are swapped",
@@ -74,30 +92,64 @@ def _check_not_swapped(table: Table, direction: Place) -> None:
             hint="correct the header, or name the columns in the campaign: columns = "
             f'{{ displacement = "{force}", force = "{displacement}" }}',
         )
-
-
-def _loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Column]:
-    """The columns of a loop with their units; only one with a rate or frequency that is stated lacks time."""
-    displacement = table.column("displacement", direction.motion.displacement_unit)
-    displacement = replace(displacement, scale=strain_factor_of_files(direction) * displacement.scale)
-    force = table.column("force", direction.motion.force_unit)
-    wanted = {"displacement": displacement, "force": replace(force, scale=test.force_sign * force.scale)}
+    column = table.column("displacement", length)
+    wanted = {"displacement": replace(column, scale=strain_factor_of_files(direction) * column.scale)}
+    column = table.column("force", resistance)
+    wanted["force"] = replace(column, scale=test.force_sign * column.scale)
     if "time" in table.roles:
-        wanted["time"] = table.column("time", "s")
+        time = table.roles["time"]
+        in_days = time.unit is None and time.index not in table.clocks and _has_day_numbers(table, time)
+        wanted["time"] = replace(time, scale=DAY) if in_days else table.column("time", "s")
     elif test.rate is None and test.frequency is None:
         hint = 'or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign'
         raise table.missing("time", "s", hint)
     return wanted
 
 
-def _check_sense(table: Table, column: Column, displacement: Floats, force: Floats, force_sign: int) -> None:
-    """Refuse a force whose covariance with the displacement is negative."""
-    if displacement @ force < displacement.sum() * force.sum() / force.size:
+def _has_day_numbers(table: Table, time: Column) -> bool:
+    """Return True if a time without a unit holds the day numbers of a spreadsheet."""
+    try:
+        return are_day_numbers(table.read({"time": time}, fewest_rows=1)["time"])
+    except ValueError:
+        return False
+
+
+def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats, tuple[str, ...]]:
+    """Time that increases from row to row.
+
+    Args:
+        table: of the loop.
+        column: of the time.
+        time: as recorded [s], (n,).
+
+    Returns:
+        Time [s], (n,), and a sentence if it was changed: clocks go on after midnight, and rounded times that repeat
+        are spread evenly.
+
+    Raises:
+        MeasurementError: the time goes back or stands still, or its unit is in doubt.
+    """
+    if column.index in table.clocks:
+        time = without_midnight(time)
+        time = time - time[0]
+    if column.scale == 1.0 and column.unit and are_day_numbers(time):
         raise table.error(
-            "the force falls where the displacement rises",
+            "these times look like day numbers of a spreadsheet, not seconds",
             column=column,
-            expected="force and displacement counted in the same direction",
-            hint="if the load cell counts the other way round, write force_sign = -1 in the campaign"
-            if force_sign == 1
-            else "take force_sign = -1 out of the campaign",
+            found=f"{time[0]:.9g} {column.unit} to {time[-1]:.9g} {column.unit}",
+            expected="times in seconds, or days",
+            hint='units = { time = "d" } in the campaign; or subtract the first time from all',
         )
+    later, notes = np.diff(time) > 0.0, ()
+    if not later.all() and (even := spread(time)) is not None:
+        rate = (time.size - 1) / (even[-1] - even[0])
+        return even, (f'"{column.header}" is rounded and repeats: its rows are spread evenly, at {rate:.6g} Hz',)
+    hint = "if a column numbers the runs, bushfit init makes a loop of each"
+    if "block" in table.headers:
+        hint = 'this file has several blocks: rows = { block = "1" } in the campaign takes the first; bushfit init all'
+    elif np.all(np.diff(time) >= 0.0):
+        hint = 'take the time out, with columns = { time = "..." } for another column, or state rate or frequency'
+    table.refuse(np.append(False, ~later), column, "time does not increase", "a later time on every row", hint)
+    if time[-1] - time[0] < LEAST_VALUE:
+        raise table.error("the record takes no time", column=column, expected=f"{LEAST_VALUE:g} s or more")
+    return time, notes

@@ -98,6 +98,7 @@ def weigh(
     """
     open_thousands = len({way.thousands for way in ways}) > 1
     unclear, ungrouped = None, False
+    columns: dict[str, set[int]] = {}
     grouped: dict[str, tuple[Place, str]] = {}
     for place, text in cells:
         if not all_cells and len({way.decimal for way in ways}) == 1:
@@ -105,6 +106,9 @@ def weigh(
         ungrouped = ungrouped or _UNGROUPED.fullmatch(text) is not None
         if text.isdecimal():
             continue
+        for mark in ".,":
+            if mark in text and text.replace(mark, "", 1).isdecimal():
+                columns.setdefault(mark, set()).add(place[1])
         left = tuple(way for way in ways if way.allows(text))
         if not left:
             if is_like_number(text):
@@ -117,6 +121,8 @@ def weigh(
             unclear = place, text
         if len({way.decimal for way in ways}) == 1:
             unclear = None
-    # 62.598 between 20,000 and 3694,85 is a slip rather than 62 thousand
-    contrary = grouped.get(ways[0].thousands or "") if ungrouped and open_thousands else None
+    # 62.598 between 20,000 and 3694,85 is a slip rather than 62 thousand; so is 594,436 between 595.1 and 596.25
+    contrary = grouped.get(ways[0].thousands or "") if open_thousands else None
+    if contrary and not (ungrouped or contrary[0][1] in columns.get(ways[0].decimal, ())):
+        contrary = None
     return Evidence(ways, unclear, contrary)

@@ -1,157 +1,220 @@
-"""The parts of a file that may hold a table each: sheets of a workbook, or groups of channels of a recording.
+"""Parts of a file that can contain a table: the text, worksheets of a workbook, or groups of recorded channels.
 
-python-calamine reads the sheets of xlsx, xlsb, xls and ods: exactly, and imported in a millisecond where openpyxl takes
-170. It does so in a process of its own (`workbook_process`), because an archive of some kilobytes may hold sheets of
-terabytes.
+python-calamine reads xlsx, xlsb, xls and ods.
 """
 
-import json
-import marshal
-import signal
-import subprocess
-import sys
-from collections.abc import Callable, Mapping, Sequence
+import io
+import re
+import zipfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
 from functools import lru_cache
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 from bushfit.errors import BushfitError, MeasurementError, did_you_mean
-from bushfit.reading import workbook_process
-from bushfit.reading.files import view_bytes
+from bushfit.reading.files import sha256, to_utf8, view_bytes
 from bushfit.reading.instruments import format_of, read_groups, word_for_part
-from bushfit.reading.source import Sheet
+from bushfit.reading.layout import FileFormat
+from bushfit.reading.source import RowSource, Sheet, Text
 
-#: Cells that all sheets which are read span together at most; chosen: a full sheet of ten columns.
+#: Cells of all sheets that are read, including empty ones between others; chosen: a full sheet of ten columns.
 _MOST_CELLS = 10_500_000
-#: Memory that a workbook may take in its process [bytes]; chosen: what that many cells take, and half as much again.
-_MOST_MEMORY = 2 << 30
-#: Processor time that a workbook may take there [s]; chosen: what that many cells take, three times.
-_MOST_SECONDS = 30
-#: By how much longer it is waited for on a machine with much else to do.
-_PATIENCE = 15
+#: Bytes of the unpacked sheets of a workbook; chosen: 100 for each of these cells.
+_MOST_BYTES = 1 << 30
 #: First bytes of a zip archive, which newer workbooks are, and of the older formats of Office.
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+#: Last cell of a sheet of an xlsx workbook, near the start of its XML.
+_DIMENSION = re.compile(rb'<(?:\w+:)?dimension ref="(?:[A-Z]+\d+:)?([A-Z]+)(\d+)"')
+#: Cell with a formula and without a value, as programs write it that do not compute.
+_NOT_COMPUTED = re.compile(
+    rb"(?:</(?:\w+:)?f>|<(?:\w+:)?f\b[^<>]*/>)\s*(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v>\s*</(?:\w+:)?v>)?\s*</(?:\w+:)?c>"
+)
 #: Parts that an error lists at most; chosen: a line or two.
 _MOST_LISTED = 12
-#: What to do about a test whose channels lie in several groups.
 _ONE_GROUP = "a test needs its channels in one group, at one rate and of one length: resample those that differ"
 
 
-def read_sheets(
-    data: bytes, file: Path, name: str | None = None, kind: type[BushfitError] = MeasurementError
-) -> tuple[Sequence[str], list[Sheet]]:
-    """The names of all sheets of a workbook, and the sheet of a name, or else all visible ones, or all if none is.
+@dataclass(frozen=True, eq=False)
+class OpenedFile:
+    """Content of a test file.
+
+    Args:
+        file: path.
+        checksum: SHA-256 of the file, which may still be computed.
+        stated: format as the user states it.
+        parts: text, sheets or groups that can contain the table.
+    """
+
+    file: Path
+    checksum: Future[str]
+    stated: FileFormat
+    parts: Sequence[RowSource]
+
+    def choose(self, is_usable: Callable[[RowSource], bool]) -> RowSource:
+        """Choose the part that contains the table.
+
+        Args:
+            is_usable: function that returns True if a part contains such a table.
+
+        Raises:
+            MeasurementError: no part, or more than one, is usable.
+        """
+        parts = self.parts
+        usable = [part for part in parts if is_usable(part)] if len(parts) > 1 else parts
+        if len(usable) == 1:
+            return usable[0]
+        kind = word_for_part(self.file)
+        raise MeasurementError(
+            f"more than one {kind} holds such a table" if usable else f"no {kind} holds such a table",
+            file=self.file,
+            found=_listed([part.sheet or "" for part in usable or parts]),
+            expected="one",
+            hint=_ONE_GROUP if kind == "group" and not usable else 'choose it in the campaign: sheet = "..."',
+        )
+
+
+def open_file(file: Path, stated: FileFormat) -> OpenedFile:
+    """Open a text in any encoding, a workbook or a recording.
+
+    Args:
+        file: path.
+        stated: format as the user states it; `sheet` selects a part.
 
     Raises:
-        kind: no workbook, or one that takes more memory or time than a workbook may.
+        MeasurementError: the file cannot be read, or has no such part.
     """
-    book = _known(data)
-    wanted = book.get("shown") if name is None else [name]
-    if wanted is None or not book["sheets"].keys() >= set(wanted):
-        answer = _asked(data, file, kind, sheets=wanted, cells=book["left"])
-        book.update(answer, sheets=book["sheets"] | answer["sheets"])
-    return book["names"], [
-        Sheet(
-            title, book["sheets"][title], lambda: bool(_asked(data, file, MeasurementError, formulas=True)["formulas"])
-        )
-        for title in (book["shown"] if name is None else [name])
-        if title in book["sheets"]
-    ]
-
-
-@lru_cache(maxsize=1)
-def _known(_: bytes) -> dict[str, Any]:
-    """What was read of the last workbook, to be added to: to look at one takes several passes."""
-    return {"sheets": {}, "left": _MOST_CELLS}
-
-
-def _asked(data: bytes, file: Path, kind: type[BushfitError], **order: object) -> Mapping[str, Any]:
-    """The answer of `workbook_process` to an order about a workbook.
-
-    Raises:
-        kind: the workbook is broken, or takes more memory or time than a workbook may.
-    """
-    found = find_spec("python_calamine")
-    packages = str(Path(found.origin).parents[1]) if found and found.origin else ""
-    order |= {"memory": _MOST_MEMORY, "seconds": _MOST_SECONDS, "packages": packages}
-    command = [sys.executable, "-I", "-S", workbook_process.__file__, json.dumps(order)]
-    try:
-        done = subprocess.run(command, input=data, capture_output=True, check=False, timeout=_PATIENCE * _MOST_SECONDS)
-        status, answer = done.returncode, marshal.loads(done.stdout) if done.returncode == 0 else {}
-    except subprocess.TimeoutExpired:
-        status, answer = -getattr(signal, "SIGXCPU", 0), {}
-    if "error" in answer:
-        expected, hint = "a table as text, or a workbook: xlsx, xlsb, xls or ods", "save it again as xlsx, or as CSV"
-        raise kind("the workbook cannot be read", file=file, found=answer["error"], expected=expected, hint=hint)
-    if status or "too_many" in answer:
-        slow = status == -getattr(signal, "SIGXCPU", 0)
-        taken = f"more than {_MOST_SECONDS} s of work" if slow else f"more than {_MOST_MEMORY >> 30} GiB of memory"
-        raise kind(
-            "the workbook is too large",
-            file=file,
-            found=f'more, with sheet "{answer["too_many"]}"' if answer else taken,
-            expected=f"at most {_MOST_CELLS} cells in the sheets that are read, empty ones between others counted",
-            hint="save the sheet as CSV",
-        )
-    return answer
+    data = view_bytes(file, MeasurementError)
+    checksum, parts = sha256(data), read_parts(data, file)
+    if not parts:
+        if stated.sheet:
+            expected = "a workbook, or a file with groups of channels"
+            raise MeasurementError(
+                "this is no workbook", file=file, found=f'sheet = "{stated.sheet}"', expected=expected
+            )
+        return OpenedFile(file, checksum, stated, [Text(*to_utf8(data, file, stated.encoding))])
+    if (name := stated.sheet) is None:
+        return OpenedFile(file, checksum, stated, [part for part, visible in parts if visible])
+    names = [part.sheet for part, _ in parts]
+    if name not in names:
+        problem = f"there is no such {word_for_part(file)}"
+        hint = did_you_mean(name, names)
+        raise MeasurementError(problem, file=file, found=f'"{name}"', expected=_listed(names), hint=hint)
+    return OpenedFile(file, checksum, stated, [part for part, _ in parts if part.sheet == name])
 
 
 def parts_of(file: Path) -> Sequence[Sheet]:
-    """The visible sheets of a workbook, or the groups of a recording; none where the file is a text.
+    """Visible sheets of a workbook, or groups of a recording; none for a text.
 
     Raises:
         MeasurementError: a workbook or recording that cannot be read.
     """
-    return _read(view_bytes(file, MeasurementError), file)[1]
+    return [part for part, visible in read_parts(view_bytes(file, MeasurementError), file) if visible]
 
 
-def open_part(data: bytes, file: Path, name: str | None, is_usable: Callable[[Sheet], bool]) -> Sheet | None:
-    """The part of a file that holds the table: the one that is stated by its name, or else the only usable one.
+def read_parts(data: bytes, file: Path) -> Sequence[tuple[Sheet, bool]]:
+    """Sheets of a workbook, or groups of a recording, each with True if it is visible; none for a text.
 
-    None where the file is a text.
+    Args:
+        data: bytes of the file.
+        file: path, for errors.
 
     Raises:
-        MeasurementError: a workbook or recording that cannot be read, or that has no such or no single usable part.
+        MeasurementError: a workbook or recording that cannot be read.
     """
-    names, found = _read(data, file, name)
-    if not names:
-        if name:
-            expected = "a workbook, or a file with groups of channels"
-            raise MeasurementError("this is no workbook", file=file, found=f'sheet = "{name}"', expected=expected)
-        return None
-    kind = word_for_part(file)
-    if name is not None:
-        if own := [part for part in found if part.sheet == name]:
-            return own[0]
-        raise MeasurementError(
-            f"there is no such {kind}",
-            file=file,
-            found=f'"{name}"',
-            expected=_listed(names),
-            hint=did_you_mean(name, names),
-        )
-    usable = [part for part in found if is_usable(part)] if len(found) > 1 else found
-    if len(usable) == 1:
-        return usable[0]
-    raise MeasurementError(
-        f"more than one {kind} holds such a table" if usable else f"no {kind} holds such a table",
-        file=file,
-        found=_listed([part.sheet for part in usable or found]),
-        expected="one",
-        hint=_ONE_GROUP if kind == "group" and not usable else 'choose it in the campaign: sheet = "..."',
-    )
-
-
-def _read(data: bytes, file: Path, name: str | None = None) -> tuple[Sequence[str], Sequence[Sheet]]:
-    """The names of all parts of a file, and the part of a name, or else all; none of a text."""
-    if own := format_of(data, file):
-        groups = read_groups(data, file, own)
+    if recording := format_of(data, file):
+        groups = read_groups(data, file, recording)
         if isinstance(groups, MeasurementError):
             raise groups
-        return [group.sheet for group in groups], groups
-    return read_sheets(data, file, name) if data.startswith(_WORKBOOKS) else ((), ())
+        return [(group, True) for group in groups]
+    return read_sheets(data, file) if data.startswith(_WORKBOOKS) else ()
+
+
+def read_sheets(data: bytes, file: Path, kind: type[BushfitError] = MeasurementError) -> Sequence[tuple[Sheet, bool]]:
+    """Sheets of a workbook, each with True if it is visible; if none is visible, all count as such.
+
+    Args:
+        data: bytes of the file.
+        file: path, for errors.
+        kind: class of errors.
+
+    Raises:
+        kind: no workbook, or one with more cells than can be read.
+    """
+    try:
+        return _sheets(data)
+    except OverflowError as error:
+        limit = f"at most {_MOST_CELLS} cells in all sheets, including empty ones between others"
+        hint = "save the sheet as CSV"
+        raise kind("the workbook is too large", file=file, found=str(error), expected=limit, hint=hint) from None
+    except ValueError as error:
+        expected, hint = "a table as text, or a workbook: xlsx, xlsb, xls or ods", "save it again as xlsx, or as CSV"
+        raise kind("the workbook cannot be read", file=file, found=str(error), expected=expected, hint=hint) from error
+
+
+@lru_cache(maxsize=1)
+def _sheets(data: bytes) -> Sequence[tuple[Sheet, bool]]:
+    """Sheets of a workbook; an inspection reads the same one several times.
+
+    Raises:
+        OverflowError: too many cells.
+        ValueError: a broken workbook.
+    """
+    import python_calamine as calamine
+
+    try:
+        contents = dict(_sheets_in_xml(data))
+        _check_size(contents)
+        book = calamine.load_workbook(io.BytesIO(data))
+        shown = {sheet.name for sheet in book.sheets_metadata if sheet.visible == calamine.SheetVisibleEnum.Visible}
+        sheets, left = [], _MOST_CELLS
+        for name in book.sheet_names:
+            sheet = book.get_sheet_by_name(name)
+            left -= sheet.height * sheet.width
+            if left < 0:
+                raise OverflowError(f'more, with sheet "{name}"')
+            content = [_row(row) for row in sheet.to_python(skip_empty_area=False)]
+            lacks_values = lambda: any(map(_NOT_COMPUTED.search, contents.values()))  # noqa: E731
+            sheets.append((Sheet(name, content, lacks_values), name in shown or not shown))
+        return sheets
+    except (calamine.CalamineError, zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError) as error:
+        raise ValueError(str(error)) from error
+
+
+def _sheets_in_xml(data: bytes) -> list[tuple[str, bytes]]:
+    """Name and XML of the sheets in an xlsx workbook; of larger ones the start."""
+    if not data.startswith(b"PK"):
+        return []
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        parts = [part for part in archive.infolist() if re.search(r"sheet[^/]*\.xml$", part.filename)]
+        whole = sum(part.file_size for part in parts) <= _MOST_BYTES
+        if not whole:
+            raise OverflowError(f"{sum(part.file_size for part in parts)} bytes in its sheets")
+        return [(part.filename, archive.read(part)) for part in parts]
+
+
+def _check_size(sheets: dict[str, bytes]) -> None:
+    """Refuse sheets whose last cell is too far from the first: the reader allocates all cells between them."""
+    for name, content in sheets.items():
+        if match := _DIMENSION.search(content[:10_000]):
+            column = 0
+            for letter in match[1]:
+                column = 26 * column + letter - 64
+            if column * int(match[2]) > _MOST_CELLS:
+                raise OverflowError(f"{match[2].decode()} rows of {column} columns in {name}")
+
+
+def _row(cells: Sequence[object]) -> list[str | float]:
+    """Cells of a row: numbers, and anything else as text on one line; without empty cells at the end."""
+    row: list[str | float] = [
+        float(cell) if isinstance(cell, int | float) and not isinstance(cell, bool) else " ".join(str(cell).split())
+        for cell in cells
+    ]
+    while row and row[-1] == "":
+        row.pop()
+    return row
 
 
 def _listed(names: Sequence[str]) -> str:
+    """Names in quotation marks; of many the first."""
     return ", ".join(f'"{name}"' for name in names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")

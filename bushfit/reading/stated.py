@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo
 
 from bushfit.errors import CampaignError, error_location
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
-from bushfit.reading.columns import Rows
+from bushfit.reading.cells import Rows
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Source, Stepped, Waveform, rebuild_time
@@ -161,8 +161,8 @@ class TestFile(FileFormat):
         known = {key: each for key, each in {**stated, "temperature_degC": degrees}.items() if each is not None}
         return Source(Path(self.file), sha256, known, tuple(notes))
 
-    def taken(self, *, shared: bool) -> Rows:
-        """The rows that make the test; others may be in the same file."""
+    def rows_of_test(self, *, shared: bool) -> Rows:
+        """Selection of the rows that make the test; with `shared`, a column has to separate the tests of a file."""
         return Rows(self.direction, self.specimen_number, self.rows, shared)
 
 
@@ -215,6 +215,10 @@ class SweepFile(TestFile):
         at_amplitude: of a file without a column for it, with its unit: "0.1 mm", "0.15 %".
         at_frequency: likewise [Hz].
         stepped: what was stepped while the other was held, where the order of the rows does not tell it.
+        force_sign: -1 if the force counts the other way, which turns the phase by 180 deg; found in the phase unless
+            stated.
+        phase_sign: -1 if the loss counts the other way: as the phase of the displacement relative to the force; found
+            in the values unless stated.
     """
 
     columns: Annotated[Mapping[str, Text], _roles(SWEEP_COLUMNS, "header")] = field(default_factory=dict)
@@ -223,3 +227,5 @@ class SweepFile(TestFile):
     at_amplitude: Text | None = None
     at_frequency: Frequency | None = None
     stepped: Stepped | None = None
+    force_sign: Literal[1, -1] | None = None
+    phase_sign: Literal[1, -1] | None = None

@@ -1,58 +1,68 @@
-"""A table of a test: its columns recognised by their headers, with units, and its numbers in SI."""
+"""Table of a test: columns classified by name and unit, and their numbers in SI."""
 
 import csv
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
-from difflib import get_close_matches
+from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bushfit import units
-from bushfit.errors import MeasurementError, NoColumnError, UnitError, error_location
+from bushfit.errors import MeasurementError, UnitError, error_location
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
-from bushfit.reading.columns import Columns, Rows
-from bushfit.reading.files import sha256, to_utf8, view_bytes
+from bushfit.reading.blocks import combined
+from bushfit.reading.cells import Cells, Rows
+from bushfit.reading.classification import classify
 from bushfit.reading.headers import (
     LOOP_COLUMNS,
     OF_MOTION,
+    PAIRS,
     SWEEP_COLUMNS,
     Column,
-    Heading,
     Vocabulary,
     is_angular,
     of_motion,
-    plain,
-    split_convention,
 )
-from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
-from bushfit.reading.numerals import is_like_number
-from bushfit.reading.parts import open_part
-from bushfit.reading.source import RowSource, Sheet, Text
+from bushfit.reading.layout import DELIMITERS, FileFormat, find_layout
+from bushfit.reading.measurement import Floats
+from bushfit.reading.numerals import Numerals, weigh
+from bushfit.reading.parts import OpenedFile, open_file
+from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, Channels, RowSource, Sheet, Text
+from bushfit.reading.times import clock
 from bushfit.reading.wide import as_long
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
-#: Likeness, from 0 to 1, from which a header is suggested for one that is not there; chosen: one word of two suffices.
-_ALIKE = 0.4
+#: Rows that are converted at a time if pandas cannot read them; chosen: their texts fill some MiB.
+_CHUNK_ROWS = 1 << 16
+#: Rows that are compared, and cells that settle the decimal mark; chosen: a long record need not be read whole.
+_FIRST = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Table(Columns):
-    """A table that was read from a file and understood.
+class Table(Cells):
+    """Table of a test, with its columns by role.
 
     Args:
-        checksum: SHA-256 of the file, perhaps still under way.
-        names, motion: for each role the headers it usually goes by, whatever the motion, and that of what was tested.
+        checksum: SHA-256 of the file, which may still be computed.
+        names: usual names of the columns by role, for any motion.
+        motion: displacement, rotation or strain.
+        notes: sentences on columns that were recognised by their unit.
     """
 
     checksum: Future[str]
     names: Mapping[str, Sequence[str]]
     motion: Motion
+    notes: tuple[str, ...] = field(default=(), kw_only=True)
 
     @classmethod
     def open(
         cls,
-        file: Path,
+        file: Path | OpenedFile,
         names: Mapping[str, Sequence[str]],
         columns: Mapping[str, str] | None = None,
         stated_units: Mapping[str, str] | None = None,
@@ -60,59 +70,68 @@ class Table(Columns):
         motion: Motion = TRANSLATION,
         rows: Rows | None = None,
     ) -> "Table":
-        """Read a file and understand its header.
+        """Read a file and classify its columns.
 
         Args:
-            file: a text in any dialect, a workbook or a recording. Lines of other content may stand above the header,
-                and a row of units below it. A sweep's may be a wide table.
-            names: for each role the headers it usually goes by, LOOP_COLUMNS or SWEEP_COLUMNS.
-            columns, stated_units: header and unit of roles, where it is no usual one, or the file does not tell it.
-            stated: what the file does not tell of its format.
-            motion: of what was tested, by which a test of strain and modulus goes by other headers.
-            rows: that make the test; all of them where none are stated.
+            file: text in any dialect, workbook or recording, which may be open already. Lines of other content may
+                stand above the header, and a row of units below it.
+            names: usual names of the columns by role: LOOP_COLUMNS, SWEEP_COLUMNS or RESONANCE_COLUMNS.
+            columns: header, or number from 1, of the column of a role, if its name is unusual.
+            stated_units: units by role that the file does not state.
+            stated: format of the file as the user states it.
+            motion: of what was tested; a test of strain and modulus has other names.
+            rows: rows that make the test; default all.
+
+        Returns:
+            The table.
 
         Raises:
             MeasurementError: no such file, no text, no header, a header that does not settle which column is which, or
                 no such rows.
             UnitError: two different units for one column.
         """
-        stated = stated or FileFormat()
-        data = view_bytes(file, MeasurementError)
-        checksum = sha256(data)
-        vocabulary = Vocabulary(of_motion(names, motion), columns or {})
+        opened = file if isinstance(file, OpenedFile) else open_file(file, stated or FileFormat())
+        stated, columns = opened.stated, dict(columns or {})
+        numbered = {role: "\0" if text.isdecimal() else text for role, text in columns.items()}
+        vocabulary = Vocabulary(of_motion(names, motion), numbered)
 
-        def lay_out(source: RowSource) -> tuple[RowSource, Layout, Vocabulary]:
+        def lay_out(source: RowSource) -> tuple[RowSource, Any, bool]:
             delimiter = "" if isinstance(source, Sheet) else DELIMITERS[stated.delimiter] if stated.delimiter else None
             layout = source.layout or find_layout(
                 source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line
             )
-            if (
-                "amplitude" in names
-                and stated.header_line is None
-                and (wide := as_long(source, file, vocabulary, layout, delimiter))
-            ):
-                return *wide, Vocabulary({role: (role,) for role in names}, {})
-            return source, layout, vocabulary
+            may_be_wide = "amplitude" in names and stated.header_line is None
+            if may_be_wide and (wide := as_long(source, opened.file, vocabulary, layout, delimiter)):
+                return *wide, True
+            return *combined(source, layout, vocabulary), False
 
         try:
-            part = open_part(
-                data, file, stated.sheet, lambda part: len(vocabulary.roles(lay_out(part)[1].headers) - {"time"}) > 1
-            )
-            source, layout, understood = lay_out(part or Text(*to_utf8(data, file, stated.encoding)))
+            layouts = {id(part): lay_out(part) for part in opened.parts}
+            part = opened.choose(lambda part: len(vocabulary.roles(layouts[id(part)][1].headers) - {"time"}) > 1)
         except csv.Error as error:
-            raise MeasurementError("the table cannot be read", file=file, found=str(error)) from error
+            raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
+        source, layout, is_wide = layouts[id(part)]
         if stated.header_line not in (None, layout.header_line):
             found = f"header_line = {stated.header_line}"
-            raise MeasurementError("there is no header on this line", file=file, found=found, hint="lines count from 1")
-        table = cls(file, source, layout, stated, {}, checksum, names, motion)
+            problem, hint = "there is no header on this line", "lines count from 1"
+            raise MeasurementError(problem, file=opened.file, found=found, hint=hint)
+        table = cls(opened.file, source, layout, stated, {}, opened.checksum, names, motion)
         if len(table.headers) < 2:
-            found = table.headers[0] if table.headers else "nothing"
             expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
-            raise table.header_error("there is only one column", found=found, expected=expected)
-        if all(is_like_number(cell) for cell in table.headers):
-            raise table.header_error("there is no header", expected=_EXPECTED_HEADER)
-        named = columns or {} if understood is vocabulary else {}
-        table = replace(table, roles=table._recognise(understood, named, stated_units or {}))
+            raise table.header_error("there is only one column", expected=expected)
+        if layout.headerless and not any(text.isdecimal() for text in columns.values()):
+            tests = (("time", "displacement", "force"), ("frequency", "amplitude", "stiffness", "loss_factor"))
+            entries = [", ".join(f'{role} = "{n}"' for n, role in enumerate(test, 1)) for test in tests]
+            ways = " or ".join(f"columns = {{ {entry} }}" for entry in entries)
+            hint = f"name the columns by their numbers in the campaign, and their units: {ways}"
+            raise table.header_error("there is no header", found=None, expected=_EXPECTED_HEADER, hint=hint)
+        if is_wide:
+            vocabulary, columns = Vocabulary({role: (role,) for role in names}, {}), {}
+        roles, notes, clocks = classify(table, names, motion, vocabulary, columns, stated_units or {})
+        essential = ({"displacement", "force"}, *(set(pair) for pair in PAIRS))
+        present = next((pair for pair in essential if pair <= set(roles)), set(roles) & {"displacement", "force"})
+        needed = frozenset(roles[role].index for role in present)
+        table = replace(table, roles=roles, notes=notes, clocks=clocks, needed=needed)
         return table if rows is None else table.taking(rows)
 
     @property
@@ -121,7 +140,15 @@ class Table(Columns):
         return self.checksum.result()
 
     def column(self, role: str, expected: str, hint: str | None = None) -> Column:
-        """The column of a role, with the factor from its unit to the SI unit `expected`; a ratio needs no unit.
+        """Find the column of a role, with its factor to SI; a ratio needs no unit.
+
+        Args:
+            role: of the column.
+            expected: SI unit.
+            hint: what the user can do if there is no such column.
+
+        Returns:
+            The column.
 
         Raises:
             MeasurementError: no such column.
@@ -130,53 +157,84 @@ class Table(Columns):
         if role not in self.roles:
             raise self.missing(role, expected, hint)
         column = self.roles[role]
+        if column.index in self.clocks:
+            return column
+        label, place = role.replace("_", " "), self.place(self.layout.header_line, column)
+        if math.isnan(column.logarithm):
+            unit = column.unit or units.example_unit(expected)
+            raise UnitError(
+                f"the base of the logarithm of the {label} is not known",
+                file=self.file,
+                place=place,
+                found=f'"{column.header}"',
+                expected="log10 or ln in the header",
+                hint=f'units = {{ {role} = "log10({unit})" }} in the campaign, or units = {{ {role} = "ln({unit})" }}',
+            )
         if column.unit is None and (expected != "1" or role in OF_MOTION):
             example = units.example_unit(expected)
+            angular = expected == "Hz" and is_angular(column.header, "1/s")
+            other = f', or units = {{ {role} = "rad/s" }}' if angular else ""
             raise UnitError(
-                f"the {_label(role)} has no unit",
+                f"the {label} has no unit",
                 file=self.file,
-                place=self.place(self.layout.header_line, column),
+                place=place,
                 found=f'"{column.header}"',
-                expected=units.describe_unit(expected),
-                hint=f'write "{column.header} [{example}]" in the header, '
-                f'or units = {{ {role} = "{example}" }} in the campaign',
+                expected=f"{units.describe_unit(expected)}{', or an angular frequency, such as rad/s' * angular}",
+                hint=f'write "{column.header} [{"rad/s" if angular else example}]" in the header, '
+                f'or units = {{ {role} = "{example}" }} in the campaign{other}',
             )
         unit = column.unit or "1"
         others = ("m", "rad", "N/m", "N*m/rad") if self.motion is STRAINING else ("1", "Pa")
-        if role in OF_MOTION and role != "force" and any(units.is_compatible(unit, other) for other in others):
+        if role in OF_MOTION and "force" not in role and any(units.is_compatible(unit, other) for other in others):
             self.refuse_other_motion(role, [column.header])
-        with error_location(self.file, self.place(self.layout.header_line, column)):
+        with error_location(self.file, place):
             if expected == "Hz" and is_angular(column.header, unit):
                 per_second = "rad/s" if units.is_compatible(unit, "rad/s") else "Hz"
                 return replace(column, scale=units.si_factor(unit, per_second) / (2.0 * math.pi))
             return replace(column, scale=units.si_factor(unit, expected))
 
     def agrees(self, role: str, expected: str) -> bool:
-        """Whether a role has a column with a unit of the dimension of `expected`."""
+        """Return True if a role has a column with a unit of the dimension of `expected`."""
         column = self.roles.get(role)
         return column is not None and column.unit is not None and units.is_compatible(column.unit, expected)
 
     def missing(self, role: str, expected: str, hint: str | None = None) -> MeasurementError:
-        """The error for a role that has no column; `expected` is its SI unit."""
+        """Create the error for a role without a column.
+
+        Args:
+            role: of the column.
+            expected: its SI unit.
+            hint: what else the user can do.
+        """
         self.refuse_other_motion(role)
+        label = role.replace("_", " ")
         return self.header_error(
-            f"there is no column for the {_label(role)}",
-            expected=f'a header such as "{_label(role)} [{units.example_unit(expected)}]"',
+            f"there is no column for the {label}",
+            expected=f'a header such as "{label} [{units.example_unit(expected)}]"',
             hint=f"name the column in the campaign: {self.columns_key(role, expected)}" + (f", {hint}" if hint else ""),
         )
 
     def columns_key(self, role: str, unit: str) -> str:
-        """The key that names the column of a role, with the one header that names none and has a unit that fits."""
+        """Key of a campaign that names the column of a role: each header without a role that has a fitting unit.
+
+        Args:
+            role: of the column.
+            unit: its SI unit.
+        """
         usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
-        free = (header for header in self.headers if usual.heading(header) is None)
-        found = [header for header in free if units.is_compatible(units.split_header(header)[1] or "", unit)]
-        return f'columns = {{ {role} = "{found[0] if len(found) == 1 else "..."}" }}'
+        free = [header for header in self.headers if header and usual.heading(header) is None]
+        fitting = [header for header in free if units.is_compatible(units.split_header(header)[1] or "", unit)]
+        return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
 
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
-        """Refuse headers that would name a role in a test of the other kind of motion: strain, or displacement.
+        """Refuse headers that name a role in a test of the other kind of motion: strain, or displacement.
+
+        Args:
+            role: of the column.
+            headers: that are known to do so; default those of the table that do.
 
         Raises:
-            MeasurementError: there is such a header in the table, or one of those that are known to be (`headers`).
+            MeasurementError: there is such a header.
         """
         kinds = ("displacement and force or stiffness", "strain and modulus")
         other, (expected, found) = STRAINING, kinds
@@ -184,82 +242,142 @@ class Table(Columns):
         if self.motion is STRAINING:
             other, (found, expected) = TRANSLATION, kinds
             hint = 'take specimen out of the campaign, or give it kind = "shear" with its area and thickness'
-        words = Vocabulary({role: of_motion(self.names, other)[role]} if role in OF_MOTION else {}, {})
+        names = of_motion(self.names, other)
+        differs = role in names and names[role] is not of_motion(self.names, self.motion)[role]
+        words = Vocabulary({role: names[role]} if differs else {}, {})
         for header in headers or filter(words.heading, self.headers):
-            raise self.header_error(
-                f"this is a test of {found}", found=f'"{header}" for the {_label(role)}', expected=expected, hint=hint
-            )
+            label = role.replace("_", " ")
+            problem = f"this is a test of {found}"
+            raise self.header_error(problem, found=f'"{header}" for the {label}', expected=expected, hint=hint)
 
-    def _recognise(
-        self, vocabulary: Vocabulary, columns: Mapping[str, str], stated_units: Mapping[str, str]
-    ) -> dict[str, Column]:
-        """The columns by role, each with its unit; `columns` and `stated_units` as of `open`."""
-        roles: dict[str, Column] = {}
-        for index, header in sorted(enumerate(self.headers), key=lambda one: _is_k(one[1])):
-            heading = vocabulary.heading(header)
-            if heading is None:
-                continue
-            role = heading.role
-            column = self._column_of(heading, index, stated_units.get(role))
-            if plain(header) == "t" and role == "temperature" and not units.kelvin_scale(column.unit or ""):
-                continue  # a time, or another quantity
-            if role == "frequency" and role in roles:  # in Hz and in rad/s
-                angular = [is_angular(one.header, one.unit or "") for one in (roles[role], column)]
-                if angular[0] != angular[1]:
-                    roles[role] = roles[role] if angular[1] else column
-                    continue
-            if _is_k(header) and role not in columns:
-                known = role in roles and not _is_k(roles[role].header)  # K* says more than K
-                if known or not any(units.is_compatible(column.unit or "", si) for si in ("N/m", "N*m/rad")):
-                    continue
-            if role in roles and self.texts(index) == self.texts(roles[role].index):
-                continue
-            if role in roles:
-                raise self.header_error(
-                    f"more than one column could be the {_label(role)}",
-                    found=f"{roles[role].header}, {header}",
-                    expected="one",
-                    hint="give each a header of its own"
-                    if header == roles[role].header
-                    else f'choose it in the campaign: columns = {{ {role} = "{header}" }}',
-                )
-            roles[role] = column
-        for role in (role for role in columns if role not in roles):
-            near = next(iter(get_close_matches(columns[role], self.headers, n=1, cutoff=_ALIKE)), "")
-            raise self.header_error(
-                f'there is no column "{columns[role]}"',
-                kind=NoColumnError,
-                expected=f"the header that was named for the {_label(role)}",
-                hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
-                + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
-            )
-        if "amplitude_reached" in roles and "amplitude" not in roles:
-            roles["amplitude"] = replace(roles.pop("amplitude_reached"), role="amplitude")
-        return roles
+    def read(self, wanted: Mapping[str, Column], *, fewest_rows: int) -> dict[str, Floats]:
+        """Read columns; see `read_with_notes`."""
+        return self.read_with_notes(wanted, fewest_rows=fewest_rows)[0]
 
-    def _column_of(self, heading: Heading, index: int, stated_unit: str | None) -> Column:
-        """The column under a heading, with the unit that header, units row and user agree on."""
-        parts = [split_convention(unit) for unit in (heading.unit, self.layout.units[index], stated_unit) if unit]
-        conventions = {said for said in (heading.convention, *(part[1] for part in parts)) if said}
-        stated = {unit for unit, _ in parts if unit}
-        unit, convention = next(iter(stated), None), next(iter(conventions), None)
-        column = Column(heading.role, self.headers[index], index, unit, 1.0, convention)
-        if len(stated) > 1 or len(conventions) > 1:
-            raise UnitError(
-                f"two units for the {_label(heading.role)}",
-                file=self.file,
-                place=self.place(self.layout.header_line, column),
-                found=" and ".join(sorted(stated) if len(stated) > 1 else sorted(conventions)),
-                expected="one unit, from the header, the units row or the campaign",
-            )
-        return column
+    def read_with_notes(
+        self, wanted: Mapping[str, Column], *, fewest_rows: int
+    ) -> tuple[dict[str, Floats], tuple[str, ...]]:
+        """Read columns: with pandas if all rows are data of one notation, else row by row.
 
+        Args:
+            wanted: columns by role, with their factors to SI.
+            fewest_rows: that the table must have.
 
-def _is_k(header: str) -> bool:
-    """Whether a header is the symbol K alone, with or without a unit."""
-    return plain(units.split_header(header)[0]) == "k"
+        Returns:
+            Values in SI by role, (n,) each, and sentences on rows that are left out and on columns known by their unit.
 
+        Raises:
+            MeasurementError: numbers that can be read in two ways, too few rows, or so many rows without data that the
+                meaning of the table is in doubt.
+        """
+        notes, values = self.notes, self._by_library(wanted)
+        if values is None:
+            table = self.needing(wanted)
+            notes = (*notes, *table.left_out())
+            values = table._row_by_row(wanted)
+            if len(next(iter(values.values()))) < fewest_rows and (bad := table.first_fault()):
+                raise bad
+        for role, column in wanted.items():
+            if column.logarithm:
+                with np.errstate(over="ignore"):
+                    values[role] = column.scale * column.logarithm ** (values[role] / column.scale)
+        count = len(next(iter(values.values())))
+        if count < fewest_rows:
+            problem, hint = "too few rows", None
+            if isinstance(self.source, Sheet) and self.source.lacks_values():
+                problem = "the workbook has formulas whose values were not saved"
+                hint = "open it in a spreadsheet program and save it again"
+            raise self.error(problem, found=f"{count}", expected=f"at least {fewest_rows}", hint=hint)
+        return values, notes
 
-def _label(role: str) -> str:
-    """A role in words."""
-    return role.replace("_", " ")
+    def needing(self, wanted: Mapping[str, Column]) -> "Table":
+        """The table with only those rows that have a number in each of these columns."""
+        return replace(self, needed=self.needed | {column.index for column in wanted.values()})
+
+    def first_fault(self) -> MeasurementError | None:
+        """Error for the first row without data; None if there is no such row."""
+        faults = ((line, cells) for line, cells, fault in self._all_rows() if fault in ("cell", "width", "missing"))
+        return next((self.bad_row(line, cells) for line, cells in faults), None)
+
+    def check_positive(self, roles: Sequence[str], wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
+        """Refuse values that are not positive.
+
+        Args:
+            roles: that must be positive, if they are among `values`.
+            wanted: columns by role.
+            values: in SI by role, (n,) each.
+
+        Raises:
+            MeasurementError: there is such a value.
+        """
+        for role in roles:
+            if role in values:
+                problem = f"the {role.replace('_', ' ')} is not positive"
+                self.refuse(values[role] <= 0.0, wanted[role], problem, "a number above zero")
+                least = f"{LEAST_VALUE / abs(wanted[role].scale):.3g} or more"
+                self.refuse(values[role] < LEAST_VALUE, wanted[role], "no rig records so little", least)
+
+    def refuse(
+        self, bad: NDArray[np.bool_], column: Column, problem: str, expected: str, hint: str | None = None
+    ) -> None:
+        """Refuse rows; the error names line and cell of the first.
+
+        Args:
+            bad: True for each bad row, (n,).
+            column: with the bad cell.
+            problem: in one clause.
+            expected: what the cell should contain.
+            hint: the next step.
+
+        Raises:
+            MeasurementError: there is a bad row.
+        """
+        if bad.any():
+            line, cells = next(islice(self.rows(), int(np.argmax(bad)), None))
+            found = f'"{cells[column.index]}"'
+            raise self.error(problem, line=line, column=column, found=found, expected=expected, hint=hint)
+
+    def _by_library(self, wanted: Mapping[str, Column]) -> dict[str, Floats] | None:
+        """Columns as a library reads them, in SI by role; None if they have to be read row by row.
+
+        The library takes no thousands separators. If it reads all cells as numbers, the first cells settle the decimal
+        mark.
+        """
+        scales = {column.index: column.scale for column in wanted.values()}
+        if self.selected is not None or self.clocks & set(scales):
+            return None
+        if isinstance(self.source, Channels):
+            known = self.source.values(scales)
+            return None if known is None else {role: known[column.index] for role, column in wanted.items()}
+        if not isinstance(self.source, Text):
+            return None
+        decimals = {way.decimal for way in weigh(islice(self.number_texts(), _FIRST), self.possible_numerals()).ways}
+        first = [str(cell) for cell in next(self.rows(), (0, ()))[1]]
+        if len(decimals) > 1 or len(first) != len(self.headers):
+            return None
+        numerals = Numerals(decimals.pop())
+        if not all(numerals.allows(first[column.index]) for column in wanted.values()):
+            return None  # a library may take a column of TRUE for numbers
+        values = self.source.columns(self.layout, first, scales, numerals)
+        return None if values is None else {role: values[column.index] for role, column in wanted.items()}
+
+    def _row_by_row(self, wanted: Mapping[str, Column]) -> dict[str, Floats]:
+        """Columns of rows that a library does not read, in SI by role, (n,) each.
+
+        Raises:
+            MeasurementError: a cell with no finite number, or one beyond LARGEST_VALUE.
+        """
+        parts: dict[str, list[Floats]] = {role: [np.empty(0)] for role in wanted}
+        remaining = self.rows()
+        while chunk := list(islice(remaining, _CHUNK_ROWS)):
+            for role, column in wanted.items():
+                numbers, is_clock = [], column.index in self.clocks
+                for line, cells in chunk:
+                    cell = cells[column.index]
+                    text = clock if is_clock else self.numerals.value
+                    number = text(str(cell)) if isinstance(cell, str) or is_clock else cell
+                    if number is None or not abs(number * column.scale) <= LARGEST_VALUE:
+                        raise self.bad_row(line, cells, column=column)
+                    numbers.append(number * column.scale)
+                parts[role].append(np.array(numbers, dtype=float))
+        return {role: np.concatenate(chunks) for role, chunks in parts.items()}

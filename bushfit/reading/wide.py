@@ -12,17 +12,18 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate, groupby
 from pathlib import Path
 from typing import NamedTuple
 
 from bushfit import units
 from bushfit.errors import MeasurementError
+from bushfit.reading.blocks import COUNTED
 from bushfit.reading.headers import AmplitudeConvention, Heading, Vocabulary, split_convention
-from bushfit.reading.layout import DELIMITERS, Layout, Line, is_comment, split
+from bushfit.reading.layout import DELIMITERS, Layout, is_comment, split
 from bushfit.reading.numerals import is_like_number
-from bushfit.reading.source import RowSource, Sheet
+from bushfit.reading.source import Combined, RowSource
 
 #: The two roles of which one runs down and the other across.
 _STEPPED = ("frequency", "amplitude")
@@ -40,8 +41,6 @@ _LEVEL = re.compile(
 _SYMBOLS = {"f": "frequency", "a": "amplitude", "x": "amplitude", "s": "amplitude", "\u03b3": "amplitude"}
 #: What joins a level to a quantity in a header, and says no more.
 _JOINTS = re.compile(r"[\[(]\s*(?:at|bei)?\s*[\])]|(?<!\w)(?:at|bei|für|for|à|a|@|:|,|;|=|-)(?!\w)")
-#: How amplitudes are counted, in the header of a long table.
-_COUNTED: dict[AmplitudeConvention | None, str] = {"peak-to-peak": " p-p", "zero-to-peak": " 0-p", None: ""}
 #: A level that may have thousands: 1,250.
 _OPEN = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 #: What parts the two roles that a corner names: "f [Hz] \ A [mm]".
@@ -76,17 +75,6 @@ class _Series(NamedTuple):
 
 #: A row of a wide table: its line and cells.
 _Row = tuple[int, list[str | float]]
-
-
-@dataclass(frozen=True, eq=False)
-class _LongTable(Sheet):
-    """The rows of a wide table as those of a long one, each with the line of the wide one it comes from (`numbers`)."""
-
-    numbers: Sequence[int] = ()
-
-    def lines(self, _: int) -> Iterator[Line]:
-        """All rows below the header."""
-        return (Line(number, cells) for number, cells in zip(self.numbers, self.content, strict=True))
 
 
 def as_long(
@@ -261,7 +249,7 @@ def _as_long_table(
                 problem, file=file, place=place, found=_described(series), expected=expected, hint=hint
             )
     headers = [
-        f"{role}{_COUNTED[convention]}{f' [{unit}]' if unit else ''}".replace("_", " ")
+        f"{role}{COUNTED[convention]}{f' [{unit}]' if unit else ''}".replace("_", " ")
         for role, unit, convention in (*down, *across, *quantities)
     ]
     numbers: list[int] = []
@@ -272,7 +260,7 @@ def _as_long_table(
         for points in zip(*(column.points for column in beside), strict=True):
             numbers.append(points[0][0])
             rows.append([points[0][1], level, *(cell for _, _, cell in points)])
-    sheet = _LongTable(source.sheet or "", rows, numbers=numbers)
+    sheet = Combined(source.sheet or "", rows, numbers=numbers)
     return sheet, Layout(delimiter, tuple(headers), min(numbers) - 1, ("",) * len(headers), None)
 
 

@@ -19,13 +19,11 @@ IN_LOOP = [
     ("no units", every("time [s],displacement [mm],force [N]", "time,displacement,force"), 'loop.csv, line 1, column "displacement": the displacement has no unit', 'write "displacement [mm]" in the header, or units = { displacement = "mm" } in the'),
     ("unknown unit", every("force [N]", "force [Nn]"), 'loop.csv, line 1, column "force [Nn]": unknown unit', "a unit such as mm, N, kN/mm, deg, Hz or %"),
     ("unit of another kind", every("force [N]", "force [mm]"), 'loop.csv, line 1, column "force [mm]": the unit does not fit', "a force, such as N"),
-    ("unknown columns", every("force [N]", "gadget [N]"), "loop.csv, line 1: there is no column for the force", 'name the column in the campaign: columns = { force = "gadget [N]" }'),
+    ("unknown columns", every("force [N]", "gadget"), "loop.csv, line 1: there is no column for the force", 'name the column in the campaign: columns = { force = "..." }'),
     ("two force columns", lambda lines: text([line + "," + (line.split(",")[2] if at == 0 else "1") for at, line in enumerate(lines)]), "loop.csv, line 1: more than one column could be the force", "give each a header of its own"),
-    ("a cell of text", row(7, "0.", "abc"), 'loop.csv, line 7, column "time [s]": this is no finite number', "a number such as 12.5"),
-    ("a cell that is empty", lambda lines: text([*lines[:5], ",".join([*lines[5].split(",")[:2], ""]), *lines[6:]]), 'loop.csv, line 6, column "force [N]": the cell is empty', "a number such as 12.5"),
-    ("a cell too many", lambda lines: text([*lines[:5], lines[5] + ",1", *lines[6:]]), "loop.csv, line 6: the row does not match the header", "part the columns by semicolons where numbers have a decimal comma"),
-    ("a cell too few", lambda lines: text([*lines[:5], lines[5].rpartition(",")[0], *lines[6:]]), "loop.csv, line 6: the row does not match the header", "3 cells"),
-    ("decimal commas in a comma file", every(".", ","), "loop.csv, line 2: the row does not match the header", "part the columns by semicolons where numbers have a decimal comma"),
+    ("cells of text", lambda lines: text([lines[0], *(line.replace("0.", "abc", 1) for line in lines[1:])]), 'loop.csv, line ', 'column "time [s]": this is no finite number', "a number such as 12.5", "more such rows"),
+    ("cells too many", lambda lines: text([lines[0], *(line + ",1" * (at % 2) for at, line in enumerate(lines[1:]))]), "the row does not match the header", "3 cells", "more such rows"),
+    ("decimal commas in a comma file", every(".", ","), "loop.csv, line 2: the row does not match the header", "separate the columns by semicolons if numbers have a decimal comma"),
     ("time stands still", column(0, "1.0"), 'loop.csv, line 3, column "time [s]": time does not increase', "a later time on every row"),
     ("no displacement", column(1, "0"), 'loop.csv, column "displacement [mm]": the displacement never changes', "a loop"),
     ("no force", column(2, "0"), 'loop.csv, column "force [N]": the force never changes', "a loop"),
@@ -40,7 +38,7 @@ IN_LOOP = [
     ("a time of 1e-300", lambda lines: "\n".join([lines[0], *(f"{number}e-300,{line.partition(',')[2]}" for number, line in enumerate(lines[1:]))]), 'loop.csv, column "time [s]": the record takes no time'),
     ("zeros far behind the head", lambda lines: ("\n".join(lines) + "\n").encode() * 40 + bytes(5), "loop.csv, line ", "this is not text", "found: byte 0x00"),
     ("zeros in a file of Latin letters", lambda lines: ("\n".join(lines) + "\n\xe4\n").encode("latin-1") * 40 + b"1,2\x00,3\n", "loop.csv, line ", "this is not text", "found: byte 0x00"),
-    ("a header that clears the screen", every("force [N]", "for\x1b[2Jce\u202e [N]"), "loop.csv, line 1: there is no column for the force", "for\\x1b[2Jce\\u202e [N]"),
+    ("a header that clears the screen", every("force [N]", "for\x1b[2Jce\u202e"), "loop.csv, line 1: there is no column for the force", "for\\x1b[2Jce\\u202e"),
 ]
 #: The same of the sweep.
 IN_SWEEP = [
@@ -64,7 +62,6 @@ IN_SWEEP = [
     ("unknown unit of temperature", added("temperature [degR]", "22"), 'sweep.csv, line 1, column "temperature [degR]": unknown unit', 'found: "degR"'),
     ("temperatures without unit", added("temperature", "-20", "22"), 'sweep.csv, line 1, column "temperature": the temperature has no unit', 'units = { temperature = "degC" }'),
     ("negative relative error", added("relative error [-]", "-0.01"), 'sweep.csv, line 2, column "relative error [-]": the relative error is not positive', "a number above zero"),
-    ("loss the other way throughout", lambda lines: text(lines).replace(",0.1", ",-0.1").replace(",-0.1,", ",0.1,"), 'sweep.csv, column "loss factor [-]": the loss counts the other way', "turn the sign of this column in the file"),
     ("wide table with a row less", wide("155,655,655\n", ""), "sweep.csv, line 2: the blocks of this wide table differ", "5 rows; loss factor of 2 amplitudes, 6 rows"),
     ("wide table of what?", wide("tan delta\n", ""), "sweep.csv, line 2: a block of this wide table does not say what it holds", "tan delta above each block"),
     ("wide table without units", wide("f [Hz],0.1 mm,0.2 mm", "f [Hz],A=0.1,A=0.2"), "sweep.csv, line 2: this wide table counts one thing in two ways", "one unit for each quantity"),
@@ -83,6 +80,5 @@ IN_RESONANCE = [
     ("base and mass swapped", row(1, "base acceleration [g],mass acceleration [g]", "mass acceleration [g],base acceleration [g]"), "shaker.csv: the ", "check "),
     ("the base stands still in a row", row(9, ",0.1000,", ",0.0000,"), 'shaker.csv, line 9, column "base acceleration [g]": the base acceleration is not positive', "a number above zero"),
     ("a row short", kept(11), "shaker.csv: too few rows", "at least 12"),
-    ("a cell that is empty", row(9, ",0.1000,", ",,"), 'shaker.csv, line 9, column "base acceleration [g]": the cell is empty', "a number such as"),
     ("the mass moves as the base does", lambda lines: column(2, "0.1000")(column(3, "-1")(lines).splitlines()), "shaker.csv: ", "check "),
 ]

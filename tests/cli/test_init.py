@@ -77,7 +77,7 @@ def test_what_only_the_user_knows_is_asked_for_and_written(typed: Run, tests: li
     loop = change(tests[0], time="", force="Kanal 3").rename(tests[0].with_name("first.csv"))
     known: list[str] = []
     asked = (
-        ("--column", "force=Kanal 3", "--column force="),
+        ("--column", "force=Kanal 3", '--column "force='),
         ("--unit", "force=N", '--unit "force='),
         ("--rate", "24 mm/min", "--rate"),
         ("--direction", "axial", "--direction axial"),

@@ -111,7 +111,7 @@ def test_a_visit_makes_a_campaign_that_fits(
         "from its name: amplitude 0.05 mm",
         'half of "Dynamic Displacement p-p (mm)", which counts peak-to-peak',
         "from the lines above the table: preload 0.9 kN, operator 3",
-        "Buchse 7.xlsx, sheet Info: the columns do not make a test",
+        "Buchse 7.xlsx, sheet Info: there is only one column",
         "Notizen.txt: there is only one column",
         "Bild.png: no table, by its ending",
         "alt.xlsx: ",

@@ -201,8 +201,8 @@ BAD_SWEEPS: list[tuple[str, dict[str, Any], list[str]]] = [
     (with_line(LOSS, 3, "15,0.1,1e-320,600"), {}, ["line 3", "no rig records so little"]),
     (
         PHASE.replace("0.1\n", "-6.5\n"),
-        {},
-        ["the loss counts the other way", '"phase [deg]"', "8 of 8", "turn the sign"],
+        {"phase_sign": 1},
+        ["the loss counts the other way", '"phase [deg]"', "8 of 8", "phase_sign = -1"],
     ),
     (SWEEP.replace("[-]", "[%]"), {}, ['"loss factor [%]"', "0.1 % at most", "0.5 %", '"[-]"']),
     (

@@ -239,6 +239,6 @@ def _csv(file: Path) -> pd.DataFrame:
 
 def _workbook(file: Path) -> pd.DataFrame:
     """Cells of the first sheet of a workbook as texts."""
-    first, *_ = read_sheets(view_bytes(file, ModelError, largest=_LARGEST), file, kind=ModelError)[1]
+    (first, _), *_ = read_sheets(view_bytes(file, ModelError, largest=_LARGEST), file, kind=ModelError)
     header, *rows = first.content
     return pd.DataFrame([[str(cell) for cell in row] for row in rows if row], columns=[str(cell) for cell in header])

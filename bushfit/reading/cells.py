@@ -1,0 +1,399 @@
+"""Cells of a table: rows of data, notation of numbers, columns that assign rows to tests, and errors with a place."""
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bushfit.errors import MeasurementError
+from bushfit.reading.headers import ROW_COLUMNS, WORDS, Column, Vocabulary, plain
+from bushfit.reading.instruments import word_for_part
+from bushfit.reading.layout import FileFormat, Layout, is_row, is_units_row
+from bushfit.reading.measurement import Floats
+from bushfit.reading.names import named_direction
+from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, is_like_number, weigh
+from bushfit.reading.runs import rows_alike
+from bushfit.reading.source import Channels, RowSource, Sheet, Text, holds_number, rows
+from bushfit.reading.times import clock
+
+#: Rows per value in the mean of a column that assigns rows to tests; chosen: a column that counts its rows has one.
+_FEWEST_ROWS = 3
+#: Rows that are examined first; chosen: a long record need not be read whole.
+_FIRST = 1000
+#: Rows that are left out and look like data, per row of data, at most; chosen: more make the meaning doubtful.
+_MOST_LEFT_OUT = 0.1
+#: Lines that a note lists.
+_MOST_LISTED = 4
+#: Meaning of columns that assign rows to tests.
+_LABELS = Vocabulary(ROW_COLUMNS, {})
+_SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
+#: Texts for a missing value.
+_MISSING = frozenset(
+    ("", "nan", "#n/a", "#na", "n/a", "na", "-", "--", "---", "null", "none", "#value!", "#div/0!", "#num!")
+)
+
+
+class Rows(NamedTuple):
+    """Selection of the rows of a file that make a test.
+
+    Args:
+        direction: in the column that states directions, if there is one.
+        specimen_number: in the column that states it, if there is one.
+        texts: text in other columns, by header.
+        shared: True if the file is listed more than once, so that a column has to select the rows.
+    """
+
+    direction: str | None = None
+    specimen_number: str | None = None
+    texts: Mapping[str, str] = {}
+    shared: bool = False
+
+
+def same_text(text: str, other: str) -> bool:
+    """Return True if two texts of a column are equal but for case and number signs: 17 and #17."""
+    return text.strip(" #").casefold() == other.strip(" #").casefold()
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Header and rows of a table as in its file.
+
+    Args:
+        file: path.
+        source: its lines.
+        layout: header, units row and delimiter.
+        stated: format as the user states it.
+        roles: recognised columns by role.
+        selected: positions of the rows that make the test, among all lines below the header; None for all.
+        needed: indices of columns that hold a number in every row of data.
+        clocks: indices of columns that hold times as texts.
+    """
+
+    file: Path
+    source: RowSource
+    layout: Layout
+    stated: FileFormat
+    roles: Mapping[str, Column]
+    selected: frozenset[int] | None = field(default=None, kw_only=True)
+    needed: frozenset[int] = field(default=frozenset(), kw_only=True)
+    clocks: frozenset[int] = field(default=frozenset(), kw_only=True)
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """Cells of the header."""
+        return self.layout.headers
+
+    def rows(self) -> Iterator[tuple[int, Sequence[str | float]]]:
+        """Line number and cells of each row of data; rows without data are left out.
+
+        Raises:
+            MeasurementError: a line or a quoted cell is far too long.
+        """
+        for position, (line, cells, fault) in enumerate(self._all_rows()):
+            if fault is None and (self.selected is None or position in self.selected):
+                yield line, cells
+
+    def _all_rows(self) -> Iterator[tuple[int, Sequence[str | float], str | None]]:
+        """Line number, cells, and fault of each row; a row of data has no fault."""
+        width = len(self.headers)
+        try:
+            for line, cells in rows(self.source, self.layout):
+                if any(cell != "" for cell in cells):
+                    padded = cells if len(cells) >= width else [*cells, *[""] * (width - len(cells))]
+                    yield line, padded, self._fault(cells, padded)
+        except csv.Error as error:
+            raise self.error("the table cannot be read", found=str(error)) from error
+
+    def _fault(self, cells: Sequence[str | float], padded: Sequence[str | float]) -> str | None:
+        """Reason why a row is no data; None if it is data."""
+        first = next((cell for cell in cells if cell != ""), "")
+        if isinstance(first, str) and plain(first) in _SUMMARIES and plain(first):
+            return "summary"
+        if len(cells) > len(self.headers) and any(cell != "" for cell in cells[len(self.headers) :]):
+            return "width" if is_row([str(cell) for cell in cells]) else "text"
+        if len(cells) < len(self.headers) and self.layout.delimiter == " " and is_row([str(cell) for cell in cells]):
+            return "width"
+        for index in self.needed:
+            cell = padded[index]
+            if index in self.clocks:
+                if clock(str(cell)) is None:
+                    return "text"
+            elif isinstance(cell, str) and not is_like_number(cell):
+                texts = [str(padded[other]).lower() for other in self.needed]
+                if all(text in _MISSING for text in texts) or not any(is_like_number(str(other)) for other in cells):
+                    return "text"
+                return "missing" if cell.lower() in _MISSING and cell else "cell"
+        return None
+
+    def left_out(self) -> Iterator[str]:
+        """Sentence on the rows that are left out because they hold no data of the test.
+
+        Raises:
+            MeasurementError: so many of these rows look like data that their meaning is in doubt.
+        """
+        faults: dict[int, tuple[str, Sequence[str | float]]] = {}
+        total, header = 0, [plain(cell) for cell in self.headers]
+        for line, cells, fault in self._all_rows():
+            total += fault is None
+            texts = [str(cell) for cell in cells]
+            repeated = fault and ([plain(text) for text in texts[: len(header)]] == header or is_units_row(texts))
+            if fault and not repeated:
+                faults[line] = fault, cells
+        doubtful = [line for line, (fault, _) in faults.items() if fault in ("cell", "width")]
+        if len(doubtful) > _MOST_LEFT_OUT * total:
+            raise self.bad_row(doubtful[0], faults[doubtful[0]][1], len(doubtful))
+        if faults:
+            listed = [
+                f"{'row' if isinstance(self.source, Sheet) else 'line'} {line} "
+                f"({', '.join(str(cell) for cell in cells if cell != '')[:40]})"
+                for line, (_, cells) in islice(faults.items(), _MOST_LISTED)
+            ]
+            more = ", ..." if len(faults) > _MOST_LISTED else ""
+            yield f"{len(faults)} row{'s' * (len(faults) > 1)} left out, without data: {', '.join(listed)}{more}"
+
+    def bad_row(
+        self, line: int, cells: Sequence[str | float], count: int = 1, column: Column | None = None
+    ) -> MeasurementError:
+        """Error for a row that does not fit the header, or has a cell that is no number.
+
+        Args:
+            line: line number.
+            cells: its cells.
+            count: number of such rows.
+            column: with the bad cell; default the first needed one without a number.
+        """
+        width, also = len(self.headers), f", and {count - 1} more such rows" if count > 1 else ""
+        needed = (column for column in self.roles.values() if column.index in self.needed)
+        column = column or next((column for column in needed if not holds_number(cells, column.index)), None)
+        if column is None or len(cells) > width:
+            commas = self.layout.delimiter == "," and not any("." in str(cell) for cell in cells)
+            return self.error(
+                "the row does not match the header",
+                line=line,
+                found=f"{len(cells)} cell{'s' * (len(cells) != 1)}{also}",
+                expected=f"{width} cells",
+                hint="separate the columns by semicolons if numbers have a decimal comma" if commas else None,
+            )
+        cell = cells[column.index]
+        if cell == "" and isinstance(self.source, Sheet) and self.source.lacks_values():
+            hint = "open it in a spreadsheet program and save it again"
+            return self.error("the workbook has formulas whose values were not saved", hint=hint)
+        return self.error(
+            "the cell is empty" if cell == "" else "this is no finite number, or one beyond every rig",
+            line=line,
+            column=column,
+            found=f'"{cell}"{also}',
+            expected=f"a number such as 12{self.numerals.decimal}5",
+        )
+
+    @cached_property
+    def row_labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
+        """Index and texts, (n,), of the columns that state direction, specimen_number and run, by these keys."""
+        labels: dict[str, tuple[int, Sequence[str]]] = {}
+        for index, header in enumerate(self.headers):
+            heading = _LABELS.heading(header) if header else None
+            if heading is None or heading.role in labels or (header == "block" and "displacement" not in self.roles):
+                continue
+            if texts := self._texts_of_tests(index):
+                if heading.role == "direction":
+                    known = {text: named_direction([text], short=True) for text in set(texts)}
+                    texts = [str(known[text] or text) for text in texts] if any(known.values()) else []
+                labels |= {heading.role: (index, texts)} if texts else {}
+        return labels
+
+    def taking(self, wanted: Rows) -> Self:
+        """Select the rows of one test.
+
+        Args:
+            wanted: texts in the columns that assign rows to tests.
+
+        Returns:
+            The table of these rows.
+
+        Raises:
+            MeasurementError: there is no such row or column, the rows belong to several parts, or no column selects
+                the tests of a shared file.
+        """
+        stated = {"direction": wanted.direction, "specimen_number": wanted.specimen_number}
+        chosen = [(*self.row_labels[key], text) for key, text in stated.items() if text and key in self.row_labels]
+        for header, text in wanted.texts.items():
+            if header not in self.headers:
+                raise self.header_error(f'there is no column "{header}"', expected="headers, as keys of rows")
+            chosen.append((self.headers.index(header), self.texts(self.headers.index(header)), text))
+        if wanted.shared and not chosen:
+            expected = "each file once, or a column that selects the rows of each test"
+            raise self.header_error("a file is listed twice", expected=expected)
+        column, parts = self.row_labels.get("specimen_number", (0, ()))
+        total = len(parts or (chosen[0][1] if chosen else ()))
+        kept = [n for n in range(total) if all(same_text(texts[n], text) for _, texts, text in chosen)]
+        several = len({parts[n] for n in kept}) > 1 if parts else False
+        if several or (chosen and not kept):
+            shown = [(column, parts, "one part")] if several else chosen
+            raise self.header_error(
+                "this file holds tests of several parts" if several else "no row is of this test",
+                found="; ".join(
+                    f'{", ".join(dict.fromkeys(texts))} in column "{self.headers[index]}"' for index, texts, _ in shown
+                ),
+                expected=" and ".join(text for *_, text in shown),
+                hint='state one of them, as specimen_number = "..."; bushfit init lists all tests of a file',
+            )
+        if not chosen or len(kept) == total:
+            return self
+        positions = [n for n, (*_, fault) in enumerate(self._all_rows()) if fault is None]
+        return replace(self, selected=frozenset(positions[n] for n in kept))
+
+    def not_understood(self, selection: NDArray[np.intp] | None = None, *settled: Floats) -> Iterator[str]:
+        """Sentences on columns that may separate tests and have no known meaning, and on rows left out.
+
+        Args:
+            selection: rows of a sweep, (n,); None for all.
+            settled: frequency and level of these rows, (n,). A number that depends on both is a measured one; a text
+                that depends on one is its name. The numbers of a loop are channels.
+        """
+        known = {column.index for column in self.roles.values()}
+        known |= {index for key, (index, texts) in self.row_labels.items() if key != "direction" or len({*texts}) == 1}
+        known |= {index for index, header in enumerate(self.headers) if header == "block"}
+        for index in (index for index in range(len(self.headers)) if index not in known):
+            is_number, header = self.holds_numbers(index), self.headers[index]
+            if (is_number and not settled) or not (texts := self._texts_of_tests(index)):
+                continue
+            chosen = np.array(texts)[slice(None) if selection is None else selection]
+            values, number, counts = np.unique(chosen, return_inverse=True, return_counts=True)
+            depends_on = [settled] if is_number else [(quantity,) for quantity in settled]
+            explained = any(all(np.ptp(number[rows]) == 0 for rows in rows_alike(*keys)) for keys in depends_on)
+            if values.size > 1 and not explained and not (is_number and counts.min() < _FEWEST_ROWS):
+                listed = ", ".join(values[:4]) + ", ..." * (values.size > 4)
+                yield (
+                    f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all '
+                    f'rows count as one test; rows = {{ "{header}" = "{values[0]}" }} in the campaign takes those alone'
+                )
+
+    def holds_numbers(self, index: int) -> bool:
+        """Return True if a column begins with a number."""
+        return holds_number(next(self.rows(), (0, ()))[1], index)
+
+    def texts(self, index: int, most: int | None = None) -> list[str]:
+        """Texts of a column, (n,), or of its first `most` rows; an empty cell, as merged ones are, repeats the last."""
+        texts, last = [], ""
+        for _, cells in islice(self.rows(), most):
+            cell = cells[index] if index < len(cells) else ""
+            last = (cell.strip(" #") if isinstance(cell, str) else f"{cell:.12g}") or last
+            texts.append(last)
+        return texts
+
+    def _texts_of_tests(self, index: int) -> list[str]:
+        """Texts of a column without a role if it may separate tests; else an empty list."""
+        if self.layout.written or not self.headers[index] or index in {column.index for column in self.roles.values()}:
+            return []
+        first = self.texts(index, _FIRST)
+        return self.texts(index) if any(first) and _FEWEST_ROWS * len(set(first)) <= len(first) else []
+
+    def error(
+        self,
+        problem: str,
+        *,
+        line: int | None = None,
+        column: Column | None = None,
+        kind: type[MeasurementError] = MeasurementError,
+        **details: Any,
+    ) -> MeasurementError:
+        """Create an error with its place.
+
+        Args:
+            problem: in one clause.
+            line: line number.
+            column: column of the cell.
+            kind: class of the error.
+            details: found, expected and hint.
+        """
+        return kind(problem, file=self.file, place=self.place(line, column), **details)
+
+    def header_error(self, problem: str, found: str | None = None, **details: Any) -> MeasurementError:
+        """Create an error in the header.
+
+        Args:
+            problem: in one clause.
+            found: default the cells of the header, if the file is understood as a table of numbers.
+            details: further arguments of `error`.
+        """
+        if found is None and (
+            len(self.roles) > 1
+            or self.layout.written
+            or any(is_row([str(cell) for cell in cells]) for _, cells in islice(self.rows(), _MOST_LISTED))
+        ):
+            found = ", ".join(self.headers)
+        found = found or f"{len(self.headers)} cell{'s' * (len(self.headers) != 1)}, which name no columns of a test"
+        return self.error(problem, line=self.layout.header_line, found=found, **details)
+
+    def place(self, line: int | None, column: Column | None) -> str | None:
+        """Location in the file in words: sheet, line and column as far as they are given."""
+        source = self.source
+        parts = [
+            f'{word_for_part(self.file)} "{source.sheet}"' if source.sheet else None,
+            f"{'row' if source.sheet or isinstance(source, Channels) else 'line'} {line}" if line else None,
+            f'column "{column.header}"' if column else None,
+        ]
+        return ", ".join(part for part in parts if part) or None
+
+    @cached_property
+    def numerals(self) -> Numerals:
+        """Notation of the numbers in all columns with a role.
+
+        Raises:
+            MeasurementError: the numbers have two notations, or can be read in two ways.
+        """
+        layout, source = self.layout, self.source
+        notations = self.possible_numerals()
+        if layout.delimiter == "," and isinstance(source, Text) and not source.may_have_comma(layout):
+            notations = tuple(way for way in notations if "," not in (way.decimal, way.thousands)) or notations
+        evidence = weigh(self.number_texts(), notations)
+        columns = {column.index: column for column in self.roles.values()}
+        may_group = isinstance(source, Sheet) or source.may_group(layout, evidence.ways[0].decimal)
+        if evidence.contrary is None and may_group:
+            evidence = weigh(self.number_texts(), notations, all_cells=True)
+        if evidence.contrary:
+            (line, index), text = evidence.contrary
+            raise self.error(
+                "this number has another format than the others",
+                line=line,
+                column=columns[index],
+                found=f'"{text}"',
+                expected=f"numbers with a decimal {'comma' if evidence.ways[0].decimal == ',' else 'point'}",
+                hint="correct this cell; or, if all numbers of the file are written so, state "
+                'decimal = "..." and thousands = "..." in the campaign',
+            )
+        if evidence.unclear:
+            (line, index), text = evidence.unclear
+            readings = dict.fromkeys(way.value(text) or 0.0 for way in evidence.ways)
+            raise self.error(
+                "this number can be read in two ways",
+                line=line,
+                column=columns[index],
+                found=f'"{text}", and no number in the file that settles it',
+                expected=" or ".join(f"{reading:.15g}" for reading in readings),
+                hint='state decimal = "." or decimal = "," in the campaign',
+            )
+        return evidence.ways[0]
+
+    def possible_numerals(self) -> tuple[Numerals, ...]:
+        """Notations of numbers that the user leaves possible."""
+        decimal, thousands = self.stated.decimal, self.stated.thousands
+        fitting = (way for way in ALL_NUMERALS if decimal in (None, way.decimal))
+        notations = tuple(way for way in fitting if thousands in (None, way.thousands or "none"))
+        if not notations:
+            raise self.error("decimal mark and thousands separator are the same", found=decimal, expected="two signs")
+        return notations
+
+    def number_texts(self) -> Iterator[tuple[Place, str]]:
+        """Place and text of the cells of columns with a role, without those that the file stores as numbers."""
+        indices = {column.index for column in self.roles.values()} - self.source.numeric - self.clocks
+        for line, cells in self.rows() if indices else ():
+            for index in indices:
+                if index < len(cells) and isinstance(cell := cells[index], str):
+                    yield (line, index), cell

@@ -1,0 +1,104 @@
+"""Time of each row: clocks, dates, day numbers of spreadsheets, and rounded stamps."""
+
+import re
+from datetime import datetime, timedelta
+
+import numpy as np
+
+from bushfit.reading.measurement import Floats
+
+DAY = 86_400.0
+#: Clock: 20:07:10.100, 07:10,5, 8:07:10 PM; a duration may follow "1 day, ".
+_CLOCK = re.compile(
+    r"(?:(?P<days>\d+) days?,?\s+)?(?:(?P<h>\d{1,4}):)?(?P<m>\d{1,4}):(?P<s>\d{1,2}(?:[.,:]\d+)?)"
+    r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
+)
+#: Date before a clock: 2026-11-26T, 26.11.2026, 11/26/2026.
+_DATE = re.compile(r"(?P<a>\d{1,4})[-./](?P<b>\d{1,2})[-./](?P<c>\d{1,4})(?:[T\s,]+|$)")
+#: Time zone after a clock.
+_ZONE = re.compile(r"\s*(?:Z|UTC|GMT|[+-]\d\d:?\d\d)$")
+#: Day numbers of spreadsheets from 1954 to 2119; chosen: all dates of tests.
+_DAY_NUMBERS = (20_000.0, 80_000.0)
+#: Mean step of day numbers [d]; chosen: rows follow each other within 9 s.
+_LARGEST_DAY_STEP = 1e-4
+
+
+def clock(text: str) -> float | None:
+    """Seconds of a clock, or of a date and clock since 1970.
+
+    Args:
+        text: such as "20:07:10.100", "8:07:10 PM" or "2026-11-26T20:07:10". In 07:10:100 the last part is milliseconds.
+
+    Returns:
+        Time [s]; None if the text is no clock. Days and months that are ambiguous are read as day and month; only the
+        differences between rows are used.
+    """
+    text = _ZONE.sub("", text.strip())
+    date, days = _DATE.match(text), 0.0
+    if date:
+        first, second, third = (int(part) for part in date.groups())
+        year, month, day = (first, second, third) if first > 31 else (third, second, first)
+        month, day = (day, month) if month > 12 else (month, day)
+        try:
+            days = (datetime(year if year > 99 else 2000 + year, month, day) - datetime(1970, 1, 1)) / timedelta(days=1)
+        except ValueError:
+            return None
+        text = text[date.end() :]
+        if not text:
+            return None
+    match = _CLOCK.fullmatch(text)
+    if match is None:
+        return None
+    hours, half = int(match["h"] or 0), (match["half"] or "").lower()
+    if half:
+        hours = hours % 12 + 12 * half.startswith("p")
+    whole, _, rest = re.sub("[,:]", ".", match["s"]).partition(".")
+    days += int(match["days"] or 0)
+    return DAY * days + 3600.0 * hours + 60.0 * int(match["m"]) + int(whole) + (float(f"0.{rest}") if rest else 0.0)
+
+
+def are_day_numbers(values: Floats) -> bool:
+    """Return True if numbers are dates of a spreadsheet, in days.
+
+    Args:
+        values: numbers as the file has them, (n,).
+
+    Returns:
+        True if all lie between 1954 and 2119 and differ by seconds. As seconds, the same numbers would be a record
+        with steps below 0.1 ms that begins hours after zero.
+    """
+    low, high = _DAY_NUMBERS
+    within = values.size > 1 and low <= float(values.min()) and float(values.max()) <= high
+    return within and 0.0 < float(np.ptp(values)) < _LARGEST_DAY_STEP * values.size
+
+
+def without_midnight(seconds: Floats) -> Floats:
+    """Clock times [s], (n,), of which those after midnight count on."""
+    return seconds + DAY * np.cumsum(np.append(0.0, np.diff(seconds) < -0.5 * DAY))
+
+
+def spread(time: Floats) -> Floats | None:
+    """Time of evenly sampled rows whose recorded time was rounded, so that it repeats.
+
+    Args:
+        time: recorded time [s], (n,).
+
+    Returns:
+        Even times, (n,), all within one step of the recorded ones; None if time goes back, or if no even sampling
+        rounds to these times.
+
+    Notes:
+        With q the smallest step between different times, an even clock t0 + i dt is rounded to within q. The line
+        through the first rows of each value gives t0 and dt.
+    """
+    steps = np.diff(time)
+    if steps.min(initial=1.0) < 0.0 or not np.any(steps > 0.0):
+        return None
+    first = np.append(0, np.flatnonzero(steps > 0.0) + 1)
+    if first.size < 3:
+        return None
+    quantum = float(steps[steps > 0.0].min())
+    row = np.arange(time.size)
+    slope, start = np.polyfit(first[1:], time[first[1:]], 1)
+    even = start + slope * row
+    return even - even[0] + time[0] if np.all(np.abs(even - time) <= 1.01 * quantum) else None

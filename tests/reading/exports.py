@@ -1,0 +1,281 @@
+"""Files as laboratories and test machines write them, with the test in each or the question that it raises."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+FREQUENCY = np.tile([5.0, 10.0, 20.0, 40.0, 80.0], 2)
+AMPLITUDE = np.repeat([0.1, 0.5], 5)
+#: Stiffness of the sweep [N/mm], as all files state it in full.
+STIFFNESS = (1500.0 + 2.0 * FREQUENCY - 400.0 * AMPLITUDE) * (1.0 + 1j * (0.1 + FREQUENCY / 1000.0))
+ETA = STIFFNESS.imag / STIFFNESS.real
+PHASE = np.degrees(np.angle(STIFFNESS))
+DAMPING = STIFFNESS.imag / (2.0 * np.pi * FREQUENCY)
+#: Three cycles of 1 mm at 0.1 Hz.
+TIME = np.arange(600) * 0.05
+DISPLACEMENT = np.sin(2.0 * np.pi * 0.1 * TIME)
+FORCE = 1000.0 * np.sin(2.0 * np.pi * 0.1 * TIME + 0.1)
+
+
+@dataclass(frozen=True)
+class Export:
+    """A file and what `inspect` makes of it.
+
+    Args:
+        content: of the file.
+        kind: of the test; None if the file raises a question.
+        words: of the question, or of the notes.
+        stated: options that the file needs, as keys of a campaign.
+        name: of the file.
+        reference: columns of the test in SI; default those of this module.
+    """
+
+    content: str | bytes
+    kind: str | None = "sweep"
+    words: Sequence[str] = ()
+    stated: dict[str, Any] = field(default_factory=dict)
+    name: str = "export.txt"
+    reference: dict[str, np.ndarray] | None = None
+
+
+def table(headers: Sequence[str], *columns: Any, mark: str = "\t", form: str = "{:.9g}") -> list[str]:
+    """Lines of a table; a column is an array, or a list of texts."""
+    texts = [[cell if isinstance(cell, str) else form.format(cell) for cell in column] for column in columns]
+    return [mark.join(headers), *(mark.join(row) for row in zip(*texts, strict=True))]
+
+
+def sweep(headers: str, *columns: Any, mark: str = "\t", **other: Any) -> str:
+    """A sweep whose headers are separated by "|"."""
+    return "\n".join(table(headers.split("|"), *columns, mark=mark, **other)) + "\n"
+
+
+F, A, K = FREQUENCY, AMPLITUDE, np.abs(STIFFNESS)
+USUAL = "Frequency [Hz]|Amplitude [mm]|K* [N/mm]|"
+LOOP = "time [s],displacement [mm],force [N]".replace(",", "\t")
+
+
+def loop(headers: str = "time [s]|displacement [mm]|force [N]", *columns: Any, **other: Any) -> str:
+    """A loop."""
+    return sweep(headers, *(columns or (TIME, DISPLACEMENT, FORCE)), **other)
+
+
+def blocks(title: Callable[[float], str], headers: str, mark: str = "\t", end: Sequence[str] = ()) -> str:
+    """A block of a sweep for each amplitude, below its title."""
+    lines: list[str] = []
+    for amplitude in (0.1, 0.5):
+        rows = amplitude == AMPLITUDE
+        lines += [title(amplitude), *table(headers.split("|"), F[rows], K[rows], ETA[rows], mark=mark), *end]
+    return "\n".join(lines) + "\n"
+
+
+def clock(seconds: float, form: str) -> str:
+    """A time of day, from 20:07:10 on."""
+    total = 72_430.0 + seconds
+    hours, minutes = int(total // 3600), int(total % 3600 // 60)
+    return form.format(h=hours, m=minutes, s=total % 60, h12=(hours - 1) % 12 + 1)
+
+
+MTS793 = "\n".join(
+    "\n".join(
+        [
+            f"Data Acquisition: Timed {n}\tTime: {20.0 + n:.3f}\tSec\t11/26/2026 8:07:1{n} PM", "Station Name: elastomer.cfg", "",
+            *table(["Time", "Axial Displacement", "Axial Force"], ["Sec", *(f"{t:.3f}" for t in TIME)],
+                   ["mm", *(f"{x:.6f}" for x in DISPLACEMENT)], ["N", *(f"{y:.4f}" for y in FORCE)]), "",
+        ]
+    )
+    for n in range(3)
+)  # fmt: skip
+LVM = "\r\n".join(
+    [
+        "LabVIEW Measurement\t", "Writer_Version\t2", "Reader_Version\t2", "Separator\tTab", "Decimal_Separator\t.",
+        "Multi_Headings\tYes", "X_Columns\tOne", "Time_Pref\tRelative", "Operator\tAB", "Date\t2026/11/26",
+        "Time\t20:07:10.1234567890123", "***End_of_Header***\t", "\t", "Channels\t2\t", "Samples\t600\t600\t",
+        "Date\t2026/11/26\t2026/11/26\t", "Time\t20:07:10\t20:07:10\t", "Y_Unit_Label\tmm\tN\t",
+        "X_Dimension\tTime\tTime\t", "X0\t0.0000000000000000E+0\t0.0000000000000000E+0\t", "Delta_X\t0.050000\t0.050000\t",
+        "***End_of_Header***\t\t\t", "X_Value\tLVDT\tLoad Cell\tComment",
+        *(f"{t:.6f}\t{x:.6f}\t{y:.6f}" for t, x, y in zip(TIME, DISPLACEMENT, FORCE, strict=True)), "",
+    ]
+)  # fmt: skip
+LVM_NO_X = LVM.replace("X_Columns\tOne", "X_Columns\tNo")
+LVM_NO_X = "\r\n".join(
+    "\t" + line.partition("\t")[2] if line[:1].isdigit() else line for line in LVM_NO_X.split("\r\n")
+)
+G = STIFFNESS / 200.0  # [MPa] at strains of 1 and 5 %
+RHEO = "\n".join(
+    [
+        "Project:\tEPDM", "Test:\tAmplitude sweep", "", "Interval and data points:\t1\t10",
+        "Interval data:\tPoint No.\tAngular Frequency\tShear Strain\tStorage Modulus\tLoss Modulus\tSample\tWaveform Strain\tWaveform Stress",
+        "\t\t[rad/s]\t[%]\t[Pa]\t[Pa]\t\t[%]\t[Pa]",
+        *(
+            line
+            for n in range(10)
+            for line in [
+                f"\t{n + 1}\t{2 * np.pi * F[n]:.9g}\t{10 * A[n]:.9g}\t{1e6 * G[n].real:.9g}\t{1e6 * G[n].imag:.9g}\t\t\t",
+                *(f"\t\t\t\t\t\t{i}\t{np.sin(i):.4f}\t{1e3 * np.sin(i + 0.1):.4f}" for i in range(8)),
+            ]
+        ),
+    ]
+)  # fmt: skip
+MODULUS = {"frequency": F, "amplitude": A / 10.0, "stiffness": 1e6 * G}
+ONE_HZ = {"frequency": 0 * F + 1.0, "amplitude": A / 10.0, "stiffness": 1e6 * G}
+T10 = (
+    "Frequency\tDynamic Displacement p-p\tK*\tTan Delta\tPhase\tC\tMean Load\n"
+    "Hz\tmm\tN/mm\t\tdeg\tN-s/mm\tN\n" + "\n".join(table([], F, 2 * A, K, ETA, PHASE, DAMPING, 0 * F + 500.0)[1:])
+)  # fmt: skip
+EXCEL_DAYS = TIME / 86_400.0 + 46_352.5
+RAW = [f"{x:.4f}\t{y:.3f}" for x, y in zip(DISPLACEMENT, FORCE, strict=True)]
+
+EXPORTS: dict[str, Export] = {
+    # sweeps that have other columns too
+    "displacement and force of the points": Export(
+        sweep("Frequency [Hz]|Displacement [mm]|Force [N]|K* [N/mm]|Loss angle [deg]", F, A, K * A, K, PHASE)
+    ),
+    "mean position and load": Export(
+        sweep("Frequency (Hz)|Amplitude (mm)|Position (mm)|Load (N)|K* (N/mm)|Phase (deg)", F, A, 0 * F + 3.2, 0 * F + 512, K, PHASE)
+    ),
+    "position that is no amplitude": Export(
+        sweep("Frequency [Hz]|Displacement [mm]|Force [N]|K* [N/mm]|Loss angle [deg]", F, 0 * F + 3.1, 0 * F + 512.3, K, PHASE),
+        None, ["amplitude"],
+    ),
+    "strain and stress of the points": Export(
+        sweep("Time [s]|Shear strain [%]|Shear stress [kPa]|G' [MPa]|G'' [MPa]", 12 * np.arange(10), 10 * A, A * 100 * np.abs(G), G.real, G.imag),
+        stated={"at_frequency": "1 Hz"}, reference=ONE_HZ,
+    ),
+    "RheoCompass with waveforms": Export(RHEO, words=["rows left out"], reference=MODULUS),
+    # hints that misled
+    "omega without unit": Export(sweep("omega|Amplitude [mm]|K* [N/mm]|tan delta", 2 * np.pi * F, A, K, ETA), None, ["rad/s"]),
+    "omega with the unit of the hint": Export(
+        sweep("omega|Amplitude [mm]|K* [N/mm]|tan delta", 2 * np.pi * F, A, K, ETA), stated={"units": {"frequency": "rad/s"}}
+    ),
+    "log10 f": Export(sweep("log10 f [Hz]|Amplitude [mm]|K* [N/mm]|tan delta", np.log10(F), A, K, ETA)),
+    "log f": Export(sweep("log f [Hz]|Amplitude [mm]|K* [N/mm]|tan delta", np.log10(F), A, K, ETA), None, ["log10(Hz)", "ln(Hz)"]),
+    "log f, as the hint says": Export(
+        sweep("log f [Hz]|Amplitude [mm]|K* [N/mm]|tan delta", np.log10(F), A, K, ETA), stated={"units": {"frequency": "log10(Hz)"}}
+    ),
+    **{
+        header: Export(sweep(f"Frequency [Hz]|{header}|K* [N/mm]|tan delta", F, factor * A, K, ETA))
+        for header, factor in (
+            ("Amplitude RMS [mm]", 0.5**0.5), ("Amplitude eff. [mm]", 0.5**0.5), ("Amp [mm rms]", 0.5**0.5),
+            ("AmpPkPk(mm)", 2.0), ("DA [mm]", 2.0), ("Amplitude (2a) [mm]", 2.0), ("Amplitude max-min [mm]", 2.0),
+            ("Amplitude total [mm]", 2.0), ("Double amplitude (mm)", 2.0), ("DispPkPk [mm]", 2.0),
+            ("Amplitude [±mm]", 1.0), ("Amplitude (mm pk)", 1.0), ("Amplitude peak [mm]", 1.0), ("±Displacement [mm]", 1.0),
+        )
+    },
+    "amplitudes stated as rms": Export(
+        sweep("Frequency [Hz]|Amplitude [mm]|K* [N/mm]|tan delta", F, 0.5**0.5 * A, K, ETA), stated={"amplitude": "rms"}
+    ),
+    "damping": Export(sweep(USUAL + "Damping [-]", F, A, K, ETA), None, ["loss_factor", "damping_ratio"]),
+    "damping is a loss factor": Export(
+        sweep(USUAL + "Damping [-]", F, A, K, ETA), stated={"columns": {"loss_factor": "Damping [-]"}}
+    ),
+    "damping is a damping ratio": Export(
+        sweep(USUAL + "Damping [-]", F, A, K, ETA / 2), stated={"columns": {"damping_ratio": "Damping [-]"}}
+    ),
+    "damping ratio": Export(sweep(USUAL + "Damping ratio [%]", F, A, K, 50 * ETA)),
+    # damping coefficients
+    "damping coefficient beside a phase": Export(
+        sweep("Freq (Hz)|Amplitude (mm)|K* (N/mm)|Phase (deg)|Damping (N-s/mm)", F, A, K, PHASE, DAMPING)
+    ),
+    "damping coefficient alone": Export(sweep("Freq [Hz]|Amplitude [mm]|K' [N/mm]|C [N*s/mm]", F, A, STIFFNESS.real, DAMPING)),
+    "magnitude and damping coefficient": Export(sweep("Freq [Hz]|Amplitude [mm]|K* [N/mm]|C (Ns/mm)", F, A, K, DAMPING)),
+    "MTS elastomer": Export(T10),
+    # rows that are no data, and blocks
+    "blocks with amplitudes": Export(blocks("Amplitude: {} mm".format, "f [Hz]|K* [N/mm]|tan delta")),
+    "blocks with amplitudes and one header": Export(
+        "f [Hz]\tK* [N/mm]\ttan delta\n" + "\n".join(
+            line for line in blocks("Amplitude: {} mm".format, "f [Hz]|K* [N/mm]|tan delta").splitlines() if line[0] != "f"
+        ), words=[],
+    ),
+    "blocks, means, and an end": Export(
+        blocks("Amplitude:\t{}\tmm".format, "f [Hz]|K* [N/mm]|tan delta", end=["Mean\t1450\t0.12", "Std\t10\t0.01", "---", "End of test"]),
+        words=["rows left out", "Mean"],
+    ),
+    "means": Export(sweep(USUAL + "tan delta", F, A, K, ETA) + "Mean\t0.3\t1400\t0.13\nStd Dev\t0.1\t20\t0.01\n", words=["2 rows left out"]),
+    "missing values": Export(
+        sweep(USUAL + "tan delta", F, A, K, ETA) + "90\t0.1\tNaN\t0.1\n100\t0.1\t#N/A\t0.1\n", words=["2 rows left out"]
+    ),
+    "MTS793, nine acquisitions": Export(MTS793, "loop", name="loop.dat"),
+    "end of a loop": Export(loop() + "End of test\n---\n\tNaN\tNaN\n", "loop", ["rows left out"]),
+    # sign and range of phases
+    **{
+        f"phases {what}": Export(sweep(USUAL + "Phase [deg]", F, A, K, phase), words=[word])
+        for what, phase, word in (
+            ("negative", -PHASE, "phase_sign"), ("near -174", PHASE - 180, "force_sign"), ("near 174", 180 - PHASE, "force_sign"),
+            ("near 354", 360 - PHASE, "wrapped"), ("near 366", 360 + PHASE, "wrapped"), ("near 186", 180 + PHASE, "force_sign"),
+        )
+    },
+    "phases as stated": Export(sweep(USUAL + "Phase [deg]", F, A, K, -PHASE), stated={"phase_sign": -1}),
+    "loss factors negative": Export(sweep(USUAL + "tan delta", F, A, K, -ETA), words=["phase_sign"]),
+    "loss stiffness negative": Export(sweep("f [Hz]|A [mm]|K' [N/mm]|K'' [N/mm]", F, A, STIFFNESS.real, -STIFFNESS.imag), words=["phase_sign"]),
+    # time
+    "clock": Export(loop("Time|Displacement [mm]|Force [N]", [clock(t, "{h:02d}:{m:02d}:{s:06.3f}") for t in TIME], DISPLACEMENT, FORCE), "loop"),
+    "ISO": Export(loop("Timestamp|Displacement [mm]|Force [N]", ["2026-11-26T" + clock(t, "{h:02d}:{m:02d}:{s:06.3f}") for t in TIME], DISPLACEMENT, FORCE), "loop"),
+    "ISO with zone and blanks": Export(loop("Date Time|Displacement [mm]|Force [N]", ["2026-11-26 " + clock(t, "{h:02d}:{m:02d}:{s:06.3f}+01:00") for t in TIME], DISPLACEMENT, FORCE), "loop"),
+    "date and time": Export(loop("Date|Time|Displacement [mm]|Force [N]", ["26.11.2026"] * 600, [clock(t, "{h:02d}:{m:02d}:{s:06.3f}") for t in TIME], DISPLACEMENT, FORCE), "loop"),
+    "AM and PM": Export(loop("Time|Displacement [mm]|Force [N]", ["11/26/2026 " + clock(t, "{h12}:{m:02d}:{s:06.3f} PM") for t in TIME], DISPLACEMENT, FORCE, mark=";"), "loop"),
+    "clock with a comma": Export(
+        "Uhrzeit;Weg [mm];Kraft [N]\n" + "\n".join(
+            ";".join([clock(t, "{h:02d}:{m:02d}:{s:06.3f}"), f"{x:.6f}", f"{y:.4f}"]).replace(".", ",")
+            for t, x, y in zip(TIME, DISPLACEMENT, FORCE, strict=True)
+        ), "loop",
+    ),
+    "rounded stamps": Export(loop("Time|Displacement [mm]|Force [N]", [clock(t, "{h:02d}:{m:02d}:{s:06.3f}")[:8] for t in TIME], DISPLACEMENT, FORCE), "loop", ["spread evenly"]),
+    "rounded seconds": Export(loop("time [s]|displacement [mm]|force [N]", [f"{t:.1f}" for t in TIME - 0.001], DISPLACEMENT, FORCE), "loop", ["spread evenly"]),
+    "day numbers": Export(loop("Time|Displacement [mm]|Force [N]", [f"{d:.10f}" for d in EXCEL_DAYS], DISPLACEMENT, FORCE), "loop"),
+    "day numbers as seconds": Export(
+        loop("Time|Displacement [mm]|Force [N]", [f"{d:.10f}" for d in EXCEL_DAYS], DISPLACEMENT, FORCE), None, ["day numbers"], {"units": {"time": "s"}}
+    ),
+    "day numbers as days": Export(
+        loop("Time|Displacement [mm]|Force [N]", [f"{d:.10f}" for d in EXCEL_DAYS], DISPLACEMENT, FORCE), "loop", (), {"units": {"time": "d"}}
+    ),
+    # columns
+    **{
+        f"columns by unit: {headers}": Export(loop(headers), "loop")
+        for headers in ("t [s]|LVDT 2 [mm]|Load Cell [N]", "Time (s)|x (mm)|Fz (N)", "t[s]|s1[mm]|MGC Kanal 3[N]")
+    },
+    "two columns by unit": Export(
+        loop("Time [s]|LVDT 1 [mm]|Fx [N]|Fz [N]", TIME, DISPLACEMENT, 0.1 * FORCE, FORCE), None, ['columns = { force = "Fx [N]" }', 'columns = { force = "Fz [N]" }'],
+    ),
+    **{
+        f"unit {unit}": Export(sweep(f"Frequency [{hz}]|Amplitude [mm]|K* [{unit}]|tan delta", factor * F, A, K, ETA))
+        for unit, hz, factor in (("N mm-1", "Hz", 1), ("N.mm-1", "cpm", 60), ("N mm^-1", "cps", 1))
+    },
+    "real and imaginary": Export(sweep("f [Hz]|A [mm]|K real [N/mm]|K imag [N/mm]", F, A, STIFFNESS.real, STIFFNESS.imag)),
+    "Re and Im": Export(sweep("f [Hz]|A [mm]|Re(K*) [N/mm]|Im(K*) [N/mm]", F, A, STIFFNESS.real, STIFFNESS.imag)),
+    "force and displacement amplitudes": Export(sweep("f [Hz]|Displacement amplitude [mm]|Force amplitude [N]|Phase [deg]", F, A, K * A, PHASE)),
+    "F and x": Export(sweep("f [Hz]|x [mm]|F [N]|phase [deg]", F, A, K * A, PHASE)),
+    "force and displacement p-p": Export(sweep("f [Hz]|Disp p-p [mm]|Force p-p [kN]|Phase [deg]", F, 2 * A, 2 * K * A / 1e3, PHASE)),
+    "LabVIEW": Export(LVM, "loop", name="loop.lvm"),
+    "LabVIEW without X": Export(LVM_NO_X, "loop", name="loop.lvm"),
+    "LabVIEW, decimal comma": Export(
+        LVM.replace("Decimal_Separator\t.", "Decimal_Separator\t,").replace("0.0", "0,0").replace("\t-0.", "\t-0,").replace(".", ","), "loop", name="loop.lvm"
+    ),
+    "names of rows": Export(
+        "\n".join(["Frequency [Hz]\tAmplitude [mm]\tK* [N/mm]\ttan delta", *(f"{n}\t{line}" for n, line in enumerate(table([], F, A, K, ETA)[1:], 1))])
+    ),
+    "unnamed last column": Export("\n".join(["time [s],displacement [mm],force [N]", *(",".join(f"{v:.6f}" for v in (t, x, y, 23.0)) for t, x, y in zip(TIME, DISPLACEMENT, FORCE, strict=True))]), "loop", name="loop.csv"),
+    "no header": Export("\n".join(table([], TIME, DISPLACEMENT, FORCE)[1:]), None, ['columns = { time = "1"', "no header"]),
+    "no header, columns by number": Export(
+        "\n".join(table([], TIME, DISPLACEMENT, FORCE)[1:]), "loop", (),
+        {"columns": {"time": "1", "displacement": "2", "force": "3"}, "units": {"time": "s", "displacement": "mm", "force": "N"}},
+    ),
+    "equal headers, column by number": Export(
+        loop("time [s]|displacement [mm]|force [N]|force [N]", TIME, DISPLACEMENT, FORCE, 0.5 * FORCE), "loop", (), {"columns": {"force": "3"}}
+    ),
+    # numbers and contradictions
+    "one cell in another format": Export(
+        sweep("Frequency [Hz]|Amplitude [mm]|K* [N/mm]|tan delta", F, A, [f"{k - 800:.3f}" if n != 3 else f"{k - 800:.3f}".replace(".", ",") for n, k in enumerate(K)], ETA, mark=";"),
+        None, ["another format"],
+    ),
+    "amplitudes that contradict": Export(
+        sweep("f [Hz]|amplitude [mm]|Amplitude p-p [mm]|K* [N/mm]|tan delta", F, A, A, K, ETA), None, ["contradict"]
+    ),
+    "amplitudes that agree": Export(sweep("f [Hz]|amplitude [mm]|Amplitude p-p [mm]|K* [N/mm]|tan delta", F, A, 2 * A, K, ETA)),
+    "one header for two roles": Export(
+        loop(), None, ["two roles"], {"columns": {"force": "displacement [mm]", "displacement": "displacement [mm]"}}
+    ),
+}  # fmt: skip
