@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from ctypes import c_double, c_int, c_uint
 from pathlib import Path
@@ -21,8 +20,6 @@ from bushfit.model.result import Result
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Source
 
-#: The system that the tests run on.
-HERE = {"linux": "linux", "win32": "windows", "darwin": "macos"}[sys.platform]
 FREQUENCIES = np.arange(5.0, 156.0, 10.0)
 #: Amplitudes of the grid by direction [m or rad].
 LEVELS = {
@@ -41,8 +38,8 @@ def order_of(model: Model, places: Sequence[Place] = tuple(LEVELS), accuracy: fl
 
 
 def written(wanted: Order, folder: Path) -> Path:
-    """The FMU of an order for this system alone."""
-    ((name, content),) = export(wanted, (HERE,)).files.items()
+    """The FMU of an order, written into a folder."""
+    ((name, content),) = export(wanted).files.items()
     (folder / name).write_bytes(content)
     return folder / name
 

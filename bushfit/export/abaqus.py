@@ -1,7 +1,7 @@
-"""Abaqus: a connector whose stiffness and damping follow tables over frequency, and the compound as a material.
+"""Abaqus: a connector with tables of stiffness and damping over frequency, and the compound as a material.
 
-Connector: with FREQUENCY DEPENDENCE=ON all 21 constants of the symmetric 6 x 6 matrix stand in three lines a frequency,
-its upper triangle column by column. Forces are D u + C du/dt, so C is the loss stiffness over 2 pi f.
+Connector: with FREQUENCY DEPENDENCE=ON the 21 constants of the symmetric 6 x 6 matrix take three lines per frequency,
+the upper triangle column by column. Forces are D u + C du/dt, so C is the loss stiffness over 2 pi f.
 
 Material: neo-Hooke with C10 = G/2 for the long-term modulus G (of the elastic branch) and D1 = 0 for an incompressible
 rubber. The table has omega Re(g*) = G''/G and omega Im(g*) = 1 - G'/G, two columns of bulk, which are zero, and the
@@ -19,46 +19,46 @@ import numpy as np
 from bushfit.effects import Level as EffectLevel
 from bushfit.export.contract import MM_T_S_N, Exported, Order, UnitSystem
 from bushfit.export.deck import (
+    AmplitudeLevel,
     Form,
-    Level,
     by_dof,
-    commented,
-    directions,
-    of_levels,
-    of_tables,
-    real,
-    stated,
-    tables,
-    to_bytes,
+    comment_lines,
+    deck_lines,
+    describe_amplitudes,
+    encode_deck,
+    exported_directions,
+    format_real,
+    stiffness_tables,
+    table_losses,
 )
 from bushfit.geometry import Specimen
 from bushfit.units import number
 
-#: Constants of a symmetric 6 x 6 matrix, and how many of them a data line holds.
+#: Number of constants of a symmetric 6 x 6 matrix, and of values per data line.
 _CONSTANTS, _A_LINE = 21, 8
-#: The parameter that is the long-term modulus [Pa].
+#: Parameter that is the long-term modulus [Pa].
 _LONG_TERM = "mu"
-#: Where the material's modulus is asked for: engineering shear strain, which is twice the equivalent strain.
+#: Specimen whose modulus is that of the material, over engineering shear strain.
 _COMPOUND = Specimen("compound", "modulus")
 
 _FORM = Form(lambda f, k: (k.real, k.imag / (2.0 * np.pi * f)), lambda f, a, b: a + 2j * np.pi * f * b)
 
 
 def export(order: Order) -> Exported:
-    """A connector behavior for each amplitude, and the compound at the strains of the first direction."""
+    """Write a connector behavior per amplitude, and the compound at the strains of the first direction."""
     units = order.units or MM_T_S_N
-    losses = tuple(of_tables(order, _FORM))
-    if known := _LONG_TERM in order.result.model.values:
+    losses = tuple(table_losses(order, _FORM))
+    if has_material := _LONG_TERM in order.result.model.values:
         losses += ("compound: strain is uniform in a material, so the amplitude of each element is that of the table",)
     else:
         losses += ("compound: no elastic branch, so no long-term modulus, and no material",)
-    used = "behaviors are for CONN3D2 of type BUSHING; they act in *STEADY STATE DYNAMICS, DIRECT"
-    lines = of_levels(order, "**", units, losses, used, "BUSHING_", partial(_behavior, units))
-    return Exported({"bushing.inp": to_bytes([*lines, *(_materials(order, units) if known else ())])}, losses)
+    usage = "behaviors are for CONN3D2 of type BUSHING; they act in *STEADY STATE DYNAMICS, DIRECT"
+    lines = deck_lines(order, "**", units, losses, usage, "BUSHING_", partial(_behavior, units))
+    return Exported({"bushing.inp": encode_deck([*lines, *(_materials(order, units) if has_material else ())])}, losses)
 
 
-def _behavior(units: UnitSystem, rank: int, level: Level) -> Iterator[str]:
-    """Elasticity and damping of one amplitude."""
+def _behavior(units: UnitSystem, rank: int, level: AmplitudeLevel) -> Iterator[str]:
+    """Yield the lines of elasticity and damping of one amplitude."""
     yield f"*CONNECTOR BEHAVIOR, NAME=BUSHING_{rank}"
     frequency = level[0].frequency * units.frequency.factor
     diagonals = np.zeros((2, 6, frequency.size))
@@ -67,24 +67,24 @@ def _behavior(units: UnitSystem, rank: int, level: Level) -> Iterator[str]:
     for keyword, diagonal in zip(("ELASTICITY", "DAMPING"), diagonals, strict=True):
         yield f"*CONNECTOR {keyword}, FREQUENCY DEPENDENCE=ON"
         for f, values in zip(frequency, diagonal.T, strict=True):
-            triangle = np.diag(values).T[np.tril_indices(6)]  # the upper one of the matrix, column by column
-            texts = [*(real(value) for value in triangle), real(f, 10)]
+            triangle = np.diag(values).T[np.tril_indices(6)]  # upper triangle of the matrix, column by column
+            texts = [*(format_real(value) for value in triangle), format_real(f, 10)]
             for start in range(0, _CONSTANTS + 1, _A_LINE):
                 yield ", ".join(texts[start : start + _A_LINE])
 
 
 def _materials(order: Order, units: UnitSystem) -> Iterator[str]:
-    """The compound at the strain of each amplitude of the first direction."""
-    model, first = order.result.model.without(EffectLevel.INSTRUMENT), directions(order)[0]
+    """Yield the lines of the compound at the strain of each amplitude of the first direction."""
+    model, first = order.result.model.without(EffectLevel.INSTRUMENT), exported_directions(order)[0]
     long_term = model.values[_LONG_TERM]
-    for rank, table in enumerate(tables(first), start=1):
+    for rank, table in enumerate(stiffness_tables(first), start=1):
         strain = 2.0 * table.amplitude * model.unit_strain(table.direction)
         ratio = model.stiffness(_COMPOUND, table.frequency, strain, under=order.under) / long_term
-        where = f"shear strain amplitude {number(100.0 * strain, 6)} %, that of {stated((table,))}"
-        yield from commented("**", [f"COMPOUND_{rank}: {where}"])
+        about = f"shear strain amplitude {number(100.0 * strain, 6)} %, that of {describe_amplitudes((table,))}"
+        yield from comment_lines("**", [f"COMPOUND_{rank}: {about}"])
         yield f"*MATERIAL, NAME=COMPOUND_{rank}"
         yield "*HYPERELASTIC, NEO HOOKE, MODULI=LONG TERM"
-        yield f"{real(0.5 * long_term * units.stress.factor)}, 0."
+        yield f"{format_real(0.5 * long_term * units.stress.factor)}, 0."
         yield "*VISCOELASTIC, FREQUENCY=TABULAR"
         for f, loss, gain in zip(table.frequency * units.frequency.factor, ratio.imag, 1.0 - ratio.real, strict=True):
-            yield f"{real(loss)}, {real(gain)}, 0., 0., {real(f, 10)}"
+            yield f"{format_real(loss)}, {format_real(gain)}, 0., 0., {format_real(f, 10)}"

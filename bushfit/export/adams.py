@@ -1,9 +1,9 @@
-"""Adams Car: bushing property files (.bus), a force over displacement and a damping in each of six directions.
+"""Adams Car: bushing property files (.bus) with a curve of force over displacement and a damping per degree of freedom.
 
 The curve is the storage stiffness at the lowest frequency times each amplitude, so that it softens as the rubber does.
-The damping is one number: in `bushing_car.bus` a viscous damper, in `bushing_ride.bus` the loss angle that the bushing
-of Adams Car Ride reads there. Both are those of the middle frequency and amplitude of the grid. A file states
-its units, which Adams converts; they are mm, newton, degrees and second.
+The damping is one number at the middle frequency and amplitude of the grid: a viscous damper in `bushing_car.bus`, the
+loss angle for the frequency bushing of Adams Car Ride in `bushing_ride.bus`. A file states its units, which Adams
+converts: mm, newton, degrees and second.
 
 Source: Adams Car Ride help, "Frequency Bushing" (damping coefficients are interpreted as loss angles); blocks,
 attributes and units as in the public fixture `fixture.bus` of the package suspension_multibody, which reads them;
@@ -11,7 +11,7 @@ Altair TeimOrbit format and AutoBush, which reads the same files.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -20,122 +20,131 @@ from bushfit.export.contract import Exported, Order
 from bushfit.export.deck import (
     DOFS,
     Table,
-    commented,
-    directions,
+    band_losses,
+    comment_lines,
+    common_losses,
+    describe_amplitudes,
+    encode_deck,
+    exported_directions,
+    format_real,
     heading,
     middle,
-    of_all,
-    of_band,
-    real,
-    stated,
-    tables,
-    to_bytes,
+    stiffness_tables,
 )
 from bushfit.geometry import ROTATION, TRANSLATION
 from bushfit.prediction.caveats import percent_off
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import number
 
-#: Names of what moves and what resists in each degree of freedom: x and fx to az and tz.
+#: Names of displacement and force in each degree of freedom, from 1 to 6.
 _AXES = (("x", "fx"), ("y", "fy"), ("z", "fz"), ("ax", "tx"), ("ay", "ty"), ("az", "tz"))
-#: From SI to the displacement and force of the files: mm and N, deg and N mm.
+#: Factors from SI to the displacement and force of the files: mm and N, deg and N mm.
 _SCALES = {TRANSLATION: (1e3, 1.0), ROTATION: (float(np.degrees(1.0)), 1e3)}
 #: Units of the files.
 _UNITS = {"LENGTH": "mm", "ANGLE": "degrees", "FORCE": "newton", "MASS": "kg", "TIME": "second"}
-#: What of the damping column each file has.
-_KINDS = {
+#: File for Adams Car or for Adams Car Ride.
+Kind = Literal["car", "ride"]
+#: Comment on the damping in each kind of file.
+_KINDS: dict[Kind, str] = {
     "car": "damping: viscous, N s/mm and N mm s/deg",
     "ride": "damping: the loss angle in deg, for the frequency bushing of Adams Car Ride alone",
 }
 
 
 class _Element(NamedTuple):
-    """What stands for a direction: its tables by amplitude, and the points of its curve, (n,) [m, N or rad, N m].
+    """Bushing element of one direction.
 
-    The damping is right at the frequency `at` [Hz] of the table `reference`, where the stiffness is `there`.
+    Args:
+        tables: exact stiffness, by amplitude.
+        displacement, force: points of the curve [m and N, or rad and N m], (n,).
+        reference: table of the middle amplitude.
+        frequency: middle frequency [Hz], at which the damping is exact.
+        exact: complex stiffness of the reference table at this frequency [N/m or N m/rad].
     """
 
     tables: Sequence[Table]
-    moved: Array
+    displacement: Array
     force: Array
     reference: Table
-    at: float
-    there: complex
+    frequency: float
+    exact: complex
 
-    def damping(self, kind: str) -> float:
-        """A damper's constant [N s/m or N m s/rad], or a loss angle [rad]."""
-        return float(self.there.imag / (2.0 * np.pi * self.at) if kind == "car" else np.angle(self.there))
+    def damping(self, kind: Kind) -> float:
+        """Damper constant [N s/m or N m s/rad], or loss angle [rad]."""
+        return float(self.exact.imag / (2.0 * np.pi * self.frequency) if kind == "car" else np.angle(self.exact))
 
-    def stiffness(self, kind: str, table: Table) -> Array:
+    def stiffness(self, kind: Kind, table: Table) -> Array:
         """Complex stiffness of the element at the points of a table, (n,)."""
-        storage = np.interp(table.amplitude, self.moved, self.force) / table.amplitude
+        storage = np.interp(table.amplitude, self.displacement, self.force) / table.amplitude
         if kind == "ride":
             return np.full(table.frequency.size, storage * (1.0 + 1j * np.tan(self.damping(kind))))
         return storage + 2j * np.pi * table.frequency * self.damping(kind)
 
+    def loss(self, kind: Kind) -> str:
+        """Sentence on the error of one curve and one damping over the grid."""
+        pairs = [(self.stiffness(kind, table), table.stiffness) for table in self.tables]
+        written, exact = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+        loss = number(float(np.max(np.abs(loss_factor(written) - loss_factor(exact)))), 2)
+        return (
+            f"{self.reference.direction}, {kind}: frequency, one damping, of {number(self.frequency, 4)} Hz: over "
+            f"the grid |K| is {percent_off(np.abs(written / exact))} off, the loss factor up to {loss}"
+        )
+
 
 def export(order: Order) -> Exported:
-    """One file for Adams Car and one for Adams Car Ride, and what they leave out."""
-    elements = [_element(tables(each)) for each in directions(order)]
-    shared = [line for each in directions(order) for line in of_band(each)] + list(of_all(order))
+    """Write one file for Adams Car and one for Adams Car Ride."""
+    predictions = exported_directions(order)
+    elements = [_element(stiffness_tables(prediction)) for prediction in predictions]
+    shared = [line for prediction in predictions for line in band_losses(prediction)] + list(common_losses(order))
     if order.units:
         shared.append(f"the units asked for, {order.units}: the file states its own, which Adams converts")
-    files, losses = dict[str, bytes](), list[str]()
-    for kind in _KINDS:
-        own = []
-        for element in elements:  # what one curve and one damping cost over the grid of a direction
-            pairs = [(element.stiffness(kind, table), table.stiffness) for table in element.tables]
-            found, exact = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-            loss = number(float(np.max(np.abs(loss_factor(found) - loss_factor(exact)))), 2)
-            own.append(
-                f"{element.reference.direction}, {kind}: frequency, one damping, of {number(element.at, 4)} Hz: over "
-                f"the grid |K| is {percent_off(np.abs(found / exact))} off, the loss factor up to {loss}"
-            )
-        files[f"bushing_{kind}.bus"] = to_bytes(_file(order, elements, kind, [*own, *shared]))
-        losses += own
-    return Exported(files, (*losses, *shared))
+    losses = {kind: [element.loss(kind) for element in elements] for kind in _KINDS}
+    files = {
+        f"bushing_{kind}.bus": encode_deck(_property_file(order, elements, kind, [*losses[kind], *shared]))
+        for kind in _KINDS
+    }
+    return Exported(files, (*losses["car"], *losses["ride"], *shared))
 
 
-def _element(own: Sequence[Table]) -> _Element:
-    """The curve through the storage force of each amplitude, and the table and row of the damping.
+def _element(tables: Sequence[Table]) -> _Element:
+    """Element with a curve through the storage force at each amplitude.
 
-    A single amplitude is continued in a straight line, because splines need five points.
+    A single amplitude is extrapolated linearly, because splines need five points.
     """
-    amplitude = np.array([table.amplitude for table in own])
-    force = amplitude * np.array([table.stiffness[0].real for table in own])
+    amplitude = np.array([table.amplitude for table in tables])
+    force = amplitude * np.array([table.stiffness[0].real for table in tables])
     if amplitude.size == 1:
         amplitude, force = (values[0] * np.array([1.0, 2.0]) for values in (amplitude, force))
-    moved, resisting = (np.concatenate([-values[::-1], [0.0], values]) for values in (amplitude, force))
-    reference = middle(own)
-    row = (reference.frequency.size - 1) // 2  # the middle of the frequencies, the lower of two
-    at, there = float(reference.frequency[row]), complex(reference.stiffness[row])
-    return _Element(own, moved, resisting, reference, at, there)
+    displacement, force = (np.concatenate([-values[::-1], [0.0], values]) for values in (amplitude, force))
+    reference = middle(tables)
+    row = (reference.frequency.size - 1) // 2  # of two middle frequencies, the lower
+    frequency, exact = float(reference.frequency[row]), complex(reference.stiffness[row])
+    return _Element(tables, displacement, force, reference, frequency, exact)
 
 
-def _file(order: Order, elements: Sequence[_Element], kind: str, losses: Sequence[str]) -> Iterator[str]:
-    """The lines of a property file."""
-    at = f"{number(elements[0].at, 4)} Hz, {stated([element.reference for element in elements])}"
-    about = [_KINDS[kind], f"damping at {at}; curves at the lowest frequency"]
-    yield from commented("$", [*heading(order, ", ".join(_UNITS.values()), losses), *about])
+def _property_file(order: Order, elements: Sequence[_Element], kind: Kind, losses: Sequence[str]) -> Iterator[str]:
+    """Yield the lines of a property file."""
+    amplitudes = describe_amplitudes([element.reference for element in elements])
+    about = f"damping at {number(elements[0].frequency, 4)} Hz, {amplitudes}; curves at the lowest frequency"
+    yield from comment_lines("$", [*heading(order, ", ".join(_UNITS.values()), losses), _KINDS[kind], about])
     yield from _block("MDI_HEADER", {"FILE_TYPE": "'bus'", "FILE_VERSION": "4.0", "FILE_FORMAT": "'ASCII'"})
     yield from _block("UNITS", {name: f"'{unit}'" for name, unit in _UNITS.items()})
-    damping, curves = dict[int, float](), dict[int, tuple[Array, Array]]()
+    damping, curves = [0.0] * len(_AXES), [(np.arange(-2.0, 3.0), np.zeros(5))] * len(_AXES)
     for element in elements:
         displacement, force = _SCALES[element.reference.direction.motion]
         scale = force / displacement if kind == "car" else float(np.degrees(1.0))
         for dof in DOFS[element.reference.direction]:
-            damping[dof] = scale * element.damping(kind)
-            curves[dof] = element.moved * displacement, element.force * force
-    values = {f"{resists.upper()}_DAMPING": real(damping.get(dof, 0.0)) for dof, (_, resists) in enumerate(_AXES, 1)}
-    yield from _block("DAMPING", values)
-    for dof, (moves, resists) in enumerate(_AXES, start=1):
-        curve = curves[dof] if dof in curves else (np.arange(-2.0, 3.0), np.zeros(5))  # nothing known
-        yield from _block(f"{resists.upper()}_CURVE", {})
-        yield f"{{{moves:>16} {resists:>17}}}"
-        yield from (f"{real(moved, 10):>17} {real(resisting):>17}" for moved, resisting in zip(*curve, strict=True))
+            damping[dof - 1] = scale * element.damping(kind)
+            curves[dof - 1] = element.displacement * displacement, element.force * force
+    values = zip(_AXES, damping, strict=True)
+    yield from _block("DAMPING", {f"{force.upper()}_DAMPING": format_real(value) for (_, force), value in values})
+    for (moved, resisting), curve in zip(_AXES, curves, strict=True):
+        yield from _block(f"{resisting.upper()}_CURVE", {})
+        yield f"{{{moved:>16} {resisting:>17}}}"
+        yield from (f"{format_real(x, 10):>17} {format_real(y):>17}" for x, y in zip(*curve, strict=True))
 
 
 def _block(name: str, attributes: Mapping[str, str]) -> Iterator[str]:
-    """A block and its attributes."""
+    """Yield the lines of a block with its attributes."""
     yield f"[{name}]"
     yield from (f" {key} = {value}" for key, value in attributes.items())

@@ -1,16 +1,17 @@
-"""An FMU: FMI 2.0 for co-simulation, displacement in and force out, with the libraries for three systems.
+"""FMU: FMI 2.0 for co-simulation, displacement in and force out, for the system on which it is written.
 
-The libraries are compiled when the export is made, not when the package is built: the model's numbers are compiled in,
-so that an FMU reads no file while it runs, and who writes none needs no compiler. The compiler is zig's, from the
-package `ziglang`, which makes libraries for Linux, Windows and macOS on any of them. The sources need no C library, so
-that nothing of the target system has to be there, and the libraries depend on nothing.
+The library is compiled when the FMU is written, with the values of the model in it, so that an FMU reads no file while
+it runs. The compiler is that of zig, from the package `ziglang`. The sources need no C library.
+
+Source: Functional Mock-up Interface for Model Exchange and Co-Simulation, version 2.0.4.
 """
 
 import hashlib
 import importlib.util
 import io
+import os
+import platform
 import re
-import struct
 import subprocess
 import sys
 import tempfile
@@ -23,122 +24,129 @@ from xml.etree import ElementTree as ET
 
 from bushfit.errors import OutputError
 from bushfit.export.contract import Exported, Order
-from bushfit.export.in_time import FIELDS, ONE, TABLES, InTime, in_time
+from bushfit.export.in_time import FIELDS, TABLES, UNIT_FIELDS, TimeModel, time_model
 from bushfit.geometry import Place, Unit
 from bushfit.reading.tablefile import folder_name
 from bushfit.version import __version__
 
-#: Folder of an FMU, ending of the library, and zig's names of the machines in it, by the system's name.
-SYSTEMS = {
-    "linux": ("linux64", ".so", ("x86_64-linux-none",)),
-    "windows": ("win64", ".dll", ("x86_64-windows-gnu",)),
-    "macos": ("darwin64", ".dylib", ("x86_64-macos", "aarch64-macos")),
+#: Folder of the library in an FMU, its suffix, and the system in the compiler's target, by `sys.platform`.
+_SYSTEMS = {
+    "linux": ("linux64", ".so", "linux-none"),
+    "win32": ("win64", ".dll", "windows-gnu"),
+    "darwin": ("darwin64", ".dylib", "macos"),
 }
-#: Options of the compiler; without contraction all machines round alike.
+#: Names of processors in the compiler's target.
+_PROCESSORS = {"amd64": "x86_64", "arm64": "aarch64"}
+#: Options of the compiler; without contraction all processors round alike.
 _OPTIONS = (
     *("-shared", "-O2", "-std=c99", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-s"),
     *("-ffreestanding", "-nostdlib", "-DFREESTANDING", "-Wall", "-Wextra", "-Werror"),
 )
-#: Machine in a file with a library for each of several, as macOS has them, and its variant: x86-64 and arm64.
-_MACHINES = {"x86_64-macos": (0x01000007, 3), "aarch64-macos": (0x0100000C, 0)}
-#: Libraries in it begin at multiples of 2 to this power [bytes].
-_ALIGNED = 14
-#: The sources that all FMUs share.
+#: Sources that all FMUs share.
 _SHARED = ("fmu.c", "bushing.c", "bushing.h", "fmi2.h")
-#: Exponents of SI base units of the units that have whole ones; others are known by name alone.
-_BASE: Mapping[str, Mapping[str, int]] = TABLES["units"]
-#: What XML cannot hold.
+#: Exponents of SI base units, by unit with integer exponents.
+_BASE_UNITS: Mapping[str, Mapping[str, int]] = TABLES["units"]
+#: Characters that XML does not allow.
 _NO_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-#: Values 0 and 1 stand first on the list of the C sources.
-_FIRST = 2
+#: Number of constants (0 and 1) before the values of the model in the C sources.
+_OFFSET = 2
 
 
-def libraries(sources: Mapping[str, bytes], name: str, systems: Collection[str] = tuple(SYSTEMS)) -> dict[str, bytes]:
-    """The shared library of each system, by its path in an FMU: `linux64/<name>.so` and so on.
+def export(order: Order) -> Exported:
+    """Write a model as an FMU with one input and one output per direction or specimen.
+
+    Args:
+        order: model, predictions and settings.
+
+    Returns:
+        The FMU, its losses and the Maxwell arms in it.
 
     Raises:
-        OutputError: there is no compiler, or it failed.
+        ModelError: an effect without a law in time.
+        OutputError: the compiler is missing or failed.
+    """
+    model = time_model(order)
+    safe_name = re.sub(r"[^A-Za-z0-9]+", "_", folder_name(order.result.name))
+    name = f"bushfit_{safe_name[:40].strip('_').lower()}"
+    sources = {file: (files("bushfit.export") / "c" / file).read_bytes() for file in _SHARED}
+    sources |= {"model.c": model_source(model).encode()}
+    without_guid = [model_description(order, model, name, ""), model_header(model, "").encode()]
+    digest = hashlib.sha256(b"".join([*sources.values(), *without_guid])).digest()
+    guid = f"{{{uuid.UUID(bytes=digest[:16])}}}"
+    sources |= {"model.h": model_header(model, guid).encode()}
+    path, library = compile_library(sources, name)
+    content = {
+        "modelDescription.xml": model_description(order, model, name, guid),
+        path: library,
+        **{f"sources/{file}": source for file, source in sources.items()},
+    }
+    return Exported({f"{name}.fmu": _zip_archive(content)}, model.losses, model.arms)
+
+
+def compile_library(sources: Mapping[str, bytes], name: str) -> tuple[str, bytes]:
+    """Compile the shared library of an FMU for this system.
+
+    Args:
+        sources: C sources and headers by file name.
+        name: name of the library without suffix.
+
+    Returns:
+        Path of the library in the FMU, and its content.
+
+    Raises:
+        OutputError: there is no compiler, it does not know this system, or it failed.
     """
     if importlib.util.find_spec("ziglang") is None:
         raise OutputError(
             "there is no compiler for the FMU",
             found="no package ziglang",
-            expected="the compiler that makes libraries for Linux, Windows and macOS on any of them",
+            expected="the compiler of the package ziglang",
             hint='pip install "bushfit[fmu]"',
         )
-    found = {}
+    if sys.platform not in _SYSTEMS:
+        raise OutputError("no FMU for this system", found=sys.platform, expected="one of " + ", ".join(_SYSTEMS))
+    system, suffix, target = _SYSTEMS[sys.platform]
+    machine = platform.machine().lower()
+    target = f"{_PROCESSORS.get(machine, machine)}-{target}"
+    # the compiler looks for its caches below the home folder, which a service or a container may lack
+    cache = Path(tempfile.gettempdir()) / f"bushfit-compiler-{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
+    caches = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
     with tempfile.TemporaryDirectory() as folder:
         for file, content in sources.items():
             (Path(folder) / file).write_bytes(content)
-        files = [file for file in sources if file.endswith(".c")]
-        for system in systems:
-            where, ending, targets = SYSTEMS[system]
-            parts = {target: _compiled(Path(folder), files, target) for target in targets}
-            found[f"{where}/{name}{ending}"] = _joined(parts) if len(parts) > 1 else parts[targets[0]]
-    return found
+        units = [file for file in sources if file.endswith(".c")]
+        command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *_OPTIONS, *units, "-o", f"{name}{suffix}"]
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            env={**os.environ, **caches},
+            capture_output=True,
+            text=True,
+            timeout=300.0,
+            check=False,
+        )
+        if done.returncode:
+            message = (done.stderr or done.stdout).strip()
+            raise OutputError("the compiler of the FMU failed", place=target, found=message)
+        return f"binaries/{system}/{name}{suffix}", (Path(folder) / f"{name}{suffix}").read_bytes()
 
 
-def _compiled(folder: Path, files: Collection[str], target: str) -> bytes:
-    """The library of one machine."""
-    made = folder / target
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *_OPTIONS, *files, "-o", made.name]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300.0, check=False)
-    if done.returncode:
-        raise OutputError("the compiler of the FMU failed", place=target, found=(done.stderr or done.stdout).strip())
-    return made.read_bytes()
-
-
-def _joined(parts: Mapping[str, bytes]) -> bytes:
-    """One file for several machines, in the format of macOS (mach-o/fat.h: big-endian words)."""
-    step = 1 << _ALIGNED
-    head, body, begin = struct.pack(">II", 0xCAFEBABE, len(parts)), b"", step
-    for target, content in parts.items():
-        head += struct.pack(">IIIII", *_MACHINES[target], begin, len(content), _ALIGNED)
-        body += content + bytes(-len(content) % step)
-        begin = step + len(body)
-    return head + bytes(step - len(head)) + body
-
-
-def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
-    """The FMU of an order, with one input and one output a place.
-
-    Raises:
-        ModelError: the model cannot run in time.
-        OutputError: there is no compiler.
-    """
-    found = in_time(order)
-    safe = re.sub(r"[^A-Za-z0-9]+", "_", folder_name(order.result.name))
-    name = f"bushfit_{safe[:40].strip('_').lower()}"
-    sources = {file: (files("bushfit.export") / "c" / file).read_bytes() for file in _SHARED}
-    sources |= {"model.c": model_c(found).encode()}
-    plain = description(order, found, name, "")
-    digest = hashlib.sha256(b"".join([*sources.values(), plain, model_h(found, "").encode()])).digest()
-    guid = f"{{{uuid.UUID(bytes=digest[:16])}}}"
-    sources |= {"model.h": model_h(found, guid).encode()}
-    content = {
-        "modelDescription.xml": description(order, found, name, guid),
-        **{f"binaries/{path}": library for path, library in libraries(sources, name, systems).items()},
-        **{f"sources/{file}": source for file, source in sources.items()},
-    }
-    return Exported({f"{name}.fmu": _archive(content)}, found.losses, found.arms)
-
-
-def model_h(found: InTime, guid: str) -> str:
-    """Sizes of the lists, and what an importer knows the FMU by."""
+def model_header(model: TimeModel, guid: str) -> str:
+    """C header with the sizes of the lists and the GUID of the FMU."""
     sizes = {
-        "VALUES": _FIRST + len(found.values),
-        "CONSTANTS": _FIRST + sum(not value.settable for value in found.values),
-        "DIRECTIONS": len(found.places),
-        "PARTS": max(1, len(found.parts)),
-        "ARMS": max(1, len(found.arm_rows)),
+        "VALUES": _OFFSET + len(model.values),
+        "CONSTANTS": _OFFSET + sum(not value.settable for value in model.values),
+        "DIRECTIONS": len(model.places),
+        "PARTS": max(1, len(model.parts)),
+        "ARMS": max(1, len(model.arm_rows)),
     }
     listed = ", ".join(f"{name} = {size}" for name, size in sizes.items())
     return f'#define GUID "{guid}"\nenum {{ {listed} }};\n'
 
 
-def model_c(found: InTime) -> str:
-    """The lists themselves."""
-    values, reference = found.values, {value.name: at for at, value in enumerate(found.values, start=_FIRST)}
+def model_source(model: TimeModel) -> str:
+    """C source with the values, directions and Maxwell arms of a model."""
+    values, reference = model.values, {value.name: index for index, value in enumerate(model.values, start=_OFFSET)}
     lists = {
         "start": [0.0, 1.0, *(value.value for value in values)],
         "least": [0.0, 1.0, *(value.bounds[0] for value in values)],
@@ -146,103 +154,118 @@ def model_c(found: InTime) -> str:
     }
     lines = ['#include "bushing.h"', ""]
     for name, numbers in lists.items():
-        lines += [f"const double {name}[VALUES] = {{", f"    {', '.join(f'{x!r}' for x in numbers)}", "};"]
+        lines += [f"const double {name}[VALUES] = {{", f"    {', '.join(f'{number!r}' for number in numbers)}", "};"]
     lines.append("const Direction directions[DIRECTIONS] = {")
-    known = [field for own in FIELDS.values() for field in own]
-    for own, lever in zip(found.fields, found.levers, strict=True):
-        neutrals = {field: int(field in ONE) for field in known if field not in own}
-        set_ = {**neutrals, **{field: reference[name] for field, name in own.items()}}
-        listed = ", ".join(f".{field} = {place}" for field, place in set_.items())
+    all_fields = [field for effect_fields in FIELDS.values() for field in effect_fields]
+    for fields, lever in zip(model.fields, model.levers, strict=True):
+        neutral = {field: int(field in UNIT_FIELDS) for field in all_fields if field not in fields}
+        indices = {**neutral, **{field: reference[name] for field, name in fields.items()}}
+        listed = ", ".join(f".{field} = {index}" for field, index in indices.items())
         lines.append(f"    {{{listed}, .lever = {lever!r}}},")
     lines += ["};", "const Arm arms[ARMS] = {"]
-    arms = found.arm_rows or ((0, 0.0, 1.0),)
-    lines += [f"    {{{part}, {share!r}, {time!r}}}," for part, share, time in arms]
+    rows = model.arm_rows or ((0, 0.0, 1.0),)
+    lines += [f"    {{{part}, {share!r}, {time!r}}}," for part, share, time in rows]
     return "\n".join([*lines, "};", ""])
 
 
-def description(order: Order, found: InTime, name: str, guid: str) -> bytes:
-    """modelDescription.xml: what an importer is told."""
+def model_description(order: Order, model: TimeModel, name: str, guid: str) -> bytes:
+    """Content of modelDescription.xml.
+
+    Args:
+        order: model, predictions and settings.
+        model: the model as lists.
+        name: model identifier.
+        guid: identifier that ties the description to the library.
+    """
     about = f"Rubber bushing, displacement in and force out, of {order.source.file} (SHA-256 {order.source.sha256})"
-    about = "; ".join([about, *map(": ".join, order.remarks(found.losses))])
+    about = "; ".join([about, *map(": ".join, order.remarks(model.losses))])
     root = ET.Element("fmiModelDescription", {
-        "fmiVersion": "2.0", "modelName": _text(order.result.name), "guid": guid, "description": _text(about),
+        "fmiVersion": "2.0", "modelName": _xml_text(order.result.name), "guid": guid, "description": _xml_text(about),
         "generationTool": f"bushfit {__version__}", "variableNamingConvention": "flat", "numberOfEventIndicators": "0",
     })  # fmt: skip
     simulation = ET.SubElement(root, "CoSimulation", {
         "modelIdentifier": name, "canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true",
         "canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true",
     })  # fmt: skip
-    compiled = ET.SubElement(simulation, "SourceFiles")
+    source_files = ET.SubElement(simulation, "SourceFiles")
     for file in (*(file for file in _SHARED if file.endswith(".c")), "model.c"):
-        ET.SubElement(compiled, "File", {"name": file})
-    variables = _variables(found)
-    _units(ET.SubElement(root, "UnitDefinitions"), found, {str(each["unit"]) for _, each in variables})
+        ET.SubElement(source_files, "File", {"name": file})
+    variables = _variables(model)
+    _define_units(ET.SubElement(root, "UnitDefinitions"), model, {real["unit"] for _, real in variables})
     ET.SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": "1", "stepSize": "0.001"})
     listed = ET.SubElement(root, "ModelVariables")
     for variable, real in variables:
         scalar = ET.SubElement(listed, "ScalarVariable", variable)
         ET.SubElement(scalar, "Real", {key: value for key, value in real.items() if value})
     structure = ET.SubElement(root, "ModelStructure")
-    outputs = [k for k, (variable, _) in enumerate(variables, start=1) if variable["causality"] == "output"]
+    outputs = [index for index, (variable, _) in enumerate(variables, start=1) if variable["causality"] == "output"]
     for kind in ("Outputs", "InitialUnknowns"):
-        unknown = ET.SubElement(structure, kind)
-        for k in outputs:
-            ET.SubElement(unknown, "Unknown", {"index": str(k)})
+        unknowns = ET.SubElement(structure, kind)
+        for index in outputs:
+            ET.SubElement(unknowns, "Unknown", {"index": str(index)})
     ET.indent(root)
     return ET.tostring(root, encoding="utf-8", xml_declaration=True)
 
 
-def _variables(found: InTime) -> list[tuple[dict[str, str], dict[str, str]]]:
-    """The attributes of each scalar variable, and of its real value: inputs, outputs, then the values."""
-    count, displays, listed = _FIRST + len(found.values), _displays(found.places), []
-    for place in found.places:
-        moved, resisted, _ = place.motion.words
+def _variables(model: TimeModel) -> list[tuple[dict[str, str], dict[str, str]]]:
+    """Attributes of each scalar variable and of its real value: inputs, outputs, then values of the model."""
+    count, displays, variables = _OFFSET + len(model.values), _display_units(model.places), []
+    for place in model.places:
+        displacement, force, _ = place.motion.words
         kinds: tuple[tuple[str, str, str, dict[str, str], dict[str, str]], ...] = (
-            (moved, "input", place.motion.displacement_unit, {"start": "0"}, {}),
-            (resisted, "output", place.motion.force_unit, {}, {"initial": "calculated"}),
+            (displacement, "input", place.motion.displacement_unit, {"start": "0"}, {}),
+            (force, "output", place.motion.force_unit, {}, {"initial": "calculated"}),
         )
-        for which, (word, causality, unit, start, initial) in enumerate(kinds):
-            reference = count + which * len(found.places) + found.places.index(place)
-            variable = {"name": _text(f"{word}.{place}"), "valueReference": str(reference), "causality": causality}
-            shown = displays[unit].name if unit in displays else ""
-            real = {"unit": "" if unit == "1" else unit, "displayUnit": shown, **start}
-            listed.append(({**variable, "variability": "continuous", **initial}, real))
-    for reference, value in enumerate(found.values, start=_FIRST):
+        for block, (word, causality, unit, start, initial) in enumerate(kinds):
+            reference = count + block * len(model.places) + model.places.index(place)
+            variable = {"name": _xml_text(f"{word}.{place}"), "valueReference": str(reference), "causality": causality}
+            display = displays[unit].name if unit in displays else ""
+            real = {"unit": "" if unit == "1" else unit, "displayUnit": display, **start}
+            variables.append(({**variable, "variability": "continuous", **initial}, real))
+    for reference, value in enumerate(model.values, start=_OFFSET):
         kind = {"causality": "parameter", "variability": "tunable"} if value.settable else {
             "causality": "local", "variability": "constant",
         }  # fmt: skip
-        variable = {"name": _text(value.name), "valueReference": str(reference), "description": _text(value.meaning)}
+        variable = {
+            "name": _xml_text(value.name),
+            "valueReference": str(reference),
+            "description": _xml_text(value.meaning),
+        }
         limits = dict(zip(("min", "max"), map(repr, value.bounds), strict=True)) if value.settable else {}
         unit = "" if value.unit == "1" else value.unit
-        listed.append(({**variable, **kind, "initial": "exact"}, {"unit": unit, **limits, "start": repr(value.value)}))
-    return listed
+        variables.append(
+            ({**variable, **kind, "initial": "exact"}, {"unit": unit, **limits, "start": repr(value.value)})
+        )
+    return variables
 
 
-def _units(definitions: ET.Element, found: InTime, used: Collection[str]) -> None:
-    """Every unit that is used, as far as it has whole exponents in SI base units, and what engineers read it in."""
-    displays = _displays(found.places)
+def _define_units(definitions: ET.Element, model: TimeModel, used: Collection[str]) -> None:
+    """Add a definition of every used unit: its exponents of SI base units, and its display unit."""
+    displays = _display_units(model.places)
     for name in sorted(filter(None, used)):
         unit = ET.SubElement(definitions, "Unit", {"name": name})
-        if name in _BASE:
-            ET.SubElement(unit, "BaseUnit", {base: str(power) for base, power in _BASE[name].items()})
+        if name in _BASE_UNITS:
+            ET.SubElement(unit, "BaseUnit", {base: str(power) for base, power in _BASE_UNITS[name].items()})
         if name in displays:
             ET.SubElement(unit, "DisplayUnit", {"name": displays[name].name, "factor": repr(displays[name].factor)})
 
 
-def _displays(places: Sequence[Place]) -> dict[str, Unit]:
-    """The units in which engineers read motion and force, by those that the FMU has, where these differ."""
-    both = [((p.motion.displacement_unit, p.motion.force_unit), p.display[:2]) for p in places]
-    shown = {unit: display for units, displays in both for unit, display in zip(units, displays, strict=True)}
-    return {unit: display for unit, display in shown.items() if unit != "1" and display.factor != 1.0}
+def _display_units(places: Sequence[Place]) -> dict[str, Unit]:
+    """Display units of displacements and forces by SI unit, where the two differ."""
+    pairs = [
+        pair
+        for place in places
+        for pair in zip((place.motion.displacement_unit, place.motion.force_unit), place.display[:2], strict=True)
+    ]
+    return {unit: display for unit, display in pairs if unit != "1" and display.factor != 1.0}
 
 
-def _text(text: str) -> str:
-    """A text without what XML cannot hold."""
+def _xml_text(text: str) -> str:
     return _NO_XML.sub("_", text)
 
 
-def _archive(content: Mapping[str, bytes]) -> bytes:
-    """A zip archive of the same bytes for the same content: its entries have no date."""
+def _zip_archive(content: Mapping[str, bytes]) -> bytes:
+    """A zip archive without dates, so that equal contents give equal bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in content.items():

@@ -1,8 +1,8 @@
-"""Nastran and OptiStruct: PBUSH and PBUSHT, a property for each amplitude, with tables over frequency.
+"""Nastran and OptiStruct: PBUSH and PBUSHT, one property per amplitude, with tables over frequency.
 
-In a frequency response the element has K (1 + i GE) in each degree of freedom; elsewhere the nominal values of PBUSH
-act, here those of the lowest frequency. OptiStruct takes |K| and the loss angle as well: K = KMAG cos(ANGLE) and GE =
-tan(ANGLE), the angle in deg.
+In a frequency response the element has K (1 + i GE) in each degree of freedom; other solutions use the nominal values
+of PBUSH, here those of the lowest frequency. OptiStruct also accepts |K| and the loss angle: K = KMAG cos(ANGLE) and
+GE = tan(ANGLE), the angle in deg.
 
 Source: Autodesk Nastran 2025 reference, PBUSHT; Altair OptiStruct 2021 reference, PBUSH (example 3) and PBUSHT.
 """
@@ -13,14 +13,14 @@ from functools import partial
 import numpy as np
 
 from bushfit.export.contract import MM_T_S_N, Exported, Order, UnitSystem
-from bushfit.export.deck import Form, Level, by_dof, of_levels, of_tables, real, to_bytes
+from bushfit.export.deck import AmplitudeLevel, Form, by_dof, deck_lines, encode_deck, format_real, table_losses
 
-#: Distance between the numbers of the tables of two properties: that of K in degree of freedom n ends on n, of the loss
-#: on 10 + n.
+#: Difference between the table numbers of two properties. The last two digits are the degree of freedom n for K, and
+#: 10 + n for the loss.
 _TABLES = 100
 
 
-#: The names of the two tables, their form, and the name of the file.
+#: Names of the two tables, their form, and the name of the file, by dialect.
 _DIALECTS = {
     "nastran": (
         ("K", "GE"),
@@ -36,25 +36,25 @@ _DIALECTS = {
 
 
 def export(order: Order) -> Exported:
-    """The bulk data of the bushing, without elements, and what it leaves out."""
+    """Write the bulk data of the bushing, without elements."""
     (names, form, file), units = _DIALECTS[order.dialect], order.units or MM_T_S_N
-    losses = tuple(of_tables(order, form))
-    used = (
+    losses = tuple(table_losses(order, form))
+    usage = (
         "the tables act in frequency response; PBUSH alone, at the lowest frequency, acts elsewhere; PARAM,G is added "
         "to the loss"
     )
-    lines = of_levels(order, "$", units, losses, used, "property ", partial(_property, names, form, units))
-    return Exported({file: to_bytes(lines)}, losses)
+    lines = deck_lines(order, "$", units, losses, usage, "property ", partial(_property, names, form, units))
+    return Exported({file: encode_deck(lines)}, losses)
 
 
-def _property(names: Sequence[str], form: Form, units: UnitSystem, pid: int, level: Level) -> Iterator[str]:
-    """PBUSH, PBUSHT and the tables of one amplitude."""
+def _property(names: Sequence[str], form: Form, units: UnitSystem, pid: int, level: AmplitudeLevel) -> Iterator[str]:
+    """Yield the lines of PBUSH, PBUSHT and the tables of one amplitude."""
     rows = [(dof, *form.in_units(table, units)) for dof, table in by_dof(level)]
     several = level[0].frequency.size > 1
     nominal, numbers = [dict[int, str](), dict[int, str]()], [dict[int, str](), dict[int, str]()]
     for dof, _, *columns in rows:
         for part, column in enumerate(columns):
-            nominal[part][dof] = real(column[0])
+            nominal[part][dof] = format_real(column[0])
             numbers[part][dof] = str(_TABLES * pid + 10 * part + dof)
     yield from _card("PBUSH*", [str(pid), *_by_dof(names, nominal)])
     if several:
@@ -62,12 +62,12 @@ def _property(names: Sequence[str], form: Form, units: UnitSystem, pid: int, lev
         for dof, frequency, *parts in rows:
             for part, column in enumerate(parts):
                 points = zip(frequency, column, strict=True)
-                pairs = [text for f, value in points for text in (real(f, 10), real(value))]
+                pairs = [text for f, value in points for text in (format_real(f, 10), format_real(value))]
                 yield from _card("TABLED1*", [numbers[part][dof], "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
 
 
 def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
-    """The fields of a property after its number: a name and six values for each part, and so on the next line."""
+    """Fields of a property after its number: a name and six values per part, one part per line."""
     fields: list[str] = []
     for name, row in zip(names, rows, strict=True):
         fields += [*([""] if fields else []), name, *(row.get(dof, "") for dof in range(1, 7))]
@@ -75,7 +75,7 @@ def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
 
 
 def _card(name: str, fields: Sequence[str]) -> Iterator[str]:
-    """A card: of small fields eight a line after its name; of large ones, whose name ends in *, four, in pairs."""
+    """Yield the lines of a card: eight small fields per line, or four large ones if the name ends in "*"."""
     count, shape, begin = (4, ">16", "*") if name.endswith("*") else (8, "<8", "")
     padded = [*fields, *[""] * (-len(fields) % 8)]
     for start in range(0, len(padded), count):

@@ -54,7 +54,7 @@ def named(order: Order) -> Callable[[str], Order]:
 
 @pytest.fixture(scope="session")
 def exported(paper_model: Model) -> Exported:
-    """The paper's bushing in three directions, for all systems."""
+    """The paper's bushing in three directions."""
     return export(order_of(paper_model))
 
 
