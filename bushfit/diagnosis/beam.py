@@ -17,14 +17,13 @@ import numpy as np
 from bushfit.diagnosis.claims import Screen, claims
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.explanations import Explanation, FaultyPlace, Meeting
-from bushfit.diagnosis.hypotheses import Asked, Hypothesis, State, Tests, Weighed
+from bushfit.diagnosis.hypotheses import COMPOUND, Asked, Hypothesis, State, Tests, Weighed
 from bushfit.diagnosis.laplace import laplace
-from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS
+from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, FAR, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_what_it_uses
 from bushfit.diagnosis.refit import beside, refitted, within_reach
 from bushfit.diagnosis.words import judged
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.rig_class import ASSUMED, of_class
 from bushfit.progress import track
 
 #: Refits at most of what is probable by a linear count alone. For time.
@@ -63,7 +62,8 @@ class Search:
                 fresh += self._of_records()
             for weighed in fresh:
                 self._note_state(weighed)
-            best = max(each.log_posterior for each in self.found.values() if not (each.unnamed or each.levels))
+            followed = [each for each in self.found.values() if each.unnamed in ("", COMPOUND) and not each.levels]
+            best = max(each.log_posterior for each in followed)
             near = sorted(fresh, key=lambda each: -each.log_posterior)[: BEAM[min(depth, 1)]]
             beam = [each for each in near if each.log_posterior > best - FAR]
             if not beam:
@@ -79,7 +79,7 @@ class Search:
         """Whether one answer is all but sure already, with whatever may be beside it weighed, and it fits."""
         finding = judged(self.ordered, self.asked.tolerance)
         if finding.verdict == "consistent":
-            return finding.nothing >= NAMED and self.root.first.chance >= DOES_NOT_FIT
+            return finding.nothing >= NAMED and self.root.first.chance() >= DOES_NOT_FIT
         return finding.verdict == "named" and finding.told[0].best.refitted
 
     def _settle(self) -> None:
@@ -117,16 +117,12 @@ class Search:
         self._note_state(weighed)
         for each, worth in weighed.worths:
             if len(weighed.state.effects) < self.asked.most or each.kind != "effect":
-                self._note(weighed.with_(each, worth, self._prior(each.kind, each.name) - log(depth + 1)))
+                for one in weighed.with_(each, worth, self._prior(each.kind, each.name) - log(depth + 1)):
+                    self._note(one)
 
     def _note_state(self, weighed: Weighed) -> None:
-        state, claim = weighed.state, weighed.state.tests.claim
-        self._note(
-            Hypothesis(state.effects, claim, state.places, "", False, weighed.log_posterior, state.size, 0.0, weighed)
-        )
-        wide = state.log_prior + state.density + weighed.first.log_evidence_wide
-        size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED)))
-        self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, 0.0, weighed))
+        for each in weighed.alone:
+            self._note(each)
 
     @cached_property
     def _met_odds(self) -> float:
@@ -163,8 +159,9 @@ class Search:
         those that take most off chi-square, which tells more where the gap is large."""
         state = weighed.state
         new = [each.name for each in weighed.effects if state.key | {each.name} not in self._seen]
+        prior = state.log_prior + state.density - weighed.log_posterior
         evidence = {
-            each.name: self._prior("effect", each.name) + worth.log_evidence - weighed.first.log_evidence
+            each.name: prior + self._prior("effect", each.name) + worth.whole
             for each, worth in weighed.worths
             if each.kind == "effect"
         }
@@ -183,10 +180,15 @@ class Search:
             return []
         proposed = [each.proposal for each in weighed.effects if each.name in names]
         start = asked.start if not state.effects and state.evidence.reduced > _BENT else {}
-        return [
-            self._weigh(self._with_effect(state, name, evidence, depth))
-            for name, evidence in refitted(state.evidence, proposed, start, asked.held, asked.bounds).items()
-        ]
+        grown: dict[str, Weighed] = {}
+        for columns in (None, weighed.fitted_beside) if weighed.bent else (None,):  # by noise alone, and beside it
+            fits = refitted(state.evidence, proposed, start, asked.held, asked.bounds, columns)
+            for name, evidence in fits.items():
+                one = self._weigh(self._with_effect(state, name, evidence, depth))
+                self._note_state(one)
+                if name not in grown or one.log_posterior > grown[name].log_posterior:
+                    grown[name] = one
+        return list(grown.values())
 
     def _with_effect(self, state: State, name: str, evidence: Evidence, depth: int) -> State:
         density, precision, size = laplace(name, evidence, state.evidence)
@@ -203,13 +205,13 @@ class Search:
     def _with_places(self, weighed: Weighed, depth: int) -> list[Weighed]:
         state, grown = weighed.state, []
         own = [(each, worth) for each, worth in weighed.worths if isinstance(each, FaultyPlace)]
-        own.sort(key=lambda pair: -(self._prior("place", pair[0].name) + pair[1].log_evidence))
+        own.sort(key=lambda pair: -(self._prior("place", pair[0].name) + pair[1].whole))
         for place, shifted in own[:_PLACES]:
             free = place.freely
             (scattered,) = weighed.worths_of([free])
-            each, worth = (free, scattered) if scattered.log_evidence > shifted.log_evidence else (place, shifted)
+            each, worth = (free, scattered) if scattered.whole > shifted.whole else (place, shifted)
             odds = self._prior("place", each.name) - log(depth + 1)
-            better = weighed.with_(each, worth, odds).log_posterior > weighed.log_posterior
+            better = state.log_prior + state.density + odds + worth.whole > weighed.log_posterior
             if better and state.key | {each.name} not in self._seen:
                 evidence = state.evidence
                 if evidence.reduced > _BENT:  # by the place, too

@@ -70,12 +70,21 @@ class Worth:
         size: of what it changes, relative to |K|, as the tests leave it.
         likeliest: the size at which the tests are likeliest.
         by_node: logarithm of the evidence at each node, best size, (nodes,).
+        beside: the same beside a deviation of the compound; None without.
     """
 
     log_evidence: float
     size: float
     likeliest: float
     by_node: Array
+    beside: "Worth | None" = None
+
+    @property
+    def whole(self) -> float:
+        """ln evidence, with a deviation of the compound and without."""
+        if self.beside is None:
+            return self.log_evidence
+        return float(np.logaddexp(self.log_evidence, self.beside.log_evidence))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +97,7 @@ class Ledger:
         precision: prior precision of each of these; 0 where the prior is flat, (k,).
         groups: what may be missing.
         at: numbers of the rig's nodes that count; all where it is None.
+        compound: the compound's own deviation at unit size, a part of every hypothesis; None without.
     """
 
     residual: Array
@@ -96,19 +106,39 @@ class Ledger:
     rig: RigErrors
     groups: Sequence[Group] = ()
     at: Array | None = None
+    compound: Group | None = None
+
+    @cached_property
+    def _smooth(self) -> Array:
+        """Columns of the compound's own deviation, (q, n)."""
+        return np.zeros((0, self.residual.size)) if self.compound is None else self.compound.whole
+
+    @property
+    def _first(self) -> int:
+        """Number of the first row of a group among all."""
+        return 1 + len(self.jacobian) + len(self._smooth)
 
     @cached_property
     def _at(self) -> Array:
-        return np.arange(len(self.rig.nodes)) if self.at is None else self.at
+        every = np.arange(len(self.rig.nodes)) if self.at is None else self.at
+        return every if self.compound is not None else every[self.rig.compound[every] == 0.0]
 
     @cached_property
-    def _within(self) -> Array:
-        return self.rig.within[self._at]
+    def _plain(self) -> Array:
+        """Which nodes have neither errors beyond the class of the rig nor a deviation of the compound."""
+        return self.rig.within[self._at] & ~self._bent
+
+    @cached_property
+    def _bent(self) -> Array:
+        """Which nodes have a deviation of the compound."""
+        return np.asarray(self.rig.compound[self._at] > 0.0)
 
     @cached_property
     def _every(self) -> Array:
-        """Residual, derivatives and columns of all groups, (1 + k + c, n)."""
-        return np.concatenate([self.residual[None], self.jacobian, *(group.whole for group in self.groups)])
+        """Residual, derivatives, and columns of the compound and of all groups, (1 + k + q + c, n)."""
+        return np.concatenate(
+            [self.residual[None], self.jacobian, self._smooth, *(group.whole for group in self.groups)]
+        )
 
     @cached_property
     def _scatters(self) -> Array:
@@ -121,7 +151,7 @@ class Ledger:
     @cached_property
     def _places(self) -> list[Array]:
         """Numbers of the rows of each group among all."""
-        ends = 1 + len(self.jacobian) + np.cumsum([0, *(len(group.columns) for group in self.groups)])
+        ends = self._first + np.cumsum([0, *(len(group.columns) for group in self.groups)])
         return [np.arange(*pair) for pair in pairwise(ends.tolist())]
 
     @cached_property
@@ -136,7 +166,7 @@ class Ledger:
     @cached_property
     def _products(self) -> "_Products":
         every, scatters = self._every, self._scatters
-        first = 1 + len(self.jacobian)
+        first = self._first
         parts = [_columns(every, scatters), _columns(every, ~scatters)]
         along = np.zeros((len(self.rig.blocks), self.rig.width, len(every)))
         for number, block in enumerate(self.rig.blocks):
@@ -154,37 +184,66 @@ class Ledger:
         """At every node what the tests say without a group, and along all groups; some nodes at a time, as memory has
         it."""
         rows = len(self.rig.blocks) * self.rig.width * self._every.shape[0]
-        parts = np.array_split(self._at, max(1, min(len(self._at), len(self._at) * rows // _AT_ONCE)))
-        found = [self._solved_at(part) for part in parts]
-        arrays = zip(*((each.base, each.misfit, each.size, each.along) for each in found), strict=True)
-        base, misfit, size, along = map(np.concatenate, arrays)
-        grams = [np.concatenate(kind) for kind in zip(*(each.grams for each in found), strict=True)]
-        return _Solved(base, misfit, size, along, grams)
+        own, sizes = self.rig.combination[self._at], self.rig.compound[self._at]
+        every = np.unique(own)
+        found = []
+        for part in np.array_split(every, max(1, min(every.size, every.size * rows // _AT_ONCE))):
+            errors = self._with_errors(part)
+            for size in np.unique(sizes[np.isin(own, part)]):
+                nodes = np.flatnonzero((sizes == size) & np.isin(own, part))
+                solved = self._solved_at(self._at[nodes], errors.at(np.searchsorted(part, own[nodes])), float(size))
+                found.append((nodes, solved))
+        order = np.argsort(np.concatenate([nodes for nodes, _ in found]))
+        arrays = zip(*((each.base, each.misfit, each.size, each.along, each.moved) for _, each in found), strict=True)
+        base, misfit, size, along, moved = (np.concatenate(array)[order] for array in arrays)
+        grams = [np.concatenate(kind)[order] for kind in zip(*(each.grams for _, each in found), strict=True)]
+        return _Solved(base, misfit, size, along, grams, moved)
 
-    def _solved_at(self, nodes: Array) -> "_Solved":
-        k, products, known = len(self.jacobian), self._products, self.precision > 0.0
-        told = np.diag((products.rows[0] + products.rows[1])[1:, 1 : 1 + k]) + self.precision  # the same at every node
-        scale = np.sqrt(np.maximum(told, np.finfo(float).tiny))
-        scatter, (roots, log_sizes) = self.rig.scatter[nodes], self.rig.roots
+    def _with_errors(self, combinations: Array) -> "_WithErrors":
+        """Inner products of rows by the covariance of noise and errors of the rig, at some combinations of sizes of
+        these."""
+        products, first = self._products, self._first
+        scatter, roots = self.rig.distinct_scatter[combinations], self.rig.roots[0][combinations]
         share = 1.0 / np.square(scatter)[:, None, None]
-        left = (roots[nodes] @ products.along).reshape(len(nodes), -1, len(self._every))
-        gram = share * products.rows[0] + products.rows[1] - left[..., : 1 + k].swapaxes(1, 2) @ left
-        information = gram[:, 1:, 1 : 1 + k] + np.diag(self.precision)
-        root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(k))
-        free = np.linalg.solve(root, gram[:, 1:] / scale[:, None])
-        rest = gram[:, 0] - np.einsum("nk,nkc->nc", free[..., 0], free)
-        log_size = log_sizes[nodes] + 2.0 * products.count * np.log(scatter)
-        log_size += 2.0 * np.sum(np.log(np.einsum("nkk->nk", root) * scale), axis=1)
-        log_size -= np.sum(np.log(self.precision[known]))
-        taken = np.concatenate((left, free), axis=1)
-        square = share[..., 0] * products.squares[0] + products.squares[1] - np.einsum("nwc,nwc->nc", taken, taken)
+        left = (roots @ products.along).reshape(len(scatter), -1, len(self._every))
+        gram = share * products.rows[0] + products.rows[1] - left[..., :first].swapaxes(1, 2) @ left
+        square = share[..., 0] * products.squares[0] + products.squares[1] - np.einsum("nwc,nwc->nc", left, left)
         grams = []
         for (_, own), parts in zip(self._alike, products.grams, strict=True):
-            there = np.moveaxis(taken[..., own], 1, -1)  # (nodes, groups, columns, taken)
+            there = np.moveaxis(left[..., own], 1, -1)  # (combinations, groups, columns, errors)
             grams.append(share[..., None] * parts[0] + parts[1] - there @ there.swapaxes(-1, -2))
+        log_size = self.rig.roots[1][combinations] + 2.0 * products.count * np.log(scatter)
+        return _WithErrors(gram, square, grams, log_size)
+
+    def _solved_at(self, nodes: Array, errors: "_WithErrors", size: float) -> "_Solved":
+        """At some nodes, all with a deviation of the compound of one size: it moves as parameters of known precision
+        do."""
+        products, flat, first = self._products, len(self.jacobian), self._first
+        chosen = np.arange(first if size else 1 + flat)
+        precision = np.concatenate((self.precision, np.ones(chosen.size - 1 - flat)))
+        known = precision > 0.0
+        grow = np.concatenate((np.ones(1 + flat), np.full(first - 1 - flat, size), np.ones(len(self._every) - first)))
+        gram = errors.gram[:, chosen] * grow[chosen, None] * grow
+        told = np.diag((products.rows[0] + products.rows[1])[1:, 1:])[: chosen.size - 1] * np.square(grow[chosen[1:]])
+        scale = np.sqrt(np.maximum(told + precision, np.finfo(float).tiny))
+        information = gram[:, 1:, chosen[1:]] + np.diag(precision)
+        root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(scale.size))
+        free = np.linalg.solve(root, gram[:, 1:] / scale[:, None])
+        rest = gram[:, 0] - np.einsum("nk,nkc->nc", free[..., 0], free)
+        log_size = errors.log_size + 2.0 * np.sum(np.log(np.einsum("nkk->nk", root) * scale), axis=1)
+        log_size -= np.sum(np.log(precision[known]))
+        square = errors.square - np.einsum("nkc,nkc->nc", free, free)
+        grams = []
+        for (_, own), gram_of in zip(self._alike, errors.grams, strict=True):
+            there = np.moveaxis(free[..., own], 1, -1)  # (nodes, groups, columns, free)
+            grams.append(gram_of - there @ there.swapaxes(-1, -2))
         weight = np.array([self.rig.nodes[node].log_weight for node in nodes.tolist()])
         base = weight - 0.5 * (rest[:, 0] + log_size)
-        return _Solved(base, rest[:, 0], np.maximum(square[:, 1 + k :], 0.0), rest[:, 1 + k :], grams)
+        moved = np.zeros(len(nodes))
+        if size and self.compound is not None:
+            back = np.linalg.solve(root.swapaxes(1, 2), free[..., :1])[..., 0] / scale
+            moved = np.square(np.abs(back[:, flat:] * size @ self.compound.unit)).max(axis=-1)
+        return _Solved(base, rest[:, 0], np.maximum(square[:, first:], 0.0), rest[:, first:], grams, moved)
 
     def worths_of(self, groups: Sequence[Group]) -> list[Worth]:
         """What other groups are worth, some at a time, as memory has it."""
@@ -195,29 +254,45 @@ class Ledger:
     @property
     def log_evidence(self) -> float:
         """Of the tests with nothing missing, errors of the rig within what its class allows."""
-        return float(logsumexp(self._solved.base[self._within]))
+        return float(logsumexp(self._solved.base[self._plain]))
+
+    @property
+    def log_evidence_bent(self) -> float:
+        """The same with a deviation of the compound."""
+        return float(logsumexp(self._solved.base[self._bent])) if self._bent.any() else -np.inf
+
+    @property
+    def deviation(self) -> tuple[float, float]:
+        """What a deviation of the compound changes as the tests leave it, and its likeliest size, relative to |K|."""
+        base = self._solved.base[self._bent]
+        share = np.exp(base - logsumexp(base))
+        sizes = self.rig.compound[self._at][self._bent]
+        likeliest = max(np.unique(sizes), key=lambda size: share[sizes == size].sum())
+        return float(np.sqrt(share @ self._solved.moved[self._bent])), float(likeliest)
 
     @property
     def log_evidence_wide(self) -> float:
         """The same with errors of levels beyond the class."""
-        beyond = ~self._within
+        beyond = ~(self._plain | self._bent)
         return float(logsumexp(self._solved.base[beyond])) if beyond.any() else -np.inf
 
     def likely(self, far: float) -> Array:
-        """Numbers of the nodes that nothing missing, or one of the groups, brings so near the best in ln evidence."""
-        alone = self._solved.base
-        best = np.max(np.array([alone, *(worth.by_node for worth in self.worths)]), axis=0)
-        within = self._within
-        kept = (alone > alone[within].max() - far) | (best > best[within].max() - far)
-        return self._at[kept]
+        """Numbers of the nodes at which a group may count: those so near the best in ln evidence; without a deviation
+        of the compound also those that one makes likely, since a group may do the same."""
+        base, plain, own = self._solved.base, self._plain, self.rig.combination[self._at]
+        base = np.where(plain | self._bent, base, -np.inf)
+        best = np.full(own.max() + 1, -np.inf)
+        np.maximum.at(best, own, base)
+        near = base > base.max() - far
+        return self._at[near | (plain & ((base > base[plain].max() - far) | (best[own] > best.max() - far)))]
 
-    @property
-    def chance(self) -> float:
-        """Probability that tests of this model and rig leave more than these do, over the nodes as likely as they are.
+    def chance(self, *, bent: bool = False) -> float:
+        """Probability that tests of this model and rig leave more than these do, over the nodes as likely as they are;
+        `bent` beside a deviation of the compound.
 
         Notes: a posterior predictive check on r^T P r (Gelman, Meng and Stern, 1996).
         """
-        base = np.where(self._within, self._solved.base, -np.inf)
+        base = np.where(self._bent if bent else self._plain, self._solved.base, -np.inf)
         freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
         return float(np.exp(base - logsumexp(base)) @ chdtrc(freedom, self._solved.misfit))
 
@@ -225,7 +300,7 @@ class Ledger:
     def worths(self) -> list[Worth]:
         """What each group is worth, errors of the rig within what its class allows."""
         found: dict[int, Worth] = {}
-        first = 1 + len(self.jacobian)
+        first = self._first
         for (numbers, own), gram in zip(self._alike, self._solved.grams, strict=True):
             units = [self.groups[number].unit for number in numbers]
             gains, moved = _of_all(gram, self._solved.along[:, own - first], units)
@@ -241,12 +316,12 @@ class Ledger:
         """Mean, (g,), and covariance, (g, g), of the amounts of a group whose columns move together, over all sizes and
         the nodes within the class of the rig."""
         kind, place = next((kind, own.index(number)) for kind, (own, _) in enumerate(self._alike) if number in own)
-        size, vectors = np.linalg.eigh(self._solved.grams[kind][self._within, place])
-        along = self._solved.along[self._within][:, self._places[number] - 1 - len(self.jacobian)]
+        size, vectors = np.linalg.eigh(self._solved.grams[kind][self._plain, place])
+        along = self._solved.along[self._plain][:, self._places[number] - self._first]
         along = np.einsum("nij,ni->nj", vectors, along)[:, None]
         v2 = np.square(SIZES)[:, None]
         grown = 1.0 + v2 * np.maximum(size, 0.0)[:, None]
-        gain = 0.5 * np.sum(v2 * along**2 / grown - np.log(grown), axis=-1) + self._solved.base[self._within, None]
+        gain = 0.5 * np.sum(v2 * along**2 / grown - np.log(grown), axis=-1) + self._solved.base[self._plain, None]
         share = np.exp(gain - logsumexp(gain))
         means = np.einsum("nij,nsj->nsi", vectors, -v2 * along / grown)
         mean = np.einsum("ns,nsi->i", share, means)
@@ -256,14 +331,20 @@ class Ledger:
     def _worth(self, gains: Array, moved: Array) -> Worth:
         """From gains in ln evidence and squares of the change, (nodes, columns, sizes)."""
         whole = self._solved.base[:, None, None] + gains
-        within = whole[self._within]
-        top = within.max()
-        share = np.exp(within - top)
-        total = share.sum()
-        size = float(np.sqrt(np.sum(share * moved[self._within]) / total))
-        likeliest = float(SIZES[int(np.argmax(share.sum(axis=(0, 1))))])
-        log_evidence = float(top + np.log(total) - np.log(whole.shape[1] * SIZES.size))
-        return Worth(log_evidence, size, likeliest, whole.max(axis=(1, 2)))
+        by_node = whole.max(axis=(1, 2))
+
+        def of(chosen: Array, beside: Worth | None = None) -> Worth:
+            own = whole[chosen]
+            if not own.size:
+                return Worth(-np.inf, 0.0, float(SIZES[0]), by_node, beside)
+            share = np.exp(own - own.max())
+            total = share.sum()
+            size = float(np.sqrt(np.sum(share * moved[chosen]) / total))
+            likeliest = float(SIZES[int(np.argmax(share.sum(axis=(0, 1))))])
+            log_evidence = float(own.max() + np.log(total) - np.log(whole.shape[1] * SIZES.size))
+            return Worth(log_evidence, size, likeliest, by_node, beside)
+
+        return of(self._plain, of(self._bent) if self._bent.any() else None)
 
 
 def _columns(every: Array, chosen: Array) -> Array:
@@ -327,12 +408,30 @@ class _Products:
 
 
 @dataclass(frozen=True, eq=False)
+class _WithErrors:
+    """Inner products by the covariance of noise and errors of the rig, at some combinations of their sizes: of
+    residual, derivatives and the compound with all rows; of each row with itself; of the columns of groups that move
+    together; and the logarithm of the determinant of that covariance."""
+
+    gram: Array
+    square: Array
+    grams: list[Array]
+    log_size: Array
+
+    def at(self, numbers: Array) -> "_WithErrors":
+        """The same of some of the combinations."""
+        grams = [gram[numbers] for gram in self.grams]
+        return _WithErrors(self.gram[numbers], self.square[numbers], grams, self.log_size[numbers])
+
+
+@dataclass(frozen=True, eq=False)
 class _Solved:
     """At every node: ln evidence without a group, misfit, and U^T P U (its diagonal, and whole of groups that move
-    together) and U^T P r of the columns."""
+    together) and U^T P r of the columns; and the square of what the compound's deviation changes at the most."""
 
     base: Array
     misfit: Array
     size: Array
     along: Array
     grams: list[Array]
+    moved: Array

@@ -29,10 +29,17 @@ _CORRECTED = (
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Where the fit of a model to all tests of a campaign ended, and the tests."""
+    """Where the fit of a model to all tests of a campaign ended, and the tests.
+
+    Args:
+        solution: the fit, its residuals in units of noise.
+        data_sets: the tests.
+        joint: the same fit with residuals whitened by an error that the tests have in common, if it was made so.
+    """
 
     solution: Solution
     data_sets: tuple[DataSet, ...]
+    joint: Solution | None = None
 
     @property
     def model(self) -> Model:

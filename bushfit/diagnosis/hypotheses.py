@@ -10,14 +10,30 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
-from bushfit.diagnosis.currency import Ledger, Worth
+from bushfit.diagnosis.currency import Group, Ledger, Worth
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import Explanation, FaultyPlace, Meeting, MissingEffect, effects, places, unnamed
-from bushfit.diagnosis.priors import FAR
+from bushfit.diagnosis.explanations import (
+    Explanation,
+    FaultyPlace,
+    Meeting,
+    MissingEffect,
+    compound,
+    effects,
+    places,
+    unnamed,
+)
+from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.rig_errors import RigErrors, rig_errors, scattering_alone
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data import Data
+from bushfit.fitting.rig_class import ASSUMED, of_class
+
+#: Name of the compound's own deviation among what has no name.
+COMPOUND = "compound"
+#: Logarithm of odds below which a node of the sizes of the rig's errors does not count; chosen for time, as e^-8 of an
+#: answer changes none.
+_NEAR = 8.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +78,7 @@ class Hypothesis:
         size: of what it changes, relative to |K|.
         last: of this, what its last explanation changes, where it was counted linearly; else 0.
         weighed: the state that it is, with its effects refitted, or to which its last explanation was added linearly.
+        bent: whether the compound deviates from the model's laws beside all of this.
     """
 
     effects: tuple[str, ...]
@@ -73,6 +90,7 @@ class Hypothesis:
     size: float
     last: float
     weighed: Weighed
+    bent: bool = False
 
     @property
     def key(self) -> frozenset[Hashable]:
@@ -88,7 +106,7 @@ class Hypothesis:
     @property
     def chance(self) -> float:
         """Probability of tests that it meets worse than these."""
-        return self.weighed.first.chance
+        return self.weighed.first.chance(bent=self.bent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +135,16 @@ class Tests:
     @cached_property
     def errors(self) -> RigErrors:
         return rig_errors(self.bare, self.rig)
+
+    @cached_property
+    def compound(self) -> Group | None:
+        """The compound's own deviation from the model's laws, in residuals as `bare` has them."""
+        return compound(self.bare)
+
+    @cached_property
+    def deviation(self) -> Group | None:
+        """The same in residuals as they are fitted."""
+        return compound(self.base)
 
     @cached_property
     def fixed(self) -> list[Explanation]:
@@ -178,11 +206,25 @@ class Weighed:
         for place, amount in zip(state.places, state.amounts, strict=True):
             free.append(place.columns)
             precision += [amount**-2] * len(place.columns)
-        return Ledger(self.bare.residual, np.concatenate(free), np.array(precision), tests.errors)
+        rows = np.concatenate(free)
+        return Ledger(self.bare.residual, rows, np.array(precision), tests.errors, compound=tests.compound)
 
     @cached_property
     def log_posterior(self) -> float:
-        return self.state.log_prior + self.state.density + self.first.log_evidence
+        whole = float(np.logaddexp(self.first.log_evidence, self.first.log_evidence_bent))
+        return self.state.log_prior + self.state.density + whole
+
+    @cached_property
+    def bent(self) -> float:
+        """Likeliest size of a deviation of the compound, relative to |K|; 0 where none is likelier."""
+        first = self.first
+        return first.deviation[1] if first.log_evidence_bent > first.log_evidence else 0.0
+
+    @property
+    def fitted_beside(self) -> Array | None:
+        """Columns beside which effects are refitted, at one standard deviation; None where the compound obeys."""
+        deviation = self.state.tests.deviation
+        return self.bent * deviation.whole if self.bent and deviation else None
 
     @cached_property
     def effects(self) -> list[MissingEffect]:
@@ -190,26 +232,64 @@ class Weighed:
 
     @cached_property
     def worths(self) -> list[tuple[Explanation, Worth]]:
-        """Every explanation that can be counted linearly, at the sizes of the rig's errors that matter: those that
-        nothing more, or something smooth, makes likely."""
+        """Every explanation that can be counted linearly, at the sizes of the rig's errors that matter."""
         every = [each for each in (*self.effects, *self.state.tests.fixed) if each.group is not None]
         return list(zip(every, self.worths_of(every), strict=True))
 
-    @cached_property
-    def _likely(self) -> Array:
-        """Numbers of the nodes that nothing more, or something smooth, makes likely."""
-        curves = [each.group for each in self.state.tests.fixed if each.group and each.kind == "unnamed"]
-        return replace(self.first, groups=curves).likely(FAR)
-
     def worths_of(self, every: Sequence[Explanation]) -> Sequence[Worth]:
         """Of explanations that have columns."""
-        return replace(self.first, at=self._likely).worths_of([each.group for each in every if each.group])
+        return replace(self.first, at=self.first.likely(_NEAR)).worths_of([each.group for each in every if each.group])
 
-    def with_(self, each: Explanation, worth: Worth, log_odds: float) -> Hypothesis:
-        """This state with an explanation more, counted linearly."""
-        state = self.state
+    def with_(self, each: Explanation, worth: Worth, log_odds: float) -> list[Hypothesis]:
+        """This state with an explanation more, counted linearly; and beside a deviation of the compound."""
+        state, tests = self.state, self.state.tests
         names = (*state.effects, each.name) if each.kind == "effect" else state.effects
         spots = (*state.places, each) if isinstance(each, FaultyPlace) else state.places
         curve = each.name if each.kind == "unnamed" else ""
-        posterior, size = state.log_prior + state.density + log_odds + worth.log_evidence, max(state.size, worth.size)
-        return Hypothesis(names, state.tests.claim, spots, curve, False, posterior, size, worth.size, self)
+        prior = state.log_prior + state.density + log_odds
+        found = [
+            Hypothesis(
+                names,
+                tests.claim,
+                spots,
+                curve,
+                False,
+                prior + worth.log_evidence,
+                max(state.size, worth.size),
+                worth.size,
+                self,
+            )
+        ]
+        if worth.beside and np.isfinite(worth.beside.log_evidence):
+            size = max(state.size, worth.beside.size, self.first.deviation[0])
+            posterior = prior + worth.beside.log_evidence
+            found.append(
+                Hypothesis(
+                    names, tests.claim, spots, curve or COMPOUND, False, posterior, size, worth.beside.size, self, True
+                )
+            )
+        return found
+
+    @property
+    def alone(self) -> list[Hypothesis]:
+        """This state with nothing more; with errors of levels beyond the class of the rig; and with a deviation of the
+        compound."""
+        state, first = self.state, self.first
+        prior, claim = state.log_prior + state.density, state.tests.claim
+        plain = Hypothesis(
+            state.effects, claim, state.places, "", False, prior + first.log_evidence, state.size, 0.0, self
+        )
+        size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED)))
+        wide = replace(plain, levels=True, log_posterior=prior + first.log_evidence_wide, size=size)
+        if not np.isfinite(first.log_evidence_bent):
+            return [plain, wide]
+        deviation = first.deviation[0]
+        bent = replace(
+            plain,
+            unnamed=COMPOUND,
+            log_posterior=prior + first.log_evidence_bent,
+            size=max(state.size, deviation),
+            last=deviation,
+            bent=True,
+        )
+        return [plain, wide, bent]

@@ -22,13 +22,18 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
     could show; at rest on an end of that it moves no further, and the fall of the likelihood away from the end tells
     how much of it counts. Of an effect in place of a branch each parameter beyond the branch's two is uniform over a
     factor of 20.
+
+    Args:
+        name: of the effect.
+        evidence, before: the fits with it and without.
     """
-    effect, names = get_effect(name), evidence.solution.coordinates.names
+    solution = evidence.joint or evidence.solution
+    effect, names = get_effect(name), solution.coordinates.names
     data_sets, model = evidence.data_sets, evidence.model
     other = model.without(name) if effect.replaces is None else before.model
     size = max(each.change(model, other) for each in data_sets)
     density, precision, count = 0.0, {}, 0
-    jacobian = evidence.solution.jacobian
+    jacobian = solution.jacobian
     variances = np.diag(np.linalg.pinv(jacobian @ jacobian.T, rcond=1e-12, hermitian=True))
     if effect.replaces is not None:
         count = max(len(effect.parameters) - 2, 0)
@@ -52,9 +57,9 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
         else:
             wide = max(float(np.ptp(tried)) / parameter.typical, 1.0)
         density -= log(wide)
-        if coordinate in evidence.solution.at_bound:
+        if coordinate in solution.at_bound:
             count -= 1
-            pull = abs(float(evidence.solution.jacobian[names.index(coordinate)] @ evidence.residual))
+            pull = abs(float(solution.jacobian[names.index(coordinate)] @ solution.residual))
             density += log(min(wide, 1.0 / max(pull, 1e-12)))
             precision[coordinate] = np.inf
         else:

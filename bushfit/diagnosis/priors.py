@@ -17,11 +17,14 @@ LEVELS = ((0.0, 0.35), (0.4, 0.3), (1.0, 0.25), (2.5, 0.1))
 WANDERING = ((0.0, 0.6), (0.5, 0.25), (1.0, 0.15))
 #: Errors of levels, in units of the class, above which they are an explanation of their own.
 WITHIN_CLASS = 1.5
+#: Sizes of the compound's own deviation from the model's laws, relative to |K|, with their weights: a compound that
+#: obeys a few parameters within noise, or one that departs by one to three per cent, as most do, or by more.
+COMPOUND = ((0.0, 0.5), (0.01, 0.15), (0.02, 0.15), (0.04, 0.12), (0.08, 0.08))
 #: Harmonics of what wanders along a run; their variance falls as 1/j^2.
 WAVES = 4
 #: Degrees of freedom of the scatter, from which on it counts as known.
 KNOWN = 30
-#: Logarithm of odds below which a node, a state of the search or an explanation is not followed.
+#: Logarithm of odds below which a state of the search or an explanation is not followed.
 FAR = 12.0
 #: States of the search that are kept, in the first round and later, and rounds.
 BEAM, ROUNDS = (4, 3), 3
@@ -38,3 +41,5 @@ TELLS = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
 MOSTLY = 0.9
 #: Probability of what the leader leaves, below which it does not fit.
 DOES_NOT_FIT = 0.002
+#: Gap, held out, in units of noise, up to which a name closes it: noise alone makes 1.1.
+MOST_LEFT = 1.2

@@ -29,7 +29,12 @@ _FIRST = 16
 
 
 def refitted(
-    evidence: Evidence, proposed: Sequence[Proposal], start: Mapping[str, float], held: Sequence[str], bounds: Bounds
+    evidence: Evidence,
+    proposed: Sequence[Proposal],
+    start: Mapping[str, float],
+    held: Sequence[str],
+    bounds: Bounds,
+    columns: Array | None = None,
 ) -> dict[str, Evidence]:
     """Proposals fitted with all parameters, by name; those that cannot come near the best are left out.
 
@@ -37,17 +42,27 @@ def refitted(
         evidence: the fitted model without the effects.
         start: values of parameters to start from.
         held, bounds: parameters that do not move, and limits inside the parameters' own.
+        columns: what one standard deviation of each amount makes of the residuals that all tests have in common beside
+            their noise, (c, n); None where they have noise alone.
     """
     fits: dict[str, Descent] = {}
+    tests: Sequence[DataSet] = evidence.data_sets
+    if columns is not None:
+        tests = Joined(evidence.data_sets, CommonError.of_all(columns), freedom=1.0)
     for proposal in proposed:
         limits = {**within_reach(proposal.model, evidence.data_sets), **bounds}
         known = {name: value for name, value in start.items() if name in proposal.model.values}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
-            fits[proposal.name] = fit_from(proposal.model.with_values(known), evidence.data_sets, held, limits)
+            fits[proposal.name] = fit_from(proposal.model.with_values(known), tests, held, limits)
     list(track("effects refitted", _finished(fits), len(fits)))
     best = min((fit.chi_square for fit in fits.values()), default=0.0)
     near = {name: fit for name, fit in fits.items() if _ended(fit) or fit.chi_square <= best + _FAR}
-    return {name: Evidence(fit.solution, evidence.data_sets) for name, fit in near.items()}
+    if columns is None:
+        return {name: Evidence(fit.solution, evidence.data_sets) for name, fit in near.items()}
+    return {
+        name: Evidence(fit.solution.at(fit.model, evidence.data_sets), evidence.data_sets, fit.solution)
+        for name, fit in near.items()
+    }
 
 
 def _finished(fits: dict[str, Descent]) -> Iterator[str]:

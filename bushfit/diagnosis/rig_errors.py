@@ -7,11 +7,11 @@ from itertools import product
 from math import log
 
 import numpy as np
-from scipy.special import chdtri
+from scipy.special import chdtri, logsumexp
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.priors import KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
+from bushfit.diagnosis.priors import COMPOUND, KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted, with_gains
 from bushfit.fitting.rig_class import ASSUMED, of_class
@@ -30,12 +30,14 @@ class Node:
         scatter: standard deviation of a sweep's point, relative to the one that counts.
         errors: standard deviations by kind of error, in units of the rig's class.
         wide: whether errors of levels are larger than the class allows.
+        compound: size of the compound's own deviation from the model's laws, relative to |K|.
     """
 
     scatter: float
     errors: tuple[float, ...]
     log_weight: float
     wide: bool = False
+    compound: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,14 +65,29 @@ class RigErrors:
     nodes: Sequence[Node]
 
     @cached_property
-    def scatter(self) -> Array:
-        """Of each node, (nodes,)."""
-        return np.array([node.scatter for node in self.nodes])
+    def _combinations(self) -> dict[tuple[float, ...], int]:
+        """Number of each combination of scatter and errors that nodes have."""
+        return {of: number for number, of in enumerate(dict.fromkeys((n.scatter, *n.errors) for n in self.nodes))}
+
+    @cached_property
+    def combination(self) -> Array:
+        """Number of the combination of scatter and errors of each node, (nodes,)."""
+        return np.array([self._combinations[node.scatter, *node.errors] for node in self.nodes])
+
+    @cached_property
+    def distinct_scatter(self) -> Array:
+        """Of each combination, (combinations,)."""
+        return np.array([of[0] for of in self._combinations])
 
     @cached_property
     def within(self) -> Array:
         """Which nodes are within the class of the rig, (nodes,) bool."""
         return np.array([not node.wide for node in self.nodes])
+
+    @cached_property
+    def compound(self) -> Array:
+        """Size of the compound's own deviation at each node, (nodes,)."""
+        return np.array([node.compound for node in self.nodes])
 
     @cached_property
     def width(self) -> int:
@@ -79,7 +96,8 @@ class RigErrors:
 
     @cached_property
     def roots(self) -> tuple[Array, Array]:
-        """At every node and block L^-1 D of S = 1 + D W W^T D = L L^T, (nodes, blocks, w, w), and ln|S|, (nodes,).
+        """At every combination and block L^-1 D of S = 1 + D W W^T D = L L^T, (combinations, blocks, w, w), and ln|S|,
+        (combinations,).
 
         Notes: times the products of errors with any rows it is what is to be taken off the products of those rows.
         """
@@ -90,8 +108,8 @@ class RigErrors:
             inner[number, :size, :size] = block.columns @ block.columns.T
             kinds[number, :size] = block.kinds
         scatters = np.array([block.scatters for block in self.blocks], dtype=bool)
-        share = np.where(scatters, 1.0 / self.scatter[:, None], 1.0)[..., None]
-        errors = np.array([(*node.errors, 0.0) for node in self.nodes])[:, kinds] * share
+        share = np.where(scatters, 1.0 / self.distinct_scatter[:, None], 1.0)[..., None]
+        errors = np.array([(*of[1:], 0.0) for of in self._combinations])[:, kinds] * share
         root = np.linalg.cholesky(np.eye(self.width) + errors[..., None] * inner * errors[..., None, :])
         log_size = 2.0 * np.sum(np.log(np.einsum("nbii->nbi", root)), axis=(1, 2))
         return np.linalg.inv(root) * (errors * share)[..., None, :], log_size
@@ -124,10 +142,13 @@ def nodes(evidence: Evidence) -> list[Node]:
     scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < KNOWN else [1.0]
     runs = RUNS if sweeps else ((0.0, 1.0),)
     waves = WANDERING if sweeps else ((0.0, 1.0),)
-    return [
-        Node(scatter, (run, level, wave, level), log(a * b * c / len(scatters)), wide=level > WITHIN_CLASS)
-        for scatter, (run, a), (level, b), (wave, c) in product(scatters, runs, LEVELS, waves)
+    made = [
+        Node(scatter, (run, level, wave, level), log(a * b * c * d / len(scatters)), level > WITHIN_CLASS, deviation)
+        for scatter, (run, a), (level, b), (wave, c), (deviation, d) in product(scatters, runs, LEVELS, waves, COMPOUND)
+        if deviation == 0.0 or level <= WITHIN_CLASS  # what levels have beyond the class would hide a deviation
     ]
+    whole = logsumexp([node.log_weight for node in made])
+    return [replace(node, log_weight=float(node.log_weight - whole)) for node in made]
 
 
 def blocks(evidence: Evidence, rig: RigSettings) -> list[Block]:

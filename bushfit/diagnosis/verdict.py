@@ -18,9 +18,10 @@ from bushfit.diagnosis.holdout import hold_out
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
+from bushfit.diagnosis.priors import MOST_LEFT
 from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where, chances
 from bushfit.diagnosis.words import Composition, Finding
-from bushfit.effects import get_effect
+from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import parted, with_gains
@@ -70,14 +71,66 @@ class Told:
 
     def _named(self) -> Diagnosis:
         assert self.first
-        best = self.first.best
-        if best.claim:
-            return self._of_record(best.claim)
-        names = [Named(name, self._evidence()) for name in best.effects]
-        beside = [place.name for place in best.places] + (["something without a name"] if best.unnamed else [])
-        words = f"{_all(best.effects)} {'closes' if len(best.effects) == 1 else 'close'} "
-        words += f"part of the gap; the rest: {', '.join(beside)}" if beside else "the gap"
-        return self._finished(self.finding.verdict, words, best.weighed.state.evidence, names, places=best)
+        first, names = self.first, self.finding.names
+        if first.best.claim:
+            return self._of_record(first.best.claim)
+        after = self._with_names(names)
+        entries = [Named(name, self._evidence()) for name in names]
+        if self.finding.verdict == "named" and (doubt := self._doubt(after, names)):
+            return self._partly(after, entries, doubt)
+        if self.finding.verdict == "partly":
+            return self._partly(after, entries, "")
+        words = f"{_all(names)} {'closes' if len(names) == 1 else 'close'} the gap"
+        return self._finished("named", words, after, entries, places=first.best)
+
+    def _with_names(self, names: Sequence[str]) -> Evidence:
+        """The model as it came with these effects, fitted to noise alone."""
+        of_names = [each for each in self.hypotheses if set(each.effects) == set(names) and each.refitted]
+        others = [each for each in self.hypotheses if set(each.effects) >= set(names) and each.refitted]
+        fitted = (of_names or others)[0].weighed.state
+        model = fitted.evidence.model
+        for name in fitted.effects:
+            if name not in names:
+                model = model.without(name)
+        asked = self.search.asked
+        return fit(model, fitted.evidence.data_sets, asked.held, asked.bounds)
+
+    def _doubt(self, after: Evidence, names: Sequence[str]) -> str:
+        """Why names that are all but sure do not explain the whole gap; "" if they do."""
+        held = hold_out(self._fitted(self.base), self._fitted(after), self.search.asked.bounds)
+        if held.after is not None and held.after > MOST_LEFT:
+            return f"held out, {number(held.after, 3)} times the noise is left"
+        result = result_of(self._fitted(after), self.search.asked.bounds, after.model.effects, lacking=False)
+        for name in names:
+            effect = get_effect(name)
+            amount = qualified_name(effect, effect.amount) if effect.replaces is None else ""
+            low, high = (result.interval(amount) if amount in result.model.values else None) or (1.0, 1.0)
+            if effect.amount.neutral is not None and low <= effect.amount.neutral <= high:
+                return f"{name} may be nothing: the 95 % interval of its amount includes none"
+        return ""
+
+    def _partly(self, after: Evidence, entries: Sequence[Named], doubt: str) -> Diagnosis:
+        """Names that explain part of the gap, with the rest described where a correction stands."""
+        assert self.first
+        best, names = self.first.best, [entry.name for entry in entries]
+        base, plain = self._fitted(self.base), self._fitted(after)
+        excess = [max(each.chi_square / sum(d.counted for d in each.data_sets) - 1.0, 0.0) for each in (base, plain)]
+        share = 1.0 - excess[1] / excess[0] if excess[0] else 1.0
+        words = f"{_all(names)} {'explains' if len(names) == 1 else 'explain'} {number(100 * share, 2)} % of the gap"
+        beside = [place.name for place in self.first.places]
+        beside += ["errors of levels beyond the rig's class"] if best.levels else []
+        gap = self._described(after) if not beside else None
+        if gap:
+            entries = [*entries, Named(UNNAMED, gap.evidence)]
+            beside.append(f"something without a name, {gap.words}")
+        elif self.first.unnamed:
+            beside.append("something without a name")
+        words += f"; the rest: {', '.join([*beside, *filter(None, [doubt])])}" if beside or doubt else ""
+        return self._finished("partly", words, gap.after if gap else after, entries, places=best, gap=gap)
+
+    def _described(self, evidence: Evidence) -> Described | None:
+        asked, rig = self.search.asked, self.data.campaign.rig
+        return describe(self._fitted(evidence), rig, asked.start, asked.held, asked.bounds) if asked.most else None
 
     def _of_record(self, claim: Claim) -> Diagnosis:
         """A mistake in the record: the gap shrinks if it was made; the model stays as it was."""
@@ -106,7 +159,7 @@ class Told:
     def _ambiguous(self) -> Diagnosis:
         told = self.finding.told
         labels = {id(each): self.label(each) for each in told}
-        led = next((each for each in told if each.best.effects or each.best.claim), None)
+        led = next((each for each in told if each.names or each.best.claim), None)
         others = tuple(labels[id(each)] for each in told if each is not led)
         names: list[Named] = []
         if led and led.best.claim:
@@ -114,32 +167,30 @@ class Told:
                 replace(each, alternatives=others) for each in _entries(self.data, led.best.claim, self._of_claim(led))
             ]
         elif led:
-            names = [Named(name, self._probability(led), others) for name in led.best.effects]
+            names = [Named(name, self._probability(led), others) for name in led.names]
         words = f"these tests cannot tell {' from '.join(labels.values())}"
         fitted = [each for each in told if each.best.effects and each.best.refitted]
         models = [each.best.weighed.state.evidence.model for each in fitted]
         advice = deciding_test(models, [each.probability for each in fitted], self.base.data_sets)
         if led and led.best.claim:
             advice = f"look into the records of the tests; {'; '.join(led.best.claim.corrections(self.data))}"
-        spot = next((each.best for each in told if each.best.places), None)
+        spot = next((each.best for each in told if each.places), None)
         return self._finished("ambiguous", words, self.base, names, places=spot, next_test=advice)
 
     def _without_name(self) -> Diagnosis:
         """A gap that is described where a correction stands, else unexplained, with the place at fault if one is."""
-        asked, finding = self.search.asked, self.finding
+        finding = self.finding
         lead = f"; no more than leads: {_all(finding.leads)}" if finding.leads else ""
         spot = self.first.best if self.first and finding.verdict == "unexplained" else None
-        rig = self.data.campaign.rig
-        if (
-            not spot
-            and asked.most
-            and (found := describe(self._fitted(self.base), rig, asked.start, asked.held, asked.bounds))
-        ):
+        if not spot and (found := self._described(self.base)):
+            largest = [place.name for place in self.first.best.places] if self.first else []
             words = f"a real gap stays that no known effect closes: {found.words}{lead}"
+            words += f"; it is largest at {_all(largest)}" if largest else ""
             names = [Named(UNNAMED, found.evidence)]
             return self._finished("described", words, found.after, names, gap=found)
         words = "a real gap stays that no known effect closes" + lead
         advice = ""
+        spot = spot or (self.first.best if self.first and self.first.best.places else None)
         if spot and spot.places:
             words = f"{_all([place.name for place in spot.places])}: this stands out from all other tests; "
             words += "measure it again before looking for physics"
@@ -151,8 +202,8 @@ class Told:
     def label(self, each: Composition) -> str:
         """A composition by the names of its effects, or what else it is."""
         best = each.best
-        names = [*(best.claim.labels(self.data) if best.claim else ()), *best.effects]
-        return " + ".join((*names, *(f"fault: {place.name}" for place in best.places), *_nameless(best)))
+        names = [*(best.claim.labels(self.data) if best.claim else ()), *each.names]
+        return " + ".join((*names, *(f"fault: {place.name}" for place in each.places), *_nameless(each)))
 
     @cached_property
     def odds(self) -> Odds:
@@ -167,17 +218,17 @@ class Told:
         """A composition as it is told to people: what each of its parts is, with its name."""
         best = each.best
         parts = [best.claim.words(self.data)] if best.claim else []
-        parts += [f"{get_effect(name).phrase} ({name})" for name in best.effects]
-        parts += [f"the tests are off: {place.name}" for place in best.places]
-        *most, last = (*parts, *_nameless(best))
+        parts += [f"{get_effect(name).phrase} ({name})" for name in each.names]
+        parts += [f"the tests are off: {place.name}" for place in each.places]
+        *most, last = (*parts, *_nameless(each))
         return ", and ".join(filter(None, (", ".join(most), last)))
 
     def _evidence(self) -> str:
         """Why effects were named."""
         assert self.first
-        after = self._fitted(self.first.best.weighed.state.evidence)
+        after = self._fitted(self._with_names(self.finding.names))
         gain = self._fitted(self.base).chi_square - after.chi_square
-        beside = " with what was named beside it" if len(self.first.best.effects) > 1 else ""
+        beside = " with what was named beside it" if len(self.finding.names) > 1 else ""
         return f"takes {gain:.0f} off chi-square{beside}; {self._probability(self.first)}"
 
     def _probability(self, each: Composition) -> str:
@@ -268,7 +319,7 @@ class Told:
             return Judged(name, score, None, share, {}, why)
         after = alone.weighed.state.evidence
         own = {key: value for key, value in after.model.values.items() if key not in self.base.model.values}
-        told = self.first and name in self.first.best.effects
+        told = self.first and name in self.first.names
         why = "part of the likeliest explanation" if told else _LESS_LIKELY
         return Judged(name, score, self.base.chi_square - after.chi_square, share, own, why)
 
@@ -279,10 +330,10 @@ class Told:
         return (f"not identifiable from these tests: {', '.join(blind)}",) if blind else ()
 
 
-def _nameless(best: Hypothesis) -> list[str]:
-    """What a hypothesis holds beside effects, places and mistakes."""
-    levels = ["errors of levels beyond the rig's class"] if best.levels else []
-    return [*levels, *(["something without a name"] if best.unnamed else [])]
+def _nameless(each: Composition) -> list[str]:
+    """What a composition holds beside effects, places and mistakes."""
+    levels = ["errors of levels beyond the rig's class"] if each.best.levels else []
+    return [*levels, *(["something without a name"] if each.unnamed else [])]
 
 
 def _all(names: Sequence[str]) -> str:

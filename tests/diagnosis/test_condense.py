@@ -105,7 +105,7 @@ def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten() -> None:
     before, after = data.sweeps[0], banded.sweeps[0]
     for point in range(0, 160, 7):
         same = (before.sweep.amplitude == sweep.amplitude[point]) & (before.sweep.frequency == sweep.frequency[point])
-        assert astuple(after.under.at(point)) == astuple(before.under.at(int(np.flatnonzero(same)[0])))
+        assert astuple(after.under.select(point)) == astuple(before.under.select(int(np.flatnonzero(same)[0])))
 
 
 UP = np.geomspace(5.0, 60.0, 450)

@@ -116,6 +116,31 @@ def test_an_amount_is_integrated_over_its_sense(sense: int) -> None:
     assert of.worths[0].log_evidence == pytest.approx(np.log(whole) + power + NODES[0].log_weight, abs=1e-4)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed: int) -> None:
+    """At every node of some size, beside nothing more and beside a group; at the others there is none."""
+    plain = ledger(seed)
+    columns = np.random.default_rng(seed).normal(size=(2, plain.residual.size))
+    sizes = (0.0, 0.3, 0.7)
+    nodes = [replace(node, compound=size) for node in NODES[:2] for size in sizes]
+    of = replace(plain, rig=RigErrors(plain.rig.blocks, nodes), compound=Group(columns, np.eye(2), together=True))
+    group, size = of.groups[0].columns, SIZES[:, None, None]
+
+    def evidence(bent: bool, added: Array) -> float:
+        own = [node for node in nodes if (node.compound > 0.0) is bent]
+        whole = [covariance(of, node) + node.compound**2 * columns.T @ columns + added for node in own]
+        return float(logsumexp([restricted(of, each) + node.log_weight for node, each in zip(own, whole, strict=True)]))
+
+    nothing = np.zeros((of.residual.size, of.residual.size))
+    assert of.log_evidence == pytest.approx(evidence(False, nothing), abs=1e-6)
+    assert of.log_evidence_bent == pytest.approx(evidence(True, nothing), abs=1e-6)
+    added = size**2 * (group.T @ group)
+    worth = of.worths[0]
+    for bent, found in ((False, worth.log_evidence), (True, worth.beside.log_evidence if worth.beside else 0.0)):
+        over_sizes = logsumexp([evidence(bent, each) for each in added]) - np.log(SIZES.size)
+        assert found == pytest.approx(over_sizes, abs=1e-6)
+
+
 @given(SEEDS)
 def test_what_does_nothing_leaves_the_evidence_as_it_is(seed: int) -> None:
     """Columns of nothing, or of what the parameters do too, or that the tests hardly see."""
@@ -170,8 +195,8 @@ def test_the_chance_of_clean_tests_is_even(node: int) -> None:
     of, random = ledger(7, groups=False, rows=14), np.random.default_rng(2)
     noise = np.linalg.cholesky(covariance(of, NODES[node]))
     drawn = [noise @ random.normal(size=of.residual.size) for _ in range(200)]
-    alone = [replace(of, residual=row, at=np.array([node])).chance for row in drawn]
-    every = [replace(of, residual=row).chance for row in drawn]
+    alone = [replace(of, residual=row, at=np.array([node])).chance() for row in drawn]
+    every = [replace(of, residual=row).chance() for row in drawn]
     print(f"p {kstest(alone, 'uniform').pvalue:.3f}; below 5 %: {np.mean(np.array(every) < 0.05):.3f}")
     assert kstest(alone, "uniform").pvalue > 1e-3
     assert np.mean(np.array(every) < 0.05) < 0.09
@@ -183,7 +208,8 @@ def test_nodes_that_nothing_more_makes_likely_are_kept(seed: int, far: float) ->
     exact = [restricted(of, covariance(of, node)) + node.log_weight for node in of.rig.nodes]
     within = max(value for value, node in zip(exact, of.rig.nodes, strict=True) if not node.wide)
     kept = [of.rig.nodes[number] for number in of.likely(far)]
-    assert all(node in kept for node, value in zip(of.rig.nodes, exact, strict=True) if value > within - far + 1e-6)
+    near = zip(of.rig.nodes, exact, strict=True)
+    assert all(node in kept for node, value in near if value > within - far + 1e-6 and not node.wide)
 
 
 def test_columns_that_move_together_change_what_their_sum_does_where_it_is_largest() -> None:

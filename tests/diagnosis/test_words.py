@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.words import Finding, judged
 from bushfit.effects.mistakes import MISTAKES
@@ -21,11 +20,13 @@ def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, chanc
     """Of parts joined by +: effects, "unnamed", "levels", places as "kind:name", a mistake by its name; "" of none."""
     names = parts.split("+") if parts else []
     spots = [name.split(":") for name in names if ":" in name]
-    places: Any = tuple(Explanation("place", family, name, None) for family, name in spots)
+    places: Any = tuple(SimpleNamespace(family=family, name=name, extreme=False) for family, name in spots)
     claims: list[Any] = [SimpleNamespace(mistake=MISTAKES[name], tests=(0,)) for name in names if name in MISTAKES]
     others = {"unnamed", "levels", *MISTAKES}
     effects = tuple(name for name in names if ":" not in name and name not in others)
-    weighed: Any = SimpleNamespace(state=SimpleNamespace(effects=effects), first=SimpleNamespace(chance=chance))
+    weighed: Any = SimpleNamespace(
+        state=SimpleNamespace(effects=effects), first=SimpleNamespace(chance=lambda **_: chance)
+    )
     claim, curve = claims[0] if claims else None, "smooth all" if "unnamed" in names else ""
     size = size if names else 0.0
     return Hypothesis(effects, claim, places, curve, "levels" in names, log(odds), size, last, weighed)
@@ -88,7 +89,7 @@ def test_names_stand_beside_what_has_none_where_they_change_most(last: float, ve
     finding = judged([one("inertia+unnamed", 0.99, size=0.05, last=last), one("inertia", 0.01)], TOLERANCE)
     assert finding.verdict == verdict
     assert finding.leads == (("inertia",) if verdict == "described" else ())
-    assert told(finding) == {"inertia+unnamed": 0.99}
+    assert told(finding) == {"inertia+unnamed": 1.0}
 
 
 @pytest.mark.parametrize("more", [(), ("inertia+delay",)])

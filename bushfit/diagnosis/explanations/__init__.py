@@ -1,9 +1,21 @@
 """What may explain a gap: each kind proposes itself, as columns with a prior, and says what it is in words."""
 
-from bushfit.diagnosis.explanations.contract import Explanation, FaultyPlace, MissingEffect
+from bushfit.diagnosis.explanations.compound import compound
+from bushfit.diagnosis.explanations.contract import Explanation, FaultyPlace, MissingEffect, is_pattern
 from bushfit.diagnosis.explanations.effects import effects
 from bushfit.diagnosis.explanations.meeting import Meeting, meetings
 from bushfit.diagnosis.explanations.places import places
 from bushfit.diagnosis.explanations.unnamed import unnamed
 
-__all__ = ["Explanation", "FaultyPlace", "Meeting", "MissingEffect", "effects", "meetings", "places", "unnamed"]
+__all__ = [
+    "Explanation",
+    "FaultyPlace",
+    "Meeting",
+    "MissingEffect",
+    "compound",
+    "effects",
+    "is_pattern",
+    "meetings",
+    "places",
+    "unnamed",
+]

@@ -1,6 +1,7 @@
 """What every explanation of a gap has: a name, a share of the odds, and columns with a prior."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -42,11 +43,13 @@ class FaultyPlace(Explanation):
         direction: of the first test touched.
         frequency: lowest and highest [Hz].
         amplitude: lowest and highest, zero-to-peak [m or rad].
+        extreme: True for the smallest or largest level of its direction, where a law of amplitude does the same.
     """
 
     direction: Place
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
+    extreme: bool = field(default=False, kw_only=True)
 
     @property
     def columns(self) -> Array:
@@ -70,3 +73,9 @@ class FaultyPlace(Explanation):
         columns = self.columns
         left = columns @ residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
         return float(np.sqrt(np.mean(left**2)))
+
+
+def is_pattern(places: Sequence[FaultyPlace]) -> bool:
+    """True if places together may be physics: several frequencies, as of a resonance or a ripple, or a level at an end
+    of the range, as of a contact or a law of amplitude."""
+    return sum(place.family == "frequency" for place in places) > 1 or any(place.extreme for place in places)

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
@@ -73,13 +74,19 @@ def _place(
 
 def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
     levels = Counter(_direction(sweep) for sweep in sweeps for _ in np.unique(sweep.held))
+    ends = {
+        name: [end for sweep in sweeps if _direction(sweep) == name for end in (sweep.held.min(), sweep.held.max())]
+        for name in levels
+    }
     for sweep in sweeps:
         for held in np.unique(sweep.held):
             here = sweep.held == held
             words = sweep.line_words(int(np.argmax(here)))
             if levels[_direction(sweep)] > 1:  # in this file or in others
                 columns = _off(evidence, [sweep], [here], sloping=True)
-                yield _place(evidence, words, "level", [sweep], [here], columns)
+                place = _place(evidence, words, "level", [sweep], [here], columns)
+                extremes = min(ends[_direction(sweep)]), max(ends[_direction(sweep)])
+                yield replace(place, extreme=levels[_direction(sweep)] > 2 and held in extremes)
             numbers = np.unique(sweep.repeat[here])
             for number in numbers if numbers.size > 2 else ():
                 mine = here & (sweep.repeat == number)

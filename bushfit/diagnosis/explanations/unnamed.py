@@ -31,12 +31,12 @@ def unnamed(evidence: Evidence) -> list[Explanation]:
     if loops:
         groups = alike(loops)
         shapes = block_diag(*[smooth_waves(np.arange(_PHASES) / _PHASES)] * len(groups))
-        columns = np.concatenate([_harmonics(evidence, group) for group in groups])
+        columns = np.concatenate([harmonics(evidence, group) for group in groups])
         found.append(("loops", Group(columns, shapes, together=True)))
     return [Explanation("unnamed", "unnamed", name, group) for name, group in found]
 
 
-def _harmonics(evidence: Evidence, loops: Sequence[LoopData]) -> Array:
+def harmonics(evidence: Evidence, loops: Sequence[LoopData]) -> Array:
     """What the harmonics of loops that repeat one another share, (c, n)."""
     columns = np.zeros((len(loops[0].contrasts()), evidence.residual.size))
     for loop in loops:
@@ -53,8 +53,8 @@ def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Ite
         np.log(np.stack((sweep.frequency, sweep.amplitude * model.unit_strain(sweep.direction)), axis=1)) / lengths
         for sweep in sweeps
     ]
-    features = _features(np.concatenate(points))[:, None] * np.array([[1.0], [1.0j]])
-    share = features.reshape(-1, features.shape[-1])
+    patterns = _features(np.concatenate(points))[:, None] * np.array([[1.0], [1.0j]])
+    share = patterns.reshape(-1, patterns.shape[-1])
     columns, of_row, of_point = np.zeros((len(share), evidence.residual.size)), np.full(evidence.residual.size, -1), []
     kinds = [(str(sweep.direction), _degrees(sweep)) for sweep in sweeps]
     ends = np.cumsum([0, *map(len, points)])
@@ -67,7 +67,7 @@ def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Ite
         parts = columns * (of_row == own), share * (np.array(of_point) == own)
         moved, changed = (part.reshape(-1, part.shape[-1]) for part in parts)
         yield direction, Group(moved, changed, together=True)
-    if len({name for name, _ in kinds}) > 1:
+    if how == "rough" and len({name for name, _ in kinds}) > 1:  # what is smooth in all is the compound's
         yield "all", Group(columns, share, together=True)
 
 
