@@ -1,121 +1,194 @@
-"""The measurement that would decide: of a menu, the entry that tells most of several explanations per effort."""
+"""The next test of a diagnosis: of the tests a laboratory can make, the one that separates the explanations best.
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+Candidates are tests of the bushing and tests of the fixture without it: empty, with a reference spring, or with a steel
+dummy. Each is ranked by its information on which explanation is right, per hour, within the limits of the rig; `plan`
+ranks its tests for rivals by the same information.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
+from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array, Level
 from bushfit.fitting.data_sets import DataSet, parted
-from bushfit.geometry import Direction, Place
+from bushfit.geometry import TRANSLATION, Direction, Place
 from bushfit.model.model import Model
 
-#: Relative noise of one point of a test that does not exist yet: that of a good servo-hydraulic rig.
+#: Relative noise of one point of a test that was not made yet: that of a good servo-hydraulic rig.
 _NOISE = 5e-3
-#: Odds of an explanation, relative to the likeliest, below which it counts as if it had these.
+#: Probability of an explanation, relative to the likeliest, below which it counts as this probable.
 _LEAST_ODDS = 1e-6
-#: Information below which a test tells nothing [nats].
-_TELLS_SOMETHING = 1e-6
+#: Information below which a test separates nothing [nats].
+_LEAST_INFORMATION = 1e-6
+#: Amplitude of a rotation if none was tested [rad]; chosen.
+_ROTATION = 0.02
+#: Stiffness of what is mounted in place of the bushing, over that of the bushing; a dummy as stiff as a model allows.
+_EMPTY, _SPRING, _DUMMY = 1e-9, 1.0, 300.0
+_LARGEST_MODULUS = 9e8
 
 
 @dataclass(frozen=True)
-class MenuEntry:
-    """A test a lab can do.
+class NextTest:
+    """A test that a laboratory can make.
 
     Args:
-        effort: in units of one more sweep.
-        frequencies: [Hz], or multiples of the campaign's highest where `beyond`; None for those of the campaign.
-        beyond: whether the frequencies count from the campaign's highest.
-        amplitudes: relative to the campaign's largest; None for its own.
-        without_rig: True where the test removes or knows what belongs to the rig.
+        sentence: the test as an instruction.
+        hours: on the rig, with the change of the set-up.
+        place: direction or specimen; None for the place of the last test.
+        frequencies: [Hz], or multiples of the highest one tested if `beyond`; None for those tested.
+        beyond: whether the frequencies are multiples.
+        amplitudes: multiples of the largest amplitude tested, or if negative of the smallest; None for those tested.
+        mounted: stiffness mounted in place of the bushing, over that of the bushing; None for the bushing itself.
     """
 
-    words: str
-    effort: float
-    direction: Place | None = None
+    sentence: str
+    hours: float
+    place: Place | None = None
     frequencies: tuple[float, ...] | None = None
     beyond: bool = False
     amplitudes: tuple[float, ...] | None = None
-    without_rig: bool = False
+    mounted: float | None = None
 
 
-MENU = (
-    MenuEntry("run the empty fixture, or add a known mass, at the same frequencies", 0.5, without_rig=True),
-    MenuEntry(
-        "put a steel dummy in place of the bushing: it shows the rig's compliance, delay and gain",
-        0.5,
-        without_rig=True,
-    ),
-    MenuEntry("sweep from 0.05 to 5 Hz at the same amplitudes", 1.5, frequencies=(0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)),
-    MenuEntry("sweep to twice the highest frequency", 1.0, frequencies=(1.1, 1.4, 1.7, 2.0), beyond=True),
-    MenuEntry("sweep at a fifth and a tenth of the smallest amplitude", 1.0, amplitudes=(-0.1, -0.2)),
-    MenuEntry("sweep at one and a half and twice the largest amplitude", 1.0, amplitudes=(1.5, 2.0)),
-    MenuEntry("sweep in the radial direction at the same amplitudes", 1.0, direction=Direction.RADIAL),
-    MenuEntry("sweep in the axial direction at the same amplitudes", 1.0, direction=Direction.AXIAL),
-    MenuEntry("sweep in torsion", 2.0, direction=Direction.TORSION, amplitudes=(1.0,)),
+BUSHING_TESTS = (
+    NextTest("sweep from 0.05 to 5 Hz at the same amplitudes", 1.5, frequencies=(0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)),
+    NextTest("sweep to twice the highest frequency", 1.0, frequencies=(1.1, 1.4, 1.7, 2.0), beyond=True),
+    NextTest("sweep at a fifth and a tenth of the smallest amplitude", 1.0, amplitudes=(-0.1, -0.2)),
+    NextTest("sweep at one and a half and twice the largest amplitude", 1.0, amplitudes=(1.5, 2.0)),
+    NextTest("sweep in the radial direction at the same amplitudes", 1.0, Direction.RADIAL),
+    NextTest("sweep in the axial direction at the same amplitudes", 1.0, Direction.AXIAL),
+    NextTest("sweep in torsion", 2.0, Direction.TORSION, amplitudes=(1.0,)),
+)
+FIXTURE_TESTS = (
+    NextTest("run the empty {place} fixture, or add a known mass, at the same frequencies", 0.5, mounted=_EMPTY),
+    NextTest("put a steel dummy in the {place} fixture: its compliance is that of the rig", 0.5, mounted=_DUMMY),
+    NextTest("put a reference spring of known stiffness in the {place} fixture", 0.75, mounted=_SPRING),
 )
 
 
-def deciding_test(models: Sequence[Model], odds: Sequence[float], data_sets: Sequence[DataSet]) -> str:
-    """The entry that is expected to tell most of which model is true, per effort; "" where none tells anything.
+def deciding_test(
+    models: Sequence[Model],
+    odds: Sequence[float],
+    data_sets: Sequence[DataSet],
+    rig: RigSettings = UNSTATED,
+) -> str:
+    """The test that is expected to separate the explanations best per hour, as an instruction.
 
     Args:
-        models: that explain the tests so far, each with its probability in `odds`.
+        models: that explain the tests so far.
+        odds: probability of each model.
+        data_sets: the tests so far.
+        rig: its limits.
 
-    A distance is that of complex stiffness over the test's points, in units of noise.
+    Returns:
+        An instruction, or an empty text if no test separates the models.
     """
     if len(models) < 2:
         return ""
+    undecided = float(entropy_left(odds, np.zeros((len(models), len(models)))))
+    best, best_rate = "", _LEAST_INFORMATION
+    for test in _candidates(data_sets):
+        frequency, amplitude, place = _points(test, data_sets)
+        feasible = np.all([within_limits(model, rig, place, frequency, amplitude) for model in models], axis=0)
+        if test.mounted is None and not feasible.any():
+            continue
+        points = (frequency[feasible], amplitude[feasible]) if test.mounted is None else (frequency, amplitude)
+        distances = _distances(test, models, place, *points)
+        rate = (undecided - float(entropy_left(odds, distances))) / test.hours
+        if rate > best_rate * (1.0 + 1e-9):
+            best, best_rate = test.sentence, rate
+    return best
+
+
+def _candidates(data_sets: Sequence[DataSet]) -> Iterator[NextTest]:
+    """Tests of the fixtures of all places tested, and tests of the bushing in directions that were not swept."""
+    places = dict.fromkeys(data_set.direction for data_set in data_sets)
+    for place, test in product(places, FIXTURE_TESTS):
+        yield replace(test, place=place, sentence=test.sentence.format(place=place))
     swept = {sweep.direction for sweep in parted(data_sets)[1]}
-    menu = [entry for entry in MENU if entry.direction not in swept]
-    nothing = entropy_left(odds, np.zeros((len(models), len(models))))
-    told = [float(nothing - entropy_left(odds, _distances(entry, models, data_sets))) for entry in menu]
-    best = max(range(len(menu)), key=lambda place: told[place] / menu[place].effort)
-    return menu[best].words if told[best] > _TELLS_SOMETHING else ""
+    yield from (test for test in BUSHING_TESTS if test.place not in swept)
+
+
+def within_limits(model: Model, rig: RigSettings, place: Place, frequency: Array, amplitude: Array) -> Array:
+    """Points that a rig can reach, by its limits of force, displacement, velocity and frequency, (n,) bool.
+
+    Args:
+        model: whose force is expected.
+        rig: its limits; one that is not stated is none.
+        place: direction or specimen.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad, or strain], (n,).
+    """
+    limits = [(frequency, rig.max_frequency)]
+    force = np.abs(model.stiffness(place, frequency, amplitude)) * amplitude
+    if place.motion is TRANSLATION:
+        velocity = 2.0 * np.pi * frequency * amplitude
+        limits += [(force, rig.max_force), (amplitude, rig.max_displacement), (velocity, rig.max_velocity)]
+    elif place.is_rotation:
+        limits += [(force, rig.max_moment), (amplitude, rig.max_rotation)]
+    reachable = [values <= limit * (1.0 + 1e-9) for values, limit in limits if limit is not None]  # rounding
+    return np.all([np.ones(np.shape(frequency), dtype=bool), *reachable], axis=0)
 
 
 def entropy_left(odds: Sequence[float] | Array, distances: Array) -> Array:
-    """How open it is, at the most, which of several explanations is right once tests are done [nats], (...).
+    """Entropy of which of several explanations is right that tests leave, at most [nats], (...).
 
     Args:
-        odds: of each explanation before, in any unit, (r,).
-        distances: chi-square between what any two expect of the tests, (..., r, r).
+        odds: probability of each explanation before the tests, in any unit, (r,).
+        distances: chi-square between what any two explanations predict, (..., r, r).
 
-    Notes: of mixtures of normal distributions the tests tell at least -sum_i p_i ln sum_j p_j exp(-d_ij/8)
-        (Kolchinsky and Tracey, 2017) of the entropy of the odds; this is the rest.
+    Notes:
+        For mixtures of normal distributions the tests reduce the entropy by -sum_i p_i ln sum_j p_j exp(-d_ij/8) at
+        least (Kolchinsky and Tracey, 2017).
     """
     p = np.maximum(odds, _LEAST_ODDS * np.max(odds))
     p = p / p.sum()
-    others = np.exp(-distances / 8.0) * (1.0 - np.eye(p.size))  # by themselves: next to 1 they would be rounded away
+    others = np.exp(-distances / 8.0) * (1.0 - np.eye(p.size))  # without the diagonal, beside which they would vanish
     return np.asarray(np.log1p(others @ p / p) @ p)
 
 
-def _distances(entry: MenuEntry, models: Sequence[Model], data_sets: Sequence[DataSet]) -> Array:
-    """Between the responses of any two models to a test, squared, in units of noise, (models, models)."""
-    frequency, amplitude, direction = _points(entry, data_sets)
-    if entry.without_rig:
-        frequency, amplitude, direction = _points(MenuEntry("", 1.0), data_sets)
-        responses = [_rig_share(model, direction, frequency, amplitude) for model in models]
+def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency: Array, amplitude: Array) -> Array:
+    """Chi-square between the responses of any two models to a test, (models, models).
+
+    The empty fixture is compared by its stiffness and the steel dummy by its compliance, both relative to the bushing:
+    beside these the stiffness of the empty fixture and the compliance of the dummy are zero.
+    """
+    if test.mounted is None:
+        responses = [np.log(model.stiffness(place, frequency, amplitude)) for model in models]
     else:
-        responses = [np.log(model.stiffness(direction, frequency, amplitude)) for model in models]
-    each = np.array(responses)
-    return np.sum(np.square(np.abs(each[:, None] - each)), axis=-1) / _NOISE**2
+        reference = np.abs(models[0].stiffness(place, frequency, amplitude)).mean()
+        measured = [
+            _fixture(model, place, test.mounted * reference).stiffness(place, frequency, amplitude) / reference
+            for model in models
+        ]
+        if test.mounted == _SPRING:
+            responses = [np.log(ratio) for ratio in measured]
+        else:
+            responses = [1.0 / ratio if test.mounted == _DUMMY else ratio for ratio in measured]
+    stacked = np.array(responses)
+    return np.sum(np.square(np.abs(stacked[:, None] - stacked)), axis=-1) / _NOISE**2
 
 
-def _rig_share(model: Model, direction: Place, frequency: Array, amplitude: Array) -> Array:
-    bare = model.without(Level.INSTRUMENT)
-    return np.log(model.stiffness(direction, frequency, amplitude) / bare.stiffness(direction, frequency, amplitude))
+def _fixture(model: Model, place: Place, stiffness: float) -> Model:
+    """A model of a spring of this stiffness [SI] in the rig of a model."""
+    rig = [effect.name for effect in model.records if effect.level is Level.INSTRUMENT]
+    values = {**model.values, "mu": min(stiffness / model.stiffness_per_modulus(place), _LARGEST_MODULUS)}
+    return Model.with_defaults(model.bushing, ("elastic", *rig), values)
 
 
-def _points(entry: MenuEntry, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Place]:
-    direction = entry.direction or data_sets[-1].direction
-    same = [data_set for data_set in data_sets if data_set.direction == direction] or list(data_sets)
+def _points(test: NextTest, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Place]:
+    """Frequencies [Hz], amplitudes [m or rad, or strain] and place of a test."""
+    place = test.place or data_sets[-1].direction
+    same = [data_set for data_set in data_sets if data_set.direction == place] or list(data_sets)
     amplitudes = np.unique(np.concatenate([data_set.amplitude for data_set in same]))
-    if direction.is_rotation and not same[0].direction.is_rotation:
-        amplitudes = np.array([0.02])
-    if entry.amplitudes:
-        amplitudes = np.array([amplitudes.min() * -x if x < 0 else amplitudes.max() * x for x in entry.amplitudes])
+    if place.is_rotation and not same[0].direction.is_rotation:
+        amplitudes = np.array([_ROTATION])
+    if test.amplitudes:
+        amplitudes = np.array([amplitudes.min() * -x if x < 0 else amplitudes.max() * x for x in test.amplitudes])
     measured = np.unique(np.concatenate([data_set.frequency for data_set in data_sets]))
-    frequencies = np.array(entry.frequencies) if entry.frequencies else measured
-    f, x = np.meshgrid(frequencies * (measured.max() if entry.beyond else 1.0), amplitudes)
-    return f.ravel(), x.ravel(), direction
+    frequencies = np.array(test.frequencies) if test.frequencies else measured
+    grid = np.meshgrid(frequencies * (measured.max() if test.beyond else 1.0), amplitudes)
+    return grid[0].ravel(), grid[1].ravel(), place

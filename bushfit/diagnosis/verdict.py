@@ -171,7 +171,9 @@ class Told:
         words = f"these tests cannot tell {' from '.join(labels.values())}"
         fitted = [each for each in told if each.best.effects and each.best.refitted]
         models = [each.best.weighed.state.evidence.model for each in fitted]
-        advice = deciding_test(models, [each.probability for each in fitted], self.base.data_sets)
+        advice = deciding_test(
+            models, [each.probability for each in fitted], self.base.data_sets, self.data.campaign.rig
+        )
         if led and led.best.claim:
             advice = f"look into the records of the tests; {'; '.join(led.best.claim.corrections(self.data))}"
         spot = next((each.best for each in told if each.places), None)

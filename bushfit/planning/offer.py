@@ -7,12 +7,13 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.diagnosis.next_test import within_limits
 from bushfit.diagnosis.priors import TELLS
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.coordinates import residual
 from bushfit.fitting.data_sets import new_sweep
-from bushfit.geometry import ROTATION, TRANSLATION, Direction, Place
+from bushfit.geometry import Direction, Place
 from bushfit.model.covariance import Z95
 from bushfit.planning.contract import Knowledge, Test, Wanted, operating_points
 from bushfit.planning.criterion import Budget, View, distances
@@ -127,16 +128,8 @@ def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates:
 def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
     """A test less the steps that are beyond the limits of the rig or what rubber bears; None where too few are left."""
     (frequency, size), place = operating_points(test), test.direction
-    force = np.abs(known.model.stiffness(place, frequency, size)) * size
-    limits = [(frequency, rig.max_frequency)]
-    if place.motion is TRANSLATION:
-        speed = 2.0 * np.pi * frequency * size
-        limits += [(force, rig.max_force), (size, rig.max_displacement), (speed, rig.max_velocity)]
-    elif place.motion is ROTATION:
-        limits += [(force, rig.max_moment), (size, rig.max_rotation)]
     bearable = size * known.model.unit_strain(place) <= max(0.5, known.strain or 0.0)  # what it has borne
-    for reached, limit in limits:
-        bearable &= reached <= (limit or np.inf) * (1.0 + 1e-9)  # rounding
+    bearable &= within_limits(known.model, rig, place, frequency, size)
     if isinstance(test, SimulatedLoop):
         return test if bearable.all() else None
     kept = np.array(test.steps)[bearable]

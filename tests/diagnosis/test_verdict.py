@@ -12,7 +12,7 @@ import pytest
 from rigged import SHARED, Measured, asked, no_loops, no_repeats, no_sweeps, one_direction, said
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.next_test import MENU, deciding_test, entropy_left
+from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, entropy_left
 from bushfit.effects import BASE
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet
@@ -86,7 +86,8 @@ def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured: Measur
     assert not proposed & {"sleeve_compliance", "rig_compliance"}
 
 
-WORDS = [entry.words for entry in MENU]
+SENTENCES = [test.sentence for test in BUSHING_TESTS]
+SENTENCES += [test.sentence.format(place=place) for test in FIXTURE_TESTS for place in ("axial", "radial")]
 EVEN = (0.5, 0.5)
 
 
@@ -129,7 +130,7 @@ def test_pairs(
 ) -> None:
     models = with_each(paper_model, one, other)
     found = deciding_test(models, EVEN, data_sets)
-    assert found in WORDS
+    assert found in SENTENCES
     assert any(word in found for word in words)
     assert deciding_test(models[::-1], EVEN, data_sets) == found
 
@@ -143,10 +144,29 @@ def test_a_direction_that_is_swept_is_no_next_test(paper_model: Model, measured:
     assert not any(direction in deciding_test(models, EVEN, both) for direction in ("axial", "radial"))
 
 
+def test_a_factor_of_one_direction_is_settled_by_a_reference_spring_in_its_fixture(
+    paper_model: Model, data_sets: list[DataSet]
+) -> None:
+    """An empty fixture and a steel dummy read the same whatever the gain of a transducer is."""
+    models = [
+        paper_model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 0.93}),
+        paper_model.with_effect("displacement_gain.radial", {"displacement_gain.radial": 1.06}),
+    ]
+    found = deciding_test(models, (0.9, 0.1), data_sets)
+    assert found == "put a reference spring of known stiffness in the radial fixture"
+
+
+def test_the_next_test_is_within_the_limits_of_the_rig(paper_model: Model, data_sets: list[DataSet]) -> None:
+    models = with_each(paper_model, {"viscous.eta": 60.0}, {"maxwell.mu1": 1e5, "maxwell.tau": 6e-4})
+    top = max(float(data_set.frequency.max()) for data_set in data_sets)
+    assert "highest frequency" in deciding_test(models, EVEN, data_sets)
+    assert "highest frequency" not in deciding_test(models, EVEN, data_sets, RigSettings(max_frequency=top))
+
+
 def test_a_test_without_the_rig_parts_nothing_inside_the_rubber(paper_model: Model, data_sets: list[DataSet]) -> None:
     models = with_each(paper_model, {"viscous.eta": 100.0}, {"strain_stiffening.c3": 20.0})
     found = deciding_test(models, EVEN, data_sets)
-    assert found in WORDS
+    assert found in SENTENCES
     assert not any(words in found for words in ("fixture", "dummy"))
 
 
