@@ -261,7 +261,7 @@ class Heads(NamedTuple):
 
 
 #: Heads of `family_cells`, and of `parameter_cells` without the labels of the two results.
-FAMILY_HEADS = ("family", "parameters", "NRMSE", "chi2", "odds", "held out", "first there", "parts")
+FAMILY_HEADS = ("family", "parameters", "NRMSE", "χ²", "probability", "held out", "first, held out", "parts")
 
 
 def parameter_cells(row: ParameterContrast) -> list[str]:

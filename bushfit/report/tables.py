@@ -25,7 +25,8 @@ from bushfit.units import CELSIUS
 
 #: Headers of what was measured and of the model beside it, in the tables of loops and sweeps.
 _MEASURED = re.compile(
-    r"(strain amplitude|(model )?(displacement|rotation|strain|force|moment|stress|stiffness|modulus|loss factor)) \["
+    r"outlier$|(strain amplitude|(model )?"
+    r"(displacement|rotation|strain|force|moment|stress|stiffness|modulus|loss factor)) \["
 )
 #: Columns of all tables that hold texts; the others hold numbers.
 TEXTS = frozenset(

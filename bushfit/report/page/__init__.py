@@ -5,9 +5,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import re
-import tomllib
-from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,20 +19,22 @@ if TYPE_CHECKING:
 
 #: Where the templates are, with the style sheet and the script that go into every page.
 _TEMPLATES = Path(__file__).parent / "templates"
-#: What a warning means for who uses the numbers, by how it is told.
-_USES: Mapping[str, str] = tomllib.loads(Path(__file__).with_name("uses.toml").read_text(encoding="utf-8"))
 
 
 def report_page(documents: Documents, tables: Tables) -> str:
-    """The report of a result as HTML: the same text for the same documents and tables, to the digits of their files.
+    """The report of a result as HTML.
+
+    Args:
+        documents: model, plain fit and diagnosis by the names of their files without endings.
+        tables: sweeps, loops, gap and those of predicted places, likewise.
 
     Raises:
-        ModelError: no model among the documents, or a spoiled one.
+        ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
     """
-    from bushfit.report.page.readback import ReportData
+    from bushfit.report.page.record import report_record
     from bushfit.report.page.report import report_context
 
-    return rendered("report.html", report_context(ReportData.of(documents, tables)))
+    return rendered("report.html", report_context(report_record(documents, tables)))
 
 
 def comparison_page(documents: Documents, _: Tables) -> str:
@@ -66,11 +65,6 @@ def filled(template: str, context: dict[str, Any]) -> str:
     return _environment().get_template(template).render(context)
 
 
-def use_of(warning: str) -> str:
-    """What a warning means for the use of the numbers, in one sentence."""
-    return next(use for pattern, use in _USES.items() if re.search(pattern, warning))
-
-
 def _hash(text: str) -> str:
     """A text as a content policy names it."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
@@ -80,6 +74,8 @@ def _hash(text: str) -> str:
 def _environment() -> jinja2.Environment:
     import jinja2
 
+    from bushfit.report.page.formulas import formula
+
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -88,7 +84,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     environment.filters["number"] = number
-    environment.filters["use"] = use_of
+    environment.filters["formula"] = formula
     environment.filters["px"] = lambda pixels: f"{pixels:.1f}".removesuffix(".0")
     return environment
 
@@ -105,7 +101,7 @@ def folder_pages(folder: Path, base: str = "") -> list[ResultFile]:
     """
     from bushfit.report.page.comparison import read_comparison
     from bushfit.report.page.index import is_batch, page_of, read_batch
-    from bushfit.report.page.readback import has_model, read_results
+    from bushfit.report.page.record import has_model, read_results
     from bushfit.report.results import page_file
 
     if is_batch(folder):

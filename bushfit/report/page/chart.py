@@ -1,4 +1,4 @@
-"""The two pictures of a page: a chart of lines, bands and points, and maps of cells.
+"""A chart of lines, bands and points for the page of a batch.
 
 They are SVG of the page's own, in the templates chart.html and maps.html, not matplotlib's: every run writes a page,
 also where no other picture is asked for. matplotlib would take 0.3 s to load and 0.05 s a chart, each five times as
@@ -8,7 +8,6 @@ large. Colours are attributes, since pages are shown where style sheets and scri
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -19,8 +18,6 @@ from bushfit.report.page import filled
 from bushfit.report.tables import spread
 from bushfit.units import number
 
-#: Most levels, tests or loops that a chart draws: more colours are not told apart; most places of a page.
-MOST_LEVELS, MOST_PLACES = 8, 8
 #: Width of a picture [pixels]: two stand side by side on a screen, and on paper.
 _WIDTH = 460.0
 #: Height of the panel of a chart, and the room left, right and below for ticks and labels [pixels].
@@ -39,26 +36,6 @@ _COLORS = ("#2d1160", "#1f4e9c", "#0a7399", "#0d7f62", "#4b7f1b", "#85690a", "#b
 DASHES = ("", "6 2", "2 2", "9 2 2 2", "4 4", "1 3", "12 3", "6 2 2 2")
 #: Colour of limits, and of other level lines.
 LIMIT, _GREY = "#b3121d", "#595959"
-#: Left of maps, between two of them, and above the first: room for names [pixels].
-_MAPS_LEFT, _BETWEEN, _MAPS_TOP = 96.0, 12.0, 48.0
-#: Height of a row of cells, and the most that a map is high [pixels].
-_CELL, _MOST_MAP = 15.0, 110.0
-#: Where the colour of a cell changes, in % off; the first is that of what agrees.
-_EDGES = (0.5, 1.0, 2.0, 5.0, 10.0)
-#: Colours from agreement outward, of what was measured above the model and below.
-_ABOVE = ("#ececec", "#f9c4ab", "#ee8f6c", "#d1493e", "#9f1330", "#5d0a26")
-_BELOW_MODEL = ("#ececec", "#bfdcec", "#7fb8d8", "#3984be", "#1f5290", "#0b2a56")
-#: From this colour outward a cell below the model bears a bar: red and blue are one grey in a print without colours.
-_BARRED = 2
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """What a page shows of a place: its pictures, and what must be told of them."""
-
-    place: str
-    pictures: Sequence[Markup]
-    notes: Sequence[str]
 
 
 def colors(count: int) -> list[str]:
@@ -235,77 +212,7 @@ def _pair(x: float, y: float) -> str:
     return f"{x:.1f} {y:.1f}".replace(".0 ", " ").removesuffix(".0")
 
 
-@dataclass(frozen=True, eq=False)
-class Cells:
-    """A map: what it shows, its rows from below, what lies along x, and values in %, (rows, columns), before and after;
-    of one side alone where both are the same."""
-
-    name: str
-    rows: Sequence[str]
-    along: tuple[str, str, str]
-    sides: Sequence[Array]
-
-    def side(self, at: int) -> Array:
-        """The values before (0) or after (1)."""
-        return self.sides[min(at, len(self.sides) - 1)]
-
-    @property
-    def size(self) -> float:
-        """Height of a row [pixels]."""
-        return min(_CELL, _MOST_MAP / len(self.rows))
-
-    @property
-    def every(self) -> int:
-        """Of so many rows one has room for its name."""
-        return max(1, round(12.0 / self.size))
-
-
-def maps(title: str, heads: Sequence[str], shown: Sequence[Cells], alt: str) -> Markup:
-    """Maps below each other, before and after side by side, one scale for all."""
-    left = max(_MAPS_LEFT, _LETTER * max(len(name) for each in shown for name in each.rows) + 6.0)
-    width = (_WIDTH - left - _RIGHT - _BETWEEN * (len(heads) - 1)) / len(heads)
-    heights = [each.size * len(each.rows) + 36.0 for each in shown]
-    tops = [_MAPS_TOP + sum(heights[:place]) for place in range(len(heights) + 1)]
-    scale = (*_BELOW_MODEL[:0:-1], *_ABOVE)
-    context: dict[str, Any] = {
-        "title": title,
-        "alt": alt,
-        "width": _WIDTH,
-        "height": tops[-1] + 30.0,
-        "heads": heads,
-        "starts": [left + side * (width + _BETWEEN) for side in range(len(heads))],
-        "map_width": width,
-        "placed": [*zip(shown, tops[:-1], strict=True)],
-        "painted": partial(_painted, width=width),
-        "scale": scale,
-        "scale_left": (_WIDTH - 24.0 * len(scale)) / 2,
-        "scale_top": tops[-1],
-        "edges": (*(-edge for edge in _EDGES[::-1]), *_EDGES),
-    }
-    return Markup(filled("maps.html", context))
-
-
-def _painted(values: Array, left: float, top: float, height: float, width: float) -> Iterator[tuple[str, str, str]]:
-    """The cells of one map by colour: colour, their outlines, and bars where the measurement is far below."""
-    rows, columns = values.shape
-    wide = width / columns
-    step = np.searchsorted(_EDGES, np.abs(values), side="right") * np.where(values < 0.0, -1, 1)
-    for level in range(-len(_EDGES), len(_EDGES) + 1):
-        found = np.argwhere(np.isfinite(values) & (step == level))
-        boxes = [(left + column * wide, top + (rows - 1 - row) * height) for row, column in found]
-        outlines = "".join(f"M{x:.1f} {y:.1f}h{wide:.1f}v{height:.1f}h-{wide:.1f}z" for x, y in boxes)
-        bars = "".join(f"M{x + wide / 4:.1f} {y + height / 2:.1f}h{wide / 2:.1f}" for x, y in boxes)
-        if boxes:
-            color = _ABOVE[level] if level >= 0 else _BELOW_MODEL[-level]
-            yield color, outlines, bars if level <= -_BARRED else ""
-
-
 def span_of(values: Array) -> str:
     """Least and largest of the values that are known, in words."""
     known = values[np.isfinite(values)]
     return f"{number(float(known.min()), 3)} to {number(float(known.max()), 3)}" if known.size else "nothing"
-
-
-def every_nth(count: int, most: int) -> slice:
-    """Every so many-th of some rows, at most so many."""
-    return slice(None, None, max(1, -(-count // most)))

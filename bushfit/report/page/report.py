@@ -1,34 +1,39 @@
-"""The report of a result, in the order in which its reader asks: what was tested, the verdict, the numbers."""
+"""The report of a result: what a customer reads first, then figures, parameters and tests, then an appendix."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
-from markupsafe import Markup
-from scipy.special import fdtri
 
-from bushfit.diagnosis.document import EffectEntry, GapEntry
+from bushfit.diagnosis.document import DiagnosisFile, EffectEntry
 from bushfit.diagnosis.record import odds_in_words
+from bushfit.effects.contract import Array
 from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Specimen
+from bushfit.model.covariance import Z95
 from bushfit.model.document import TestTable
-from bushfit.model.model import FIVE
 from bushfit.model.result import Misfit, Result
-from bushfit.prediction.caveats import of_points, warnings_of
-from bushfit.report.page import filled
-from bushfit.report.page.chart import MOST_PLACES
-from bushfit.report.page.gap import gap_panels, loop_panels
-from bushfit.report.page.readback import ReportData
-from bushfit.report.page.sweeps import amplitude_panels, cole_cole_panels, frequency_panels, sweeps_of
-from bushfit.report.parameters import Row, interval_kind, parameter_rows
-from bushfit.report.tables import DISPLAYS, IF_RIGS, columns_of, complete, numbers, spread
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.stiffness import Prediction, predict
+from bushfit.report import plots
+from bushfit.report.page.record import ReportRecord
+from bushfit.report.page.svg import Picture, picture
+from bushfit.report.parameters import interval_kind, parameter_rows
+from bushfit.report.tables import DISPLAYS, spread
 from bushfit.units import display_unit, format_aligned, format_range, number
 
-#: How a verdict is coloured: nothing to do, something to know, something to do.
+#: Colour of the verdict: nothing to do, something to know, something to do.
 _TONES = {"consistent": "good", "named": "good", "unexplained": "bad"}
-#: Conditions of tests, as a campaign has them, and what a page calls them.
+#: Consequence of each verdict for the use of the numbers.
+_CONSEQUENCES = {
+    "consistent": "The model explains the tests within their noise. Use it within the tested range.",
+    "named": "Use the model with the effect that was added, within the tested range.",
+    "ambiguous": "Use stiffness and loss within the tested range. Do not attribute the difference to one cause yet.",
+    "described": "Use the whole band, from low to high, within the tested range. The cause is not known.",
+    "partly": "Part of the difference is not explained. Use the numbers with their bands, within the tested range.",
+    "unexplained": "Do not release these numbers: the model misses the tests, and the cause is not known.",
+}
+#: Conditions of tests by their campaign keys; the first three are shown even if they are not stated.
 _CONDITIONS = {
     "temperature_degC": "Temperature",
     "preload": "Preload",
@@ -36,104 +41,201 @@ _CONDITIONS = {
     "operator": "Operator",
     "specimen_number": "Specimen no.",
 }
-#: What stands of them beside each test.
-_STATED = {
+#: Conditions beside each test.
+_BESIDE_TEST = {
     "specimen_number": "part {}",
     "temperature_degC": "{} °C",
     "preload": "{} preload",
-    "order": "{}. in the session",
+    "order": "no. {} of the session",
 }
-#: Frequencies and amplitudes of a place whose predicted values are tabled, and rows of all places together.
+#: Highest frequency of a static stiffness [Hz].
+_STATIC = 1.0
+#: Reduced chi-square of a sweep that was not fitted, up to which it agrees within its noise; chosen: 95 % of the values
+#: of 20 points are below.
+_AGREES = 1.4
+#: Frequencies and amplitudes of a place in the table of values, and rows of all places together.
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
-#: Regions and tests that a page lists at most: the documents have all.
-MOST = 12
-#: Side of a cell, the way from one to the next, and the room left for the ends of intervals [pixels].
-_CELL, _PITCH, _LEFT, _TOP = 76.0, 80.0, 52.0, 26.0
-#: Half a cell is so many times an ellipse that touches both edges.
-_ROOM = 1.12
-#: Corners of an ellipse as it is drawn.
-_CORNERS = 48
-#: Way from the middle of a cell to the ends of an interval of well known errors, as a share of its side.
-_END = 0.5 * 1.96 / (2.45 * _ROOM)
+#: Tests, regions and places that a page lists or draws at most: the files have all.
+MOST, _MOST_PLACES = 12, 6
 
 
-def report_context(found: ReportData) -> dict[str, Any]:
-    """All that the template of a report asks for."""
-    result, diagnosis, campaign, tests = found.result, found.diagnosis, found.campaign, found.tests
-    gaps = [*_gaps(diagnosis["gap"])] if diagnosis else []
-    report = campaign.report if campaign else {}
-    every = sweeps_of(found)
-    bodies = [("Bushing", tube(result.model.bushing))] if result.model.bushing else []
-    bodies += [(f"Specimen {specimen}", _specimen(specimen)) for specimen in result.specimens]
+class Headline(NamedTuple):
+    """Dynamic and static stiffness of one place at one operating point, as texts with units.
+
+    Args:
+        basis: whether the place was fitted, measured or only predicted.
+        accuracy: expected error, or an empty text where no tests give one.
+    """
+
+    place: str
+    frequency: str
+    amplitude: str
+    stiffness: str
+    stiffness_band: str
+    loss_factor: str
+    loss_factor_band: str
+    loss_angle: str
+    accuracy: str
+    static: str
+    static_point: str
+    stiffening: str
+    basis: str
+
+
+def report_context(record: ReportRecord) -> dict[str, Any]:
+    """Everything that the template of a report needs."""
+    result, diagnosis, campaign, tests = record.result, record.diagnosis, record.campaign, record.tests
+    bodies = [("Bushing", tube_description(result.model.bushing))] if result.model.bushing else []
+    bodies += [(f"Specimen {specimen}", _specimen_description(specimen)) for specimen in result.specimens]
+    head = {key.replace("_", " ").capitalize(): value for key, value in (campaign.report if campaign else {}).items()}
+    predictions = record.predictions[:_MOST_PLACES]
+    place_warnings = [prediction.warnings for prediction in record.predictions]
     return {
         "name": campaign.name if campaign else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
-        "head": {key.replace("_", " ").capitalize(): value for key, value in report.items()},
+        "head": head,
         "logo": campaign.logo if campaign else None,
         "facts": [*bodies, *conditions(test.conditions for test in tests)],
-        "tests": [_tested(test, result.tests) for test in tests[:MOST]],
-        "conditioned": any(test.conditions for test in tests),
-        "more_tests": max(0, len(tests) - MOST),
+        "headlines": [headline(record, prediction) for prediction in predictions],
         "diagnosis": diagnosis,
         "tone": _TONES.get(diagnosis["verdict"], "fair") if diagnosis else "fair",
-        "has_odds": found.has_odds,
-        "odds": odds_in_words(diagnosis) if diagnosis and found.has_odds else [],
+        "consequence": _CONSEQUENCES[diagnosis["verdict"]] if diagnosis else "",
         "effects": [(effect, [*_sizes(effect)]) for effect in diagnosis["effects"]] if diagnosis else [],
-        "usable": [(place, _degrees(place.loss_factor)) for place in result.usable],
+        "odds": odds_in_words(diagnosis) if diagnosis else [],
+        "pictures": [*_pictures(record, predictions)],
+        "appendix": [*_appendix_pictures(record, predictions)],
         "rows": list(parameter_rows(result)),
         "interval": interval_kind(result),
-        "plain": {row.name: row.value for row in parameter_rows(found.plain)} if found.plain else {},
+        "plain": {row.name: row.value for row in parameter_rows(record.joint)} if record.joint else {},
         "quality": result.quality,
         "model_error": result.model_error is not None,
-        "correlations": [
-            f"{one}/{other} {size:+.2f}"
-            for one, other, size in result.covariance.correlations()
-            if abs(size) > 0.9  # they trade off against each other
-        ],
         "equation": result.model.equation().splitlines()[0],
-        "corner": corner(result),
-        "places": frequency_panels(every),
-        "payne": amplitude_panels(found),
-        "cole_cole": cole_cole_panels(every),
-        "tabled": [*_tabled(found)],
-        "loops": loop_panels(found),
-        "gap": gap_panels(found),
-        "gaps": gaps,
-        "added": any(before != after for _, before, after in gaps if after),
-        "warnings": warnings_of(result, _of_tables(found), diagnosis["warnings"] if diagnosis else ()),
+        "tests": [_test_row(test, result.tests) for test in tests[:MOST]],
+        "conditioned": any(test.conditions for test in tests),
+        "more_tests": max(0, len(tests) - MOST),
+        "tabled": [*_tabled(predictions)],
+        "gaps": [*_gaps(diagnosis)] if diagnosis else [],
+        "warnings": warnings_of(result, place_warnings, diagnosis["warnings"] if diagnosis else ()),
         "campaign": campaign,
-        "files": _files(found),
-        "versions": found.versions,
-        "levels": _levels(found),
-        "moduli": any(place.motion is STRAINING for place in found.places.values()),
+        "files": _files(record),
+        "versions": record.versions,
+        "levels": _stiffness_levels(predictions),
+        "moduli": any(prediction.direction.motion is STRAINING for prediction in predictions),
     }
 
 
-def _of_tables(found: ReportData) -> Iterator[Iterator[str]]:
-    """The warnings of what is predicted in the table of each place."""
-    for name, place in found.places.items():
-        (amplitude, stiffness, _), ((_, length), _, (_, unit)) = columns_of(place), place.display
-        headers = "frequency [Hz]", amplitude, stiffness
-        if name not in found.tables:
-            continue
-        table = complete(found.tables[name], *headers)
-        table = table[numbers(table, stiffness)[0] != 0.0]  # which only a hand puts there
-        if len(table):
-            others = (f"{stiffness}, {IF_RIGS}", f"measured {stiffness}")
-            rigs, measured = (numbers(table, each)[0] / unit if each in table else None for each in others)
-            measured = None if measured is None else np.where(measured == 0.0, np.nan, measured)
-            grid = numbers(table, *headers) / [[1.0], [length], [unit]]
-            yield of_points(found.result, place, grid, rigs, measured, None)
+def headline(record: ReportRecord, prediction: Prediction) -> Headline:
+    """Stiffness and loss of a place at the operating point in the middle of its grid, and its static stiffness.
+
+    The point is the amplitude in the middle of those predicted and the frequency nearest to the geometric mean of the
+    lowest and highest. Static stiffness is that at the lowest tested frequency, where it is at most 1 Hz, at the same
+    amplitude. The interval of the dynamic stiffening counts the correlation of both.
+    """
+    result, place = record.result, prediction.direction
+    (length, to_length), _, (name, factor) = place.display
+    amplitudes, frequencies = np.unique(prediction.amplitude), np.unique(prediction.frequency)
+    amplitude = float(amplitudes[(amplitudes.size - 1) // 2])
+    middle = math.sqrt(frequencies[0] * frequencies[-1])
+    frequency = float(frequencies[np.argmin(np.abs(np.log(frequencies / middle)))])
+    lowest = min([*(result.measured.frequency[:1] if result.measured else ()), *frequencies.tolist()])
+    points = predict(result, place, [lowest, frequency], [amplitude])
+    dynamic, static = points.frequency.size - 1, 0
+    stiffness = points.stiffness
+    unit, to_unit = display_unit(name, factor, float(stiffness.value[dynamic]))
+    values = [[to_unit * float(end[i]) for end in (stiffness.value, stiffness.low, stiffness.high)] for i in (0, -1)]
+    loss = [float(end[dynamic]) for end in (points.loss_factor.value, points.loss_factor.low, points.loss_factor.high)]
+    known = static != dynamic and lowest <= _STATIC
+    return Headline(
+        str(place),
+        f"{number(frequency, 3)} Hz",
+        format_range(length, to_length * amplitude),
+        f"{number(values[-1][0], 4)} {unit}",
+        _interval(values[-1]),
+        number(loss[0], 3),
+        _interval(loss, 3),
+        f"{number(math.degrees(math.atan(loss[0])), 3)}°",
+        _accuracy(result, str(place)),
+        f"{number(values[0][0], 4)} {unit}" if known else "not tested",
+        f"at {number(lowest, 2)} Hz" if known else f"lowest frequency {number(lowest, 3)} Hz",
+        _stiffening(points.stiffness.root, stiffness.value) if known else "",
+        _basis(record, str(place)),
+    )
 
 
-def tube(bushing: Bushing) -> str:
+def _interval(values: Sequence[float], digits: int = 4) -> str:
+    """The ends of an interval with the decimals of its value; empty where it has no width."""
+    _, low, high = format_aligned(values, digits, minimum_digits=2)
+    return f"{low} to {high}" if values[2] > values[1] else ""
+
+
+def _stiffening(root: Array, stiffness: Array) -> str:
+    """Ratio of the dynamic and static stiffness with its 95 % interval."""
+    ratio = stiffness[-1] / stiffness[0]
+    relative = root / stiffness
+    half = Z95 * ratio * float(np.linalg.norm(relative[:, -1] - relative[:, 0])) if root.shape[1] > 1 else 0.0
+    return f"{ratio:.2f}" if half == 0.0 else f"{ratio:.2f} ± {half:.2f}"
+
+
+def _accuracy(result: Result, place: str) -> str:
+    usable = next((usable for usable in result.usable if usable.place == place), None)
+    if usable is None:
+        return ""
+    points = f"95 % of {usable.points} {'held-out ' if usable.held_out else ''}points"
+    stiffness, loss = number(100 * usable.stiffness, 2), number(usable.loss_factor, 2)
+    return f"stiffness {stiffness} %, loss factor {loss} ({points})"
+
+
+def _basis(record: ReportRecord, place: str) -> str:
+    """Sentence on the tests that the prediction of a place rests on."""
+    fitted = record.result.measured.directions if record.result.measured else ()
+    if place in fitted:
+        return "fitted to tests of this place"
+    tests = [test for test in record.result.tests if test.place == place and test.held is None and not test.fitted]
+    source = f"predicted from {' and '.join(fitted)} tests" if fitted else "calculated from given parameters"
+    if not tests:
+        return f"{source}; not tested"
+    worst = max(tests, key=lambda test: test.reduced_chi_square)
+    if worst.reduced_chi_square <= _AGREES:
+        return f"{source}; the measured sweep agrees within its noise ({number(100 * worst.nrmse, 2)} %)"
+    return f"{source}; the measured sweep differs by {number(100 * worst.nrmse, 2)} %"
+
+
+def _pictures(record: ReportRecord, predictions: Sequence[Prediction]) -> Iterator[Picture]:
+    """Predictions beside measurements, loops, and measured minus model."""
+    result = record.result
+    for count, prediction in enumerate(predictions):
+        title = f"{prediction.direction}: prediction and measurement"
+        figure = plots.prediction.prediction_figure(result, prediction, record.sweeps, title)
+        yield picture(figure, f"p{count}-")
+    if record.loops is not None:
+        yield picture(plots.fits.loops_figure(result, record.loops, "Hysteresis loops"), "l")
+    if record.gap is not None and record.diagnosis is not None:
+        yield picture(plots.gap.gap_figure(record.gap, result, record.diagnosis, "Measured minus model"), "g")
+
+
+def _appendix_pictures(record: ReportRecord, predictions: Sequence[Prediction]) -> Iterator[Picture]:
+    """Residuals of the sweeps if nothing else shows them, storage and loss stiffness, and confidence ellipses."""
+    result = record.result
+    if record.sweeps is not None and record.gap is None:
+        yield picture(plots.fits.sweeps_figure(result, record.sweeps, "Sweeps and their residuals"), "s")
+    for count, prediction in enumerate(predictions):
+        if np.unique(prediction.frequency).size > 1:
+            title = f"{prediction.direction}: storage and loss stiffness, Cole-Cole diagram"
+            figure = plots.appendix.complex_figure(result, prediction, record.sweeps, title)
+            yield picture(figure, f"c{count}-")
+    if ellipses := plots.appendix.ellipses_figure(result, "Confidence regions of pairs of parameters"):
+        yield picture(ellipses, "e")
+
+
+def tube_description(bushing: Bushing) -> str:
+    """Dimensions of a bushing in words."""
     sizes = 2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length
     inner, outer, length = (number(1e3 * size, 4) for size in sizes)
     formulas = "; radial formulas corrected by finite elements" if bushing.shape == "calibrated" else ""
     return f"rubber tube, inner diameter {inner} mm, outer diameter {outer} mm, length {length} mm{formulas}"
 
 
-def _specimen(specimen: Specimen) -> str:
+def _specimen_description(specimen: Specimen) -> str:
     if specimen.area is None or specimen.thickness is None:
         return f"modulus of the compound, {specimen.strain} strain"
     blocks = "one block" if specimen.elements == 1 else f"{specimen.elements} blocks in parallel"
@@ -143,191 +245,110 @@ def _specimen(specimen: Specimen) -> str:
 
 
 def conditions(stated: Iterable[Mapping[str, str | float]]) -> Iterator[tuple[str, str]]:
-    """Conditions of all tests: each value once; of three that every report has, too, that they are not stated."""
+    """Names and values of the conditions of all tests, each distinct value once."""
     tests = list(stated)
     for key, name in _CONDITIONS.items():
         values = list(dict.fromkeys(test[key] for test in tests if key in test))
-        if degrees := sorted(value for value in values if not isinstance(value, str)):
+        if numbers := sorted(value for value in values if not isinstance(value, str)):
             unit = " °C" if key == "temperature_degC" else ""
-            yield name, " to ".join(dict.fromkeys(f"{number(end, 3)}{unit}" for end in (degrees[0], degrees[-1])))
+            yield name, " to ".join(dict.fromkeys(f"{number(end, 3)}{unit}" for end in (numbers[0], numbers[-1])))
         elif values:
             yield name, ", ".join(map(str, values))
         elif key in ("temperature_degC", "preload", "date"):
             yield name, "not stated"
 
 
-def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str | int]:
-    """A test in a row of a table: its range, and how well the model meets it."""
+def _test_row(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str | int]:
+    """Texts of a row of the table of tests: range, conditions and misfit of the model."""
     unit, factor = DISPLAYS[test.unit]
-    met = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
+    misfit = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
     stated = [
         words.format(value if isinstance(value, str) else number(value, 3))
-        for key, words in _STATED.items()
+        for key, words in _BESIDE_TEST.items()
         if (value := test.conditions.get(key)) is not None
     ]
     return {
         "test": test.test,
-        "kind": {"loop": "hysteresis loop", "sweep": "sweep"}.get(test.kind, test.kind),
+        "kind": {"loop": "hysteresis loop"}.get(test.kind, test.kind),
         "place": test.place,
         "frequency": format_range("Hz", *test.frequency_Hz),
         "amplitude": format_range(unit, *(factor * end for end in test.amplitude)),
         "rows": test.rows,
         "conditions": ", ".join(stated),
-        "nrmse": f"{number(100 * met.nrmse, 2)} %" if met else "",
-        "chi": number(met.reduced_chi_square, 2) + " (not fitted)" * (not met.fitted) if met else "",
+        "use": ("fitted" if misfit.fitted else "not fitted") if misfit else "",
+        "nrmse": f"{number(100 * misfit.nrmse, 2)} %" if misfit else "",
+        "chi": number(misfit.reduced_chi_square, 2) if misfit else "",
     }
 
 
 def _sizes(effect: EffectEntry) -> Iterator[tuple[str, str, str]]:
-    """Name, value and interval of the parameters of an effect that was named, as people read them."""
+    """Name, value and interval of the parameters of an effect, as texts with units."""
     for name, size in effect["parameters"].items():
         unit, factor = display_unit(size["unit"], 1.0, size["value"])
         value, *ends = format_aligned([factor * x for x in (size["value"], *(size["ci95"] or ()))], 4, minimum_digits=2)
         yield name, f"{value} {unit}".removesuffix(" -"), " to ".join(ends)
 
 
-def _files(found: ReportData) -> list[tuple[str, str]]:
-    """Every file behind the result with its hash: the campaign, its tests, fitted or not, and what else was fitted."""
-    named = ((file.file, file.sha256) for file in ([found.campaign] if found.campaign else []) + [*found.tests])
-    inputs = ((str(source.file), source.sha256) for source in found.result.inputs)
+def _gaps(diagnosis: DiagnosisFile) -> Iterator[tuple[str, str, str]]:
+    """Root mean square of measured minus model in units of noise, before and after: held-out and fitted data."""
+    parts = {"held-out data": diagnosis["gap"]["heldout"], "fitted data": diagnosis["gap"]["calibration"]}
+    for name, sizes in parts.items():
+        ends = (sizes["before"], sizes["after"]) if sizes else (None, None)
+        before, after = ("not known" if end is None else f"{end:.2f}" for end in ends)
+        yield name, before, after
+
+
+def _tabled(predictions: Sequence[Prediction]) -> Iterator[list[str]]:
+    """Rows of predicted values at some points of each grid.
+
+    Cells: place, frequency, amplitude; |K| and its band; loss angle and its band; loss factor, K' and K''.
+    """
+    frequencies = min(max(_ROWS // max(_AMPLITUDES * len(predictions), 1), 1), _FREQUENCIES)
+    for prediction in predictions:
+        (length, to_length), _, (unit, factor) = prediction.direction.display
+        for index in grid_corners(prediction.amplitude, prediction.frequency, _AMPLITUDES, frequencies):
+            stiffness, loss = (
+                [scale * float(end[index]) for end in (band.value, band.low, band.high)]
+                for band, scale in ((prediction.stiffness, factor), (prediction.loss_factor, 1.0))
+            )
+            angles = [math.degrees(math.atan(end)) for end in loss]
+            storage, imaginary = (
+                factor * float(band.value[index]) for band in (prediction.storage_stiffness, prediction.loss_stiffness)
+            )
+            yield [
+                str(prediction.direction),
+                f"{number(float(prediction.frequency[index]), 4)} Hz",
+                format_range(length, to_length * float(prediction.amplitude[index])),
+                f"{number(stiffness[0], 4)} {unit}",
+                _interval(stiffness),
+                f"{number(angles[0], 3)}°",
+                _interval(angles, 3),
+                number(loss[0], 3),
+                number(storage, 4),
+                number(imaginary, 4),
+            ]
+
+
+def grid_corners(amplitude: Array, frequency: Array, amplitudes: int, frequencies: int) -> Iterator[int]:
+    """Indices of at most so many operating points, evenly over the amplitudes and frequencies of a grid, each (n,)."""
+    levels = np.unique(amplitude)
+    for level in levels[spread(levels.size, amplitudes)]:
+        rows = np.flatnonzero(amplitude == level)
+        rows = rows[np.argsort(frequency[rows], kind="stable")]
+        yield from rows[spread(rows.size, frequencies)].tolist()
+
+
+def _files(record: ReportRecord) -> list[tuple[str, str]]:
+    """Every file behind the result with its SHA-256."""
+    named = ((file.file, file.sha256) for file in ([record.campaign] if record.campaign else []) + [*record.tests])
+    inputs = ((str(source.file), source.sha256) for source in record.result.inputs)
     return list(dict.fromkeys((file, sha256) for file, sha256 in (*named, *inputs) if file and sha256))
 
 
-def _gaps(gap: GapEntry) -> Iterator[tuple[str, str, str]]:
-    """Root mean square of what is left before and after, in units of noise: held out first."""
-    parts = {"held out, predicted from the other tests": gap["heldout"], "data fitted": gap["calibration"]}
-    for words, sizes in parts.items():
-        ends = (sizes["before"], sizes["after"]) if sizes else ()
-        known = ["not known" if end is None else f"{end:.2f}" for end in ends]
-        before, after = known or ("not testable", "")
-        yield words, before, after
-
-
-def _tabled(found: ReportData) -> Iterator[tuple[str, ...]]:
-    """Predicted values at some corners of the grid of each place, their bands, and what was measured there.
-
-    Rows of cells: place, unit, frequency, amplitude; |K| and loss angle, each with its band and as measured; loss
-    factor, K' and K''.
-    """
-    places = [(found.tables[name], place) for name, place in found.places.items() if name in found.tables]
-    frequencies = min(max(_ROWS // max(_AMPLITUDES * len(places), 1), 1), _FREQUENCIES)
-    for table, place in places[:MOST_PLACES]:
-        amplitude, stiffness, _ = columns_of(place)
-        names, parts = (stiffness, "loss factor [-]"), (f"storage {stiffness}", f"loss {stiffness}")
-        band = [f"{name}, {end}" for name in names for end in ("low", "high")]
-        (length, _), _, (unit, _) = place.display
-        known = complete(table, "frequency [Hz]", amplitude, *names, *band, *parts)
-        kinds: tuple[tuple[str, int, Callable[[float], float]], ...] = ((names[0], 4, float), (names[1], 3, _degrees))
-        for row in corners(known, amplitude, _AMPLITUDES, frequencies):
-            cells = [str(place), unit, f"{number(row['frequency [Hz]'], 4)} Hz", format_range(length, row[amplitude])]
-            for name, digits, shown in kinds:
-                ends = [shown(row[key]) for key in (name, f"{name}, low", f"{name}, high")]
-                value, *ends_told = format_aligned(ends, digits, minimum_digits=2)
-                measured = row.get(f"measured {name}", np.nan)
-                cells += [value, " to ".join(ends_told)]
-                cells.append("" if np.isnan(measured) else format_aligned([shown(measured)], digits)[0])
-            yield *cells, *(format_aligned([row[name]], 4)[0] for name in (names[1], *parts))
-
-
-def _degrees(loss_factor: float) -> float:
-    """The loss angle of a loss factor [deg]."""
-    return math.degrees(math.atan(loss_factor))
-
-
-def _levels(found: ReportData) -> str:
-    """Levels of the predicted stiffness re 1 N/m, least and largest; "" where there is none."""
-    sizes = [
-        numbers(found.tables[name], columns_of(place)[1])[0] / place.display.stiffness.factor
-        for name, place in found.places.items()
-        if place.motion is TRANSLATION and name in found.tables
-    ]
-    known = [size for each in sizes for size in each.tolist() if size > 0.0]
-    ends = [f"{20.0 * math.log10(end):.1f}" for end in (min(known), max(known))] if known else []
-    return " to ".join(dict.fromkeys(ends))
-
-
-def corners(table: pd.DataFrame, amplitude: str, amplitudes: int, frequencies: int) -> Iterator[dict[str, Any]]:
-    """At most so many rows of a table of operating points, evenly over its amplitudes and frequencies."""
-    levels = np.unique(table[amplitude])
-    for level in levels[spread(levels.size, amplitudes)]:
-        mine = table[table[amplitude] == level].sort_values("frequency [Hz]").to_dict("records")
-        yield from ({str(key): cell for key, cell in mine[at].items()} for at in spread(len(mine), frequencies))
-
-
-def corner(result: Result) -> Markup | None:
-    """Ellipses that hold two parameters at once with 95 %, in the coordinates of the fit; None of fewer than two.
-
-    Notes: a strictly positive parameter is fitted by its logarithm, in which the ellipse is one; its radius is
-    sqrt(2 F(0.95; 2, nu)) standard errors, nu the degrees of freedom of the errors (Satterthwaite).
-    """
-    rows = [row for row in parameter_rows(replace(result, profile={})) if row.name in FIVE]
-    known = [row.name for row in rows if row.error and result.covariance.stderr(row.name)]
-    if len(known) < 2:
-        return None
-    correlation = {frozenset(pair): size for *pair, size in result.covariance.correlations()}
-    cells, told = [], []
-    for down, low in enumerate(rows):
-        for across, left in enumerate(rows[:down]):
-            at = _LEFT + _PITCH * across, _TOP + _PITCH * down
-            if low.name in known and left.name in known:
-                size = correlation[frozenset((left.name, low.name))]
-                cells.append((*at, *_drawn(result, (left.name, low.name), size, *at), f"{size:+.2f}", abs(size) > 0.9))
-                told.append(f"{left.name}/{low.name} {size:+.2f}")
-            else:
-                cells.append((*at, "", "", "", False))
-    unknown = [f"{row.name}: {' '.join(words)}" for row in rows if (words := _untold(row, result))]
-    diagonal = []
-    for n, row in enumerate(rows):
-        lines = filter(None, (row.value, f"± {row.error}" if row.error else "", row.unit.replace("-", "")))
-        diagonal.append((_LEFT + _PITCH * n, _TOP + _PITCH * n, row.name, [*lines], _untold(row, result)))
-    alt = f"95 % confidence ellipses of pairs of parameters; correlations {', '.join(told)}"
-    context = {
-        "title": "Which values go together",
-        "alt": "; ".join([alt, *unknown]),
-        "width": _LEFT + _PITCH * len(FIVE),
-        "height": _TOP + _PITCH * len(rows) + 18.0,
-        "cells": cells,
-        "side": _CELL,
-        "pitch": _PITCH,
-        "diagonal": diagonal,
-        "ends": [*_ends(rows)],
-    }
-    return Markup(filled("corner.html", context))
-
-
-def _untold(row: Row, result: Result) -> Sequence[str]:
-    """In short lines what the tests do not tell of a parameter; none where they tell its value."""
-    if not row.error:
-        return row.state or "at least value", "no information"
-    value = result.model.values[row.name]  # noqa: PD011  # no frame
-    wide = result.covariance.half(row.name) >= abs(value)
-    return ("unknown by", "100 % or more") if wide else ()
-
-
-def _drawn(result: Result, pair: tuple[str, str], correlation: float, left: float, top: float) -> tuple[str, str]:
-    """The ellipse of a pair in its cell, and the 95 % intervals of either alone."""
-    covariance = result.covariance
-    chosen = np.array(covariance.names)[:, None] == np.array(pair)
-    radius = np.sqrt(2.0 * fdtri(2.0, covariance.freedom(chosen).min(), 0.95))
-    scale = _CELL / 2.0 / (_ROOM * radius)
-    angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
-    x, y = np.cos(angle), correlation * np.cos(angle) + np.sqrt(max(1.0 - correlation**2, 0.0)) * np.sin(angle)
-    middle = left + _CELL / 2.0, top + _CELL / 2.0
-    corners = zip(middle[0] + scale * radius * x, middle[1] - scale * radius * y, strict=True)
-    outline = "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in corners) + "Z"
-    half = [scale * covariance.half(name) / (covariance.stderr(name) or np.inf) for name in pair]
-    rules = [f"M{middle[0] + side * half[0]:.1f} {top:.1f}v{_CELL:.1f}" for side in (-1.0, 1.0)]
-    rules += [f"M{left:.1f} {middle[1] + side * half[1]:.1f}h{_CELL:.1f}" for side in (-1.0, 1.0)]
-    return outline, "".join(rules)
-
-
-def _ends(rows: Sequence[Row]) -> Iterator[tuple[float, float, str, str]]:
-    """Where the ends of the intervals stand beside the cells: below the columns, left of the rows."""
-    for n, row in enumerate(rows):
-        low, _, high = row.interval.partition(" to ")
-        place = _PITCH * n + _CELL / 2.0
-        for sign, end, anchor in ((-1.0, low, "start"), (1.0, high, "end")):
-            if n < len(rows) - 1:
-                yield _LEFT + place + 0.5 * sign * _CELL, _TOP + _PITCH * len(rows) + 10.0, end, anchor
-            if n:
-                yield _LEFT - 5.0, _TOP + place - _END * sign * _CELL + 4.0, end, "end"
+def _stiffness_levels(predictions: Sequence[Prediction]) -> str:
+    """Lowest and highest level of the predicted stiffness re 1 N/m [dB]; empty where there is none."""
+    sizes = [p.stiffness.value for p in predictions if p.direction.motion is TRANSLATION]
+    if not sizes:
+        return ""
+    ends = (min(size.min() for size in sizes), max(size.max() for size in sizes))
+    return " to ".join(dict.fromkeys(f"{20.0 * math.log10(end):.1f}" for end in ends))

@@ -14,6 +14,8 @@ from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.report.plots import style
 from bushfit.report.plots.measured import (
+    MOST_CURVES,
+    MOST_LOOPS,
     SECTOR,
     Curve,
     SweepGroup,
@@ -29,11 +31,13 @@ from bushfit.units import display_unit, format_range
 #: Height of a panel of residuals [cm].
 _STRIP = 2.6
 #: Points of a model's line.
-_FINE = 60
+_FINE = 30
 #: Curves of more points than this are drawn with small dots.
 _MANY_POINTS = 60
+#: Most points of a curve, and of its residuals, that are drawn.
+_MOST_POINTS = 120
 #: Most rows of a loop that are drawn.
-_MOST_ROWS = 360
+_MOST_ROWS = 240
 #: Relative error that a file states of a point, from which the point is not drawn: such points hide the others.
 _WORST_DRAWN = 0.05
 _RESIDUALS = "Lower panels: measured minus model, in units of noise. 95 % of the points should be in the grey band."
@@ -51,14 +55,14 @@ def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
         table: as `tables.sweeps_table` makes it.
         title: of the figure.
     """
-    groups = sweep_groups(table, result)
+    groups = [group.thinned() for group in sweep_groups(table, result)]
     figure = style.new_figure(title, (style.ROW + _STRIP) * len(groups))
     grid = figure.subplots(2 * len(groups), 2, squeeze=False, height_ratios=[style.ROW, _STRIP] * len(groups))
     for group, pair, strips in zip(groups, grid[::2], grid[1::2], strict=True):
         draw_curves(pair, group, result)
         _draw_residuals(pair, strips, group)
     outliers = _OUTLIERS * bool((table["outlier"] == "yes").any())
-    return style.explained(figure, "Lines: model.", points_note(table), _RESIDUALS, outliers)
+    return style.explained(figure, "Lines: model.", points_note(table), _RESIDUALS, outliers, thinned_note(groups))
 
 
 def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None:
@@ -109,13 +113,14 @@ def drawn_points(curve: Curve) -> pd.DataFrame:
 
 
 def draw_points(axes: Axes, rows: pd.DataFrame, along: str, header: str, scale: float, look: style.Style) -> None:
-    """Draw means of the repeats of a column with bars from the smallest to the largest."""
+    """Draw means of the repeats of a column, at most 120, with bars from the smallest to the largest."""
     repeats = rows.groupby(along)[header]
-    x, count = repeats.mean().index.to_numpy(), len(repeats)
+    count = len(repeats)
+    drawn = scale * repeats.agg(["mean", "min", "max"]).iloc[:: max(1, -(-count // _MOST_POINTS))]
     if count < len(rows):
-        axes.vlines(x, scale * repeats.min(), scale * repeats.max(), color=look.color, lw=0.7, alpha=0.7)
+        axes.vlines(drawn.index, drawn["min"], drawn["max"], color=look.color, lw=0.7, alpha=0.7)
     points = style.POINT if count <= _MANY_POINTS else style.DOT | {"alpha": 0.5}
-    axes.plot(x, scale * repeats.mean(), look.marker, color=look.color, **points)
+    axes.plot(drawn.index, drawn["mean"], look.marker, color=look.color, **points)
 
 
 def points_note(table: pd.DataFrame) -> str:
@@ -126,6 +131,12 @@ def points_note(table: pd.DataFrame) -> str:
     hidden = int((table["stated error [-]"] > _WORST_DRAWN).sum()) if "stated error [-]" in table else 0
     left_out = f" {hidden} points with a stated error above {100 * _WORST_DRAWN:g} % are not drawn." if hidden else ""
     return f"Points: {bars}.{left_out}"
+
+
+def thinned_note(groups: Sequence[SweepGroup]) -> str:
+    """Sentence on groups of which not all levels are drawn."""
+    full = any(len(group.curves) == MOST_CURVES for group in groups)
+    return f"Of more than {MOST_CURVES} levels {MOST_CURVES} are drawn." * full
 
 
 def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) -> tuple[Array, Array]:
@@ -150,6 +161,7 @@ def _draw_residuals(pair: Sequence[Axes], strips: Sequence[Axes], group: SweepGr
         header = f"{part} residual [noise]"
         for curve, look in zip(group.curves, looks, strict=True):
             points = drawn_points(curve)
+            points = points.iloc[:: max(1, -(-len(points) // (3 * _MOST_POINTS)))]
             look_of_points = style.DOT | {"color": look.color, "alpha": 0.8}
             strip.plot(points[group.x_header], points[header], look.marker, **look_of_points)
         strip.sharex(panel)
@@ -168,7 +180,7 @@ def _draw_residuals(pair: Sequence[Axes], strips: Sequence[Axes], group: SweepGr
 def loops_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
     """Force over displacement of loops, measured and modelled, and residuals over the phase of the cycle.
 
-    A row of panels per place. Of each loop at most 360 rows of the first and the last two cycles are drawn.
+    A row of panels per place. Of each loop at most 240 rows of the first and the last two cycles are drawn.
 
     Args:
         result: the model beside the tests; it includes the effects of the rig.
@@ -199,6 +211,8 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
         f"in units of the noise of a row, and means over {SECTOR:g}° of the cycle (lines). 95 % of the points should "
         "be in the grey band.",
         _OUTLIERS * bool((table["outlier"] == "yes").any()),
+        f"Of more than {MOST_LOOPS} loops of a direction {MOST_LOOPS} are drawn."
+        * any(len(loops) == MOST_LOOPS for _, loops in places),
     )
 
 

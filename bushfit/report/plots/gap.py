@@ -34,6 +34,8 @@ from bushfit.report.plots.measured import (
 _LEVEL, _LEAST_MAP, _LARGEST_MAP, _SCALE, _LOOPS = 0.6, 1.7, 4.2, 2.6, 4.4
 #: Most rows of a map: each is then 1.7 mm high.
 _MOST_ROWS = 24
+#: Most cells of a row: each is then 1 mm wide.
+_MOST_COLUMNS = 60
 #: Percentages at which the colour changes.
 _EDGES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 #: Share of the points that may be beyond the end of the scale, so that outliers do not stretch it.
@@ -154,7 +156,7 @@ def _draw_map(axes: Axes, group: SweepGroup, header: str, colors: ScalarMappable
     logarithmic = _is_logarithmic(along)
     ends = []
     for row, curve in enumerate(rows):
-        x, values = means(curve.rows, group.x_header, header)
+        x, values = _binned(*means(curve.rows, group.x_header, header))
         low, high = _cells(x, logarithmic=logarithmic)
         corners = (low, row - 0.5), (high, row - 0.5), (high, row + 0.5), (low, row + 0.5)
         cells = np.stack([np.stack(np.broadcast_arrays(*corner), axis=1) for corner in corners], axis=1)
@@ -172,6 +174,12 @@ def _draw_map(axes: Axes, group: SweepGroup, header: str, colors: ScalarMappable
     axes.set_xlim(left, right)
     axes.tick_params(labelsize=style.SMALL, colors=style.INK)
     axes.spines[:].set_color(style.GREY)
+
+
+def _binned(x: Array, values: Array) -> tuple[Array, Array]:
+    """Means of neighbouring points, at most 60."""
+    blocks = np.array_split(np.arange(x.size), min(x.size, _MOST_COLUMNS))
+    return np.array([x[block].mean() for block in blocks]), np.array([values[block].mean() for block in blocks])
 
 
 def _is_logarithmic(along: Array) -> bool:

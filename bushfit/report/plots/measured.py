@@ -12,13 +12,15 @@ from bushfit.effects.contract import Array
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.reading.measurement import SAME_TEMPERATURE
-from bushfit.report.tables import columns_of, moved_of
+from bushfit.report.tables import columns_of, moved_of, spread
 from bushfit.units import format_range, number
 
 #: Quantity along the x axis of a sweep.
 Axis = Literal["frequency", "amplitude"]
 #: Width of a sector of a loop's cycle over which residuals are averaged [deg].
 SECTOR = 10.0
+#: Most curves of a group, and most loops of a place, that are drawn.
+MOST_CURVES, MOST_LOOPS = 24, 8
 #: Bins of time in which a long record is drawn: more than a figure has pixels.
 TIME_BINS = 1500
 
@@ -61,6 +63,10 @@ class SweepGroup(NamedTuple):
     def held(self) -> Axis:
         """Quantity that is held while the other is stepped."""
         return "amplitude" if self.axis == "frequency" else "frequency"
+
+    def thinned(self) -> SweepGroup:
+        """At most 24 of the curves, evenly from the first to the last."""
+        return self._replace(curves=[self.curves[index] for index in spread(len(self.curves), MOST_CURVES)])
 
     @property
     def shares_levels(self) -> bool:
@@ -117,10 +123,16 @@ def means(rows: pd.DataFrame, along: str, *headers: str) -> tuple[Array, ...]:
 
 
 def loops_of(table: pd.DataFrame, result: Result) -> Iterator[tuple[Place, dict[str, pd.DataFrame]]]:
-    """Place and loops by name of a table, as `tables.loops_table` or the loops of `tables.gap_table` make it."""
+    """Loops by name of each place, at most eight, evenly from the first to the last.
+
+    Args:
+        table: as `tables.loops_table` or the loops of `tables.gap_table` make it.
+        result: model whose specimens give places by their names.
+    """
     rows = table.rename(columns={"loop": "test"})
     for name, of_place in rows.groupby("direction", sort=False):
-        yield result.place(str(name)), {str(test): loop for test, loop in of_place.groupby("test", sort=False)}
+        loops = [(str(test), loop) for test, loop in of_place.groupby("test", sort=False)]
+        yield result.place(str(name)), dict(loops[index] for index in spread(len(loops), MOST_LOOPS))
 
 
 def phase_after_turn(loop: pd.DataFrame, place: Place) -> Array:

@@ -21,7 +21,7 @@ from bushfit.report.tables import IF_RIGS, columns_of, spread
 from bushfit.units import display_unit, format_range
 
 #: Points of a model's line.
-_FINE = 60
+_FINE = 30
 #: Most amplitudes drawn over frequency, and frequencies drawn over amplitude: more bands cover each other.
 _MOST_AMPLITUDES, _MOST_FREQUENCIES = 6, 4
 #: Width of a model's line, of one with the rig's effects, and of a double line and its white core [point].
@@ -71,8 +71,8 @@ def prediction_figure(
     """
     place, lines = prediction.direction, lines_of(result, prediction)
     groups = _groups_at(result, prediction, table)
-    free = [group for group in groups if group.palette == "loop" and np.isnan(group.curves[0].level)]
-    points = [group for group in groups if group not in free]
+    free = [group.thinned() for group in groups if group.palette == "loop" and np.isnan(group.curves[0].level)]
+    points = [group for group in groups if not (group.palette == "loop" and np.isnan(group.curves[0].level))]
     rows = _rows(prediction, points)
     figure = style.new_figure(title, (len(rows) + len(free)) * style.ROW)
     grid = figure.subplots(len(rows) + len(free), 2, squeeze=False)

@@ -96,7 +96,7 @@ def test_loops_show_model_and_residuals(paper_model: Model, looped: Looped) -> N
     assert legend(figure.axes[1]) == ["1 mm, 0.1 Hz", "0.5 mm, 0.1 Hz", "model"]
     assert max(np.nanmax(line.get_ydata()) for line in lines(figure.axes[0])) == pytest.approx(458.0, rel=0.02)
     long = loops(paper_model, looped(paper_model, 1e-3, cycles=40))
-    assert max(len(line.get_xdata()) for axes in long.axes for line in (*lines(axes), *points(axes))) <= 360
+    assert max(len(line.get_xdata()) for axes in long.axes for line in (*lines(axes), *points(axes))) <= 240
     (model_line,) = lines(long.axes[0])
     step = np.hypot(np.diff(model_line.get_xdata()), np.diff(model_line.get_ydata()) / 458.0)
     assert np.nanmax(step) < 0.2, "a stroke across the cycles that are left out"
