@@ -34,8 +34,8 @@ _STRIP = 2.6
 _FINE = 30
 #: Curves of more points than this are drawn with small dots.
 _MANY_POINTS = 60
-#: Most points of a curve, and of its residuals, that are drawn.
-_MOST_POINTS = 120
+#: Points of a panel from which on curves are thinned, and points that a curve keeps at least.
+_PANEL_POINTS, _CURVE_POINTS = 480, 24
 #: Most rows of a loop that are drawn.
 _MOST_ROWS = 240
 #: Relative error that a file states of a point, from which the point is not drawn: such points hide the others.
@@ -78,7 +78,8 @@ def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None
     looks = style.styles(len(group.curves), group.palette)
     for axes, label, header, scale in zip(pair, labels, (stiffness, "loss factor [-]"), (factor, 1.0), strict=True):
         for curve, look in zip(group.curves, looks, strict=True):
-            draw_points(axes, drawn_points(curve), group.x_header, header, scale, look)
+            points = drawn_points(curve)
+            draw_points(axes, points, group.x_header, header, scale, look, len(group.curves))
             x, values = _model_line(group, curve, header, result)
             axes.plot(x, scale * values, color=look.color, ls=look.dashes, lw=1.3)
         x = np.concatenate([curve.rows[group.x_header] for curve in group.curves])
@@ -112,15 +113,32 @@ def drawn_points(curve: Curve) -> pd.DataFrame:
     return curve.rows[keep]
 
 
-def draw_points(axes: Axes, rows: pd.DataFrame, along: str, header: str, scale: float, look: style.Style) -> None:
-    """Draw means of the repeats of a column, at most 120, with bars from the smallest to the largest."""
+def draw_points(
+    axes: Axes, rows: pd.DataFrame, along: str, header: str, scale: float, look: style.Style, curves: int
+) -> None:
+    """Draw means of the repeats of a column with bars from the smallest to the largest.
+
+    Args:
+        axes: panel.
+        rows: of one level.
+        along, header: columns along x and y.
+        scale: factor from the column to the panel.
+        look: of the level.
+        curves: number of levels in the panel, which share its points.
+    """
     repeats = rows.groupby(along)[header]
     count = len(repeats)
-    drawn = scale * repeats.agg(["mean", "min", "max"]).iloc[:: max(1, -(-count // _MOST_POINTS))]
+    drawn = scale * repeats.agg(["mean", "min", "max"]).iloc[thinning(count, curves)]
     if count < len(rows):
         axes.vlines(drawn.index, drawn["min"], drawn["max"], color=look.color, lw=0.7, alpha=0.7)
     points = style.POINT if count <= _MANY_POINTS else style.DOT | {"alpha": 0.5}
     axes.plot(drawn.index, drawn["mean"], look.marker, color=look.color, **points)
+
+
+def thinning(count: int, curves: int) -> slice:
+    """Every n-th of the points of a curve, so that the panel stays readable."""
+    most = max(_CURVE_POINTS, _PANEL_POINTS // curves)
+    return slice(None, None, max(1, -(-count // most)))
 
 
 def points_note(table: pd.DataFrame) -> str:
@@ -161,7 +179,7 @@ def _draw_residuals(pair: Sequence[Axes], strips: Sequence[Axes], group: SweepGr
         header = f"{part} residual [noise]"
         for curve, look in zip(group.curves, looks, strict=True):
             points = drawn_points(curve)
-            points = points.iloc[:: max(1, -(-len(points) // (3 * _MOST_POINTS)))]
+            points = points.iloc[thinning(len(points), len(group.curves))]
             look_of_points = style.DOT | {"color": look.color, "alpha": 0.8}
             strip.plot(points[group.x_header], points[header], look.marker, **look_of_points)
         strip.sharex(panel)

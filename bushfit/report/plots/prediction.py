@@ -171,7 +171,7 @@ def draw_prediction(
             if len(rows):
                 if lines.rig is not None:
                     axes.plot(x[here], from_si * getattr(lines.rig, name).value[here], color=look.color, lw=_THIN)
-                draw_points(axes, rows, x_header, header, scale, look)
+                draw_points(axes, rows, x_header, header, scale, look, levels.size)
         style.label_axes(axes, x_header, label, x)
         highest = from_si * getattr(prediction, name).high.max()
         style.least_span(axes, 0.04 * highest if name == "stiffness" else 0.01)  # flat curves shall look flat
