@@ -26,7 +26,7 @@ from bushfit.effects import twins_of
 from bushfit.fitting.data import Data
 from bushfit.model import rig
 from bushfit.model.model import Model
-from bushfit.report.page.readback import read_results
+from bushfit.report.page.record import read_results
 from bushfit.report.results import Formats, write_results
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed

@@ -13,7 +13,7 @@ from bushfit.effects.contract import Array
 from bushfit.model.model import FIVE
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction
-from bushfit.report.parameters import parameter_rows
+from bushfit.report.parameters import Row, parameter_rows
 from bushfit.report.plots import style
 from bushfit.report.plots.measured import sweep_groups
 from bushfit.report.plots.prediction import lines_of
@@ -23,7 +23,7 @@ from bushfit.units import format_range
 #: Most amplitudes that are drawn.
 _MOST_LEVELS = 6
 #: Side of a cell of the matrix of ellipses [cm].
-_CELL = 2.7
+_CELL = 2.3
 #: Correlation from which a pair is marked: only its combination is known well.
 _STRONG = 0.9
 
@@ -110,15 +110,20 @@ def ellipses_figure(result: Result, title: str) -> Figure | None:
             _draw_ellipse(axes, result, (left.name, low.name), correlation)
             _label(axes, left.interval, low.interval, bottom=down == count - 1, left=across == 0)
             if down == count - 1:
-                axes.set_xlabel(f"{left.name} [{left.unit}]", **style.WORDS)
+                axes.set_xlabel(_name(left), **style.WORDS)
             if across == 0:
-                axes.set_ylabel(f"{low.name}\n[{low.unit}]", **style.WORDS)
+                axes.set_ylabel(_name(low), **style.WORDS)
     return style.explained(
         figure,
         "Ellipses: pairs of values inside are compatible with the tests (95 %). Broken lines: 95 % interval of each "
         f"parameter, with its ends as ticks. Number: correlation, bold from {_STRONG:g}. Of such a pair the tests "
         "determine a combination well and each parameter less well: compare the pair, not one of them.",
     )
+
+
+def _name(row: Row) -> str:
+    """Name of a parameter, with its unit unless the unit has an exponent."""
+    return row.name if "^" in row.unit else f"{row.name} [{row.unit}]"
 
 
 def _draw_ellipse(axes: Axes, result: Result, pair: Sequence[str], correlation: float) -> None:

@@ -32,7 +32,7 @@ from bushfit.fitting.data import Data
 from bushfit.planning.campaign import settings_of
 from bushfit.planning.contract import Noise, Test
 from bushfit.planning.offer import RIVALS_APART
-from bushfit.report.page.readback import read_results
+from bushfit.report.page.record import read_results
 from bushfit.report.results import Formats, write_files, write_results
 from bushfit.simulation.files import to_files
 from bushfit.simulation.measured import Simulated, simulate
@@ -101,7 +101,7 @@ def _worked(task: Task, folder: Path, hours: float | None) -> Outcome:
         data = Data.of(load_campaign(place / "campaign.toml"))
         found = diagnose_campaign(data, without=task.without)
         diagnosis, seconds = found.diagnosis, time.process_time() - started
-        write_results(place / "results", found.files, Formats(pictures=False), overwrite=True)
+        write_results(place / "results", found.files, Formats(pictures=False, pages=False), overwrite=True)
         read_results(place / "results")  # as `bushfit report` reads back what `bushfit diagnose` wrote
         truth = _SEALED.validate_json(sealed_file.read_bytes())
         outcome = _outcome(task, truth, diagnosis, seconds)
