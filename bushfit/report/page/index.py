@@ -15,8 +15,8 @@ from bushfit.errors import ModelError
 from bushfit.model.file import read_document, require_schema
 from bushfit.report.batch_document import BATCH_SCHEMA, BatchFile, PartTable
 from bushfit.report.page import filled, rendered
+from bushfit.report.page.svg import Picture, picture
 from bushfit.report.plots import batch as plots
-from bushfit.report.plots import style
 from bushfit.report.results import Documents, ResultFile, Tables, json_file
 from bushfit.report.tables import spread
 from bushfit.units import number, split_header
@@ -108,7 +108,7 @@ def index_page(documents: Documents, _: Tables, *, reported: Collection[str] = (
         "parts_compared": max((table.parts for table in batch.quantities.values()), default=0),
         "quantities": [(name, table, *_unit(name)) for name, table in batch.quantities.items()],
         "curves": curves,
-        "curves_picture": curves.picture(batch) if curves else "",
+        "curves_picture": curves.picture(batch) if curves else None,
         "heads": heads,
         "columns": [*(["measured stiffness, deviation [%]"] if curves else []), *batch.quantities],
         "rows": [
@@ -190,15 +190,11 @@ class _Curves:
         mean = 100.0 * float(np.expm1(np.log1p(self.relative[index]).mean()))
         return number(mean, 2, "+") if np.isfinite(mean) else ""
 
-    def picture(self, batch: BatchFile) -> Markup:
+    def picture(self, batch: BatchFile) -> Picture:
         """Median, range of the parts that do not differ, and the curves of those that do."""
         pairs = zip(batch.parts, self.values, strict=True)
         singles = {part.name: curve for part, curve in pairs if part.deviations and part.curve}
-        figure = plots.curves_figure(self.headers, self.values[self.usual], singles)
-        image = style.to_image(figure, "svg").decode()
-        alt = f"Measured dynamic stiffness over the points of the sweep; single curves: {', '.join(singles) or 'none'}"
-        head = Markup('<svg role="img" aria-label="{}" ').format(alt)
-        return head + Markup(image[image.index("<svg") + len("<svg ") :])
+        return picture(plots.curves_figure(self.headers, self.values[self.usual], singles), "c")
 
     def sparkline(self, index: int, *, differs: bool) -> Markup:
         """Deviation of a curve from the median over the points, with the range of the parts that do not differ."""
