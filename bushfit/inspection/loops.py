@@ -11,7 +11,8 @@ from bushfit.fitting.drive import TOLD_MEAN, Drive, drive_of
 from bushfit.fitting.loop_cycles import waveform
 from bushfit.geometry import Unit
 from bushfit.inspection.labels import wrong_labels
-from bushfit.inspection.record import Findings, told_frequencies
+from bushfit.inspection.plausible import implausible_sizes
+from bushfit.inspection.record import Findings, format_frequencies
 from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.names import Labels
 from bushfit.reduction.cycles import lone_outliers
@@ -155,7 +156,7 @@ def _outliers(channel: Channel, time: Floats) -> Iterator[str]:
         yield f"the {channel.name} has {outlier} at {listed}{more}"
 
 
-def look_at_loop(loop: Loop, labels: Labels) -> Findings:
+def describe_loop(loop: Loop, labels: Labels) -> Findings:
     """Facts and oddities of a loop; `labels` are what the names of its file and sheet say.
 
     Raises:
@@ -182,6 +183,12 @@ def look_at_loop(loop: Loop, labels: Labels) -> Findings:
     }
     odd = [
         *wrong_labels(labels, loop.direction, [amplitude, half_motion], [drive.frequency]),
+        *implausible_sizes(
+            loop.direction,
+            np.array([drive.frequency]),
+            np.array([amplitude]),
+            np.array([float(half_force) / amplitude]),
+        ),
         *odd_channels(loop),
         *drive.notes,
         *_changing(drive),
@@ -199,7 +206,7 @@ def look_at_loop(loop: Loop, labels: Labels) -> Findings:
     return facts, odd
 
 
-def look_at_history(history: Loop, labels: Labels) -> Findings:
+def describe_history(history: Loop, labels: Labels) -> Findings:
     """Facts and oddities of a history; `labels` are what the names of its file and sheet say.
 
     Raises:
@@ -212,7 +219,7 @@ def look_at_history(history: Loop, labels: Labels) -> Findings:
     frequencies = sorted({step.nominal_frequency for step in steps})
     facts = {
         "steps": f"{len(steps)} with steady cycles, {max(step.repeat for step in steps)} at most at one point",
-        "frequencies": told_frequencies(frequencies),
+        "frequencies": format_frequencies(frequencies),
         "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels)} {unit} zero-to-peak, as reached",
         "sampling": f"{sampling(history)}, {min(step.rows_per_cycle for step in steps):.3g} rows a cycle at least",
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
@@ -226,7 +233,7 @@ def look_at_history(history: Loop, labels: Labels) -> Findings:
     return facts, odd
 
 
-def look_at_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Findings:
+def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Findings:
     """Facts and oddities of a record that holds several loops, in order.
 
     Raises:

@@ -15,9 +15,9 @@ from bushfit.campaign.schema import SpecimenTable
 from bushfit.errors import BushfitError, MeasurementError, NoTestError, error_location, quote_path
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.inspection.labels import keys_from_labels, labels_of_file, temperatures_of
-from bushfit.inspection.loops import look_at_history, look_at_loop, look_at_programme
+from bushfit.inspection.loops import describe_history, describe_loop, describe_programme
 from bushfit.inspection.record import ColumnSeen, Findings, Inspected, Kind
-from bushfit.inspection.sweeps import look_at_sweep
+from bushfit.inspection.sweeps import describe_sweep
 from bushfit.reading.cells import Rows
 from bushfit.reading.headers import LOOP_COLUMNS, PAIRS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary, of_motion
 from bushfit.reading.layout import DELIMITERS, FileFormat
@@ -214,7 +214,7 @@ def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) 
     kind: Kind
     if is_sweep:
         measured = read_sweep(**_keywords(file, read_as, entry, SweepFile))
-        kind, (facts, odd) = "sweep", look_at_sweep(measured, by_name)
+        kind, (facts, odd) = "sweep", describe_sweep(measured, by_name)
     else:
         measured, entry, turned = _read_loop(file, read_as, entry, table)
         kind, (facts, odd) = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile)["test"])
@@ -304,11 +304,11 @@ def _look(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findin
     fast = max(frequencies) > _QUASI_STATIC
     if len(points) > 1 and fast:
         with suppress(MeasurementError):  # no steady sine after all
-            return "history", look_at_history(measured, by_name)
+            return "history", describe_history(measured, by_name)
     loops = programme(measured, test)
     if len(loops) > 1:
-        return "loop", look_at_programme(measured, loops, by_name)
-    facts, odd = look_at_loop(loops[0], by_name)
+        return "loop", describe_programme(measured, loops, by_name)
+    facts, odd = describe_loop(loops[0], by_name)
     if fast or len(points) > 1:
         what = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
         odd.append(

@@ -27,7 +27,7 @@ Findings = tuple[dict[str, str], list[str]]
 _TABLES = {"loop": "loops", "sweep": "sweeps"}
 
 
-def told_frequencies(frequencies: Sequence[float] | Array) -> str:
+def format_frequencies(frequencies: Sequence[float] | Array) -> str:
     """How many frequencies there are, and between which they lie: "16, from 5 to 155 Hz"; [Hz], rising, (n,)."""
     low, high = (f"{end:.4g}" for end in (frequencies[0], frequencies[-1]))
     return f"{len(frequencies)}, {f'at {low}' if low == high else f'from {low} to {high}'} Hz"

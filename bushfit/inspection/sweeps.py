@@ -9,9 +9,11 @@ from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.data_set import shown_amplitude
 from bushfit.fitting.noise import SweepNoise, sweep_noise
+from bushfit.fitting.outliers import least_absolute
 from bushfit.fitting.sweep_data import SweepData
 from bushfit.inspection.labels import wrong_labels
-from bushfit.inspection.record import Findings, told_frequencies
+from bushfit.inspection.plausible import implausible_sizes
+from bushfit.inspection.record import Findings, format_frequencies
 from bushfit.reading.measurement import Sweep, loss_factor
 from bushfit.reading.names import Labels
 from bushfit.reading.runs import rows_alike
@@ -19,46 +21,52 @@ from bushfit.reduction.arrays import MEDIAN_TO_SIGMA
 from bushfit.reduction.result import MISSED_LEVEL
 from bushfit.units import number
 
-#: Standard deviations from which a point is off its repeats, or a block off the others; chosen: no noise goes that far.
+#: Standard deviations from which a point, or a block of points, is an outlier; chosen: no noise goes that far.
 _FAR = 8.0
-#: Distance of ln K from its repeats from which a point is an outlier; chosen: less does not matter to a fit.
-_LEAST_OUTLIER = 0.01
-#: Distance of ln |K| from the other repeats from which a block is off; chosen: mountings differ by less.
-_LEAST_BLOCK_OFFSET = 0.02
+#: Distance of ln K from its repeats, and from the smooth curve of its run, from which a point is an outlier; chosen:
+#: less does not matter to a fit, and a parabola follows rubber to a few per cent.
+_SMALLEST_OUTLIER, _SMALLEST_FROM_CURVE = 0.01, 0.1
+#: Points of a run that show an outlier, and up to which the curve is a line.
+_FEWEST_POINTS, _FEW_POINTS = 6, 8
+#: Distance of ln |K| from the other repeats from which a block is an outlier; chosen: mountings differ by less.
+_SMALLEST_BLOCK_OFFSET = 0.02
 #: Blocks whose scatter can be judged.
 _FEWEST_BLOCKS = 5
 #: Probability of chance below which equal points are copies, and |K| drifts over the repeats; chosen.
 _CHANCE = 1e-4
-#: Change of ln |K| from the first repeat to the last that is told; chosen: less does not matter to a fit.
-_LEAST_DRIFT = 5e-3
-#: Probability at the least that two phases are equal; chosen: some files have them in few digits.
+#: Change of ln |K| from the first repeat to the last that is reported; chosen: less does not matter to a fit.
+_SMALLEST_DRIFT = 5e-3
+#: Smallest probability that two phases are equal; chosen: some files have them in few digits.
 _SAME_PHASE_P = 0.05
 #: Step in ln X from one level to the next below which they may be repeats of one; chosen: nobody sets finer levels.
-_LEAST_STEP = 0.02
-#: Points or frequencies that are told one by one; chosen: they make a sentence.
-_MOST_LISTED = 4
-#: Levels that are listed one by one; chosen: they make a line.
-_MOST_LEVELS = 8
+_SMALLEST_STEP = 0.02
+#: Points or frequencies, and levels, that are listed one by one; chosen: they make a sentence, and a line.
+_MOST_LISTED, _MOST_LEVELS = 4, 8
 
 
-def look_at_sweep(sweep: Sweep, labels: Labels) -> Findings:
-    """Facts and oddities of a sweep; `labels` are what the names of its file and sheet say."""
+def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
+    """Facts and oddities of a sweep.
+
+    Args:
+        sweep: in SI.
+        labels: what the names of its file and sheet state.
+    """
     unit, factor = sweep.direction.display.displacement
     frequencies, levels = np.unique(sweep.frequency), np.unique(sweep.amplitude)
-    repeats = np.unique(sweep.repeat)
     noise = sweep_noise([sweep])
     facts = {
-        "frequencies": told_frequencies(frequencies),
+        "frequencies": format_frequencies(frequencies),
         "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels[:_MOST_LEVELS])}"
         f"{', ...' if levels.size > _MOST_LEVELS else ''} {unit} zero-to-peak",
-        "repeats": f"{repeats.size}",
+        "repeats": f"{np.unique(sweep.repeat).size}",
         "noise": noise.describe(),
     }
     odd = [
         *SweepData(sweep, noise).notes,
-        *wrong_labels(labels, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
-        *_copies(sweep, noise),
-        *_untold_repeats(sweep),
+        *implausible_sizes(sweep.direction, sweep.frequency, sweep.amplitude, np.abs(sweep.stiffness)),
+        *wrong_labels(labels, sweep.direction, levels.tolist(), frequencies.tolist()),
+        *_copied_rows(sweep, noise),
+        *_close_levels(sweep),
         *_missing_frequencies(sweep),
         *_outliers(sweep, noise),
         *_odd_blocks(sweep),
@@ -68,11 +76,9 @@ def look_at_sweep(sweep: Sweep, labels: Labels) -> Findings:
     return facts, odd
 
 
-def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
-    """A sentence on rows that repeat others at the same frequency and amplitude digit by digit.
-
-    It is due where noise would hardly make as many equal by chance, in as many digits as the file has.
-    """
+def _copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
+    """Warn of rows equal to others at the same frequency and amplitude, where noise would hardly make as many equal by
+    chance in as many digits as the file has."""
     # nine digits leave out what the conversion of units leaves in the last ones
     magnitude, phase = (
         np.array([float(f"{value:.9g}") for value in values])
@@ -98,31 +104,31 @@ def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
         )
 
 
-def _untold_repeats(sweep: Sweep) -> Iterator[str]:
-    """A sentence where amplitudes of one frequency lie too close for levels, and no passes tell them for repeats."""
+def _close_levels(sweep: Sweep) -> Iterator[str]:
+    """Warn of amplitudes at one frequency that are too close for levels, where no passes mark them as repeats."""
     passes, of_frequency = np.unique(sweep.repeat).size, sweep.frequency.size / np.unique(sweep.frequency).size
     steps = [
         (float(sweep.frequency[rows[0]]), float(np.diff(np.log(levels)).min()))
         for rows in rows_alike(sweep.frequency)
         if (levels := np.unique(sweep.amplitude[rows])).size > 1
     ]
-    frequency, least = min(steps, key=lambda step: step[1], default=(0.0, np.inf))
-    if least < _LEAST_STEP and round(of_frequency) != passes:
+    frequency, smallest = min(steps, key=lambda step: step[1], default=(0.0, np.inf))
+    if smallest < _SMALLEST_STEP and round(of_frequency) != passes:
         yield (
-            f"two amplitudes at {frequency:.4g} Hz lie {number(100 * np.expm1(least), 2)} % apart and count as two "
+            f"two amplitudes at {frequency:.4g} Hz lie {number(100 * np.expm1(smallest), 2)} % apart and count as two "
             "levels: if they are repeats, a column repeat with their numbers tells so"
         )
 
 
 def _missing_frequencies(sweep: Sweep) -> Iterator[str]:
-    """A sentence for each block, a repeat of a level, that lacks frequencies which most others have."""
+    """Warn of each block, a repeat of a level, without frequencies that most others have."""
     blocks = np.stack((sweep.amplitude, sweep.repeat.astype(float)), axis=1)
     names, block = np.unique(blocks, axis=0, return_inverse=True)
     frequencies, column = np.unique(sweep.frequency, return_inverse=True)
-    there = np.zeros((len(names), frequencies.size), dtype=bool)
-    there[block.ravel(), column] = True
-    usual = there.mean(axis=0) > 0.5
-    for (level, repeat), has in zip(names, there, strict=True):
+    measured = np.zeros((len(names), frequencies.size), dtype=bool)
+    measured[block.ravel(), column] = True
+    usual = measured.mean(axis=0) > 0.5
+    for (level, repeat), has in zip(names, measured, strict=True):
         absent = frequencies[usual & ~has]
         if absent.size and len(names) > 1:
             which = f", repeat {repeat:.0f}," if np.unique(sweep.repeat).size > 1 else ""
@@ -131,31 +137,66 @@ def _missing_frequencies(sweep: Sweep) -> Iterator[str]:
 
 
 def _outliers(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
-    """A sentence for each of the points that lie far off their repeats at the same frequency and amplitude."""
-    off = np.nan_to_num(_from_repeats(sweep))
+    """Warn of points far from their repeats or, where these are fewer than three, from the curve of their run."""
+    from_repeats = _from_repeats(sweep)
+    distance = np.nan_to_num(from_repeats)
     for rows in _blocks(sweep):
-        off[rows] -= _median(off[rows])
+        distance[rows] -= _complex_median(distance[rows])
     random = np.array([noise.random[sweep.name, float(held)] for held in sweep.held])
-    parts = np.stack((off.real, off.imag), axis=1)
-    far = np.any((np.abs(parts) > _FAR * random) & (np.abs(parts) > _LEAST_OUTLIER), axis=1)
-    for row in np.flatnonzero(far)[:_MOST_LISTED]:
+    parts = np.stack((distance.real, distance.imag), axis=1)
+    far = np.any((np.abs(parts) > _FAR * random) & (np.abs(parts) > _SMALLEST_OUTLIER), axis=1)
+    curve = _from_curve(sweep)
+    alone = np.isnan(from_repeats) & (np.abs(curve) > _SMALLEST_FROM_CURVE)
+    parts[alone] = np.stack((curve[alone].real, curve[alone].imag), axis=1)
+    outliers = np.flatnonzero(far | alone)
+    for row in outliers[:_MOST_LISTED]:
         level = shown_amplitude(sweep.direction, sweep.amplitude[row])
+        repeat = "" if alone[row] else f", repeat {sweep.repeat[row]}"
+        reference = "the smooth curve through the others" if alone[row] else "its repeats"
         yield (
-            f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {level}, repeat {sweep.repeat[row]}) is "
+            f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {level}{repeat}) is "
             f"{number(100 * np.expm1(parts[row, 0]), 2, '+')} % in |K| and {np.degrees(parts[row, 1]):+.2g} deg off "
-            "its repeats"
+            f"{reference}"
         )
-    if far.sum() > _MOST_LISTED:
-        yield f"{int(far.sum()) - _MOST_LISTED} more points are as far off their repeats"
+    if outliers.size > _MOST_LISTED:
+        yield f"{outliers.size - _MOST_LISTED} more points are as far off"
+
+
+def _from_curve(sweep: Sweep) -> Array:
+    """Distance of ln K from the smooth curve of its run, for points far beyond the scatter of the others; else 0, (n,).
+
+    Notes:
+        Two curves with the least sum of distances are tried, which a few outliers do not bend, even at an end of the
+        run: a line over the logarithm of what is stepped, and a parabola over the number of the step. An outlier is far
+        from both.
+    """
+    distance = np.zeros(sweep.frequency.size, dtype=complex)
+    runs = rows_alike(sweep.repeat.astype(float), sweep.held) if sweep.stepped else []
+    for rows in runs:
+        steps, rank = np.unique(sweep.step[rows], return_inverse=True)
+        if steps.size < _FEWEST_POINTS:
+            continue
+        log_stiffness = np.log(sweep.stiffness[rows])
+        values = np.stack((log_stiffness.real, log_stiffness.imag), axis=1)
+        smaller = np.full(rows.size, np.inf + 0j)
+        for x, degree in ((np.log(steps), 1), (np.arange(float(steps.size)), 2 if steps.size > _FEW_POINTS else 1)):
+            basis = np.polynomial.legendre.legvander((2.0 * (x - x[0]) / (x[-1] - x[0]) - 1.0)[rank], degree)
+            residual = (values - basis @ least_absolute(basis, values, 1e-8)) @ np.array([1.0, 1.0j])
+            # the curve passes through as many points as it has coefficients
+            scatter = MEDIAN_TO_SIGMA * float(np.median(np.sort(np.abs(residual))[degree + 1 :]))
+            residual = np.where(np.abs(residual) > _FAR * scatter, residual, 0.0)
+            smaller = np.where(np.abs(residual) < np.abs(smaller), residual, smaller)
+        distance[rows] = smaller
+    return distance
 
 
 def _from_repeats(sweep: Sweep) -> Array:
     """Distance of ln K from the median of its repeats, nan where there are fewer than three, (n,)."""
-    value, off = np.log(sweep.stiffness), np.full(sweep.frequency.size, np.nan + 0j)
+    log_stiffness, distance = np.log(sweep.stiffness), np.full(sweep.frequency.size, np.nan + 0j)
     for rows in rows_alike(sweep.frequency, sweep.amplitude):
         if rows.size > 2:
-            off[rows] = value[rows] - _median(value[rows])
-    return off
+            distance[rows] = log_stiffness[rows] - _complex_median(log_stiffness[rows])
+    return distance
 
 
 def _blocks(sweep: Sweep) -> list[Array]:
@@ -164,18 +205,18 @@ def _blocks(sweep: Sweep) -> list[Array]:
 
 
 def _odd_blocks(sweep: Sweep) -> Iterator[str]:
-    """A sentence for each block that lies apart as a whole, and one on a drift over the repeats."""
-    off = _from_repeats(sweep)
-    blocks = [rows for rows in _blocks(sweep) if not np.isnan(off[rows]).any()]
+    """Warn of blocks that differ from the others as a whole, and of a drift over the repeats."""
+    distance = _from_repeats(sweep)
+    blocks = [rows for rows in _blocks(sweep) if not np.isnan(distance[rows]).any()]
     if len(blocks) < _FEWEST_BLOCKS:
         return
-    gain = np.array([_median(off[rows]).real for rows in blocks])
+    gain = np.array([_complex_median(distance[rows]).real for rows in blocks])
     usual = MEDIAN_TO_SIGMA * float(np.median(np.abs(gain[gain != 0.0]))) if np.any(gain) else 0.0
-    for rows, own in zip(blocks, gain, strict=True):
-        if abs(own) > max(_FAR * usual, _LEAST_BLOCK_OFFSET):
+    for rows, block_gain in zip(blocks, gain, strict=True):
+        if abs(block_gain) > max(_FAR * usual, _SMALLEST_BLOCK_OFFSET):
             yield (
                 f"{shown_amplitude(sweep.direction, sweep.amplitude[rows[0]])}, repeat {sweep.repeat[rows[0]]} lies "
-                f"{number(100 * np.expm1(own), 2, '+')} % off the other repeats as a whole: "
+                f"{number(100 * np.expm1(block_gain), 2, '+')} % off the other repeats as a whole: "
                 "other amplitude, temperature or mounting?"
             )
     repeat = np.array([sweep.repeat[rows[0]] for rows in blocks], dtype=float)
@@ -183,7 +224,7 @@ def _odd_blocks(sweep: Sweep) -> Iterator[str]:
         correlation, freedom = float(np.corrcoef(repeat, gain)[0, 1]), repeat.size - 2
         drift = correlation * float(np.std(gain) / np.std(repeat) * np.ptp(repeat))  # of the line through the gains
         t = abs(correlation) * np.sqrt(freedom / max(1.0 - correlation**2, 1e-20))
-        if 2.0 * stdtr(freedom, -t) < _CHANCE and abs(drift) > _LEAST_DRIFT:
+        if 2.0 * stdtr(freedom, -t) < _CHANCE and abs(drift) > _SMALLEST_DRIFT:
             yield (
                 f"|K| drifts by {number(100 * drift, 2, '+')} % from the first repeat to the last: warming up, or "
                 "settling?"
@@ -191,23 +232,23 @@ def _odd_blocks(sweep: Sweep) -> Iterator[str]:
 
 
 def _missed_level(sweep: Sweep) -> Iterator[str]:
-    """A sentence on the point that missed the amplitude of its level by most."""
-    off = sweep.amplitude_reached / sweep.amplitude - 1.0
-    row = int(np.argmax(np.abs(off)))
-    if abs(off[row]) > MISSED_LEVEL:
+    """Warn of the point that missed the amplitude of its level by most."""
+    relative_miss = sweep.amplitude_reached / sweep.amplitude - 1.0
+    row = int(np.argmax(np.abs(relative_miss)))
+    if abs(relative_miss[row]) > MISSED_LEVEL:
         both = sweep.amplitude_reached[row], sweep.amplitude[row]
         reached, level = (shown_amplitude(sweep.direction, size) for size in both)
         yield f"{reached} was reached where the level is {level} ({sweep.frequency[row]:.4g} Hz)"
 
 
 def _odd_loss(sweep: Sweep) -> Iterator[str]:
-    """Sentences on losses below zero, and on one that hardly any rubber has, with what the file may say instead."""
-    bad = np.flatnonzero(sweep.stiffness.imag < 0.0)
-    if bad.size:
-        level = shown_amplitude(sweep.direction, sweep.amplitude[bad[0]])
+    """Warn of losses below zero, and of a loss that hardly any rubber has, with what the file may state instead."""
+    negative = np.flatnonzero(sweep.stiffness.imag < 0.0)
+    if negative.size:
+        level = shown_amplitude(sweep.direction, sweep.amplitude[negative[0]])
         yield (
-            f"{bad.size} point{'s' * (bad.size > 1)} with a loss factor below zero, the first at "
-            f"{sweep.frequency[bad[0]]:.4g} Hz, {level}: is the force channel late?"
+            f"{negative.size} point{'s' * (negative.size > 1)} with a loss factor below zero, the first at "
+            f"{sweep.frequency[negative[0]]:.4g} Hz, {level}: is the force channel late?"
         )
     mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.possible(sweep)]
     if mistakes:
@@ -216,6 +257,6 @@ def _odd_loss(sweep: Sweep) -> Iterator[str]:
         yield f"the loss factor is {number(loss, 2)} in the median, that of hardly any rubber, unless {unless}"
 
 
-def _median(values: Array) -> complex:
+def _complex_median(values: Array) -> complex:
     """Median of the real and of the imaginary parts."""
     return complex(np.median(values.real), np.median(values.imag))

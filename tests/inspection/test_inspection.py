@@ -16,7 +16,7 @@ from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
 from bushfit.errors import BushfitError, FitError
 from bushfit.geometry import Direction, Specimen
 from bushfit.inspection.gathering import gather
-from bushfit.inspection.loops import look_at_loop
+from bushfit.inspection.loops import describe_loop
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.record import file_text
 from bushfit.model.model import Model
@@ -146,8 +146,8 @@ def test_rows_of_a_sine_do_not_pass_for_a_triangle(root: Path, tmp_path: Path) -
     file = tmp_path / "loop.csv"
     file.write_text("\n".join(line.partition(",")[2] for line in lines), encoding="utf-8")
     triangle, sine = LoopFile(file="", rate=1.2e-4), LoopFile(file="", frequency=0.1, waveform="sine")
-    _, wrong = look_at_loop(read_loop(file, Direction.AXIAL, triangle), Labels())
-    _, right = look_at_loop(read_loop(file, Direction.AXIAL, sine), Labels())
+    _, wrong = describe_loop(read_loop(file, Direction.AXIAL, triangle), Labels())
+    _, right = describe_loop(read_loop(file, Direction.AXIAL, sine), Labels())
     assert any("as those of a sine" in line for line in wrong)
     assert not any("as those of" in line for line in right)
 

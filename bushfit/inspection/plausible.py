@@ -1,0 +1,47 @@
+"""Sizes that no test of a rubber part has: the unit in a header is then likely to be wrong."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
+from bushfit.units import format_range, number
+
+#: Smallest and largest frequency of a test [Hz]; chosen: from one cycle a month to ultrasound.
+FREQUENCIES = (4e-7, 1e5)
+#: Smallest and largest amplitude [m, rad or -] and stiffness [N/m, N m/rad or Pa] by kind of motion; chosen: far beyond
+#: those of rubber parts and their laboratories.
+_AMPLITUDES = {TRANSLATION: (1e-8, 0.2), ROTATION: (1e-7, 4.0), STRAINING: (1e-8, 5.0)}
+_STIFFNESSES = {TRANSLATION: (10.0, 1e11), ROTATION: (1e-3, 1e9), STRAINING: (1e4, 1e10)}
+
+
+def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffness: Array) -> Iterator[str]:
+    """Warn of frequencies, amplitudes and stiffness that no test of a rubber part has.
+
+    Args:
+        place: direction or specimen.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m, rad or strain], (n,).
+        stiffness: magnitude [N/m, N m/rad or Pa], (n,).
+
+    Returns:
+        One sentence for each quantity beyond its limits.
+    """
+    motion = place.motion
+    quantities = (
+        ("frequency", "Hz", frequency, FREQUENCIES),
+        ("strain" if motion is STRAINING else "amplitude", motion.displacement_unit, amplitude, _AMPLITUDES[motion]),
+        (motion.words[2], motion.stiffness_unit, stiffness, _STIFFNESSES[motion]),
+    )
+    for name, unit, values, (lowest, highest) in quantities:
+        positive = values[values > 0.0]
+        if positive.size and (np.min(positive) < lowest or np.max(positive) > highest):
+            ends = [float(np.min(positive)), float(np.max(positive))]
+            found, expected = (
+                f"{number(100.0 * low, 3)} to {number(100.0 * high, 3)} %"
+                if unit == "1"
+                else format_range(unit, low, high)
+                for low, high in (ends, (lowest, highest))
+            )
+            yield f"{name} of {found} is that of no test of rubber ({expected}): is the unit in the header right?"
