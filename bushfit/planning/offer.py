@@ -1,6 +1,6 @@
 """What is on offer: the runs that a rig can make, their cost, the standard programme, and what each run would tell."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,13 +13,14 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.coordinates import residual
 from bushfit.fitting.data_sets import new_sweep
-from bushfit.geometry import Direction, Place
+from bushfit.geometry import TRANSLATION, Direction, Place
 from bushfit.model.covariance import Z95
 from bushfit.planning.contract import Knowledge, Test, Wanted, operating_points
 from bushfit.planning.criterion import Budget, View, distances
 from bushfit.planning.sensitivity import Grid, relative_slopes
-from bushfit.planning.targets import ENDLESS, Goal, goals
+from bushfit.planning.targets import ENDLESS, Goal, goals, own_bands
 from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
+from bushfit.units import number
 
 #: Time to bring the rig to another run, for its control to settle [s]; chosen.
 _RUN_SECONDS = 120.0
@@ -139,6 +140,30 @@ def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
     return replace(test, frequencies=steps) if test.stepped == "frequency" else replace(test, amplitudes=steps)
 
 
+def unlimited_rig(known: Knowledge, wanted: Wanted, tests: Sequence[Test]) -> Iterator[str]:
+    """A warning on what tests ask of a rig whose limits are not stated.
+
+    Args:
+        known: whose model gives the forces.
+        wanted: with the rig.
+        tests: of the plan.
+    """
+    rig, linear = wanted.rig, [test for test in tests if test.direction.motion is TRANSLATION]
+    if not linear or any((rig.max_force, rig.max_displacement, rig.max_velocity, rig.max_frequency)):
+        return
+    points = [(test.direction, *operating_points(test)) for test in linear]
+    frequency, amplitude = np.concatenate([pair for _, *pair in points], axis=1)
+    fastest = int(np.argmax(frequency * amplitude))
+    velocity = 2.0 * np.pi * float(frequency[fastest] * amplitude[fastest])
+    acceleration = float(np.max(np.square(2.0 * np.pi * frequency) * amplitude)) / 9.80665
+    force = max(float(np.max(np.abs(known.model.stiffness(place, f, x)) * x)) for place, f, x in points)
+    where = f"{number(1e3 * amplitude[fastest], 3)} mm at {number(frequency[fastest], 3)} Hz"
+    yield (
+        f"[rig] states no limits: the plan reaches {number(velocity, 3)} m/s ({where}), {number(acceleration, 3)} g and "
+        f"{number(force, 3)} N; state max_velocity, max_force, max_displacement and max_frequency, and plan again"
+    )
+
+
 def _rounded(value: float) -> float:
     """To two digits, as a set point is typed."""
     return float(f"{value:.2g}")
@@ -182,6 +207,13 @@ class Offer:
         ]
         each = [np.stack(np.split(relative_slopes(self.known, [sweep]), 2, axis=-1), axis=1) for sweep in sweeps]
         return np.concatenate(each, axis=-1)
+
+    @cached_property
+    def model_error(self) -> Array:
+        """Standard errors by the model's own error at the points wanted: |K|, relative, and loss factor, (2, n)."""
+        bands = [own_bands(self.known, points) for points in self.wanted.points]
+        stiffness = np.concatenate([error / value for (value, error, _), _ in bands])
+        return np.stack([stiffness, np.concatenate([error for _, (_, error, _) in bands])])
 
     @cached_property
     def goals(self) -> tuple[Goal, ...]:

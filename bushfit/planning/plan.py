@@ -25,7 +25,7 @@ from bushfit.planning.criterion import (
     ordered,
     root_of,
 )
-from bushfit.planning.offer import FOUND, RIVALS_APART, Offer, smallest_found, standard_tests
+from bushfit.planning.offer import FOUND, RIVALS_APART, Offer, smallest_found, standard_tests, unlimited_rig
 from bushfit.planning.sensitivity import Information
 from bushfit.planning.targets import ENDLESS, Goal, percent, untested
 from bushfit.reading.measurement import loss_factor
@@ -269,8 +269,8 @@ class _Planner:
             self.budget.minutes[list(runs)] + self.budget.setup * (np.diff(places, prepend=-1) != 0),
             np.sqrt(np.diag(off))[:k],
             np.linalg.norm(alone, axis=1)[:k],
-            gain,
-            phase * (1.0 + np.square(loss)),
+            np.hypot(gain, self.offer.model_error[0]),
+            np.hypot(phase * (1.0 + np.square(loss)), self.offer.model_error[1]),
             float(self.offer.apart(counts, self.offer.tellable).min()) if self.offer.known.rivals else None,
             tuple(goal.half(off) for goal in self.offer.goals),
             tuple(self._visible(noncentrality_of(found)[0], drifting.noncentrality(runs))),
@@ -354,7 +354,14 @@ class _Planner:
         )
 
     def _notes(self, planned: Programme, missed: Sequence[str | None]) -> Iterator[str]:
-        """What a user must know."""
+        """Warnings and limits of the plan, the important ones first."""
+        yield from unlimited_rig(self.offer.known, self.offer.wanted, planned.tests)
+        worst = float(self.offer.model_error[0].max(initial=0.0))
+        if worst > _WORTH_SAYING - 1.0:
+            yield (
+                f"the errors of the stiffness contain the model error, up to {number(100.0 * worst, 2)} %, which no "
+                "test lowers; bushfit diagnose looks for the effect that the model lacks"
+            )
         yield from self.offer.known.warnings
         for target, half, why in zip(self.offer.wanted.targets, planned.halves, missed, strict=True):
             if why:

@@ -107,22 +107,35 @@ def goals(known: Knowledge, wanted: Wanted, slopes: Array) -> Iterator[Goal]:
             yield _of_points(known, target, *at[target.place])
 
 
-def _of_points(known: Knowledge, target: Target, points: Points, slopes: Array) -> Goal:
-    """The goal of a predicted quantity. Without errors of its parameters, the band of `predict` is what stays open."""
+def own_bands(known: Knowledge, points: Points) -> tuple[tuple[Array, Array, Array], ...]:
+    """Errors of a prediction that no further test lowers: those of the model itself, and of readings left undecided.
+
+    Returns:
+        Of the stiffness and of the loss factor at each point: value, standard error of the model, and the half width
+        that undecided readings add, (n,) each [SI].
+    """
     exact = replace(known.result or Result(known.model), covariance=Covariance())
     found, sizes, rates = (
         predict(exact, points.place, points.frequency, points.amplitude),
         points.amplitude,
         points.frequency,
     )
-    here = np.searchsorted(np.unique(sizes), sizes) * np.unique(rates).size + np.searchsorted(np.unique(rates), rates)
-    loss = found.loss_factor.value[here]
-    of_stiffness = target.quantity == "stiffness"
-    band = found.stiffness if of_stiffness else found.loss_factor
-    value, wide = band.value[here], np.maximum(band.high - band.value, band.value - band.low)[here]
-    rows = slopes[:, 0] if of_stiffness else slopes[:, 1] * (1.0 + loss**2) / loss
-    own = np.linalg.norm(band.root, axis=0)[here] / value
-    return Goal(target, rows.T, own, np.maximum(wide / value - Z95 * own, 0.0), points)
+    index = np.searchsorted(np.unique(sizes), sizes) * np.unique(rates).size + np.searchsorted(np.unique(rates), rates)
+    bands = []
+    for band in (found.stiffness, found.loss_factor):
+        value, half = band.value[index], np.maximum(band.high - band.value, band.value - band.low)[index]
+        error = np.linalg.norm(band.root, axis=0)[index]
+        bands.append((value, error, np.maximum(half - Z95 * error, 0.0)))
+    return tuple(bands)
+
+
+def _of_points(known: Knowledge, target: Target, points: Points, slopes: Array) -> Goal:
+    """The goal of a predicted quantity."""
+    stiffness, loss_factor = own_bands(known, points)
+    value, error, undecided = stiffness if target.quantity == "stiffness" else loss_factor
+    loss = loss_factor[0]
+    rows = slopes[:, 0] if target.quantity == "stiffness" else slopes[:, 1] * (1.0 + loss**2) / loss
+    return Goal(target, rows.T, error / value, undecided / value, points)
 
 
 def untested(known: Knowledge, place: Place, tested: Iterable[str]) -> str | None:

@@ -350,3 +350,16 @@ def test_what_tests_leave_open_a_thousand_times_over_stops_no_plan(paper_model: 
     plan = plan_tests(result, aim="parameters", hours=1.0).plan
     print(plan.planned.errors)
     assert np.all(plan.planned.errors < 0.5)
+
+
+def test_a_rig_without_limits_and_an_error_of_the_model_are_told(root: Path) -> None:
+    """What no test lowers is part of the errors promised."""
+    found = plan_tests(load_campaign(root / "data/practice/case_001/bushing.toml"), hours=1.0)
+    limits, model, *_ = found.document["warnings"]
+    assert limits.startswith("[rig] states no limits: the plan reaches ")
+    assert "m/s" in limits
+    assert model.startswith("the errors of the stiffness contain the model error, up to 9 %")
+    assert all(row["planned"] > 0.03 for row in found.document["stiffness"].values())
+    points = found.plan.wanted.points
+    errors = found.plan.planned.stiffness
+    assert errors.size == sum(part.frequency.size for part in points)
