@@ -159,8 +159,9 @@ def unlimited_rig(known: Knowledge, wanted: Wanted, tests: Sequence[Test]) -> It
     force = max(float(np.max(np.abs(known.model.stiffness(place, f, x)) * x)) for place, f, x in points)
     where = f"{number(1e3 * amplitude[fastest], 3)} mm at {number(frequency[fastest], 3)} Hz"
     yield (
-        f"[rig] states no limits: the plan reaches {number(velocity, 3)} m/s ({where}), {number(acceleration, 3)} g and "
-        f"{number(force, 3)} N; state max_velocity, max_force, max_displacement and max_frequency, and plan again"
+        f"[rig] states no limits: the plan reaches {number(velocity, 3)} m/s ({where}), "
+        f"{number(acceleration, 3)} g and {number(force, 3)} N; state max_velocity, max_force, max_displacement and "
+        "max_frequency, and plan again"
     )
 
 

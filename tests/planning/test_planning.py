@@ -279,7 +279,7 @@ def test_a_plan_after_a_campaign_is_no_blinder(root: Path) -> None:
     print(f"stiffness {better:.2f}, worst effect {worst:.3f}", found.notes)
     assert better < 0.9
     assert worst < 1.005
-    assert not found.notes
+    assert len(found.notes) == 1, "that of the limits of the rig"
 
 
 @pytest.mark.slow
