@@ -109,7 +109,7 @@ def command(
     task = RowTask(folder.absolute(), tuple(dict.fromkeys(points)), formats, resume)
     plan = BatchPlan(listed.title, listed.rows, task, judged_by, junit, output.formats)
     check_output(plan, force=output.force)
-    warn, show = (lambda line: output.print_warnings([line])), (lambda result: output.print_json(result.summary))
+    warn, show = (lambda line: output.print(f"warning: {line}")), (lambda result: output.print_json(result.summary))
     result = run_batch(plan, workers, show, warn)
     _print_result(output, result, folder)
     if result.document.failed or result.document.missed or result.document.not_judged:
@@ -141,7 +141,7 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
             output.print(line)
         if len(lines) > _MOST_SHOWN:
             output.print(f"... and {len(lines) - _MOST_SHOWN} more that {what}: see {table}")
-    output.print_warnings(document.warnings)
+    output.warn(document.warnings)
     rows = []
     for header, quantity in document.quantities.items():
         name, unit = split_header(header)

@@ -109,7 +109,7 @@ def _print_comparison(output: Output, compared: ComparisonOutput) -> None:
         output.print_table(title, FAMILY_HEADS, SideBySide.of(compared.document).family_cells())
     for line in (*compared.advice, *(compared.words if output.verbose or not compared.families else ())):
         output.print(line)
-    output.print_warnings(compared.warnings)
+    output.warn(compared.warnings)
 
 
 def _print_parameters(output: Output, compared: ComparisonOutput) -> None:

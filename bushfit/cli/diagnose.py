@@ -81,7 +81,7 @@ def command(
     campaign = open_campaign(campaigns)
     folder = output.free_folder(campaign.name, "diagnosis.json", "model.json")
     data = prepare_tests(campaign, loss)
-    output.print_warnings(data.notes)
+    output.warn(data.notes)
     diagnosed = diagnose(data, model=start, tolerance=share, **settings)
     print_diagnosis(output, diagnosed)
     inputs = [*input_files(campaign), *([model] if model else [])]
@@ -101,7 +101,7 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
     if diagnosis.added or output.verbose:
         title = "model with what was added" if diagnosis.added else "model as it was"
         print_parameters(output, title, diagnosis.result)
-    output.print_warnings(diagnosed.document["warnings"])
+    output.warn(diagnosed.document["warnings"])
 
 
 def print_verdict(output: Output, diagnosed: DiagnosisOutput) -> None:

@@ -78,6 +78,6 @@ def command(
     for name, written in exported.exported.items():
         for loss in written.losses:
             output.print(f"{name} leaves out: {loss}")
-    output.print_warnings(exported.predicted.warnings)
+    output.warn(exported.predicted.warnings)
     inputs = [file, *(input_files(loaded) if loaded else [])]
     output.write(output.folder((loaded or result).name), exported.files, exported.document, inputs)

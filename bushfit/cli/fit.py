@@ -107,7 +107,7 @@ def _finish(output: Output, folder: Path, fitted: FitOutput, model: Path | None,
     from bushfit.commands.provenance import input_files
 
     campaign = fitted.data.campaign
-    output.print_warnings(fitted.data.notes)
+    output.warn(fitted.data.notes)
     print_fit(output, campaign.name, fitted)
     inputs = [*input_files(campaign), *([model] if model else [])]
     output.write(folder, fitted.files, fitted.document, inputs)

@@ -234,7 +234,7 @@ def _tell(output: Output, seen: Inspected) -> None:
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
     output.print(f"{seen.file.parent / seen.label}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
-    output.print_warnings([f"{seen.label}: {sentence}" for sentence in seen.odd])
+    output.warn([f"{seen.label}: {sentence}" for sentence in seen.odd])
     if seen.assumed:
         output.print(f"  {seen.assumed}")
 

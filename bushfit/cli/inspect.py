@@ -94,7 +94,7 @@ def tell(output: Output, seen: Inspected) -> None:
     rows = []
     for column in seen.columns:
         ends = ("" if end is None else f"{end:.6g}" for end in (column.low, column.high))
-        rows.append((escape(column.header), column.role or "(not needed)", escape(column.unit or ""), *ends))
+        rows.append((column.header, column.role or "(not needed)", column.unit or "", *ends))
     output.print_table(title, ("column", "taken for", "unit", "from", "to"), rows)
     for label, value in {"written with": written, **seen.facts}.items():
         output.print(f"  {label}: {value}")

@@ -35,8 +35,10 @@ if TYPE_CHECKING:
 _PATIENCE = 2.0
 #: Width of tables if standard error is no terminal, in characters.
 _WIDTH = 100
+#: Largest number of warnings that are printed without -v.
+_MOST_WARNINGS = 3
 #: Characters between two columns of a table.
-_GAP = 2
+_GAP = 3
 
 
 class _Console(Console):
@@ -69,7 +71,7 @@ class Output:
     no_report: bool = False
     table_format: Form = Formats.table_form
     plot_format: Sequence[Picture] = Formats.picture_forms
-    _warned: set[str] = field(default_factory=set)
+    _warnings: dict[str, None] = field(default_factory=dict)
 
     @property
     def formats(self) -> Formats:
@@ -108,11 +110,25 @@ class Output:
         """Print a line as it is, without markup."""
         self.console.print(text, markup=False)
 
-    def print_warnings(self, lines: Iterable[str]) -> None:
-        """Print each warning that was not printed before."""
-        for line in (line for line in lines if line not in self._warned):
-            self._warned.add(line)
-            self.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
+    def warn(self, warnings: Iterable[str]) -> None:
+        """Keep warnings to be printed below the results."""
+        self._warnings.update(dict.fromkeys(warnings))
+
+    def print_warnings(self) -> None:
+        """Print the most important warnings that were kept, with -v all, each with its meaning for the use."""
+        if not self._warnings:
+            return
+        from bushfit.prediction.caveats import by_importance, use_of
+
+        warnings = by_importance(self._warnings)
+        shown = warnings if self.verbose else warnings[:_MOST_WARNINGS]
+        for warning in shown:
+            self.console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
+            if (use := use_of(warning)) != use_of(""):  # which is said of warnings of no known kind
+                self.print(f"  {use}")
+        if left := len(warnings) - len(shown):
+            self.print(f"{left} more warning{'s' * (left > 1)}: -v prints all, the result files hold them")
+        self._warnings.clear()
 
     def print_table(
         self, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, text_columns: int = 1
@@ -161,6 +177,7 @@ class Output:
             document: content of --json.
             inputs: files that the command has read, none of which is replaced.
         """
+        self.print_warnings()
         written = write_results(folder, files, self.formats, overwrite=self.force, inputs=inputs)
         if document is not None:
             self.print_json(document)
@@ -181,7 +198,10 @@ def with_output(folder: str, *written: Written) -> Parameter:
             names = [option.name for option in fields(Output) if option.name in given]
             output = Output(**{name: given.pop(name) for name in names})
             with _progress(output.console):
-                return function(output=output, **given)
+                try:
+                    return function(output=output, **given)
+                finally:
+                    output.print_warnings()
 
         return in_order(
             wrapped,
@@ -203,25 +223,28 @@ def with_output(folder: str, *written: Written) -> Parameter:
 def _wrapped(
     columns: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int, width: int
 ) -> list[list[str]] | None:
-    """Headers and rows whose text columns are wrapped to the width of the terminal; None if they do not fit.
+    """Headers and rows, with headers and text columns wrapped between words to the width of the terminal.
 
-    Text is broken between words only.
+    Returns:
+        The headers, then the rows; None if they do not fit even so.
     """
     table = [list(map(printable, row)) for row in (columns, *rows)]
     widths = [max(map(cell_len, column)) for column in zip(*table, strict=True)]
-    longest_word = [
-        max(cell_len(word) for cell in column for word in (cell.split() or [""])) for column in zip(*table, strict=True)
+    narrowest = [
+        max(cell_len(part) for cell in cells for part in (cell.split() if index < text_columns else [cell]) or [""])
+        for index, (header, *cells) in enumerate(zip(*table, strict=True))
+        for cells in [[*cells, *header.split()]]
     ]
-    excess = sum(widths) + _GAP * len(widths) - width
-    for index in sorted(range(text_columns), key=lambda index: longest_word[index] - widths[index]):
-        cut = max(0, min(excess, widths[index] - longest_word[index]))
+    excess = sum(widths) + _GAP * len(widths) + 1 - width
+    for index in sorted(range(len(widths)), key=lambda index: narrowest[index] - widths[index]):
+        cut = max(0, min(excess, widths[index] - narrowest[index]))
         widths[index], excess = widths[index] - cut, excess - cut
     if excess > 0:
         return None
     for row in table:
-        for index in range(text_columns):
-            if cell_len(row[index]) > widths[index]:
-                row[index] = "\n".join(textwrap.wrap(row[index], widths[index], break_on_hyphens=False))
+        for index, cell in enumerate(row):
+            if cell_len(cell) > widths[index]:
+                row[index] = "\n".join(textwrap.wrap(cell, widths[index], break_on_hyphens=False))
     return table
 
 

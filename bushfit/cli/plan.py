@@ -155,7 +155,7 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
         )
     if document["enough"]:
         output.print(document["enough"])
-    output.print_warnings(document["warnings"])
+    output.warn(document["warnings"])
 
 
 def _print_tests(output: Output, outcome: PlanOutput) -> None:

@@ -105,4 +105,4 @@ def print_predictions(output: Output, predicted: PredictionOutput) -> None:
             rows.append(cells)
         title = f"{owner}{prediction.direction}, corners, with 95 % bands"
         output.print_table(title, list(table.columns[:4]), rows, text_columns=0)
-    output.print_warnings(predicted.warnings)
+    output.warn(predicted.warnings)

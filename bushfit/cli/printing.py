@@ -33,7 +33,7 @@ def print_step(output: Output, title: str, result: Result) -> None:
     from bushfit.prediction.caveats import warnings_of
 
     print_result(output, title, result)
-    output.print_warnings(warnings_of(result))
+    output.warn(warnings_of(result))
     print_origin(output, result)
 
 

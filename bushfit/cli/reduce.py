@@ -255,7 +255,7 @@ def _tell(output: Output, reduction: Reduction) -> None:
     title = f"{count} point{'s' * (count > 1)} found; of each line the largest noise and distortion"
     heads = ("repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]", "THD [%]")
     output.print_table(title, (f"level [{unit}]", *heads), rows)
-    output.print_warnings(reduction.warnings)
+    output.warn(reduction.warnings)
     if output.verbose:
         for skip in reduction.skipped:
             output.print(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}")
@@ -291,7 +291,7 @@ def _tell_resonance(output: Output, found: Resonance) -> None:
     )
     heads = ("f [Hz]", "points", f"amplitude [{unit}]", "|T|", f"|K| [{stiffness_unit}]", "loss factor", "error [%]")
     output.print_table(title, heads, cells)
-    output.print_warnings(found.warnings)
+    output.warn(found.warnings)
 
 
 def _span(rising: Sequence[str]) -> str:

@@ -48,7 +48,7 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     campaign = open_campaign(campaigns)
     folder = output.free_folder(campaign.name, "model.json", "diagnosis.json")
     data = prepare_tests(campaign, loss)
-    output.print_warnings(data.notes)
+    output.warn(data.notes)
     outcome = run(data)
     print_run(output, campaign.name, outcome)
     output.write(folder, outcome.files, outcome.document, input_files(campaign))

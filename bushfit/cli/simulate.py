@@ -64,7 +64,7 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
         truth = _with_effect(truth, text)
     with error_location(source):
         simulated = simulate_campaign(truth, tests, output.formats.table_form)
-    output.print_warnings(simulated.warnings)
+    output.warn(simulated.warnings)
     output.print(simulated.simulated.truth.equation())
     folder = output.folder(simulated.simulated.result.name, "simulated {}")
     output.write(folder, simulated.files, simulated.document, [source])

@@ -131,13 +131,13 @@ class ComparisonOutput:
         """Warnings that results were fitted to the same files."""
         if self.families:
             return [
-                "families are fitted to the same tests: intervals of their differences take them as independent and "
-                "are too wide as a rule; their odds, and what was held out, compare them"
+                "families are fitted to the same tests: intervals of their differences assume independent tests and "
+                "are usually too wide; compare families by their probability and held-out error"
             ]
         pairs = zip(self.labels[1:], self.comparisons, strict=True)
         return [
             f"A and {label} were fitted to the same {', '.join(comparison.shared)}: intervals of their "
-            "difference take them as independent and are too wide as a rule"
+            "difference assume independent tests and are usually too wide"
             for label, comparison in pairs
             if comparison.shared
         ]
@@ -293,10 +293,10 @@ def _fit_families(
         entries.append(ComparedResult(family.name, str(campaign.path), result, campaign.sweeps, campaign.sha256))
     first, notes = families[0].evidence, list[str]()
     if lack_of_fit(first.model, data_sets, first.parameters) is None:
-        notes.append("the first family meets these tests within their noise: nothing in them asks for another")
+        notes.append("the first family meets these tests within their noise: the tests need no other family")
     if unlikely:
         percent = number(100.0 * sum(unlikely.values()), 2)
-        notes.append(f"{len(unlikely)} more families have odds of {percent} % together: {', '.join(unlikely)}")
+        notes.append(f"{len(unlikely)} more families have a probability of {percent} % together: {', '.join(unlikely)}")
     return entries, families, notes
 
 
@@ -305,9 +305,9 @@ def _family_to_use(families: Sequence[FittedFamily], entries: Sequence[ComparedR
     rows = list(zip(ascii_uppercase, families, entries, strict=False))
     label, family, entry = max(rows, key=lambda row: row[1].probability)
     likely = [row for row in rows if row[1].probability >= _LIKELY and row[0] != label]
-    sentence = f"use {label}, {family.name}: odds {number(100.0 * family.probability, 2)} %"
+    sentence = f"use {label}, {family.name}: probability {number(100.0 * family.probability, 2)} %"
     if not likely or entry.result.measured is None:
-        return f"{sentence}, no other has {100.0 * _LIKELY:g} %"
+        return f"{sentence}; every other family is below {100.0 * _LIKELY:g} %"
     models = [row.result.model.without(Level.INSTRUMENT) for row in (entry, *(row[2] for row in likely))]
     ends = np.array([entry.result.measured.frequency, entry.result.measured.strain])
     ends[1] /= entry.result.model.unit_strain(_COMPOUND)  # as laboratories state strain
@@ -321,9 +321,9 @@ def _family_to_use(families: Sequence[FittedFamily], entries: Sequence[ComparedR
         reach.append((below.max(initial=values[0]), above.min(initial=values[-1])))
     frequencies, strains = format_range("Hz", *reach[0]), format_range("%", *(100.0 * end for end in reach[1]))
     return (
-        f"{sentence}; {', '.join(row[0] for row in likely)}, of {100.0 * _LIKELY:g} % or more, have its modulus within "
-        f"{100.0 * _AGREED:g} % over {frequencies} and {strains} shear strain; beyond, these tests do not tell "
-        "which is right"
+        f"{sentence}; {', '.join(row[0] for row in likely)} (at least {100.0 * _LIKELY:g} %) have the same modulus "
+        f"within {100.0 * _AGREED:g} % over {frequencies} and {strains} shear strain; beyond that these tests cannot "
+        "distinguish them"
     )
 
 

@@ -1,7 +1,13 @@
-"""What a prediction cannot say: sentences on what was not fitted, what is extrapolated, and what a model leaves out."""
+"""Warnings of a prediction: what was not fitted, what is extrapolated, what the model leaves out, and what each means.
 
+Every warning of the package, wherever it is written, has its meaning for the use of the numbers in `uses.toml`.
+"""
+
+import re
+import tomllib
 from collections.abc import Iterable, Iterator
 from itertools import chain
+from pathlib import Path
 
 import numpy as np
 
@@ -16,7 +22,7 @@ from bushfit.units import CELSIUS, format_range, number
 #: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
 #: set points by less.
 MARGIN = 0.01
-#: What is said of a prediction outside of the tests.
+#: End of the warning of a prediction outside of the tests.
 BEYOND = "extrapolated beyond"
 #: Share by which a finite bulk modulus lowers the radial stiffness, from which that is said: that of the other errors.
 _NOTED_LOWERING = 0.01
@@ -24,36 +30,71 @@ _NOTED_LOWERING = 0.01
 _SAME = 1e-6
 
 
-def warnings_of(result: Result, found: Iterable[Iterable[str]] = (), notes: Iterable[str] = ()) -> list[str]:
-    """All that a reader of a result's numbers must know: notes, the fit's, of predictions, of the result; each once."""
-    return list(dict.fromkeys((*notes, *result.warnings, *chain.from_iterable(found), *caveats(result))))
+#: Meaning of a warning for the use of the numbers, by a regular expression that the warning matches.
+_USES: dict[str, str] = tomllib.loads(Path(__file__).with_name("uses.toml").read_text(encoding="utf-8"))
+#: Beginnings or words of these meanings, the most important first.
+_RANKS = (
+    "^Do not use",
+    "^Find out|^Look",
+    "^For .*estimate|^Values",
+    "^Use|^For|^Settle",
+    "only|do not|no more|near",
+    "",
+)
+
+
+def use_of(warning: str) -> str:
+    """Meaning of a warning for the use of the numbers, in one sentence."""
+    return next(use for pattern, use in _USES.items() if re.search(pattern, warning))
+
+
+def by_importance(warnings: Iterable[str]) -> list[str]:
+    """Warnings in the order of their importance for the use of the numbers."""
+
+    def rank(warning: str) -> int:
+        use = use_of(warning)
+        return next(index for index, pattern in enumerate(_RANKS) if re.search(pattern, use))
+
+    return sorted(warnings, key=rank)
+
+
+def warnings_of(result: Result, predicted: Iterable[Iterable[str]] = (), notes: Iterable[str] = ()) -> list[str]:
+    """All warnings for a reader of a result's numbers, each once.
+
+    Args:
+        result: the result.
+        predicted: warnings of each prediction that is shown.
+        notes: further warnings, which come first.
+    """
+    return list(dict.fromkeys((*notes, *result.warnings, *chain.from_iterable(predicted), *caveats(result))))
 
 
 def caveats(result: Result) -> list[str]:
-    """Sentences on what holds of a result itself, whatever is predicted with it."""
+    """Warnings about a result itself, whatever is predicted from it."""
     fitted = result.measured.directions if result.measured else ()
-    own = {*Direction, *(specimen.name for specimen in result.specimens)}  # a compound was fitted on other bodies
-    lines = [line for name in fitted if name in own for line in unfitted(result, result.place(name))]
+    known = {*Direction, *(specimen.name for specimen in result.specimens)}  # a compound was fitted on other bodies
+    lines = [line for name in fitted if name in known for line in unfitted(result, result.place(name))]
     for name in result.unresolved:
         twins = " or ".join(get_effect(name).twins)
-        lines.append(f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}")
+        lines.append(f"{name} is counted as part of the bushing, but these tests cannot distinguish it from {twins}")
     lines += result.undecided
     if "springpot" not in result.model.effects:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:
         lines.append(
-            "what has no name is corrected as it was measured, by no law: outside the measured range the correction "
-            f"fades, and the band opens by up to {number(100.0 * Z95 * unnamed.beyond, 2)} % either way"
+            "the correction without a name follows the measurement and no law: outside the measured range it fades, "
+            f"and the band widens by up to {number(100.0 * Z95 * unnamed.beyond, 2)} % either way"
         )
         lines.append(
-            "what has no name counts as the bushing's, but these tests cannot tell it from the rig's: if it is the "
-            f"rig's, the car lacks the correction, up to {number(100.0 * unnamed.largest, 2)} % of |K|"
+            "the correction without a name is counted as part of the bushing, but these tests cannot distinguish it "
+            "from one of the rig: if it belongs to the rig, the bushing in the car lacks it, up to "
+            f"{number(100.0 * unnamed.largest, 2)} % of |K|"
         )
     if result.measured is None:
-        lines.append("the model was not fitted here: no uncertainty, and no fitted range to compare with")
+        lines.append("the model was not fitted here: it has no uncertainty and no fitted range")
     if rig := rig_effects(result):
         lines.append(
-            f"left out of the prediction, because they belong to the rig and not to the bushing: {', '.join(rig)}"
+            f"the prediction leaves out effects that belong to the rig and not to the bushing: {', '.join(rig)}"
         )
     return lines
 
@@ -64,68 +105,84 @@ def rig_effects(result: Result) -> list[str]:
 
 
 def unfitted(result: Result, direction: Place) -> Iterator[str]:
-    """Warnings where a direction was not fitted: its band lacks the error of the formula that leads there.
+    """Warnings for a direction that was not fitted, or was fitted with a formula that deviates from finite elements.
 
-    Where the radial direction was fitted by a formula that is off, the parameters carry its error.
+    Args:
+        result: the result.
+        direction: direction or specimen of the prediction.
     """
     fitted = result.measured.directions if result.measured else ()
     if not fitted:
         return
     corrected = {effect.corrects for effect in result.model.without(Level.INSTRUMENT).records}
+    bushing, tests = result.model.bushing, " and ".join(fitted)
     if str(direction) in fitted:
-        shape = result.model.bushing
-        if direction is Direction.RADIAL and shape and shape.shape == "paper" and direction not in corrected:
-            formula = f"the paper's formula, {_radial_error(shape)}"
-            yield f"{direction}: fitted with {formula}; the parameters carry that error"
-            yield from _compressible(result, shape)
+        if direction is Direction.RADIAL and bushing and bushing.shape == "paper" and direction not in corrected:
+            error = _radial_error(bushing)
+            yield f"{direction}: fitted with the paper's formula, {error}. The parameters carry that error"
+            yield from _compressible(result, bushing)
         return
     of_bushing = direction is Direction.AXIAL and not set(Direction).isdisjoint(fitted)
     if not (of_bushing or direction in (Direction.RADIAL, Direction.TORSION)):
         if str(direction) not in corrected:
-            tests = " and ".join(fitted)
             yield (
-                f"{direction}: not fitted; its band holds the scatter of the {tests} tests, not by how much two bodies "
-                "of one compound differ, nor the error of their dimensions"
+                f"{direction}: not fitted, predicted from the {tests} tests. The band excludes the difference between "
+                "two bodies of one compound and the error of their dimensions"
             )
         return
     radially = direction is Direction.RADIAL or (Direction.AXIAL not in fitted and Direction.RADIAL in fitted)
-    formula, compared = Direction.TORSION, "which was not compared with finite elements"
-    bushing = result.model.bushing
+    formula, error = Direction.TORSION, "which was not compared with finite elements"
     if radially and bushing:
-        formula, compared = Direction.RADIAL, _radial_error(bushing)
+        formula, error = Direction.RADIAL, _radial_error(bushing)
     if formula in corrected:
         return
-    band = f"its band holds the scatter of the {' and '.join(fitted)} tests, not" if result.fitted else "no band holds"
-    yield f"{direction}: not fitted; {band} the error of the {formula} formula, {compared}"
+    band = f"{'The band excludes' if result.fitted else 'No band includes'} the error of the {formula} formula"
+    yield f"{direction}: not fitted, predicted from the {tests} tests. {band}, {error}"
     if radially and bushing:
         yield from _compressible(result, bushing)
 
 
 def _compressible(result: Result, bushing: Bushing) -> Iterator[str]:
-    """A warning where a bulk modulus of 2 GPa would change the radial stiffness."""
+    """Warning if a bulk modulus of 2 GPa would lower the radial stiffness noticeably."""
     lowering = bushing.correction.lowering(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0
     if lowering > _NOTED_LOWERING:
-        lower = f"would lower the radial stiffness of this shape by {number(100.0 * lowering, 2)} %"
-        yield f"{Direction.RADIAL}: the rubber counts as incompressible; a bulk modulus of 2 GPa {lower}"
+        percent = number(100.0 * lowering, 2)
+        yield (
+            f"{Direction.RADIAL}: the model takes the rubber as incompressible; a bulk modulus of 2 GPa would lower "
+            f"the radial stiffness of this shape by {percent} %"
+        )
 
 
 def _radial_error(bushing: Bushing) -> str:
-    """How far the bushing's radial formulas lie off finite elements of its shape."""
+    """Deviation of the bushing's radial formulas from finite elements of its shape, as part of a sentence."""
     if bushing.correction is None:
-        return "which no finite elements back for this shape"
+        return "which was not compared with finite elements of this shape"
     if bushing.shape == "calibrated":
         return "up to 1 % in stiffness and 3 % in strain against finite elements"
     stiffness, strain = (number(100.0 / factor - 100.0, 2, "+") for factor in bushing.correction[:2])
-    off = f"for this shape {stiffness} % in stiffness and {strain} % in strain against finite elements"
-    return f'{off}, by which shape = "calibrated" goes'
+    error = f"for this shape {stiffness} % in stiffness and {strain} % in strain against finite elements"
+    return f'{error}; shape = "calibrated" in the campaign corrects it'
 
 
 def of_points(
-    result: Result, place: Place, at: Array, if_rigs: Array | None, measured: Array | None, temperature: float | None
+    result: Result,
+    place: Place,
+    points: Array,
+    rig_stiffness: Array | None,
+    measured: Array | None,
+    temperature: float | None,
 ) -> Iterator[str]:
-    """Warnings of |K| at operating points, (3, n): frequency [Hz], amplitude, |K| [SI], which may be the rig's in part,
-    or was measured otherwise, (n,)."""
-    frequency, amplitude, stiffness = at
+    """Warnings for predicted operating points.
+
+    Args:
+        result: the result.
+        place: direction or specimen.
+        points: frequency [Hz], amplitude [m, rad or 1] and |K| [SI] of the points, (3, n).
+        rig_stiffness: |K| if the unresolved effects belong to the rig, (n,).
+        measured: measured complex stiffness, nan without a measurement, (n,).
+        temperature: [K]; None for the reference temperature.
+    """
+    frequency, amplitude, stiffness = points
     yield from result.undecided
     yield from unfitted(result, place)
     yield from extrapolations(result, place, frequency, amplitude, temperature)
@@ -134,16 +191,16 @@ def of_points(
     yield from (effect.assumption for effect in effects if effect.assumption and not known & {*effect.under})
     rig = rig_effects(result)
     if rig and measured is not None and not np.isnan(measured).all():
-        off = percent_off(stiffness / np.abs(measured))
-        yield f"{place}: without {' and '.join(rig)} the predicted stiffness is {off} against what was measured"
-    if if_rigs is not None:
-        ratio, if_so = if_rigs / stiffness, f"if {' and '.join(result.unresolved)} is the rig's"
-        off = f"{percent_off(ratio)} {if_so}; low and high span both"
-        yield f"{place}: stiffness {f'the same {if_so}' if np.allclose(ratio, 1.0, atol=_SAME) else off}"
+        percent = percent_off(stiffness / np.abs(measured))
+        yield f"{place}: without {' and '.join(rig)} the predicted stiffness is {percent} against what was measured"
+    if rig_stiffness is not None:
+        ratio, condition = rig_stiffness / stiffness, f"if {' and '.join(result.unresolved)} is the rig's"
+        percent = f"{percent_off(ratio)} {condition}; low and high include both"
+        yield f"{place}: stiffness {f'the same {condition}' if np.allclose(ratio, 1.0, atol=_SAME) else percent}"
 
 
 def percent_off(ratio: Array) -> str:
-    """How far ratios are off 1, in words: "+1.2 to +3.4 %"."""
+    """Smallest and largest deviation of ratios from 1, such as "+1.2 to +3.4 %"."""
     ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratio), np.nanmax(ratio))]
     return f"{' to '.join(dict.fromkeys(ends))} %"
 
@@ -154,25 +211,33 @@ def extrapolations(
     frequency: Array,
     amplitude: Array,
     temperature: float | None = None,
-    what: str | None = None,
+    subject: str | None = None,
 ) -> Iterator[str]:
-    """A warning each for frequencies, strains and the temperature [K] of a prediction that leave what was fitted."""
+    """Warnings for frequencies, strains and a temperature outside of those that were fitted.
+
+    Args:
+        result: the result.
+        direction: direction or specimen.
+        frequency: predicted frequencies [Hz], (n,).
+        amplitude: predicted amplitudes [m, rad or 1], (n,).
+        temperature: predicted temperature [K], if one was asked for.
+        subject: beginning of the warnings; default the direction.
+    """
     if result.measured is None:
         return
+    subject = subject or str(direction)
+    if temperature and (tested := result.measured.temperature):
+        predicted, *ends = (number(kelvin - CELSIUS, 3) for kelvin in (temperature, *tested))
+        if not tested[0] - SAME_TEMPERATURE <= temperature <= tested[1] + SAME_TEMPERATURE:
+            fitted = f"predicted at {predicted} degC, but fitted at {' to '.join(dict.fromkeys(ends))} degC only"
+            yield f"{subject}: {fitted}: extrapolated by the law of Williams, Landel and Ferry"
     percent = 100.0 * result.model.unit_strain(direction)
-    axes = (
+    for axis, unit, digits, values, (low, high) in (
         ("frequencies", "Hz", 3, frequency, result.measured.frequency),
         ("strains", "%", 2, percent * amplitude, [100.0 * end for end in result.measured.strain]),
-    )
-    if temperature and (tested := result.measured.temperature):
-        asked_for, *ends = (number(kelvin - CELSIUS, 3) for kelvin in (temperature, *tested))
-        if not tested[0] - SAME_TEMPERATURE <= temperature <= tested[1] + SAME_TEMPERATURE:
-            there = f"predicted at {asked_for} degC, but fitted at {' to '.join(dict.fromkeys(ends))} degC only"
-            yield f"{what or direction}: {there}: extrapolated by the law of Williams, Landel and Ferry"
-    for axis, unit, digits, asked, (low, high) in axes:
-        if asked.min() < low * (1 - MARGIN) or asked.max() > high * (1 + MARGIN):
-            here, there = (
-                format_range(unit, *ends, digits=digits) for ends in ((asked.min(), asked.max()), (low, high))
+    ):
+        if values.min() < low * (1 - MARGIN) or values.max() > high * (1 + MARGIN):
+            predicted, fitted = (
+                format_range(unit, *ends, digits=digits) for ends in ((values.min(), values.max()), (low, high))
             )
-            said = f"predicted at {axis} of {here}, but fitted at {there} only: {BEYOND}"
-            yield f"{what or direction}: {said}"
+            yield f"{subject}: predicted at {axis} of {predicted}, but fitted at {fitted} only: {BEYOND}"

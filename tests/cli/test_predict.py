@@ -108,7 +108,7 @@ def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: 
     truth = root / "data/mystery_mount/open_last/truth.json"
     shaken = ("--mass", "0.2 kg", "--base-acceleration", "0.1 m/s^2", "--direction", "axial")
     for said, model, *more in (
-        ("left out of the prediction", truth),
+        ("belong to the rig and not to the bushing", truth),
         ("radial: not fitted", "model/model.json"),
         ("axial, resonance of 0.2 kg: predicted at strains", "model/model.json", *shaken),
     ):

@@ -96,7 +96,10 @@ def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(eit
     assert list(table.columns[14:]) == rigs
     np.testing.assert_allclose(table[rigs[1]], found.if_rigs.loss_factor.value)
     said = "\n".join((*found.warnings, *caveats(either)))
-    assert "sleeve_compliance is taken as the bushing's, but these tests cannot tell it from rig_compliance" in said
+    assert (
+        "sleeve_compliance is counted as part of the bushing, but these tests cannot distinguish it from rig_compliance"
+        in said
+    )
     assert "% if sleeve_compliance is the rig's; low and high span both" in said
     assert predict(either, Direction.RADIAL, FREQUENCIES, AMPLITUDES, rig=True).warnings == told.warnings
     shaken = predict_resonance(either, Direction.RADIAL, 1.0, 1.0, None)
@@ -235,7 +238,9 @@ def test_a_coupon_predicts_a_bushing_and_says_what_it_does_not_know(result: Resu
     found = predict(bushing, Direction.AXIAL, [10.0], [1e-4])
     np.testing.assert_allclose(found.stiffness.value, predict(result, Direction.AXIAL, [10.0], [1e-4]).stiffness.value)
     (line,) = found.warnings
-    assert line.startswith("axial: not fitted; its band holds the scatter of the DMA tests, not by how much two bodies")
+    assert line.startswith(
+        "axial: not fitted, predicted from the DMA tests. The band excludes the difference between two bodies"
+    )
 
 
 def test_extrapolation_is_said(result: Result) -> None:

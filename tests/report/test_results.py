@@ -86,12 +86,15 @@ def _killed_at(count: int, folder: Path) -> int:
         def fault(event: str, _: Any) -> None:
             if event.startswith(("open", "os.")):
                 left[0] -= 1
-                if left[0] < 0:
+                if left[0] == -1:  # the kill is announced, too
                     os.kill(os.getpid(), signal.SIGKILL)
 
-        sys.addaudithook(fault)
-        write(folder, NEW, force=True)
-        os._exit(0)
+        try:
+            sys.addaudithook(fault)
+            write(folder, NEW, force=True)
+            os._exit(0)
+        finally:
+            os._exit(1)
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
