@@ -107,9 +107,10 @@ def _print_comparison(output: Output, compared: ComparisonOutput) -> None:
     if compared.families:
         title = "families; held out: root mean square in units of noise, 1 where noise is all"
         output.print_table(title, FAMILY_HEADS, SideBySide.of(compared.document).family_cells())
-    for line in (*compared.advice, *(compared.words if output.verbose or not compared.families else ())):
+    differences = compared.words if output.verbose or not compared.families else []
+    for line in (*compared.advice, *compared.notes, *differences):
         output.print(line)
-    output.warn(compared.warnings)
+    output.warn(line for line in compared.warnings if line not in compared.notes)
 
 
 def _print_parameters(output: Output, compared: ComparisonOutput) -> None:

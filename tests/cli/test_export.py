@@ -131,7 +131,7 @@ PAPER = ("radial: not fitted, predicted from the", "+4.9 % in stiffness and +36 
 MOUNT = (
     "radial: fitted with the paper's formula, for this shape +4.3 % in stiffness and +26 % in strain against finite",
     "sleeve_compliance is counted as part of the bushing, but these tests cannot distinguish it from rig_compliance",
-    " % if sleeve_compliance is the rig's; low and high span both",
+    " % if sleeve_compliance is the rig's; low and high include both",
 )
 
 
@@ -160,10 +160,11 @@ def text_of(file: Path) -> str:
 def ran(
     request: pytest.FixtureRequest, root: Path, tmp_path_factory: pytest.TempPathFactory, work: Path
 ) -> tuple[Path, Path, tuple[str, ...], list[str]]:
-    """A campaign, the folder of its run, what must be warned of there, and what the terminal warned of."""
+    """A campaign, the folder of its run, what must be warned of there, and all its warnings."""
     name, words = request.param
     folder, campaign = tmp_path_factory.mktemp(name) / "run", root / f"configs/{name}.toml"
-    return campaign, folder, words, warned(typing(work)("run", campaign, "-o", folder, "--no-plots"))
+    done = typing(work)("run", campaign, "-o", folder, "--no-plots", "--json")
+    return campaign, folder, words, json.loads(done.stdout)["warnings"]
 
 
 Ran = tuple[Path, Path, tuple[str, ...], list[str]]
@@ -188,25 +189,25 @@ def test_pages_of_run_and_diagnose_say_what_the_terminal_says(ran: Ran, bushfit:
     assert set(of_model) <= set(told)
     assert warned(bushfit("report", folder, "-o", tmp_path / "page")) == []
     assert text_of(tmp_path / "page/report.html") == page
-    told = warned(bushfit("diagnose", campaign, "-o", tmp_path / "d", "--no-plots"))
+    told = warned(bushfit("diagnose", campaign, "-o", tmp_path / "d", "--no-plots", "-v"))
     assert set(told) >= set(of_model)
     for name in ("report.html", "diagnosis.json"):
         page = text_of(tmp_path / "d" / name).replace('\\"', '"')
         assert [line for line in told if line not in page] == [], name
-    joint = warned(bushfit("fit", campaign, "-o", tmp_path / "f", "--no-plots"))
-    assert joint == document(tmp_path / "f/model.json")["warnings"]
+    joint = warned(bushfit("fit", campaign, "-o", tmp_path / "f", "--no-plots", "-v"))
+    assert sorted(joint) == sorted(document(tmp_path / "f/model.json")["warnings"])
 
 
 def test_every_export_says_what_predict_says(ran: Ran, model: Path, bushfit: Run, tmp_path: Path) -> None:
-    done = bushfit("predict", model, "-o", tmp_path / "p", "--no-plots", "--json")
+    done = bushfit("predict", model, "-o", tmp_path / "p", "--no-plots", "--json", "-v")
     told = warned(done)
-    assert told == json.loads(done.stdout)["warnings"]
-    assert told[0] == ODD
+    assert sorted(told) == sorted(json.loads(done.stdout)["warnings"])
+    assert ODD in told
     for each in ran[2]:
         assert any(each in line for line in told), told
     formats = ("nastran", "abaqus", "adams", "fmu", "xlsx", "csv")
     asked = [word for name in formats for word in ("--format", name)]
-    assert warned(bushfit("export", model, *asked, "-o", tmp_path / "x", "--no-plots")) == told
+    assert warned(bushfit("export", model, *asked, "-o", tmp_path / "x", "--no-plots", "-v")) == told
     files = [file for kind in ("bdf", "inp", "bus", "fmu", "xlsx") for file in (tmp_path / "x").glob(f"*.{kind}")]
     assert len(files) == 6
     for file in (*files, tmp_path / "x/provenance.csv"):
@@ -215,9 +216,9 @@ def test_every_export_says_what_predict_says(ran: Ran, model: Path, bushfit: Run
 
 
 def test_a_comparison_says_of_whom_each_holds(ran: Ran, model: Path, bushfit: Run, tmp_path: Path) -> None:
-    done = bushfit("compare", "model/model.json", model, "-o", tmp_path / "c", "--no-plots", "--json")
+    done = bushfit("compare", "model/model.json", model, "-o", tmp_path / "c", "--no-plots", "--json", "-v")
     told = warned(done)
-    assert told == json.loads(done.stdout)["warnings"]
+    assert sorted(told) == sorted(json.loads(done.stdout)["warnings"])
     assert f"B: {ODD}" in told
     for line in document(model)["warnings"]:
         assert any(re.match(r"(A, )?B: ", each) and each.endswith(line) for each in told), line
@@ -237,7 +238,6 @@ def test_a_batch_says_a_long_text_once(ran: Ran, model: Path, bushfit: Run, tmp_
         assert all(each in cell for each in (ODD, *ran[2]))
     told = document(tmp_path / "b/bushings/one/row.json")["warnings"]
     assert [page.count(line) for line in told] == [1] * len(told)
-    assert page.count('<td class="remarks">warnings: 1, ') == 2
 
 
 #: Options of every format that is written without a compiler.

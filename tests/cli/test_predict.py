@@ -69,7 +69,7 @@ def test_families_of_one_campaign_are_fitted_and_held_out(bushfit: Run, tmp_path
     table = pd.read_csv(folder / "families.csv")
     assert table["label"].tolist() == ["A", "B", "C"]
     assert table["held out [noise]"].notna().all()
-    assert "the first family meets these tests within their noise" in done.stderr
+    assert "\nthe first family meets these tests within their noise" in done.stderr
     assert table["words"][2].endswith("alike within 1 %")
 
 
@@ -112,12 +112,24 @@ def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: 
         ("radial: not fitted", "model/model.json"),
         ("axial, resonance of 0.2 kg: predicted at strains", "model/model.json", *shaken),
     ):
-        done = bushfit("predict", model, *more, "-o", tmp_path / "x", "--no-plots", "--force", "--json")
-        told = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
-        assert len(set(told)) == len(told) > 0
+        done = bushfit("predict", model, *more, "-o", tmp_path / "x", "--no-plots", "--force", "--json", "-v")
+        printed = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
+        assert len(set(printed)) == len(printed) > 0
         warnings = json.loads(done.stdout)["warnings"]
-        assert [f"warning: {line}" for line in warnings] == told
-        assert any(line.startswith(said) for line in warnings)
+        assert sorted(f"warning: {line}" for line in warnings) == sorted(printed)
+        assert any(said in line for line in warnings)
+
+
+def test_three_warnings_by_importance_each_with_its_meaning(bushfit: Run, work: Path, tmp_path: Path) -> None:
+    model = document(work / "model/model.json")
+    model["warnings"] = ["sweep_axial: levels disagree", "loop: the cycles only agree if the force is in kgf"]
+    (tmp_path / "model.json").write_text(json.dumps(model), encoding="utf-8")
+    done = bushfit("predict", tmp_path / "model.json", "-o", tmp_path / "x", "--no-plots")
+    first, meaning, *_ = lines = done.stderr[done.stderr.index("warning: ") :].splitlines()
+    assert first.startswith("warning: loop: the cycles only agree if")
+    assert meaning.startswith("  Do not use the numbers before")
+    assert sum(line.startswith("warning: ") for line in lines) == 3
+    assert "1 more warning: -v prints all, the result files hold them" in lines
 
 
 def test_predict_writes_maxwell_arms_where_asked(bushfit: Run, root: Path, tmp_path: Path) -> None:

@@ -206,9 +206,9 @@ def test_a_file_that_bushfit_did_not_write_is_never_replaced(tmp_path: Path, for
         assert "--force" not in str(refused.value), "the hint would not help"
     with pytest.raises(OutputError, match="input of this run"):
         write(tmp_path / "results", {"b.json": b"2"}, force=force, inputs=(tmp_path / "results" / "d.csv",))
-    for folder in (tmp_path / "results" / "c.csv", tmp_path / "results" / "c.csv" / "below"):
-        with pytest.raises(OutputError, match="cannot be written"):
-            write(folder, NEW, force=force)
+    for folder, problem in (("c.csv", "not a folder"), ("c.csv/below", "cannot be written")):
+        with pytest.raises(OutputError, match=problem):
+            write(tmp_path / "results" / folder, NEW, force=force)
     names = {path.name for path in (tmp_path / "results").glob("[!.]*")}
     assert names == {"a.csv", "b.json", "c.csv", "d.csv", "e.csv"}
     assert (tmp_path / "results" / "b.json").read_bytes() == b"old b"
@@ -285,7 +285,7 @@ def test_loops_row_by_row_and_sweeps_by_amplitude_repeat_and_frequency(data: Dat
     assert len(table) == loop.time.size
     np.testing.assert_allclose(table["force [N]"], loop.force, rtol=1e-12)
     np.testing.assert_allclose(table["displacement [mm]"], 1e3 * loop.displacement, atol=2e-3)
-    off = (table["model force [N]"] - table["force [N]"]) / data.loops[0].drive.noise
+    off = (table["force [N]"] - table["model force [N]"]) / data.loops[0].drive.noise
     np.testing.assert_allclose(table["residual [noise]"], off, rtol=1e-9, atol=1e-9)
     assert np.std(table["residual [noise]"]) == pytest.approx(1.0, abs=0.1)
     table = sweeps_table(paper_model, data.sweeps)
