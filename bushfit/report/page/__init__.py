@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bushfit.errors import printable
-from bushfit.prediction.caveats import use_of
 from bushfit.units import number
 
 if TYPE_CHECKING:
