@@ -23,9 +23,10 @@ _JITTER = 1e-8
 #: Nodes at most; chosen: all points of the paper's plan, and little time.
 MAXIMUM_NODES = 100
 #: Patterns at most, and the variance of one, relative to the largest, that counts; chosen for time.
-_MAXIMUM_PATTERNS, _MINIMUM_VARIANCE = 30, 1e-5
-#: Digits of coordinates that tell points apart.
-_DIGITS = 6
+_MAXIMUM_PATTERNS, _MINIMUM_VARIANCE = 60, 1e-5
+#: Digits of coordinates, in lengths, that tell points apart; of more points than the number given, two: their
+#: correlation is then still known within 1e-4.
+_DIGITS, _MANY = 6, 500
 #: Change of temperature [K] that counts as a neper of frequency: near room temperature, the time scale of most rubber
 #: shifts by as much in 8 to 20 K.
 _KELVIN = 10.0
@@ -119,12 +120,16 @@ def patterns(
     Returns:
         Indices of the nodes, (m,), and the patterns at all points, (q, n).
     """
-    distinct = np.unique(points.round(_DIGITS), axis=0, return_index=True)[1]
-    chosen = distinct if distinct.size <= nodes else distinct[spread_nodes(points[distinct], nodes)]
-    correlation = matern(points[chosen], points[chosen]) + _JITTER * np.eye(chosen.size)
+    for digits in (_DIGITS, 2):
+        distinct, first, inverse = np.unique(points.round(digits), axis=0, return_index=True, return_inverse=True)
+        if len(distinct) <= _MANY:
+            break
+    chosen = np.arange(len(distinct)) if len(distinct) <= nodes else spread_nodes(distinct, nodes)
+    correlation = matern(distinct[chosen], distinct[chosen]) + _JITTER * np.eye(chosen.size)
     variance, vectors = np.linalg.eigh(correlation)  # the largest last
     kept = (variance > minimum * variance[-1]) & (np.arange(variance.size) >= variance.size - count)
-    return chosen, (matern(points, points[chosen]) @ vectors[:, kept] / np.sqrt(variance[kept])).T
+    shapes = matern(distinct, distinct[chosen]) @ vectors[:, kept] / np.sqrt(variance[kept])
+    return first[chosen], shapes.T[:, inverse.ravel()]
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,7 +128,7 @@ def result_of(
         model = found.solution.model
     solution = found.solution
     moving = tuple(name for name in solution.coordinates.names if name not in solution.at_bound)
-    cov = covariance(solution.model, [Stage(moving, found.weighed)])
+    cov = covariance(solution.model, [Stage(moving, found.weighed, found.process)])
     return Result(
         model,
         moving,
@@ -139,7 +139,7 @@ def result_of(
             *([_CORRECTED] if corrected else []),
             *([model_error_warning(error)] if error else []),
             *apart_in_temperature(model, tests),
-            *cautions(solution.model, solution, found.data_sets, bounds, cov),
+            *cautions(solution.model, found, bounds, cov),
         ),
         sources(tests),
         at_bound=solution.at_bound,

@@ -3,8 +3,11 @@
 Tests that no rubber could have given, that were not made at one temperature, or that a fit left out are told of.
 """
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 
@@ -37,11 +40,34 @@ _CHECK = "check the units of displacement and force, and the dimensions of what 
 
 
 @dataclass(frozen=True, eq=False)
+class Process:
+    """A Gaussian process of the relative error of a model, as a part of the covariance of its residuals.
+
+    Args:
+        shapes: one standard deviation of each amount at the operating points of all tests, complex (q, p).
+        freedom: degrees of freedom that determine its size.
+    """
+
+    shapes: Array
+    freedom: float
+
+    def moves(self, model: Model, data_sets: Sequence[DataSet], influence: Array) -> Array:
+        """Covariance of parameters that it makes, (k, k), by the influence of whitened residuals on them, (k, n)."""
+        first, moved = 0, np.zeros((len(influence), len(self.shapes)))
+        for data_set, rows in zip(data_sets, rows_of(data_sets), strict=True):
+            shapes = self.shapes[:, first : first + data_set.frequency.size]
+            first += data_set.frequency.size
+            moved += influence[:, rows] @ data_set.moved(shapes * data_set.noise_free(model).measured, model).T
+        return np.asarray(moved @ moved.T)
+
+
+@dataclass(frozen=True, eq=False)
 class Stage:
-    """One fit of a procedure: the parameters it moved and the data it saw."""
+    """One fit of a procedure: the parameters it moved, the data it saw, and how the model misses them, if it does."""
 
     names: tuple[str, ...]
     data_sets: Sequence[DataSet]
+    process: Process | None = None
 
 
 def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = None) -> Covariance:
@@ -72,7 +98,8 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
         slope = jacobian(model, stage.data_sets, names)
         basis = np.linalg.qr(slope[own].T)[0]
         system[own] = basis.T @ slope.T
-        inflation = np.concatenate([np.full(data_set.size, excess) for data_set, excess in _excess(model, stage)])
+        excess = [1.0] * len(stage.data_sets) if stage.process else _excess(model, stage)
+        inflation = np.repeat(excess, [data_set.size for data_set in stage.data_sets])
         share = basis.T * np.sqrt(inflation)
         root[own, own] = np.linalg.qr(share.T)[1].T
         bases.append((own, share))
@@ -84,8 +111,18 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     spread = [carried @ part @ carried.T for part in held.spread]
     pairs = zip(stages, bases, strict=True)
     influences = [together(stage.data_sets, reaction[:, own] @ basis) for stage, (own, basis) in pairs]
-    matrix = by_value @ by_value.T + sum(_of_gains(*each) for each in zip(stages, influences, strict=True))
-    for part, lost in _unsure(stages, influences, [basis for _, basis in bases]):
+    matrix = by_value @ by_value.T
+    for stage, influence in zip(stages, influences, strict=True):
+        if stage.process:
+            added = stage.process.moves(model, stage.data_sets, influence)
+            blocks = zip(stage.data_sets, rows_of(stage.data_sets), strict=True)
+            matrix = matrix + added + sum(data_set.uncounted(influence[:, rows]) for data_set, rows in blocks)
+            spread.append(added * np.sqrt(2.0 / stage.process.freedom))
+        else:
+            matrix = matrix + _of_gains(stage, influence)
+    known = [not stage.process for stage in stages]  # of the others the noise is the least part
+    counted = [list(compress(each, known)) for each in (stages, influences, [basis for _, basis in bases])]
+    for part, lost in _unsure(*counted):
         spread.append(part)
         matrix = matrix + 2.0 * _positive(lost, np.sqrt(np.diag(matrix)))
     return Covariance(names, matrix, tuple(spread))
@@ -101,11 +138,10 @@ def _of_gains(stage: Stage, influence: Array) -> Array:
     return added
 
 
-def _excess(model: Model, stage: Stage) -> list[tuple[DataSet, float]]:
+def _excess(model: Model, stage: Stage) -> list[float]:
     """By how much each test of a stage exceeds its noise, reduced chi-square, and as all together; else 1."""
     together = lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0
-    each = zip(stage.data_sets, missed(model, stage.data_sets), strict=True)
-    return [(data_set, max(together, own or 1.0)) for data_set, own in each]
+    return [max(together, own or 1.0) for own in missed(model, stage.data_sets)]
 
 
 def _positive(matrix: Array, sizes: Array) -> Array:
@@ -199,16 +235,16 @@ def measured_range(model: Model, data_sets: Sequence[DataSet]) -> Range:
 
 def lack_of_fit(model: Model, data_sets: Sequence[DataSet], parameters: int) -> float | None:
     """Reduced chi-square where the model misses the data by more than their noise, else None."""
-    return _beyond_noise(*reduced(model, data_sets, parameters))
+    return beyond_noise(*reduced(model, data_sets, parameters))
 
 
 def missed(model: Model, data_sets: Sequence[DataSet]) -> list[float | None]:
     """The same of each test by itself, an error that all share counted."""
     residuals, parts = residual(model, data_sets), zip(rows_of(data_sets), data_sets, strict=True)
-    return [_beyond_noise(*_over_freedom(residuals[rows], [data_set], 0)) for rows, data_set in parts]
+    return [beyond_noise(*_over_freedom(residuals[rows], [data_set], 0)) for rows, data_set in parts]
 
 
-def _beyond_noise(chi_square: float, freedom: int) -> float | None:
+def beyond_noise(chi_square: float, freedom: int) -> float | None:
     """A reduced chi-square that noise is no explanation of, else None."""
     return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
@@ -222,11 +258,9 @@ def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: 
         return []
     worst, all_tests = max(each, key=lambda name: each[name], default=""), reduced(model, data_sets, parameters)[0]
     where = f", {number(each[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
-    beyond = "the model misses the data by more than their noise"
-    what = "something that is not smooth is missing as well" if isinstance(data_sets, Joined) else beyond
     return [
-        f"{what} (reduced chi-square {number(all_tests, 2)}{where}): intervals are invalid, though standard errors are "
-        f"scaled up{advice}"
+        f"the model misses the data by more than their noise (reduced chi-square {number(all_tests, 2)}{where}): "
+        f"intervals are invalid, though standard errors are scaled up{advice}"
     ]
 
 

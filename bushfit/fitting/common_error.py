@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, NamedTuple, overload
 
 import numpy as np
 
@@ -92,6 +92,25 @@ class CommonError:
         """Residuals in units of noise, (..., n), as independent numbers of unit variance."""
         vectors, size = self.along
         return rows - self.seen.back((self.seen.of(rows) @ vectors * (1.0 - 1.0 / np.hypot(1.0, size))) @ vectors.T)
+
+
+class ErrorProducts(NamedTuple):
+    """Inner products of whitened rows, such as a residual and its derivatives, with an error of unknown size.
+
+    Args:
+        products: of the rows in noise, (m, m).
+        along: components of the rows along independent amounts of the error, (m, c).
+        variance: by a unit of the error in each, (c,).
+    """
+
+    products: Array
+    along: Array
+    variance: Array
+
+    def beside(self, size: float) -> tuple[Array, float]:
+        """Inner products beside the error of a size, (m, m), and the log determinant of the covariance, over noise."""
+        grown = 1.0 + size**2 * self.variance
+        return self.products - self.along * (size**2 / grown) @ self.along.T, float(np.sum(np.log(grown)))
 
 
 @dataclass(frozen=True, eq=False)

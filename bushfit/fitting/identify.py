@@ -12,7 +12,6 @@ import numpy as np
 
 from bushfit.effects import effect_name_of
 from bushfit.fitting.assess import measured_range
-from bushfit.fitting.common_error import Joined
 from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.information import Information, further_test, percent, relative_sizes
@@ -126,7 +125,8 @@ def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], 
     if combinations:
         lines.append("what is known all the same: " + "; ".join(combinations))
     # what another test would tell beside an error of the model depends on what that error is
-    return lines if isinstance(data_sets, Joined) else [*lines, *further_test(model, data_sets, known)]
+    missed = any(data_set.model_error for data_set in data_sets)
+    return lines if missed else [*lines, *further_test(model, data_sets, known)]
 
 
 def _groups(known: Information) -> list[list[str]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.effects.history import History
-from bushfit.fitting.common_error import CommonError
+from bushfit.fitting.common_error import CommonError, ErrorProducts
 from bushfit.fitting.data_set import MeasuredTest, keep, kept
 from bushfit.fitting.drive import Drive
 from bushfit.model.model import Model
@@ -19,6 +19,11 @@ from bushfit.reading.measurement import Loop
 
 #: Harmonics of a loop that count as smooth misfit: beyond the fifth, physics makes next to nothing.
 _SMOOTH_HARMONICS = 5
+#: Harmonics that the model error of a loop has: alike up to the last smooth one, beyond they fall as 1/h.
+_ERROR_HARMONICS = 25
+#: Sizes of these over that of the whole force, (25,): their mean square is then that of the whole.
+_ERROR_SIZES = 1.0 / np.maximum(np.arange(1.0, _ERROR_HARMONICS + 1.0), _SMOOTH_HARMONICS)
+_ERROR_SIZES /= np.linalg.norm(_ERROR_SIZES)
 
 
 def smooth_waves(phase: Array) -> Array:
@@ -40,8 +45,9 @@ class LoopData(MeasuredTest):
         gain_error: standard deviation of the gain of the whole record, by the class of its rig.
         gain_weighs: whether it is part of the noise, as where [rig] states the class. A gain that is only assumed
             widens the errors of what is fitted, and bends no fit to meet the shape of a loop that a model misses.
-        shape_error: standard deviation of the model's error of each part of harmonic h, over half the force range and
-            1/h, from the second on; 0 where noise is all that is counted.
+        model_error: standard deviation of the model's error of the force, over half the force range, beside the noise;
+            it is independent from harmonic to harmonic and falls off as 1/h. 0 where noise is all that counts.
+        first_error: number of the first harmonic that has it.
         contradiction: what an earlier test of the same points says otherwise, in words.
     """
 
@@ -50,7 +56,8 @@ class LoopData(MeasuredTest):
     fundamental_only: bool = False
     gain_error: float = 0.0
     gain_weighs: bool = False
-    shape_error: float = 0.0
+    model_error: float = 0.0
+    first_error: int = 1
     contradiction: str | None = None
     kind = "loop"
     components = ("force",)
@@ -267,23 +274,76 @@ class LoopData(MeasuredTest):
 
     def _less_common(self, white: Array) -> Array:
         """Whitened rows, (..., n), whitened by the errors that all of them share as well."""
-        return self._common.whiten(white) if self._common else white
+        if self.model_error:
+            directions, size = self._error_directions
+            share = 1.0 - 1.0 / np.hypot(1.0, self.model_error * size)
+            return white - (white @ directions * share) @ directions.T
+        return self._gain.whiten(white) if self._gain else white
 
     @property
     def log_size(self) -> float:
         """Logarithm of the determinant of the covariance of its whitened rows before what they share was taken out."""
-        return self._common.log_size if self._common else 0.0
+        if self.model_error:
+            return float(np.sum(np.log1p(np.square(self.model_error * self._error_directions[1]))))
+        return self._gain.log_size if self._gain else 0.0
 
     @cached_property
-    def _common(self) -> CommonError | None:
-        """Errors of the gain, where it weighs, and of the model's shape; None without."""
-        columns = [self.gain_error * self.unit_gain] if self.gain_weighs and self.gain_error else []
-        if self.shape_error and not self.fundamental_only:
-            beyond = slice(3, len(self._waves))  # the first harmonic is part of the error of the stiffness
-            order = np.repeat(np.arange(2, _SMOOTH_HARMONICS + 1), 2)[:, None]
-            waves = self._waves[beyond] * self._per_noise * (self.shape_error * self.drive.half_range / order)
-            columns += list(self.drive.row_noise.whiten(waves) * self._counting)
-        return CommonError.of_all(np.array(columns)) if columns else None
+    def _gain(self) -> CommonError | None:
+        """The error of the gain, where it weighs; None without. Beside a model error it does not weigh."""
+        weighs = self.gain_weighs and self.gain_error
+        return CommonError.of_all(self.gain_error * self.unit_gain[None]) if weighs else None
+
+    @cached_property
+    def _error_directions(self) -> tuple[Array, Array]:
+        """Orthonormal directions that a model error of 100 % takes in units of noise, (n, c), and its sizes, (c,)."""
+        return CommonError.of_all(self._counted(self._error_waves)[2 * (self.first_error - 1) :]).along
+
+    @cached_property
+    def _error_waves(self) -> Array:
+        """One standard deviation of a model error of 100 % by harmonics, cosine and sine, in units of noise, (c, n)."""
+        count = 1 if self.fundamental_only else _ERROR_HARMONICS
+        angle = 2.0 * np.pi * self.drive.phase * np.arange(1, count + 1)[:, None]
+        waves = np.stack((np.cos(angle), np.sin(angle)), axis=1) * _ERROR_SIZES[:count, None, None]
+        waves = waves.reshape(-1, angle.shape[1])
+        if self.drive.from_rest and not self.fundamental_only:  # the first cycle has an error of its own, and a drift
+            order = np.arange(2.0 * np.ceil(self.drive.cycles))[:, None]
+            drift = np.cos(np.pi * order * self.drive.phase / self.drive.cycles) / (1.0 + order)
+            waves = np.concatenate((waves, waves * (self.drive.phase < 1.0), drift))
+        return self.drive.row_noise.whiten(waves * (self._per_noise * self.drive.half_range)) * self._counting
+
+    def with_model_error(self, size: float) -> Self:
+        """The same test with a relative model error beside its noise."""
+        test = replace(self, model_error=size)
+        test.__dict__["_error_directions"] = self._error_directions
+        return test
+
+    def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
+        """Inner products of the residual and its derivatives by parameter, by which the size of a model error is found.
+
+        Args:
+            model: whose residual it is.
+            names: of the parameters.
+        """
+        slopes = force_and_slopes(model, self.direction, self._history(model), names, self.under)[1]
+        left = (self.force(model) - self.drive.force)[None]
+        rows = np.concatenate((left, self.drive.at_rows(self.drive.from_datum(slopes)))) * self._per_noise
+        white = self._counted(self.drive.row_noise.whiten(rows) * self._counting)
+        directions, size = self._error_directions
+        return ErrorProducts(white @ white.T, white @ directions * size, np.square(size))
+
+    def uncounted(self, influence: Array) -> Array:
+        """Covariance that an estimate has beside what its weights count: the gain, less the model error of the first
+        harmonic, which the process of the model error stands for.
+
+        Args:
+            influence: of each whitened residual, (k, size).
+
+        Returns:
+            (k, k).
+        """
+        first = influence @ self._less_common(self.model_error * self._counted(self._error_waves[:2])).T
+        gain = influence @ self._less_common(self.gain_error * self.unit_gain)
+        return np.asarray(np.outer(gain, gain) - first @ first.T)
 
     def _counted(self, white: Array) -> Array:
         """Of whitened rows, (..., n), what counts as its residuals."""

@@ -1,17 +1,18 @@
-"""Model error: what a fit counts beside noise where the model misses the tests by more than that.
+"""The closest fit of a model that misses its tests, and the misfit that its intervals and bands include.
 
-A smooth error of the model bends its parameters to the quietest test if noise is all that weighs, and their intervals
-are far too narrow. Counted as what it is, tests weigh by what they can tell, and intervals are as wide as is true.
+Parameters of a model that no rubber follows exactly are those closest to the tests. So where the tests show a lack of
+fit, the estimate is least squares with the noise plus a model error that is independent from operating point to
+operating point and relatively of one size. The discrepancy is smooth in truth: a Gaussian process describes it in the
+covariance of the estimate and in the bands of predictions, and never in the weights, where it could imitate what the
+parameters do.
 
 Notes:
-    The relative error c of the complex stiffness is a Gaussian process over ln frequency and ln strain, alike in phase
-    and in quadrature, which tests share (M. C. Kennedy, A. O'Hagan, J. R. Statist. Soc. B 63 (2001) 425-464). It is
-    smooth over a decade at the most, as its prior has to say what it may not do (J. Brynjarsdottir, A. O'Hagan, Inverse
-    Problems 30 (2014) 114007): what is smoother is what the parameters are for. Its size and lengths are those of most
-    restricted likelihood (H. D. Patterson, R. Thompson, Biometrika 58 (1971) 545-554): with columns U of the whitened
-    residuals by its amounts, and the parameters projected out, twice the logarithm gains
-    sum(v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l)) by a size v, l the eigenvalues of U^T P U and b the components of U^T P r
-    along its eigenvectors.
+    The estimate is that of L2 calibration (R. Tuo, C. F. J. Wu, Ann. Statist. 43 (2015) 2331-2352) on the operating
+    points of the tests; a process in the weights needs a prior against what parameters do (M. Plumlee, J. Am. Stat.
+    Assoc. 112 (2017) 1274-1285; M. Gu, L. Wang, SIAM/ASA J. Uncertain. Quantif. 6 (2018) 1555-1583). Its covariance
+    is the sandwich J^+ V J^+^T (H. White, Econometrica 50 (1982) 1-25), V the covariance of noise and process. Sizes
+    and lengths are those of the largest restricted likelihood (H. D. Patterson, R. Thompson, Biometrika 58 (1971)
+    545-554).
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from itertools import chain, product
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.special import logsumexp
+from scipy.optimize import minimize_scalar
+from scipy.special import stdtrit
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects import BASE
@@ -32,78 +34,79 @@ from bushfit.effects.contract import Array
 from bushfit.effects.temperature import REFERENCE
 from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.errors import FitError
-from bushfit.fitting.common_error import CommonError, Joined, Seen
-from bushfit.fitting.coordinates import ROUNDING, Bounds, Solution, anderson, coordinate_bounds
-from bushfit.fitting.data_sets import DataSet, LoopData, log_slopes, parted, reached, rows_of
+from bushfit.fitting.assess import Process, beyond_noise
+from bushfit.fitting.common_error import CommonError, Seen
+from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, Solution
+from bushfit.fitting.data_sets import DataSet, LoopData, log_slopes, reached, rows_of
 from bushfit.fitting.levels import level_errors_of
 from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.robust import Estimate
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood, coordinates, in_lengths, patterns
+from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number
 
 #: Sizes tried, relative to |K|: from what the best rigs repeat to what no one calls a fit.
 _SIZES = np.geomspace(1e-3, 0.4, 25)
-#: Lengths tried, in ln frequency and ln strain: from next points apart to a decade; the parameters are for what is
-#: smoother.
-_LENGTHS = (0.4, 0.9, 2.0)
-#: Odds beforehand of something smooth that the model lacks, against nothing; as `diagnose` has them.
+#: Lengths tried, in ln frequency and in ln strain: from next points apart to a decade.
+_OVER_FREQUENCY, _OVER_STRAIN = (0.15, 0.4, 0.9, 2.0), (0.4, 0.9, 2.0)
+#: Size of the process over that of the independent model error, at least and at most: parameters absorb some of what is
+#: smooth, and of many points no more.
+_SMOOTH_RATIO = (1.0, 3.0)
+#: Likelihood of a process relative to the likeliest, from which on it counts; chosen for time.
+_COUNTS = 0.05
+#: Degrees of freedom at least of a size: Student's t of fewer has no variance.
+_MINIMUM_FREEDOM = 3.0
+#: Points of a sweep at most that a process is made of; chosen for time.
+_ENOUGH = 600
+#: Points from which on ripples over frequency are looked for as well.
+_DENSE = 300
+#: Prior odds of something smooth that the model lacks, against nothing; as `diagnose` has them.
 _ODDS = 0.2
-#: Gain of the logarithm of the likelihood by an error of middling lengths, up to which no others are tried; chosen: of
-#: clean campaigns three in four stay below. And its nodes: few, as it is but looked for.
-_SHOWS, _FEW = 0.5, 16
-#: Difference of the logarithm of the likelihood from the best, beyond which an error is tried no more.
-_FAR = 12.0
-#: Rounds in which error and parameters follow each other, at most, and the share of a standard error by which the
-#: parameters still move when they have settled.
-_MOST_ROUNDS, _SETTLED = 12, 0.1
+#: Gain of the log likelihood by a process of middling lengths, up to which no others are tried; chosen: of clean
+#: campaigns three in four stay below. And its nodes: few, as it only decides that.
+_MIDDLING, _SHOWS, _FEW = (0.9, 2.0), 0.5, 16
+#: Rounds of size and parameters at most, and the relative change of the size at which both have settled: far below
+#: how well a size is known.
+_MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 
-#: Directions and specimens, by name, in groups.
+#: Directions and specimens, by name, in groups that share a process.
 _Groups = tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
-class _FittedTests:
-    """A fitted model and its tests, as far as errors beside it are concerned.
+class FittedTests:
+    """A fitted model and its tests, for what a relative change of the stiffness does to the residuals.
 
     Args:
-        solution: residuals and derivatives in noise alone.
-        errors: of each test, whitened residuals that one standard deviation of each of the rig's errors makes, (w, n).
+        solution: residuals and derivatives, each test whitened by itself.
+        rig_errors: of each test, whitened residuals by one standard deviation of each of the rig's errors, (w, n).
     """
 
     solution: Solution
     data_sets: Sequence[DataSet]
-    errors: Sequence[Array]
+    rig_errors: Sequence[Array]
 
     @cached_property
-    def names(self) -> Array:
-        """Direction or specimen of each point, (p,)."""
-        return np.repeat(
-            [str(each.direction) for each in self.data_sets], [each.frequency.size for each in self.data_sets]
-        )
-
-    @cached_property
-    def directions(self) -> tuple[str, ...]:
-        """Each of these once."""
-        return tuple(dict.fromkeys(self.names.tolist()))
-
-    @cached_property
-    def points(self) -> Array:
-        """Place of each point, (p, 2 or 3)."""
-        return coordinates(*self.conditions)
+    def directions(self) -> Array:
+        """Direction or specimen of each operating point, by name, (p,)."""
+        counts = [data_set.frequency.size for data_set in self.data_sets]
+        return np.repeat([str(data_set.direction) for data_set in self.data_sets], counts)
 
     @cached_property
     def conditions(self) -> list[Array]:
-        """Frequency [Hz] and equivalent strain of each point, and its temperature [K] if the model knows of it."""
+        """Frequency [Hz], equivalent strain and, if the model knows of it, temperature [K] of each point, (p,) each."""
         model = self.solution.model
-        found = [*reached(model.bushing, self.data_sets)]
+        axes = [*reached(model.bushing, self.data_sets)]
         if model.knows_temperature:
-            known = [REFERENCE if (at := each.circumstances.temperature) is None else at for each in self.data_sets]
-            pairs = zip(known, self.data_sets, strict=True)
-            found.append(np.concatenate([np.broadcast_to(kelvin, each.frequency.shape) for kelvin, each in pairs]))
-        return found
+            kelvin = list[Array]()
+            for data_set in self.data_sets:
+                known = data_set.circumstances.temperature
+                kelvin.append(np.broadcast_to(REFERENCE if known is None else known, data_set.frequency.shape))
+            axes.append(np.concatenate(kelvin))
+        return axes
 
     @property
     def moving(self) -> Array:
@@ -112,139 +115,122 @@ class _FittedTests:
 
     @cached_property
     def slopes(self) -> Array:
-        """Derivatives of ln K at the points by coordinate, of the parameters that rest on no bound, complex (k, p)."""
-        model, coordinates = self.solution.model, self.solution.coordinates
-        names = [coordinates.names[i] for i in self.solution.moving]
-        found = np.concatenate([log_slopes(model, each, names) for each in self.data_sets], axis=-1)
-        return found * coordinates.slopes(model.values)[self.solution.moving, None]
+        """Derivatives of ln K at the points by coordinate of these parameters, complex (k, p)."""
+        model, fitted = self.solution.model, self.solution.coordinates
+        names = [fitted.names[i] for i in self.solution.moving]
+        slopes = np.concatenate([log_slopes(model, data_set, names) for data_set in self.data_sets], axis=-1)
+        return slopes * fitted.slopes(model.values)[self.solution.moving, None]
 
     @cached_property
     def seen(self) -> Seen:
-        """What changes of the tests' stiffness can move of the residuals: all of a sweep, two numbers of a loop."""
+        """Residuals that changes of the stiffness can move: all of a sweep, two combinations of a loop."""
         pairs = zip(rows_of(self.data_sets), self._loops, strict=True)
-        return Seen([(own, None if loop is None else loop[0]) for own, loop in pairs])
+        return Seen([(rows, None if loop is None else loop[0]) for rows, loop in pairs])
 
-    def made(self, shapes: Array) -> Array:
-        """Of the residuals that relative changes of the stiffness make, complex (c, p), what is seen, (c, d)."""
-        found, first, changes = [], 0, shapes * self._stiffness
-        for each, loop in zip(self.data_sets, self._loops, strict=True):
-            change = changes[:, first : first + each.frequency.size]
+    def columns(self, shapes: Array) -> Array:
+        """Whitened residuals, as `seen`, by relative changes of the stiffness, complex (c, p) -> (c, d)."""
+        columns, first, changes = [], 0, shapes * self._stiffness
+        for data_set, loop in zip(self.data_sets, self._loops, strict=True):
+            change = changes[:, first : first + data_set.frequency.size]
             parts = np.concatenate((change.real, change.imag), axis=-1)
-            found.append(each.moved(change, self.solution.model) if loop is None else parts @ loop[1])
-            first += each.frequency.size
-        return np.concatenate(found, axis=-1)
+            columns.append(data_set.moved(change, self.solution.model) if loop is None else parts @ loop[1])
+            first += data_set.frequency.size
+        return np.concatenate(columns, axis=-1)
 
     @cached_property
     def _stiffness(self) -> Array:
-        """Of the model at each point, complex, (p,)."""
-        return np.concatenate([each.noise_free(self.solution.model).measured for each in self.data_sets])
+        return np.concatenate([data_set.noise_free(self.solution.model).measured for data_set in self.data_sets])
 
     @cached_property
     def _loops(self) -> list[tuple[Array, Array] | None]:
-        """Of each loop orthonormal directions of these residuals, (n, 2), and what 1 and i of a change make along them,
-        (2, 2); None of a sweep."""
-        both, found = np.array([[1.0], [1.0j]]), list[tuple[Array, Array] | None]()
-        for each in self.data_sets:
-            if each.kind == "loop":
-                along, made = np.linalg.qr(each.moved(both, self.solution.model).T)
-                found.append((along, made.T))
+        """Of each loop orthonormal directions of these residuals, (n, 2), and the components along them by 1 and i of
+        a change, (2, 2); None of a sweep."""
+        units, loops = np.array([[1.0], [1.0j]]), list[tuple[Array, Array] | None]()
+        for data_set in self.data_sets:
+            if data_set.kind == "loop":
+                directions, components = np.linalg.qr(data_set.moved(units, self.solution.model).T)
+                loops.append((directions, components.T))
             else:
-                found.append(None)
-        return found
+                loops.append(None)
+        return loops
 
     @cached_property
-    def left(self) -> tuple[Array, Array]:
-        """Of what the parameters and the rig's errors make, orthonormal but for what is known of the latter, and of
-        what both leave, the part that is seen, (k, d) and (d,)."""
-        rows, residual, owns = self.solution.jacobian, self.solution.residual, rows_of(self.data_sets)
-        across = np.concatenate([rows[:, own] @ each.T for own, each in zip(owns, self.errors, strict=True)], axis=1)
-        among = block_diag(*(each @ each.T for each in self.errors))
+    def remainder(self) -> tuple[Array, Array]:
+        """Directions that parameters and rig errors absorb, (k, d), orthonormal but for the prior of the latter, and
+        the residual that both leave, (d,), as `seen`."""
+        rows, residual, blocks = self.solution.jacobian, self.solution.residual, rows_of(self.data_sets)
+        pairs = list(zip(blocks, self.rig_errors, strict=True))
+        across = np.concatenate([rows[:, block] @ errors.T for block, errors in pairs], axis=1)
+        among = block_diag(*(errors @ errors.T for errors in self.rig_errors))
         information = np.block([[rows @ rows.T, across], [across.T, among + np.eye(len(among))]])
         scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         size, vectors = np.linalg.eigh(information / np.outer(scale, scale))
         known = size > ROUNDING * size.max(initial=0.0)
         mixed = (vectors[:, known] / np.sqrt(size[known])).T / scale
-        seen = block_diag(*(self.seen.of_part(number, each) for number, each in enumerate(self.errors)))
+        seen = block_diag(*(self.seen.of_part(i, errors) for i, errors in enumerate(self.rig_errors)))
         span = mixed @ np.concatenate((self.seen.of(rows), seen))
-        along = [rows @ residual, *(each @ residual[own] for own, each in zip(owns, self.errors, strict=True))]
+        along = [rows @ residual, *(errors @ residual[block] for block, errors in pairs)]
         return span, self.seen.of(residual) - (mixed @ np.concatenate(along)) @ span
 
 
 @dataclass(frozen=True, eq=False)
-class _Prior:
-    """A smooth error of some tests, whatever model is fitted to them.
+class Discrepancy:
+    """A Gaussian process of the relative error of a fitted model.
 
     Args:
-        groups: directions and specimens that share it, by name.
-        lengths: over which it changes, in ln frequency and ln strain.
-        nodes: of each group, numbers of points, (m,).
-        shapes: the error at the points by its amounts, (q, p).
+        groups: directions and specimens that share the process, by name.
+        lengths: in ln frequency and ln strain.
+        nodes: of each group, indices of points, (m,).
+        shapes: patterns at the points, (q, p).
+        sizes: tried, relative to |K|, rising, (s,).
     """
 
+    tests: FittedTests
     groups: _Groups
     lengths: tuple[float, float]
     nodes: Sequence[Array]
     shapes: Array
+    sizes: Array
 
     @classmethod
-    def of(
-        cls, tests: _FittedTests, groups: _Groups, lengths: tuple[float, float], most: int = MAXIMUM_NODES
-    ) -> _Prior:
-        """The error at the points of some tests, by so many nodes at most."""
+    def over(cls, tests: FittedTests, groups: _Groups, lengths: tuple[float, float], most: int) -> Discrepancy:
+        """The process over the points of some tests, with a number of nodes at most in each group."""
         nodes, shapes = [], []
         for group in groups:
-            inside = np.flatnonzero(np.isin(tests.names, group))
-            own, near = patterns(in_lengths(tests.points[inside], lengths), most)
-            here = np.zeros((len(near), len(tests.points)))
-            here[:, inside] = near
-            nodes.append(inside[own])
-            shapes.append(here)
-        return cls(groups, lengths, nodes, np.concatenate(shapes))
-
-
-@dataclass(frozen=True, eq=False)
-class _Error:
-    """A smooth error beside a fitted model."""
-
-    tests: _FittedTests
-    prior: _Prior
+            inside = np.flatnonzero(np.isin(tests.directions, group))
+            chosen, near = patterns(in_lengths(coordinates(*tests.conditions)[inside], lengths), most)
+            nodes.append(inside[chosen])
+            shapes.append(np.zeros((len(near), tests.directions.size)))
+            shapes[-1][:, inside] = near
+        return cls(tests, groups, lengths, nodes, np.concatenate(shapes), _SIZES)
 
     @cached_property
-    def shapes(self) -> Array:
-        """The error at the points by a unit of each amount, in phase, then in quadrature, complex (2 q, p)."""
-        return np.concatenate((self.prior.shapes, 1j * self.prior.shapes))
+    def complex_shapes(self) -> Array:
+        """Patterns in phase, then in quadrature, complex (2 q, p)."""
+        return np.concatenate((self.shapes, 1j * self.shapes))
 
     @cached_property
-    def _likelihood(self) -> RestrictedLikelihood:
-        span, left = self.tests.left
-        return RestrictedLikelihood.of(self.tests.made(self.shapes), left, span)
+    def likelihood(self) -> RestrictedLikelihood:
+        """Restricted likelihood of its size."""
+        span, left = self.tests.remainder
+        return RestrictedLikelihood.of(self.tests.columns(self.complex_shapes), left, span)
 
     @cached_property
-    def _gains(self) -> Array:
-        """Of the logarithm of the restricted likelihood at each size, (sizes,)."""
-        return self._likelihood.gains(_SIZES)
-
-    @property
     def best(self) -> tuple[float, float]:
-        """The largest gain, and the size that brings it."""
-        return float(self._gains.max()), float(_SIZES[self._gains.argmax()])
+        """The largest gain of the log likelihood, and the size that brings it."""
+        gains = self.likelihood.gains(self.sizes)
+        return float(gains.max()), float(self.sizes[gains.argmax()])
 
-    @property
-    def log_evidence(self) -> float:
-        """Of the tests with it, all sizes as likely, over that without."""
-        return self._likelihood.log_evidence(_SIZES)
+    def conditioned(self) -> tuple[Array, Array]:
+        """The process, of its best size, conditioned on the tests.
 
-    def joined(self, data_sets: Sequence[DataSet]) -> Joined:
-        """The tests, with weights of their own, and the error that they share."""
-        tests = replace(self.tests, data_sets=data_sets)
-        error = CommonError(self.best[1] * tests.made(self.shapes), tests.seen)
-        return Joined(tuple(data_sets), error, self._likelihood.freedom(self.best[1]))
-
-    def data(self, size: float) -> Unnamed:
-        """The error, of a size, as the tests leave it."""
-        columns, rows = self.tests.made(self.shapes), self.tests.moving
+        Returns:
+            Mean at the operating points, complex (p,), and standard deviation of its two parts with those of the
+            parameters, (2, p).
+        """
+        size, columns, rows = self.best[1], self.tests.columns(self.complex_shapes), self.tests.moving
         inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
-        value = (-inverse @ columns @ self.tests.seen.of(self.tests.solution.residual)) @ self.shapes
+        mean = (-inverse @ columns @ self.tests.seen.of(self.tests.solution.residual)) @ self.complex_shapes
         both = np.concatenate((columns, self.tests.seen.of(rows)))
         information = both @ both.T
         information[len(columns) :, len(columns) :] = rows @ rows.T  # loops tell more than by a change of stiffness
@@ -252,78 +238,165 @@ class _Error:
         scale = 1.0 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         known, vectors = np.linalg.eigh(information * np.outer(scale, scale))
         root = (vectors / np.sqrt(np.maximum(known, ROUNDING))).T * scale
-        whole = root @ np.concatenate((self.shapes, self.tests.slopes))
-        errors = np.linalg.norm(whole.real, axis=0), np.linalg.norm(whole.imag, axis=0)
-        patches = []
-        for group, nodes in zip(self.prior.groups, self.prior.nodes, strict=True):
-            lists = (value[nodes].real, value[nodes].imag, *(error[nodes] for error in errors))
-            frequency, strain, *kelvin = (tuple(axis[nodes].tolist()) for axis in self.tests.conditions)
-            patches.append(Patch(group, frequency, strain, *(tuple(one.tolist()) for one in lists), *kelvin))
-        return Unnamed(size, self.prior.lengths, tuple(patches))
+        whole = root @ np.concatenate((self.complex_shapes, self.tests.slopes))
+        return mean, np.array([np.linalg.norm(whole.real, axis=0), np.linalg.norm(whole.imag, axis=0)])
+
+
+def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
+    """Processes conditioned on the tests, averaged by their likelihood: mean and standard deviation at nodes.
+
+    Between the nodes, and in sharing directions, it is as the likeliest, over lengths of the mean logarithm. Its sizes
+    are known by few degrees of freedom: standard deviations are those by which a normal interval is as wide as
+    Student's t has it.
+    """
+    gains = np.array([process.best[0] for process in processes])
+    share = np.exp(gains - gains.max())
+    counted = np.flatnonzero(share > _COUNTS).tolist()
+    share = share[counted] / share[counted].sum()
+    freedom = share @ [processes[i].likelihood.freedom(processes[i].best[1]) for i in counted]
+    wider = float(stdtrit(max(freedom, _MINIMUM_FREEDOM), 0.975)) / Z95
+    means, errors = zip(*(processes[i].conditioned() for i in counted), strict=True)
+    mean = share @ np.array(means)
+    apart = np.array([[np.square((one - mean).real), np.square((one - mean).imag)] for one in means])
+    error = wider * np.sqrt(np.tensordot(share, np.square(errors) + apart, 1))
+    lengths = np.exp(share @ np.log([processes[i].lengths for i in counted]))
+    size = wider * float(np.exp(share @ np.log([processes[i].best[1] for i in counted])))
+    best, patches = processes[int(gains.argmax())], []
+    for group, nodes in zip(best.groups, best.nodes, strict=True):
+        lists = (mean[nodes].real, mean[nodes].imag, *error[:, nodes])
+        frequency, strain, *kelvin = (tuple(axis[nodes].tolist()) for axis in best.tests.conditions)
+        patches.append(Patch(group, frequency, strain, *(tuple(row.tolist()) for row in lists), *kelvin))
+    return Unnamed(size, (float(lengths[0]), float(lengths[1])), tuple(patches))
 
 
 def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATED) -> tuple[Estimate, Unnamed | None]:
-    """A fit with an error of the model beside the noise, and that error, where the tests are likelier with it; else the
-    fit as it was, and None. Likelier, that is, than with what a rig of the class makes.
+    """The closest fit and its discrepancy where the tests show a lack of fit; else the fit as it is, and None.
+
+    Args:
+        found: least squares in the noise alone.
+        bounds: limits of parameters inside their own.
+        rig: the class of the rig, whose errors may explain a misfit.
     """
-    names = found.solution.coordinates.names
-    if not names:
+    if not found.solution.coordinates.names or not _shows_misfit(found, rig):
         return found, None
-    tests = _FittedTests(found.solution, found.minimised, _of_class(found.minimised, rig))
-    together = _Prior.of(tests, (tests.directions,), _LENGTHS[1:3], _FEW)
-    if _Error(tests, together).best[0] <= _SHOWS:
+    solution, size = closest_fit(found, bounds)
+    if size >= _SIZES[-1]:  # that is no error of a model, but another thing than it
         return found, None
-    tried = _tried(tests)
-    if float(logsumexp([each.log_evidence for each in tried])) - np.log(len(tried)) + np.log(_ODDS) < 0.0:
-        return found, None
-    asked, answered = list[Array](), list[Array]()
-    for _ in range(_MOST_ROUNDS):
-        error = max(tried, key=lambda each: each.best[0])
-        if error.best[1] >= _SIZES[-1]:  # that is no error of a model, but another thing than it
-            return found, None
-        before, shaped = tests.solution, _shaped(found.minimised, error.best[1])
-        joined, starts = error.joined(shaped), [before.model] if asked else [before.model, *_alive(before, shaped)]
-        ends = [solve(start, joined, names, bounds, strict=False) for start in starts]
-        after = min(ends, key=lambda each: each.chi_square)
-        asked.append(before.coordinates.point(before.model.values))
-        answered.append(after.coordinates.point(after.model.values))
-        if float(np.linalg.norm((answered[-1] - asked[-1]) @ after.jacobian)) < _SETTLED:
+    tests = _in_noise(solution, [_with_shape_error(data_set, size) for data_set in _thinned(found.minimised)])
+    sizes = np.geomspace(_SMOOTH_RATIO[0] * size, _SMOOTH_RATIO[1] * size, 9)
+    discrepancies = [replace(process, sizes=sizes) for process in _discrepancies(tests)]
+    discrepancy = max(discrepancies, key=lambda process: process.best[0])
+    minimised, weighed = (
+        tuple(data_set.with_model_error(size) for data_set in part) for part in (found.minimised, found.weighed)
+    )
+    whole = Discrepancy.over(_in_noise(solution, weighed), discrepancy.groups, discrepancy.lengths, MAXIMUM_NODES)
+    process = Process(discrepancy.best[1] * whole.complex_shapes, discrepancy.likelihood.freedom(discrepancy.best[1]))
+    return Estimate(solution, found.data_sets, minimised, weighed, found.outliers, process), averaged(discrepancies)
+
+
+def closest_fit(found: Estimate, bounds: Bounds) -> tuple[Solution, float]:
+    """Least squares with the noise and an independent model error, and the relative size of this.
+
+    Size and parameters follow each other: the size of the largest restricted likelihood, then the parameters.
+    """
+    tests, names = found.minimised, found.solution.coordinates.names
+    starts = [found.solution.model, *_restarted(found.solution, tests)]
+    size = min(likeliest_size(start, tests, names) for start in starts)
+    for _ in range(_MAXIMUM_ROUNDS):
+        weighted = [data_set.with_model_error(size) for data_set in tests]
+        ends = [solve(start, weighted, names, bounds, strict=False) for start in starts]
+        solution = min(ends, key=lambda end: end.chi_square)
+        starts, before = [solution.model], size
+        size = likeliest_size(solution.model, tests, [names[i] for i in solution.moving])
+        if abs(np.log(size / before)) < _SETTLED or size >= _SIZES[-1]:
             break
-        ahead = np.clip(anderson(asked, answered), *coordinate_bounds(after.coordinates, bounds))
-        tests = _at(after, after.coordinates.possible(ahead), shaped)
-        tried = [_Error(tests, each.prior) for each in tried]
-        if len(asked) > 1:  # about a model that the error no longer bends
-            best = max(each.best[0] for each in tried)
-            tried = [each for each in tried if each.best[0] > best - _FAR]
-    tests = _at(after, after.model.values, shaped)
-    size = error.best[1]
-    data = replace(error, tests=tests).data(size)
-    if data.typical >= _SIZES[-1]:
-        return found, None
-    each = found.data_sets, found.minimised, found.weighed
-    made = {id(part): error.joined(_shaped(part, size)) for part in each}  # mostly the same tests
-    whole, minimised, weighed = (made[id(part)] for part in each)
-    return Estimate(after, whole, minimised, weighed, found.outliers), data
+    return solution, size
+
+
+def likeliest_size(model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> float:
+    """Relative size of an independent model error of the largest restricted likelihood, the parameters near a model's.
+
+    Notes:
+        The logarithm is -(ln|S| + r^T P r + ln|J S^-1 J^T|)/2 with S the covariance of noise and model error, J the
+        derivatives, (k, n), and P = S^-1 - S^-1 J^T (J S^-1 J^T)^-1 J S^-1.
+    """
+    known = [data_set.error_products(model, names) for data_set in data_sets]
+    scale = np.append(1.0, Coordinates.of(model, names).slopes(model.values))
+
+    def cost(log_size: float) -> float:
+        products, log_sizes = zip(*(test.beside(float(np.exp(log_size))) for test in known), strict=True)
+        both = np.sum(products, axis=0) * np.outer(scale, scale)
+        units = np.sqrt(np.maximum(np.diag(both)[1:], np.finfo(float).tiny))
+        size, vectors = np.linalg.eigh(both[1:, 1:] / np.outer(units, units))
+        kept = size > ROUNDING * size.max(initial=0.0)
+        absorbed = np.square(both[0, 1:] / units @ vectors[:, kept]) / size[kept]
+        information = np.sum(np.log(size[kept])) + 2.0 * np.sum(np.log(units))
+        return float(sum(log_sizes) + both[0, 0] - absorbed.sum() + information)
+
+    low, high = np.log(_SIZES[[0, -1]]).tolist()
+    found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": _SETTLED / 2.0})
+    return float(np.exp(found.x))
 
 
 def log_likelihood(found: Estimate, known: Mapping[str, float]) -> float:
-    """The logarithm of the restricted likelihood of a fit, the parameters that rest on no bound integrated.
+    """Logarithm of the restricted likelihood of a fit, the parameters that rest on no bound integrated.
 
     Args:
-        known: precision beforehand of parameters, by coordinate; of the others it is 0.
+        found: the fit.
+        known: prior precision of parameters, by coordinate; of the others it is 0.
     """
     solution, tests = found.solution, found.minimised
     rows = solution.jacobian[solution.moving]
-    beforehand = [known.get(solution.coordinates.names[i], 0.0) for i in solution.moving]
-    size = sum(loop.log_size for loop in parted(tests)[0]) + (
-        tests.error.log_size if isinstance(tests, Joined) else 0.0
-    )
-    size += float(np.linalg.slogdet(rows @ rows.T + np.diag(beforehand))[1])
+    prior = [known.get(solution.coordinates.names[i], 0.0) for i in solution.moving]
+    size = sum(data_set.log_size for data_set in tests) + float(np.linalg.slogdet(rows @ rows.T + np.diag(prior))[1])
     return -0.5 * (solution.chi_square + size)
 
 
-def _alive(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
-    """A model to start from, its branches as read off the tests: a fit bent by noise may have lost one for good."""
+def model_error_warning(error: Unnamed) -> str:
+    """Sentence for people on the misfit of a model."""
+    return (
+        f"the model misses the tests by {number(100.0 * error.typical, 2)} %; parameters are the closest fit, and "
+        "their intervals include this misfit"
+    )
+
+
+def _shows_misfit(found: Estimate, rig: RigSettings) -> bool:
+    """Whether the tests show more than noise and a rig of the class make, by chi-square or as something smooth."""
+    data_sets, residual = found.minimised, found.solution.residual
+    errors = [_errors_of_class(data_set, rig) for data_set in data_sets]
+    squares = [
+        float(np.sum(np.square(CommonError.of_all(columns).whiten(residual[rows]))))
+        for columns, rows in zip(errors, rows_of(data_sets), strict=True)
+    ]
+    counts = [data_set.counted for data_set in data_sets]
+    freedom = max(sum(counts) - len(found.solution.coordinates.names), 1)
+    pairs = [(sum(squares), freedom), *zip(squares, counts, strict=True)]
+    if any(beyond_noise(square / count, count) is not None for square, count in pairs if count):
+        return True
+    thinned = _thinned(data_sets)
+    solution = found.solution.at(found.solution.model, thinned)
+    tests = FittedTests(solution, thinned, [_errors_of_class(data_set, rig) for data_set in thinned])
+    names = tuple(dict.fromkeys(tests.directions.tolist()))
+    quick = [Discrepancy.over(tests, (names,), _MIDDLING, _FEW)]
+    if tests.directions.size > _DENSE:
+        quick.append(Discrepancy.over(tests, (names,), (_OVER_FREQUENCY[0], _OVER_STRAIN[-1]), MAXIMUM_NODES))
+    if max(process.best[0] for process in quick) <= _SHOWS:
+        return False
+    processes = _discrepancies(tests)
+    evidence = [process.likelihood.log_evidence(_SIZES) for process in processes]
+    return float(np.logaddexp.reduce(evidence)) - np.log(len(evidence)) + np.log(_ODDS) >= 0.0
+
+
+def _discrepancies(tests: FittedTests) -> list[Discrepancy]:
+    """Processes that all tests share, and one of each direction by itself, of all lengths."""
+    names = tuple(dict.fromkeys(tests.directions.tolist()))
+    shared = dict.fromkeys([(names,), tuple((name,) for name in names)])
+    pairs = product(shared, product(_OVER_FREQUENCY, _OVER_STRAIN))
+    return [Discrepancy.over(tests, groups, lengths, MAXIMUM_NODES) for groups, lengths in pairs]
+
+
+def _restarted(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
+    """A model with its branches as read off the tests: a fit bent by noise may have lost one for good."""
     model, moved = solution.model, solution.coordinates.names
     known = {name: value for name, value in model.values.items() if name not in moved}
     with suppress(FitError):  # tests that no rubber gives
@@ -334,50 +407,28 @@ def _alive(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
     return []
 
 
-def _at(solution: Solution, values: Mapping[str, float], data_sets: Sequence[DataSet]) -> _FittedTests:
-    """A fit with its parameters at other values, and the tests in noise alone."""
-    found = solution.at(solution.model.with_values(values), data_sets)
-    return _FittedTests(found, data_sets, [np.empty((0, each.size)) for each in data_sets])
+def _errors_of_class(data_set: DataSet, rig: RigSettings) -> Array:
+    """Whitened residuals of a test by the errors of a rig of the class beside what counts already: the gain of a loop,
+    and gain and phase of each level, (w, n)."""
+    if isinstance(data_set, LoopData):
+        gain = data_set.gain_error * data_set.unit_gain[None]
+        return gain[:0] if data_set.gain_weighs else gain
+    beyond = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(data_set.noise.level), 0.0))
+    columns = level_errors_of(data_set)
+    return columns * np.tile(beyond, len(columns) // 2)[:, None]
 
 
-def _of_class(data_sets: Sequence[DataSet], rig: RigSettings) -> list[Array]:
-    """Whitened residuals of each test that the errors of a rig of the class make beside what is counted: the gain of a
-    loop, and gain and phase of each level, (w, n)."""
-    found = []
-    for each in data_sets:
-        if isinstance(each, LoopData):
-            own = each.gain_error * each.unit_gain[None]
-            found.append(own[:0] if each.gain_weighs else own)
-        else:
-            beyond = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(each.noise.level), 0.0))
-            columns = level_errors_of(each)
-            found.append(columns * np.tile(beyond, len(columns) // 2)[:, None])
-    return found
+def _in_noise(solution: Solution, data_sets: Sequence[DataSet]) -> FittedTests:
+    """The model of a fit with other weights, beside no errors of the rig."""
+    none = [np.empty((0, data_set.size)) for data_set in data_sets]
+    return FittedTests(solution.at(solution.model, data_sets), data_sets, none)
 
 
-def _shaped(data_sets: Sequence[DataSet], size: float) -> list[DataSet]:
-    """The same tests, the shape of loops off by as much as their stiffness."""
-    return [replace(each, shape_error=size) if isinstance(each, LoopData) else each for each in data_sets]
+def _thinned(data_sets: Sequence[DataSet]) -> list[DataSet]:
+    """The tests with evenly chosen points of dense sweeps: enough for what is smooth."""
+    return [data_set if isinstance(data_set, LoopData) else data_set.thinned(_ENOUGH) for data_set in data_sets]
 
 
-def _tried(tests: _FittedTests) -> list[_Error]:
-    """Errors of all tests together, and of each direction by itself, of all lengths."""
-    shared = dict.fromkeys([(tests.directions,), tuple((name,) for name in tests.directions)])
-    pairs = product(shared, product(_LENGTHS, _LENGTHS))
-    return [_Error(tests, _Prior.of(tests, groups, lengths, MAXIMUM_NODES)) for groups, lengths in pairs]
-
-
-def model_error_warning(error: Unnamed) -> str:
-    """What is said of a model error, for people."""
-    reached = np.ptp(np.concatenate([each.nodes[:, :2] for each in error.patches]), axis=0)
-    lengths = zip(error.lengths, reached, strict=True)
-    smooth = [
-        f"{number(length / np.log(10.0), 1)} decades of {axis}"
-        for axis, (length, reach) in zip(("frequency", "strain"), lengths, strict=True)
-        if reach > 0.0
-    ]
-    over = f", smooth over {' and '.join(smooth)}," if smooth else ""
-    return (
-        "the model misses the data by more than their noise: a model error of "
-        f"{number(100.0 * error.typical, 2)} % of |K|{over} counts beside it, in all intervals and bands"
-    )
+def _with_shape_error(data_set: DataSet, size: float) -> DataSet:
+    """The test in noise; a loop with the model error of its shape, which no change of the stiffness makes."""
+    return replace(data_set, model_error=size, first_error=2) if isinstance(data_set, LoopData) else data_set

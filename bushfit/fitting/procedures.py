@@ -21,7 +21,6 @@ from bushfit.fitting.assess import (
     quality,
     unfitted,
 )
-from bushfit.fitting.common_error import Joined
 from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, anderson
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, sources, with_level_errors
@@ -225,13 +224,13 @@ def _result(
 ) -> Result:
     """What the steps of a procedure found, the last one's model, with the uncertainty of all of them."""
     model, data_sets = steps[-1].solution.model, [data_set for step in steps for data_set in step.data_sets]
-    stages = [Stage(_moving(step), step.weighed) for step in steps]
+    stages = [Stage(_moving(step), step.weighed, step.process) for step in steps]
     fitted = tuple(name for step in steps for name in step.solution.coordinates.names)
     cov = covariance(model, stages, held)
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     of_tests = (*implausible(data.campaign.bushing, data_sets), *apart_in_temperature(model, data_sets))
     doubts = [*of_tests, *data.assumed]
-    odd = [note for step in steps for note in cautions(model, step.solution, step.data_sets, data.bounds, cov, NEXT)]
+    odd = [note for step in steps for note in cautions(model, step, data.bounds, cov, NEXT)]
     return Result(
         model,
         fitted,
@@ -249,19 +248,13 @@ def _result(
 
 def _moving(step: Estimate) -> tuple[str, ...]:
     """The parameters whose errors a fit tells; beside an error of the model, one at rest on a bound counts as held."""
-    held = step.solution.at_bound if isinstance(step.weighed, Joined) else {}
+    held = step.solution.at_bound if step.process else {}
     return tuple(name for name in step.solution.coordinates.names if name not in held)
 
 
-def cautions(
-    model: Model,
-    solution: Solution,
-    data_sets: Sequence[DataSet],
-    bounds: Bounds,
-    covariance: Covariance,
-    advice: str = "",
-) -> list[str]:
-    """What is odd about the loops of a fit, and what its data cannot tell: bounds met, what stays open, a misfit."""
+def cautions(model: Model, step: Estimate, bounds: Bounds, covariance: Covariance, advice: str = "") -> list[str]:
+    """Warnings on the loops of a fit, and on what its data do not determine: bounds met, what stays open, a misfit."""
+    solution, data_sets = step.solution, step.data_sets
     names, at_bound = solution.coordinates.names, solution.at_bound
     notes = [f"{data_set.name}: {note}" for data_set in data_sets for note in data_set.notes]
     if not names:
@@ -270,9 +263,9 @@ def cautions(
         *filter(None, [covariance.restricted(names).left_open(model.values)]),
         *notes,
         *([_STOPPED.format(solution.evaluations)] if solution.stopped else []),
-        *(_at_edge(name, end, solution, data_sets, bounds) for name, end in at_bound.items()),
-        *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),
-        *misfit(model, data_sets, len(names), advice),
+        *(_at_edge(name, end, solution, step.minimised, bounds) for name, end in at_bound.items()),
+        *left_open(model, step.minimised, [name for name in names if name not in at_bound], covariance),
+        *([] if step.process else misfit(model, data_sets, len(names), advice)),
     ]
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
+from bushfit.fitting.assess import Process
 from bushfit.fitting.coordinates import Bounds, Solution
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.outliers import misfit_scale
@@ -41,6 +42,7 @@ class Estimate:
         minimised: the same with the weights at which the solution is the least sum of squares.
         weighed: the same with the weights that give its covariance.
         outliers: by file and row.
+        process: how the model misses the tests, where it does; the weights then hold an independent model error.
     """
 
     solution: Solution
@@ -48,6 +50,7 @@ class Estimate:
     minimised: Sequence[DataSet]
     weighed: Sequence[DataSet]
     outliers: tuple[Outlier, ...]
+    process: Process | None = None
 
 
 def outliers_at(

@@ -9,6 +9,7 @@ import numpy as np
 
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
+from bushfit.fitting.common_error import ErrorProducts
 from bushfit.fitting.data_set import MeasuredTest, keep, kept, shown_amplitude
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import contradictions, outlying_points
@@ -85,6 +86,8 @@ class SweepData(MeasuredTest):
         weight: share of its weight that each point has, (n,) in `order`; all for None.
         part: rows of the sweep that belong to it, (n,) in `order`; all for None.
         under: what its rows were measured under, (rows,) each.
+        model_error: standard deviation of the relative error of the model at an operating point, which counts beside
+            the noise, in phase and in quadrature; repeats share it.
     """
 
     sweep: Sweep
@@ -94,6 +97,7 @@ class SweepData(MeasuredTest):
     part: Array | None = None
     under: Circumstances = UNKNOWN
     contradiction: str | None = None
+    model_error: float = 0.0
     kind = "sweep"
     components = ("storage", "loss")
 
@@ -157,6 +161,11 @@ class SweepData(MeasuredTest):
     def with_weight(self) -> Self:
         counted = self.weights > 0.0
         return self if counted.all() else self._part(counted)
+
+    def thinned(self, most: int) -> Self:
+        """The part of the sweep of evenly chosen points, a number of them at most."""
+        step = -(-self.order.size // most)
+        return self if step == 1 else self._part(np.arange(self.order.size) % step == 0)
 
     def fundamental(self) -> Self:
         return self
@@ -280,6 +289,14 @@ class SweepData(MeasuredTest):
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
         return self.moved(self._slopes(model, names), model)
 
+    def with_model_error(self, size: float) -> Self:
+        return replace(self, model_error=size)
+
+    def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
+        slopes = self._slopes(model, names)
+        rows = np.concatenate((self.deviation(model)[None], self._relative(slopes, self.stiffness(model))))
+        return self._whitening.error_products(rows)
+
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the stiffness at the points by fit coordinate, (len(names), n); the stiffness is kept."""
         frequency, amplitude, under, place = self._asked(model)
@@ -295,13 +312,16 @@ class SweepData(MeasuredTest):
         return self.moved(grown * self._slopes(model, names), model, added)
 
     def moved(self, change: Array, model: Model, beside: Array | float = 0.0) -> Array:
-        stiffness = self.stiffness(model) + beside
+        return self.whiten(self._relative(change, self.stiffness(model) + beside))
+
+    def _relative(self, change: Array, stiffness: Array) -> Array:
+        """What small changes of a stiffness at the points, (..., n) each, do to the deviation, (..., n)."""
         relative = change / stiffness
         if self.residuals == "complex":
-            return self.whiten(relative)
+            return relative
         gain = np.abs(stiffness / self.measured) * relative.real
         loss = relative.imag * (np.abs(stiffness) / stiffness.real) ** 2
-        return self.whiten(gain + 1j * loss * self._loss_scale)
+        return gain + 1j * loss * self._loss_scale
 
     @cached_property
     def _loss_scale(self) -> Array:
@@ -312,6 +332,13 @@ class SweepData(MeasuredTest):
         """Deviations in units of noise, shared block errors taken out: complex (..., n) -> (..., 2 n)."""
         return self._whitening.whiten(deviation)
 
+    @property
+    def log_size(self) -> float:
+        return self._whitening.log_size if self.model_error else 0.0
+
+    def uncounted(self, influence: Array) -> Array:
+        return self._whitening.uncounted(influence)
+
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
         return self._whitening.unsure(influence)
 
@@ -321,7 +348,8 @@ class SweepData(MeasuredTest):
         if self.sweep.relative_error is not None and self.sweep.noise is None:
             random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)
         line_starts = np.concatenate(([0], 1 + np.flatnonzero(np.diff(self.held))))
-        return Whitening(self.block_starts, line_starts, random, self.noise, self.weights)
+        points = np.unique(self.frequency + 1j * self.amplitude, return_inverse=True)[1]
+        return Whitening(self.block_starts, line_starts, random, self.noise, self.weights, points, self.model_error)
 
     @cached_property
     def weights(self) -> Array:

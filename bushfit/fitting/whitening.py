@@ -1,11 +1,17 @@
 """Deviations of a sweep's points in units of noise: what scatters from point to point, and what a block shares.
 
+Beside the noise a model error may count, independent from operating point to operating point; repeats share it.
+
 Notes:
     Within a block of points with random parts s_i and a shared part t the covariance is V = diag(s_i^2) + t^2 1 1^T.
     All runs of a line may share an error besides, u^2 1 1^T over the line. With a_i = 1/s_i, divided by s_i and less
     the share 1 - 1/sqrt(1 + t^2 sum a_i^2) of what lies along a, a deviation is white; of what all runs of a line share
     then, as much is taken out in the same way. A point of weight w has s_i^2 = s^2/w; without weight it is not there,
     for shared errors either.
+
+    Beside a model error of standard deviation e the covariance that whitens is diag(s_i^2) + e^2 R R^T, R = 1 where a
+    row repeats an operating point. What runs and lines share stays out of these weights: the model's own error differs
+    from level to level as well, and a level must not count less for an error of the rig that is smaller.
 """
 
 from collections.abc import Hashable
@@ -15,6 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.common_error import ErrorProducts
 from bushfit.fitting.noise import SweepNoise
 
 
@@ -36,6 +43,11 @@ class _Shared:
     def group(self) -> Array:
         """Number of the group that each point belongs to, (n,)."""
         return np.repeat(np.arange(self.starts.size), np.diff(self.starts, append=self.unit.shape[-1]))
+
+    @property
+    def log_size(self) -> float:
+        """Natural log of the determinant of 1 + variance unit unit^T, all groups."""
+        return float(np.sum(np.log1p(self.variance * self.weight)))
 
     @cached_property
     def weight(self) -> Array:
@@ -70,6 +82,9 @@ class Whitening:
         random: standard deviation of each point's gain and phase, as if it had all its weight, (2, n).
         noise: of the campaign's sweeps: its shared part, and how well either part is known.
         weights: share of its weight that each point has, (n,).
+        points: number of the operating point of each row, from 0, (n,).
+        model_error: standard deviation of the relative error of the model at each operating point, in phase and in
+            quadrature; 0 where noise is all that counts.
     """
 
     starts: Array
@@ -77,10 +92,65 @@ class Whitening:
     random: Array
     noise: SweepNoise
     weights: Array
+    points: Array
+    model_error: float = 0.0
 
     def whiten(self, deviation: Array) -> Array:
         """Deviations in units of noise, shared errors taken out, complex (..., n) -> (..., 2 n), all gains first."""
-        return _flat(self._line.less(self._block.less(_gain_and_phase(deviation) * self._block.unit)))
+        parts = _gain_and_phase(deviation) * self._block.unit
+        if self.model_error:
+            return _flat(self._less_points(parts))
+        return _flat(self._line.less(self._block.less(parts)))
+
+    def uncounted(self, influence: Array) -> Array:
+        """Covariance that the noise adds to an estimate beside what is counted with a model error in the weights.
+
+        Args:
+            influence: of each whitened residual, (k, 2 n).
+
+        Returns:
+            (k, k): what runs and lines share, less the independent model error.
+        """
+        parts = self._less_points(influence.reshape(-1, 2, self.weights.size)) * self._block.unit
+        order, starts = self._by_point
+        added = np.zeros((len(parts), len(parts)))
+        for variance, sums in (
+            (-np.full((2, 1), self.model_error**2), np.add.reduceat(parts[..., order], starts, axis=-1)),
+            (self._block.variance, np.add.reduceat(parts, self.starts, axis=-1)),
+            (self._line.variance, np.add.reduceat(parts, self.lines, axis=-1)),
+        ):
+            added += np.einsum("icp,cq,jcp->ij", sums, variance, sums)
+        return added
+
+    def error_products(self, deviation: Array) -> ErrorProducts:
+        """Inner products of deviations, complex (m, n), in noise that no run shares, with a model error."""
+        parts = _gain_and_phase(deviation) * self._block.unit
+        order, starts = self._by_point
+        along = np.add.reduceat((parts * self._block.unit)[..., order], starts, axis=-1)
+        return ErrorProducts(_flat(parts) @ _flat(parts).T, _flat(along), self._point.weight.ravel())
+
+    @property
+    def log_size(self) -> float:
+        """Natural log of the determinant of the covariance beside a model error, over that of the random noise."""
+        return self._point.log_size
+
+    @cached_property
+    def _by_point(self) -> tuple[Array, Array]:
+        """Rows ordered by operating point, (n,), and the place where each begins, (points,)."""
+        order = np.argsort(self.points, kind="stable")
+        return order, np.concatenate(([0], 1 + np.flatnonzero(np.diff(self.points[order]))))
+
+    @cached_property
+    def _point(self) -> _Shared:
+        """What the rows of an operating point share, in their order, in units of their own noise."""
+        order, starts = self._by_point
+        return _Shared(starts, self._block.unit[:, order], np.full((2, 1), self.model_error**2))
+
+    def _less_points(self, parts: Array) -> Array:
+        order, _ = self._by_point
+        left = np.empty_like(parts)
+        left[..., order] = self._point.less(parts[..., order])
+        return left
 
     def own(self, deviation: Array, *, shared: bool = True) -> Array:
         """Deviations over the random noise, complex (n,) -> (2, n), with `shared` less the block's likeliest error."""

@@ -164,7 +164,7 @@ class Grid:
         chosen = [known[tuple(point)] for point in _points_of(test).tolist()]
         first, random = np.array([0]), np.repeat(np.array(self.known.noise.scatter)[:, None], len(chosen), axis=1)
         noise = SweepNoise({}, self.known.noise.shared, "stated", 0)
-        whitening = Whitening(first, first, random, noise, np.ones(len(chosen)))
+        whitening = Whitening(first, first, random, noise, np.ones(len(chosen)), np.arange(len(chosen)))
         gain, phase = np.split(rows, 2, axis=-1)
         line = np.array([[1.0], [1.0j]]) * np.ones(len(chosen))
         return whitening.whiten(gain[:, chosen] + 1j * phase[:, chosen]), whitening.whiten(line)
