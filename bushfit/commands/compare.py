@@ -154,7 +154,11 @@ class ComparisonOutput:
             "schema": SCHEMA,
             "compared": [_entry_document(label, entry) for label, entry in entries],
             "pairs": [_pair_document(label, comparison) for label, comparison in comparisons],
-            "families": [_family_document(label, family) for label, family in families] or None,
+            "families": [
+                _family_document(label, family, entry.result)
+                for (label, family), (_, entry) in zip(families, entries, strict=False)
+            ]
+            or None,
             "words": [*self.advice, *self.words],
             "warnings": self.warnings,
             "command": self.command,
@@ -289,7 +293,8 @@ def _fit_families(
     families = [family if family.p is None else replace(family, p=next(adjusted)) for family in families]
     entries = []
     for family in families:
-        result = replace(result_of(family.evidence, data.bounds, model.effects), specimens=campaign.specimens)
+        result = result_of(family.evidence, data.bounds, model.effects, rig=campaign.rig)
+        result = replace(result, specimens=campaign.specimens)
         entries.append(ComparedResult(family.name, str(campaign.path), result, campaign.sweeps, campaign.sha256))
     first, notes = families[0].evidence, list[str]()
     if lack_of_fit(first.model, data_sets, first.parameters) is None:
@@ -358,14 +363,14 @@ def _pair_document(label: str, comparison: Comparison) -> Pair:
     }
 
 
-def _family_document(label: str, family: FittedFamily) -> Family:
+def _family_document(label: str, family: FittedFamily, result: Result) -> Family:
     """Fit and held-out error of a family as compare.json has them."""
     evidence, held_out = family.evidence, family.held
     return {
         "label": label,
         "name": family.name,
         "parameters": evidence.parameters,
-        "reduced_chi_square": evidence.reduced,
+        "reduced_chi_square": result.quality.reduced_chi_square if result.quality else evidence.reduced,
         "bic": evidence.bic,
         "heldout": held_out.after,
         "first_there": held_out.before,

@@ -76,7 +76,7 @@ def describe(
     """
     if NAME in evidence.model.effects:
         return None
-    fitted, correction = with_model_error(evidence.estimate, bounds)
+    fitted, correction = with_model_error(evidence.estimate, bounds, smooth=True)
     if correction is None or correction.uncertainty >= 1.0:
         return None
     harmonic = tuple(data_set.fundamental() for data_set in evidence.data_sets)

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
 from bushfit.fitting.agreement import met_within, misfits, usable
 from bushfit.fitting.assess import Stage, apart_in_temperature, covariance, measured_range, quality
@@ -114,6 +115,7 @@ def result_of(
     *,
     lacking: bool = True,
     corrected: Estimate | None = None,
+    rig: RigSettings = UNSTATED,
 ) -> Result:
     """The model with its uncertainty; a parameter at rest on a bound counts as held there.
 
@@ -124,7 +126,7 @@ def result_of(
     tests, model, error = evidence.data_sets, evidence.model, None
     found = corrected or evidence.estimate
     if lacking and not corrected:
-        found, error = with_model_error(found, bounds)
+        found, error = with_model_error(found, bounds, rig)
         model = found.solution.model
     solution = found.solution
     moving = tuple(name for name in solution.coordinates.names if name not in solution.at_bound)
@@ -133,7 +135,7 @@ def result_of(
         model,
         moving,
         cov,
-        quality(model, tests, len(moving)),
+        quality(model, tests, len(solution.coordinates.names)),
         measured_range(model, tests),
         (
             *([_CORRECTED] if corrected else []),

@@ -269,15 +269,20 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
     return Unnamed(size, (float(lengths[0]), float(lengths[1])), tuple(patches))
 
 
-def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATED) -> tuple[Estimate, Unnamed | None]:
+def with_model_error(
+    found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False
+) -> tuple[Estimate, Unnamed | None]:
     """The closest fit and its discrepancy where the tests show a lack of fit; else the fit as it is, and None.
 
     Args:
         found: least squares in the noise alone.
         bounds: limits of parameters inside their own.
         rig: the class of the rig, whose errors may explain a misfit.
+        smooth: whether only something smooth counts as a lack of fit.
     """
-    if not found.solution.coordinates.names or not _shows_misfit(found, rig):
+    if not found.solution.coordinates.names or not (
+        (not smooth and _exceeds_noise(found, rig)) or _is_smooth(found, rig)
+    ):
         return found, None
     solution, size = closest_fit(found, bounds)
     if size >= _SIZES[-1]:  # that is no error of a model, but another thing than it
@@ -291,7 +296,10 @@ def with_model_error(found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATE
     )
     whole = Discrepancy.over(_in_noise(solution, weighed), discrepancy.groups, discrepancy.lengths, MAXIMUM_NODES)
     process = Process(discrepancy.best[1] * whole.complex_shapes, discrepancy.likelihood.freedom(discrepancy.best[1]))
-    return Estimate(solution, found.data_sets, minimised, weighed, found.outliers, process), averaged(discrepancies)
+    error = averaged(discrepancies)
+    if error.typical >= _SIZES[-1]:
+        return found, None
+    return Estimate(solution, found.data_sets, minimised, weighed, found.outliers, process), error
 
 
 def closest_fit(found: Estimate, bounds: Bounds) -> tuple[Solution, float]:
@@ -360,8 +368,8 @@ def model_error_warning(error: Unnamed) -> str:
     )
 
 
-def _shows_misfit(found: Estimate, rig: RigSettings) -> bool:
-    """Whether the tests show more than noise and a rig of the class make, by chi-square or as something smooth."""
+def _exceeds_noise(found: Estimate, rig: RigSettings) -> bool:
+    """Whether chi-square of all tests, or of one, exceeds what noise and a rig of the class make."""
     data_sets, residual = found.minimised, found.solution.residual
     errors = [_errors_of_class(data_set, rig) for data_set in data_sets]
     squares = [
@@ -371,9 +379,12 @@ def _shows_misfit(found: Estimate, rig: RigSettings) -> bool:
     counts = [data_set.counted for data_set in data_sets]
     freedom = max(sum(counts) - len(found.solution.coordinates.names), 1)
     pairs = [(sum(squares), freedom), *zip(squares, counts, strict=True)]
-    if any(beyond_noise(square / count, count) is not None for square, count in pairs if count):
-        return True
-    thinned = _thinned(data_sets)
+    return any(beyond_noise(square / count, count) is not None for square, count in pairs if count)
+
+
+def _is_smooth(found: Estimate, rig: RigSettings) -> bool:
+    """Whether the tests are likelier with something smooth beside noise and a rig of the class, prior odds counted."""
+    thinned = _thinned(found.minimised)
     solution = found.solution.at(found.solution.model, thinned)
     tests = FittedTests(solution, thinned, [_errors_of_class(data_set, rig) for data_set in thinned])
     names = tuple(dict.fromkeys(tests.directions.tolist()))
