@@ -349,15 +349,30 @@ def likeliest_size(model: Model, data_sets: Sequence[DataSet], names: Sequence[s
 def log_likelihood(found: Estimate, known: Mapping[str, float]) -> float:
     """Logarithm of the restricted likelihood of a fit, the parameters that rest on no bound integrated.
 
+    Where the model misses the tests, a process stands beside the noise, its sizes and lengths integrated.
+
     Args:
         found: the fit.
         known: prior precision of parameters, by coordinate; of the others it is 0.
     """
-    solution, tests = found.solution, found.minimised
-    rows = solution.jacobian[solution.moving]
-    prior = [known.get(solution.coordinates.names[i], 0.0) for i in solution.moving]
-    size = sum(data_set.log_size for data_set in tests) + float(np.linalg.slogdet(rows @ rows.T + np.diag(prior))[1])
-    return -0.5 * (solution.chi_square + size)
+    size, names = max(data_set.model_error for data_set in found.minimised), found.solution.coordinates.names
+    bare = [replace(data_set, model_error=0.0) for data_set in _thinned(found.minimised)]
+    tests = _in_noise(found.solution, [_with_shape_error(data_set, size) for data_set in bare] if size else bare)
+    rows, residual = tests.moving, tests.solution.residual
+    information, gain = rows @ rows.T, 0.0
+    if size:
+        seen, processes = tests.seen.of(residual), _discrepancies(tests)
+        columns = [process.tests.columns(process.complex_shapes) for process in processes]
+        beside = [RestrictedLikelihood.of(rows, seen, np.empty((0, seen.size))) for rows in columns]
+        evidence = np.array([likelihood.log_evidence(_SIZES) for likelihood in beside])
+        gain = float(np.logaddexp.reduce(evidence)) - np.log(evidence.size)
+        best = int(evidence.argmax())
+        shares = columns[best] * _SIZES[beside[best].gains(_SIZES).argmax()]
+        across = shares @ tests.seen.of(tests.moving).T
+        information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
+    prior = np.diag([known.get(names[i], 0.0) for i in found.solution.moving])
+    log_size = sum(test.log_size for test in tests.data_sets) + float(np.linalg.slogdet(information + prior)[1])
+    return gain - 0.5 * (float(residual @ residual) + log_size)
 
 
 def model_error_warning(error: Unnamed) -> str:
