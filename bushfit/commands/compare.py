@@ -149,16 +149,12 @@ class ComparisonOutput:
             zip(self.labels, self.entries, strict=True),
             zip(self.labels[1:], self.comparisons, strict=True),
         )
-        families = zip(self.labels, self.families, strict=False)
+        families = zip(self.labels, self.families, self.entries, strict=False)
         return {
             "schema": SCHEMA,
             "compared": [_entry_document(label, entry) for label, entry in entries],
             "pairs": [_pair_document(label, comparison) for label, comparison in comparisons],
-            "families": [
-                _family_document(label, family, entry.result)
-                for (label, family), (_, entry) in zip(families, entries, strict=False)
-            ]
-            or None,
+            "families": [_family_document(label, family, entry.result) for label, family, entry in families] or None,
             "words": [*self.advice, *self.words],
             "warnings": self.warnings,
             "command": self.command,
