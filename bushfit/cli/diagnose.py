@@ -112,6 +112,8 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput) -> None:
     output.console.print(f"[bold]{escape(diagnosed.name)}:[/bold] [bold {colour}]{escape(diagnosed.headline)}[/]")
     for line in (diagnosed.diagnosis.summary, *odds_in_words(diagnosed.document)):
         output.console.print(f"  {escape(line)}")
+    if diagnosed.diagnosis.adopt:
+        output.console.print(f"  to adopt: {escape(diagnosed.diagnosis.adopt)}")
 
 
 def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:

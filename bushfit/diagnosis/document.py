@@ -96,7 +96,6 @@ class OddsEntry(TypedDict):
 
     words: Annotated[str, Doc("what it is.")]
     probability: Annotated[float, Doc("if anything is missing.")]
-    chances: Annotated[str, Doc("the same for people.")]
 
 
 class UsableEntry(TypedDict):

@@ -27,6 +27,8 @@ from bushfit.model.result import Alternative, Result
 from bushfit.prediction.caveats import warnings_of
 from bushfit.validation import to_json_data
 
+#: Probability above which no further digits are shown.
+_NEARLY_ONE = 0.995
 #: Probability below which nothing is told of what may be else.
 _LEAST_TOLD = 0.01
 
@@ -172,6 +174,12 @@ class Diagnosis:
     odds: Odds = Odds(1.0)
 
     @property
+    def adopt(self) -> str:
+        """Command that diagnoses the campaign with the named effects and mistakes adopted; "" where none is named."""
+        options = [f"--adopt {entry.label}" for entry in self.effects if entry.name != UNNAMED]
+        return f"bushfit diagnose CAMPAIGN {' '.join(options)}" if options else ""
+
+    @property
     def changed(self) -> bool:
         """Whether something was found that the model, or a warning with it, has to tell."""
         return self.after is not self.before
@@ -193,9 +201,7 @@ class Diagnosis:
             "verdict": self.verdict,
             "summary": self.summary,
             "nothing": self.odds.nothing,
-            "odds": [
-                {"words": words, "probability": share, "chances": chances(share)} for words, share in self.odds.told
-            ],
+            "odds": [{"words": words, "probability": share} for words, share in self.odds.told],
             "effects": [self._effect(named) for named in self.effects],
             "where": [_where(where) for where in self.where],
             "remainder": [_where(where) for where in self.remainder],
@@ -261,28 +267,33 @@ class Diagnosis:
         }
 
 
-def chances(probability: float) -> str:
-    """A probability as people say it: "9 in 10"."""
-    for of in (10, 100):
-        least = round(probability * of)
-        if 0 < least < of:
-            return f"{least} in {of}"
-    return "all but sure" if probability > 0.5 else "less than 1 in 100"
+def format_probability(probability: float) -> str:
+    """Format a probability as a percentage.
+
+    >>> format_probability(0.982), format_probability(0.9999)
+    ('98 %', 'above 99.5 %')
+    """
+    if probability > _NEARLY_ONE:
+        return f"above {100 * _NEARLY_ONE:g} %"
+    if probability < 1.0 - _NEARLY_ONE:
+        return f"below {100 * (1.0 - _NEARLY_ONE):.1g} %"
+    return f"{100 * probability:.0f} %"
 
 
 def odds_in_words(found: Mapping[str, Any]) -> list[str]:
-    """What a diagnosis tells of probabilities, a line each: what may be missing, the most probable first, and whether
-    nothing is."""
-    lines = [f"{each['chances']}: {each['words']}" for each in found["odds"]]
+    """Lines on the probabilities of a diagnosis: what may be missing, the most probable first, and that nothing is."""
+    if found["verdict"] == "consistent":
+        lines = [f"Probability that nothing is missing: {format_probability(found['nothing'])}."]
+        if 1.0 - found["nothing"] > _LEAST_TOLD:
+            small = format_probability(1.0 - found["nothing"])
+            lines.append(f"Probability of an effect too small for these tests to show: {small}.")
+        return lines
+    lines = [f"{format_probability(each['probability'])}: {each['words']}" for each in found["odds"]]
     rest = 1.0 - sum(each["probability"] for each in found["odds"])
     if lines and rest > _LEAST_TOLD:
-        lines.append(f"{chances(rest)}: something else")
+        lines.append(f"{format_probability(rest)}: another explanation")
     if lines and found["nothing"] > _LEAST_TOLD:
-        lines.append(f"{chances(found['nothing'])} that nothing is missing after all")
-    if found["verdict"] == "consistent":
-        lines = [f"{chances(found['nothing'])}: nothing is missing"]
-        if 1.0 - found["nothing"] > _LEAST_TOLD:
-            lines.append(f"{chances(1.0 - found['nothing'])}: something is, but these tests do not show it")
+        lines.append(f"Probability that nothing is missing: {format_probability(found['nothing'])}.")
     return lines
 
 

@@ -19,13 +19,14 @@ from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.priors import MOST_LEFT
-from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where, chances
+from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where, format_probability
 from bushfit.diagnosis.words import Composition, Finding
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import parted, with_gains
-from bushfit.units import number
+from bushfit.model.result import Result
+from bushfit.units import display_unit, format_aligned, number
 
 #: What is said of what was weighed and is not told, and where there is no gap.
 _LESS_LIKELY = "another explanation is likelier"
@@ -154,7 +155,7 @@ class Told:
 
     def _of_claim(self, each: Composition) -> str:
         gain = self.base.chi_square - each.best.weighed.state.evidence.chi_square
-        return f"takes {gain:.0f} off chi-square without a parameter; {self._probability(each)}"
+        return f"lowers chi-square by {gain:.0f} without a parameter; {self._probability(each)}"
 
     def _ambiguous(self) -> Diagnosis:
         told = self.finding.told
@@ -168,7 +169,7 @@ class Told:
             ]
         elif led:
             names = [Named(name, self._probability(led), others) for name in led.names]
-        words = f"these tests cannot tell {' from '.join(labels.values())}"
+        words = f"these tests cannot distinguish {' from '.join(labels.values())}"
         fitted = [each for each in told if each.best.effects and each.best.refitted]
         models = [each.best.weighed.state.evidence.model for each in fitted]
         advice = deciding_test(
@@ -182,15 +183,15 @@ class Told:
     def _without_name(self) -> Diagnosis:
         """A gap that is described where a correction stands, else unexplained, with the place at fault if one is."""
         finding = self.finding
-        lead = f"; no more than leads: {_all(finding.leads)}" if finding.leads else ""
+        lead = f"; leads: {_all(finding.leads)}" if finding.leads else ""
         spot = self.first.best if self.first and finding.verdict == "unexplained" else None
         if not spot and (found := self._described(self.base)):
             largest = [place.name for place in self.first.best.places] if self.first else []
-            words = f"a real gap stays that no known effect closes: {found.words}{lead}"
+            words = f"no known effect closes the gap: {found.words}{lead}"
             words += f"; it is largest at {_all(largest)}" if largest else ""
             names = [Named(UNNAMED, found.evidence)]
             return self._finished("described", words, found.after, names, gap=found)
-        words = "a real gap stays that no known effect closes" + lead
+        words = "no known effect closes the gap" + lead
         advice = ""
         spot = spot or (self.first.best if self.first and self.first.best.places else None)
         if spot and spot.places:
@@ -231,12 +232,14 @@ class Told:
         after = self._fitted(self._with_names(self.finding.names))
         gain = self._fitted(self.base).chi_square - after.chi_square
         beside = " with what was named beside it" if len(self.finding.names) > 1 else ""
-        return f"takes {gain:.0f} off chi-square{beside}; {self._probability(self.first)}"
+        return f"lowers chi-square by {gain:.0f}{beside}; {self._probability(self.first)}"
 
     def _probability(self, each: Composition) -> str:
         others = [other for other in self.finding.told if other is not each]
-        words = chances(each.probability)
-        return words + (f", next {self.label(others[0])} {chances(others[0].probability)}" if others else "")
+        words = f"probability {format_probability(each.probability)}"
+        if not others:
+            return words
+        return f"{words}, next {self.label(others[0])} {format_probability(others[0].probability)}"
 
     def _finished(
         self,
@@ -258,9 +261,10 @@ class Told:
         lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
         known, corrected = {*base.model.effects} - {*self.unresolved}, gap.fitted if gap else None
         where = (*(_place_where(base, each, places) for each in spots if places), *locate(base))
+        result = self.odds.averaged(result_of(after, bounds, known, lacking=lacking, corrected=corrected))
         return Diagnosis(
             verdict,
-            summary,
+            "; ".join([summary, *filter(None, (_format_amount(entry.name, result) for entry in names))]),
             tuple(names),
             where,
             where if after is base else locate(after),
@@ -269,7 +273,7 @@ class Told:
             tuple(self.candidates),
             base,
             after,
-            self.odds.averaged(result_of(after, bounds, known, lacking=lacking, corrected=corrected)),
+            result,
             self._notes(),
             gap.description if gap else None,
             self.odds,
@@ -330,6 +334,21 @@ class Told:
         unseen = [each.name for each in self.search.root.effects if not each.proposal.visible]
         blind = [name for name in unseen if not get_effect(name).under]  # what no test states is not asked for
         return (f"not identifiable from these tests: {', '.join(blind)}",) if blind else ()
+
+
+def _format_amount(name: str, result: Result) -> str:
+    """Amount of an effect in a model, with its 95 % interval; "" if the model has no such amount."""
+    if name == UNNAMED or name not in result.model.effects or (effect := get_effect(name)).replaces is not None:
+        return ""
+    amount = effect.amount
+    value, interval = (
+        result.model.values[qualified_name(effect, amount)],
+        result.interval(qualified_name(effect, amount)),
+    )
+    unit, factor = display_unit(amount.unit, 1.0, value)
+    shown, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
+    told = f"{amount.meaning or amount.name}: {f'{shown} {unit}'.removesuffix(' -').removesuffix(' 1')}"
+    return f"{told} (95 % interval {ends[0]} to {ends[1]})" if ends else told
 
 
 def _nameless(each: Composition) -> list[str]:

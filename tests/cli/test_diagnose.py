@@ -58,7 +58,7 @@ def test_the_document_names_the_effect_with_its_size_and_the_gap_before_and_afte
     assert done.stdout == (found / "diagnosis.json").read_text(encoding="utf-8")
     for words in ("case 001: named", "inertia", "95 %", "data fitted", "held out", "where", "next test:", "wrote "):
         assert words in done.stderr
-    assert "all but sure: moving mass between bushing and load cell (inertia)\n" in done.stderr
+    assert "above 99.5 %: moving mass between bushing and load cell (inertia)\n" in done.stderr
     written = document(found / "diagnosis.json")
     assert written["schema"] == "bushfit/diagnosis/3"
     assert written["verdict"] == "named"
@@ -135,7 +135,7 @@ def test_a_clean_campaign(bushfit: Run, tmp_path: Path) -> None:
     run = bushfit("diagnose", CLEAN, "-o", tmp_path / "x", "--no-plots")
     assert run.stdout == ""
     assert "consistent" in run.stderr
-    assert ": nothing is missing\n" in run.stderr
+    assert "Probability that nothing is missing: above 99.5 %.\n" in run.stderr
     written = document(tmp_path / "x" / "diagnosis.json")
     assert (written["effects"], written["odds"]) == ([], [])
     assert written["nothing"] > 0.15
