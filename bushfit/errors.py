@@ -85,7 +85,7 @@ def did_you_mean(name: str, candidates: Collection[str], *, similarity: float = 
     Returns:
         The hint, or None if no candidate is similar enough.
     """
-    near = get_close_matches(name, candidates, n=1, cutoff=similarity)
+    near = get_close_matches(name, [candidate for candidate in candidates if candidate != name], n=1, cutoff=similarity)
     return f'did you mean "{near[0]}"?' if near else None
 
 

@@ -83,7 +83,7 @@ def load_campaign(path: str | Path) -> Campaign:
             hint='add [[loops]] with file = "..." and direction = "axial"',
         )
     with error_location(path):
-        bushing = Bushing(**vars(content.bushing)) if content.bushing else None
+        bushing = content.bushing.to_bushing() if content.bushing else None
         specimens = tuple(Specimen(**vars(table)) for table in content.specimens)
         _check_places(content, specimens)
     with error_location(place="[report] logo"):
@@ -118,7 +118,7 @@ def load_bushing(path: Path) -> Bushing:
         expected = "a [bushing] table with name, inner_radius, outer_radius and length"
         raise CampaignError("there is no bushing in it", file=path, expected=expected)
     with error_location(path):
-        return Bushing(**vars(table))
+        return table.to_bushing()
 
 
 def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:

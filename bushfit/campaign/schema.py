@@ -11,7 +11,7 @@ from bushfit.campaign.quantities import Compound, ReportSettings, effect_values,
 from bushfit.effects import is_parameter, parameter_names
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
-from bushfit.geometry import TRANSLATION, Direction, Place, Shape, Specimen, SpecimenKind, StatedStrain
+from bushfit.geometry import TRANSLATION, Bushing, Direction, Place, Shape, Specimen, SpecimenKind, StatedStrain
 from bushfit.reading.measurement import Stepped, Waveform
 from bushfit.reading.resonance import FEWEST_ROWS
 from bushfit.reading.stated import PLACE_KEYS, Displacement, LoopFile, SweepFile, with_places
@@ -61,20 +61,39 @@ _SIMULATED_PLACES = converter(
 
 @dataclass(frozen=True)
 class BushingTable:
-    """[bushing]: a tube of rubber between two sleeves.
+    """[bushing]: a tube of rubber between two sleeves, by its radii or its diameters.
 
     Args:
         name: tables and plots are headed with it.
-        inner_radius, outer_radius: of the rubber, not diameters [m].
+        inner_radius, outer_radius: of the rubber [m].
+        inner_diameter, outer_diameter: in place of a radius [m].
         length: mean length of the rubber [m].
         shape: the radial formulas: the paper's as they are, or corrected by finite elements.
     """
 
     name: Name
-    inner_radius: Length
-    outer_radius: Length
     length: Length
+    inner_radius: Length | None = None
+    outer_radius: Length | None = None
+    inner_diameter: Length | None = None
+    outer_diameter: Length | None = None
     shape: Shape = "paper"
+
+    def __post_init__(self) -> None:
+        for side in ("inner", "outer"):
+            radius, diameter = getattr(self, f"{side}_radius"), getattr(self, f"{side}_diameter")
+            if (radius is None) == (diameter is None):
+                problem = f"the {side} size of the rubber is {'missing' if radius is None else 'stated twice'}"
+                expected = f"{side}_radius or {side}_diameter"
+                raise ValueError(CampaignError(problem, place=f"{side}_radius", expected=expected))
+
+    def to_bushing(self) -> Bushing:
+        """The bushing, with its radii."""
+        radii = {
+            f"{side}_radius": getattr(self, f"{side}_radius") or getattr(self, f"{side}_diameter") / 2.0
+            for side in ("inner", "outer")
+        }
+        return Bushing(self.name, length=self.length, shape=self.shape, **radii)
 
 
 @dataclass(frozen=True)

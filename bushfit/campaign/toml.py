@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from bushfit.errors import CampaignError
+from bushfit.errors import CONTROL, CampaignError
 from bushfit.geometry import Bushing, Place, Specimen
 from bushfit.reading.files import line_of, read_utf8
 from bushfit.units import CELSIUS
@@ -109,5 +109,5 @@ def toml_value(value: Any) -> str:
         return "{ " + ", ".join(f"{key} = {toml_value(entry)}" for key, entry in value.items()) + " }"
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}" for c in escaped) + '"'
+        return '"' + CONTROL.sub(lambda character: f"\\u{ord(character[0]):04x}", escaped) + '"'
     return str(value)

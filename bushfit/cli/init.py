@@ -143,7 +143,6 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
     Errors name the options, diameters where these were given and halved.
     """
     from bushfit.campaign.schema import BushingTable
-    from bushfit.geometry import Bushing
     from bushfit.validation import validate_tables
 
     table = {f"{side}_radius": _radius(side, sizes) for side in _SIDES}
@@ -152,7 +151,10 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
     table["length"] = length
     halved = [f"{side}_radius" for side in _SIDES if sizes[f"{side}_diameter"]]
     try:
-        return Bushing(**vars(validate_tables({"name": name, **table}, None, BushingTable))), table
+        bushing = validate_tables({"name": name, **table}, None, BushingTable).to_bushing()
+        if bushing.correction is not None:
+            table["shape"] = "calibrated"
+        return bushing, table
     except BushfitError as error:
         error.file = None
         if error.place:

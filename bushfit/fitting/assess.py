@@ -307,6 +307,31 @@ def apart_in_temperature(model: Model, data_sets: Sequence[DataSet]) -> list[str
     ]
 
 
+def mixed_conditions(data_sets: Sequence[DataSet]) -> list[str]:
+    """Warn of tests of the bushing that were made on several specimens, or under several preloads, and fitted as one.
+
+    Args:
+        data_sets: tests of a campaign.
+
+    Returns:
+        One sentence for each condition that differs.
+    """
+    sentences = []
+    for key, words in (("specimen_number", "of specimens"), ("preload", "under preloads of")):
+        by_value: dict[str, str] = {}
+        for data_set in data_sets:
+            conditions = data_set.source.conditions if data_set.source else {}
+            if key in conditions and isinstance(data_set.direction, Direction):
+                by_value.setdefault(str(conditions[key]), data_set.name)
+        if len(by_value) > 1:
+            listed = ", ".join(f"{value} ({name})" for value, name in by_value.items())
+            sentences.append(
+                f"the tests were made {words} {listed}, and one model is fitted to all: fit those of each by "
+                "themselves, in a campaign of their own"
+            )
+    return sentences
+
+
 def unfitted(model: Model, data_sets: Sequence[DataSet], advice: str) -> list[str]:
     """A sentence on the tests of each place that a model was not fitted to and misses by more than their noise."""
     off: dict[str, list[tuple[float, float, str]]] = {}

@@ -13,7 +13,7 @@ from bushfit.campaign.session import measured_session
 from bushfit.effects import BASE, effect_name_of, get_effect, with_base
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError, error_location
-from bushfit.fitting.assess import refuse_strain
+from bushfit.fitting.assess import mixed_conditions, refuse_strain
 from bushfit.fitting.coordinates import Bounds, residual
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data, with_level_errors
 from bushfit.fitting.design import designed
@@ -73,7 +73,8 @@ class Data:
     @property
     def notes(self) -> list[str]:
         """What is odd about the tests themselves, whatever is fitted to them."""
-        return [f"{test.name}: {note}" for test in self.data_sets for note in test.notes]
+        of_tests = [f"{test.name}: {note}" for test in self.data_sets for note in test.notes]
+        return [*of_tests, *mixed_conditions(self.data_sets)]
 
     @property
     def assumed(self) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign.campaign import TEST_FILES
-from bushfit.errors import BushfitError, NoColumnError, NoTestError
+from bushfit.errors import BushfitError, NoColumnError, NoTestError, printable
 from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.geometry import Direction
 from bushfit.inspection.labels import temperatures_of
@@ -53,7 +53,7 @@ class Source:
 
 
 def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Source], tuple[str, ...]]:
-    """The tests among files, the sheets of workbooks, and the files of folders, of which no deeper ones are opened.
+    """The tests among files, the sheets of workbooks, and the files of folders and of the folders in them.
 
     A file that the user names and that is no workbook with several sheets is not opened. `stated` are the keys of
     [[loops]] and [[sweeps]] that the user states. A sentence is told for each file and sheet that holds no test.
@@ -177,14 +177,25 @@ def _needs(file: Path, key: str, role: str, stated: Mapping[str, Any]) -> bool |
 
 
 def _in_folder(folder: Path) -> tuple[list[Source], list[str]]:
-    """The files of a folder that may hold tests, in order of their names, and why the others do not."""
+    """Files of a folder, and of the folders in it, that may hold tests, in order of their names, and a sentence on each
+    of the others."""
     files: list[Source] = []
     left_out: list[str] = []
-    for path in sorted(path for path in folder.iterdir() if not path.name.startswith((".", "~$"))):
-        if path.is_file() and path.suffix.lower() in TEST_FILES:
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith((".", "~$")):
+            continue
+        if not path.exists():
+            left_out.append(f"{printable(str(path))}: a link that leads nowhere")
+        elif printable(path.name) != path.name:
+            left_out.append(f"{printable(str(path))}: its name holds characters that are no text; rename it")
+        elif path.is_dir() and not path.is_symlink():
+            inner_files, inner_left_out = _in_folder(path)
+            files += inner_files
+            left_out += inner_left_out
+        elif path.is_file() and path.suffix.lower() in TEST_FILES:
             files.append(Source(path, is_named=False))
         else:
-            left_out.append(f"{path}: {'a folder' if path.is_dir() else 'no table, by its ending'}")
+            left_out.append(f"{path}: {'a link to a folder' if path.is_dir() else 'no table, by its ending'}")
     return files, left_out
 
 

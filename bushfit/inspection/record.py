@@ -12,7 +12,7 @@ from typing_extensions import Doc, TypedDict
 
 from bushfit.campaign.toml import specimen_lines, toml_value
 from bushfit.effects.contract import Array
-from bushfit.errors import CampaignError
+from bushfit.errors import CampaignError, printable
 from bushfit.geometry import Place, Specimen
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.measurement import Loop, Sweep
@@ -103,15 +103,18 @@ class Inspected:
     @property
     def label(self) -> str:
         """The name of the file, with the sheet where it has several, and with what columns tell of the test."""
-        direction = self.direction if "direction" in [one.role for one in self.columns] else None
-        added = {word_for_part(self.file): self.entry.get("sheet"), "direction": direction, "part": self.part}
+        in_columns = {column.role for column in self.columns}
+        direction = self.direction if "direction" in in_columns else None
+        part = self.part if "specimen number" in in_columns else None
+        added = {word_for_part(self.file): self.entry.get("sheet"), "direction": direction, "part": part}
         added |= self.entry.get("rows", {})
         return ", ".join([self.file.name, *(f"{key} {value}" for key, value in added.items() if value)])
 
     @property
     def part(self) -> str | None:
-        """The number of its specimen as a column tells it; None where none does."""
-        return self.entry["specimen_number"] if "specimen number" in [one.role for one in self.columns] else None
+        """Number of its specimen by a column, the file's name or the lines above its table; None if it is not known."""
+        number: str | None = self.entry.get("specimen_number")
+        return number
 
     @property
     def is_counting_open(self) -> bool:
@@ -156,7 +159,8 @@ def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[
     head = _key_lines({"name": name, **(bushing or {})})
     order = [seen for kind in _TABLES for seen in files if seen.kind == kind]
     tables = [*_specimens(files), *(file_text(seen, folder) for seen in order)]
-    return "\n".join([*(["[bushing]"] if bushing else []), *head, "", *tables])
+    report = '# [report] heads the report: customer = "...", part_number = "...", drawing, laboratory, date, logo\n'
+    return "\n".join([*(["[bushing]"] if bushing else []), *head, "", *tables, report])
 
 
 def campaigns_of_parts(
@@ -173,7 +177,7 @@ def campaigns_of_parts(
             "nothing says of which part this is",
             file=files[of_parts.index(None)].file,
             found=f"parts {', '.join(dict.fromkeys(filter(None, of_parts)))} in others",
-            expected="a column for the part in every file, or the tests of one part",
+            expected="a number of the specimen in every file, or the tests of one part",
             hint="--specimen-number takes the tests of one part, and counts for files without such a column",
         )
     texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n"}
@@ -230,6 +234,7 @@ def file_text(seen: Inspected, folder: Path | None = None) -> str:
         name = Path(os.path.relpath(seen.file, folder)).as_posix() if folder else name
     direction = f'"{seen.direction}"' if seen.direction else '"..."  # axial or radial: the file does not say'
     if seen.kind == "history":
+        name = printable(name)
         word = f'"{name}"' if " " in name else name
         stated = seen.direction or "..."
         return f"# {name} is a raw history: bushfit reduce {word} --direction {stated} makes a sweep of it\n"

@@ -21,6 +21,8 @@ _ROWS_PER_HARMONIC = 5
 _HARMONICS, _FREQUENCY_HARMONICS = 15, 3
 #: Condition number of the scaled normal equations up to which rows tell harmonics apart; chosen: errors grow tenfold.
 _WORST_CONDITION = 100.0
+#: Columns up to which rows may be too few to tell them apart, and the relative singular value that shows it.
+_FEW_COLUMNS, _SINGULAR = 5, 1e-12
 #: Terms of the drift of a step: mean, slope and curvature.
 _DRIFT_TERMS = 3
 #: Rows of a step that are fitted at a time, so that their harmonics stay in a core's cache, and that are enough to
@@ -53,7 +55,10 @@ def least_squares(columns: Floats, values: Floats, weight: NDArray[Any] | None =
     The columns are of `basis`, (n, k): nearly orthogonal over whole cycles, so that normal equations lose no digits.
     """
     weighed = columns.T if weight is None or np.all(weight == 1.0) else columns.T * weight
-    return np.linalg.solve(weighed @ columns, weighed @ values)
+    gram, moments = weighed @ columns, weighed @ values
+    if len(gram) <= _FEW_COLUMNS:  # four rows a cycle do not tell two harmonics apart
+        return np.asarray(np.linalg.lstsq(gram, moments, rcond=_SINGULAR)[0])
+    return np.linalg.solve(gram, moments)
 
 
 def as_complex(real: Floats) -> Complex:

@@ -114,19 +114,20 @@ def test_a_direction_that_is_stated_contradicts_no_file(
     typed: Run, tests: list[Path], tmp_path: Path, name: str, header: str, says: str, other: str
 ) -> None:
     """A sheet's name goes before the file's, that before headers, units of an angle before all."""
-    table, file = pd.read_csv(tests[1]).rename(columns={"stiffness [N/mm]": header}), tmp_path / "lab" / name
+    table, file = pd.read_csv(tests[1]).rename(columns={"stiffness [N/mm]": header}), tmp_path / "bench" / name
     table = table.rename(columns={"amplitude [mm]": "amplitude [deg]"} if says == "torsion" else {})
-    (tmp_path / "lab/plain.csv").write_bytes(tests[1].read_bytes())
+    file.parent.mkdir()
+    (tmp_path / "bench/plain.csv").write_bytes(tests[1].read_bytes())
     if file.suffix == ".xlsx":
         table.to_excel(file, sheet_name="Radial", index=False)
     else:
         table.to_csv(file, index=False)
-    for command in (("init", "lab", *GEOMETRY), ("init", file, *GEOMETRY), ("inspect", file, "--no-plots")):
+    for command in (("init", "bench", *GEOMETRY), ("init", file, *GEOMETRY), ("inspect", file, "--no-plots")):
         done = typed(*command, "--direction", other, "-o", "x", status=2)
         refused(done, tmp_path / "x", "leave --direction out")
         assert re.search(rf"{name}, .* says? {says}, and --direction {other}\n", done.stderr)
     typed("init", file, *GEOMETRY, "--direction", says, "-o", "x")
-    typed("init", "lab/plain.csv", *GEOMETRY, "--direction", other, "-o", "y")
+    typed("init", "bench/plain.csv", *GEOMETRY, "--direction", other, "-o", "y")
 
 
 def test_a_file_that_names_a_direction_is_no_block_in_shear(typed: Run, tests: list[Path], tmp_path: Path) -> None:
