@@ -115,7 +115,6 @@ def test_a_visit_makes_a_campaign_that_fits(
         "Notizen.txt: there is only one column",
         "Bild.png: no table, by its ending",
         "alt.xlsx: ",
-        "2023: a folder",
     ):
         assert words in done.stderr, done.stderr
     assert "hidden" not in done.stderr
