@@ -194,7 +194,7 @@ class _Curves:
         """Median, range of the parts that do not differ, and the curves of those that do."""
         pairs = zip(batch.parts, self.values, strict=True)
         singles = {part.name: curve for part, curve in pairs if part.deviations and part.curve}
-        return picture(plots.curves_figure(self.headers, self.values[self.usual], singles), "c")
+        return picture(plots.curves_figure(self.headers, self.values[self.usual], singles), "curves")
 
     def sparkline(self, index: int, *, differs: bool) -> Markup:
         """Deviation of a curve from the median over the points, with the range of the parts that do not differ."""

@@ -221,7 +221,10 @@ def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Ar
         axes.plot(x, values, color=look.color, marker=look.marker, lw=_STROKE, **style.POINT, label=shortened(name, 24))
     style.label_axes(axes, x_label, f"|K| [{unit}]", x)
     axes.legend(fontsize=style.SMALL, frameon=False)
-    return figure
+    names = f" Single curves: {', '.join(named)}." if named else ""
+    return style.explained(
+        figure, f"Measured, without a model: median of the parts, and range of those that do not differ (grey).{names}"
+    )
 
 
 @style.in_own_style

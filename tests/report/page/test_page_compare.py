@@ -147,7 +147,8 @@ def test_the_page_shows_each_curve_against_the_batch_and_who_differs(made: Path)
     rows = re.findall(r'<tr><th scope="row" align="left">(?:<a [^>]*>)?([^<]*)', page.partition('id="h-rows"')[2])
     assert max(numbers[rows.index(f"part_{SOFT}")]) < -5.0 < 5.0 < max(numbers[rows.index(f"part_0{LOSSY}")])
     assert {f"part_{SOFT}", f"part_0{LOSSY}"} < set(rows[:8]), "what differs is among those that come first"
-    assert any(alt.endswith("single curves: part_07, part_20") for alt in alts)
+    assert any(alt.endswith("Single curves: part_07, part_20") for alt in alts)
+    assert loads(page) == []
     for words in ("2 differ from the others", "SN 907", "part_20 fails: mu 0.", "Differs from the others: mu -3"):
         assert words in found.text
 
