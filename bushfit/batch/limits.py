@@ -25,6 +25,7 @@ from pydantic import ConfigDict, Field, ValidationInfo
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import (
+    FIT_NAMES,
     FIT_QUALITY,
     LOSS_FACTOR,
     STIFFNESS,
@@ -244,11 +245,11 @@ class Judgement:
     """Result of a part, the limits it misses, and those that it passes conditionally or that were not judged.
 
     Args:
-        result: the worst of all.
+        result: the worst of all; None without limits.
         misses, doubtful: sentences by the name of the quantity.
     """
 
-    result: LimitResult = "pass"
+    result: LimitResult | None = "pass"
     misses: Mapping[str, str] = field(default_factory=dict)
     doubtful: Mapping[str, str] = field(default_factory=dict)
 
@@ -281,7 +282,7 @@ def judge_part(
         if estimate is None:
             add(name, "fail", f"{name} is not known")
             continue
-        if poor and name not in {quantity.name for quantity in FIT_QUALITY.values()}:
+        if poor and name not in FIT_NAMES:
             if name not in record.measured:
                 add(name, "not judged", f"{name} not judged: poor fit")
                 continue

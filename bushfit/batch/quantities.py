@@ -103,6 +103,7 @@ class Quantity:
 #: Quality of the fit: NRMSE is the relative root mean square difference of model and tests, reduced chi-square the mean
 #: square residual in units of noise. The keys are those of a limits file.
 FIT_QUALITY = {"nrmse": Quantity("NRMSE", "-"), "reduced_chi_square": Quantity("reduced chi-square", "-")}
+FIT_NAMES = frozenset(quantity.name for quantity in FIT_QUALITY.values())
 #: Quantities at an operating point: |K|, and K''/K'.
 STIFFNESS, LOSS_FACTOR = "stiffness", "loss factor"
 

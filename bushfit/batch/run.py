@@ -129,7 +129,7 @@ def _run_rows(plan: BatchPlan, workers: Workers, warn: Callable[[str], object]) 
         records[number] = replace(record, inputs={}, files={})  # only a later run asks for these
         kept += was_kept
         failed[record.status == "failed"] += 1
-    return BatchResult(plan, records, kept, time.perf_counter() - start, notes)
+    return BatchResult.from_records(plan, records, kept, time.perf_counter() - start, notes)
 
 
 def _files(result: BatchResult) -> list[ResultFile]:

@@ -15,7 +15,7 @@ from bushfit.batch.comparison import FEWEST, capability, find_outliers, smallest
 from bushfit.batch.document import RowFile
 from bushfit.batch.limits import Judgement, Limits, describe_poor_fit, judge_part, resolve_limits
 from bushfit.batch.manifest import Row
-from bushfit.batch.quantities import FIT_QUALITY, STIFFNESS, Quantity, list_quantities, parse_point, point_quantity
+from bushfit.batch.quantities import FIT_NAMES, STIFFNESS, Quantity, list_quantities, parse_point, point_quantity
 from bushfit.batch.row import RowTask
 from bushfit.batch.store import ROWS_FOLDER
 from bushfit.effects import is_parameter
@@ -73,124 +73,109 @@ class BatchResult:
         records: of the rows, in the order of the manifest.
         kept: how many were kept from an earlier run.
         seconds: that the run took [s].
-        notes: on results of an earlier batch in the folder.
+        figures: value, low and high end of the 95 % interval, and standard error by quantity [SI], (4, n); NaN if
+            unknown.
+        quantities: all quantities of the batch by name.
+        allowed: lowest and highest allowed value of each quantity with limits [SI].
+        judgements: result of each part against the limits; None without limits, and for a row that failed.
+        poor_fits: how far the model of each part misses its tests, in words; empty if it does not.
+        curves: measured |K| at each point of the curve that most parts share, by column, (n,), NaN where not measured.
+        curve_deviation: of each measured curve from the median, relative, geometric mean over its points, (n,).
+        compared: values and standard errors that the parts are compared by, by name, (n,) each.
+        deviations: of each part from the others, in their standard deviations, by name, (n,).
+        outliers: whether each part differs from the others beyond chance, by name, (n,).
+        notes: on limits that were not judged and on results of an earlier batch.
     """
 
     plan: BatchPlan
     records: Sequence[RowFile]
     kept: int
     seconds: float
-    notes: Sequence[str] = ()
+    figures: Mapping[str, Array]
+    quantities: Mapping[str, Quantity]
+    allowed: Mapping[str, tuple[float, float]]
+    judgements: Sequence[Judgement | None]
+    poor_fits: Sequence[str]
+    curves: Mapping[str, Array]
+    curve_deviation: Array
+    compared: Mapping[str, tuple[Array, Array]]
+    deviations: Mapping[str, Array]
+    outliers: Mapping[str, Array]
+    notes: Sequence[str]
 
-    @cached_property
-    def figures(self) -> dict[str, Array]:
-        """Value, low and high end of the 95 % interval, and standard error by quantity [SI], (4, n); NaN if unknown."""
-        figures = dict[str, Array]()
-        for index, record in enumerate(self.records):
+    @classmethod
+    def from_records(
+        cls, plan: BatchPlan, records: Sequence[RowFile], kept: int, seconds: float, notes: Sequence[str]
+    ) -> BatchResult:
+        """Judge the parts by the limits and compare them with each other.
+
+        Args:
+            plan: the batch.
+            records: of the rows, in the order of the manifest.
+            kept: how many were kept from an earlier run.
+            seconds: that the run took [s].
+            notes: on results of an earlier batch in the folder.
+        """
+        figures, limits = dict[str, Array](), plan.limits
+        for index, record in enumerate(records):
             for name, estimate in record.quantities.items():
-                column = figures.setdefault(name, np.full((4, len(self.records)), np.nan))
+                column = figures.setdefault(name, np.full((4, len(records)), np.nan))
                 numbers = (estimate.value, estimate.low, estimate.high, estimate.stderr)
                 column[:, index] = np.array(numbers, dtype=float)
-        return figures
-
-    @cached_property
-    def quantities(self) -> dict[str, Quantity]:
-        """All quantities of the batch by name."""
-        return list_quantities(self.figures, self.plan.task.points)
-
-    @cached_property
-    def poor_fits(self) -> list[str]:
-        """How far the model of each part misses its tests, in words; empty if it does not."""
-        return [describe_poor_fit(record, self.plan.limits) for record in self.records]
-
-    @cached_property
-    def allowed(self) -> dict[str, tuple[float, float]]:
-        """Lowest and highest allowed value of each quantity with limits [SI]."""
-        return self._resolved[0]
-
-    @cached_property
-    def _resolved(self) -> tuple[dict[str, tuple[float, float]], list[str]]:
-        values = {name: figures[0] for name, figures in self.figures.items()}
-        return resolve_limits(self.plan.limits, values) if self.plan.limits else ({}, [])
-
-    @cached_property
-    def judgements(self) -> list[Judgement | None]:
-        """Result of each part against the limits; None without limits, and for a row that failed."""
-        limits = self.plan.limits
-        if limits is None:
-            return [None] * len(self.records)
-        return [
-            judge_part(record, limits, self.allowed, self.quantities) if record.status == "done" else None
-            for record in self.records
+        quantities = list_quantities(figures, plan.task.points)
+        values = {name: column[0] for name, column in figures.items()}
+        allowed, idle = resolve_limits(limits, values) if limits else ({}, [])
+        judgements = [
+            judge_part(record, limits, allowed, quantities) if limits and record.status == "done" else None
+            for record in records
         ]
-
-    @cached_property
-    def curves(self) -> dict[str, Array]:
-        """Measured |K| at each point of the curve that most parts share, by column, (n,), NaN where not measured.
-
-        Empty if fewer than five parts share one.
-        """
-        shared = Counter(tuple(record.curve) for record in self.records if record.curve).most_common(1)
-        curves = dict[str, Array]()
-        for point in shared[0][0] if shared and shared[0][1] >= FEWEST else ():
-            column = point_quantity(parse_point(point), STIFFNESS)
-            values = np.array([record.curve.get(point, np.nan) for record in self.records])
-            curves[f"measured {column.header}"] = column.factor * values
-        return curves
-
-    @cached_property
-    def curve_deviation(self) -> Array:
-        """Deviation of each measured curve from the median, relative, geometric mean over its points, (n,)."""
-        values = np.log([*self.curves.values()])
-        return np.asarray(np.expm1(np.mean(values - np.nanmedian(values, axis=1, keepdims=True), axis=0)))
-
-    @cached_property
-    def compared(self) -> dict[str, tuple[Array, Array]]:
-        """Values and standard errors that the parts are compared by, by name, (n,) each.
-
-        Not compared are the quality of a fit, parameters at a bound, and what a poor fit determines.
-        """
-        poor, compared = np.array([bool(reason) for reason in self.poor_fits]), dict[str, tuple[Array, Array]]()
-        for name in (name for name in self.quantities if name in self.figures and name not in _FIT_NAMES):
-            value, low, high, stderr = self.figures[name]
-            at_bound = np.array([name in record.at_bound for record in self.records])
+        poor_fits = [describe_poor_fit(record, limits) for record in records]
+        curves = _shared_curve(records)
+        logarithms = np.log([*curves.values()])
+        deviation = logarithms - np.nanmedian(logarithms, axis=1, keepdims=True) if curves else np.empty((0, 0))
+        curve_deviation = np.expm1(deviation.mean(axis=0)) if curves else np.full(len(records), np.nan)
+        # not compared are the quality of a fit, parameters at a bound, and what a poor fit determines
+        compared, poor = dict[str, tuple[Array, Array]](), np.array([bool(reason) for reason in poor_fits])
+        for name in (name for name in quantities if name in figures and name not in FIT_NAMES):
+            value, low, high, stderr = figures[name]
+            at_bound = np.array([name in record.at_bound for record in records])
             errors = np.where(np.isfinite(stderr), stderr, (high - low) / (2.0 * Z95))
             compared[name] = np.where(at_bound | poor, np.nan, value), errors
-        if self.curves:
-            compared[_CURVE] = self.curve_deviation, np.full(len(self.records), np.nan)
-        return {name: pair for name, pair in compared.items() if np.isfinite(pair[0]).sum() >= FEWEST}
-
-    @cached_property
-    def outliers(self) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Deviations by quantity in standard deviations, and which parts differ, as `find_outliers` returns them."""
-        return find_outliers(self.compared)
+        compared[_CURVE] = curve_deviation, np.full(len(records), np.nan)
+        compared = {name: pair for name, pair in compared.items() if np.isfinite(pair[0]).sum() >= FEWEST}
+        return cls(
+            plan, records, kept, seconds, figures, quantities, allowed, judgements, poor_fits, curves,
+            curve_deviation, compared, *find_outliers(compared), [*idle, *notes],
+        )  # fmt: skip
 
     @cached_property
     def document(self) -> BatchFile:
         """The results as `batch.json` has them."""
-        parts = [self._part(index) for index in range(len(self.records))]
-        names = {
-            status: [part.name for part in parts if part.result == status]
-            for status in ("conditional pass", "not judged", "conditional fail", "fail")
-        }
-        missed = [part.name for part in parts if part.misses]
-        failed = [part.name for part in parts if part.error]
-        differ = [part.name for part in parts if part.deviations]
+        columns = {name: quantity.tabled for name, quantity in self.quantities.items() if name in self.figures}
+        labels = self.labels
+        parts = [self._part(index, columns, labels) for index in range(len(self.records))]
         count = int(max((np.isfinite(values).sum() for values, _ in self.compared.values()), default=0))
+        names = {
+            "failed": [part.name for part in parts if part.error],
+            "missed": [part.name for part in parts if part.misses],
+            "conditional": [part.name for part in parts if part.result == "conditional pass" and not part.misses],
+            "not judged": [part.name for part in parts if part.result == "not judged"],
+            "differ": [part.name for part in parts if part.deviations],
+        }
         return BatchFile(
             title=self.plan.title,
             rows=len(parts),
-            done=len(parts) - len(failed),
-            failed=failed,
+            done=len(parts) - len(names["failed"]),
             limits=Counter(part.result for part in parts if part.result),
-            missed=missed,
-            conditional=[name for name in names["conditional pass"] if name not in missed],
+            failed=names["failed"],
+            missed=names["missed"],
+            conditional=names["conditional"],
             not_judged=names["not judged"],
-            differ=differ,
-            headline=self._headline(len(parts), missed, names["not judged"], failed, differ),
+            differ=names["differ"],
+            headline=self._headline(names),
             warnings=self._warnings(),
             detectable=smallest_deviation(count, len(self.compared)),
-            quantities={column.header: self._quantity(name, column) for name, column in self._columns.items()},
+            quantities={column.header: self._quantity(name, column) for name, column in columns.items()},
             curve_points=[*self.curves],
             parts=parts,
         )
@@ -201,23 +186,18 @@ class BatchResult:
         whole = replace(self.document, kept=self.kept, seconds=round(self.seconds, 3))
         return cast("Mapping[str, Any]", to_json_data(whole, BatchFile))
 
-    @property
-    def _columns(self) -> dict[str, Quantity]:
-        """Quantities that a part has, in the unit of their column, by name."""
-        return {name: quantity.tabled for name, quantity in self.quantities.items() if name in self.figures}
-
     def _quantity(self, name: str, column: Quantity) -> QuantityTable:
         values = self.figures[name][0] * column.factor
         known = values[np.isfinite(values)]
         median, sigma = scatter(known)
         detectable = None
         if name in self.compared:
-            usual = values[np.isfinite(self.compared[name][0]) & ~self.outliers[1][name]]
+            usual = values[np.isfinite(self.compared[name][0]) & ~self.outliers[name]]
             limit = smallest_deviation(int(np.isfinite(self.compared[name][0]).sum()), len(self.compared))
             detectable = limit and limit * float(usual.std(ddof=1))
         low, high = (end * column.factor for end in self.allowed.get(name, (-np.inf, np.inf)))
         fixed = self.plan.limits.bounds[name].fixed if self.plan.limits and name in self.allowed else (-np.inf, np.inf)
-        fixed = fixed if name not in _FIT_NAMES else (-np.inf, np.inf)
+        fixed = fixed if name not in FIT_NAMES else (-np.inf, np.inf)
         cp, cpk = capability(known, *(end * column.factor for end in fixed))
         ends = (end if np.isfinite(end) else None for end in (low, high))
         least, most = ends
@@ -225,39 +205,35 @@ class BatchResult:
             parts=known.size, median=median, sigma=sigma, detectable=detectable, min=least, max=most, cp=cp, cpk=cpk
         )
 
-    def _part(self, index: int) -> PartTable:
-        row, record, judgement = self.plan.rows[index], self.records[index], self.judgements[index]
-        deviations, differs = self.outliers
-        beyond = {name: float(deviations[name][index]) for name in differs if differs[name][index]}
+    def _part(self, index: int, columns: Mapping[str, Quantity], labels: Mapping[str, Sequence[str]]) -> PartTable:
+        row, record, judgement = self.plan.rows[index], self.records[index], self.judgements[index] or Judgement(None)
+        beyond = {
+            name: float(self.deviations[name][index]) for name, differs in self.outliers.items() if differs[index]
+        }
         beyond = dict(sorted(beyond.items(), key=lambda item: (not is_parameter(item[0]), -abs(item[1]))))
-        values = [self.figures[name][0, index] * column.factor for name, column in self._columns.items()]
+        relative = {_CURVE: self.curve_deviation[index]}
+        for name in beyond.keys() - {_CURVE}:
+            relative[name] = self.figures[name][0, index] / np.nanmedian(self.figures[name][0]) - 1.0
+        values = [self.figures[name][0, index] * column.factor for name, column in columns.items()]
         curve = [float(column[index]) for column in self.curves.values()]
         return PartTable(
             name=row.name,
             folder=f"{ROWS_FOLDER}/{row.folder}" if record.status == "done" else "",
             error=" ".join(record.error.split()),
-            result=judgement.result if judgement else None,
-            misses=judgement.misses if judgement else {},
-            doubtful=judgement.doubtful if judgement else {},
+            result=judgement.result,
+            misses=judgement.misses,
+            doubtful=judgement.doubtful,
             poor_fit=self.poor_fits[index],
             deviations={name: round(z, 2) for name, z in beyond.items()},
-            differs="; ".join(f"{name} {self._relative(name, index)}" for name in beyond),
+            differs="; ".join(f"{name} {number(100.0 * relative[name], 3, '+')} %" for name in beyond),
             warnings=record.warnings,
-            labels={name: texts[index] for name, texts in self._labels.items()},
+            labels={name: texts[index] for name, texts in labels.items()},
             values=[float(value) if np.isfinite(value) else None for value in values],
             curve=curve if curve and np.isfinite(curve).all() else None,
         )
 
-    def _relative(self, name: str, index: int) -> str:
-        """Deviation of a part from the median of the batch in per cent."""
-        if name == _CURVE:
-            return f"{number(100.0 * self.curve_deviation[index], 3, '+')} %"
-        values = self.figures[name][0]
-        median = float(np.nanmedian(values))
-        return f"{number(100.0 * (values[index] / median - 1.0), 3, '+')} %" if median else "above zero"
-
-    @cached_property
-    def _labels(self) -> dict[str, list[str]]:
+    @property
+    def labels(self) -> dict[str, list[str]]:
         """Texts of each row in the table, by column."""
         records, labels = self.records, dict[str, list[str]]()
         if any(row.settings.diagnoses for row in self.plan.rows):
@@ -270,21 +246,22 @@ class BatchResult:
         labels["subgroup"] = [row.subgroup or "" for row in self.plan.rows]
         return labels
 
-    def _headline(
-        self, count: int, missed: Sequence[str], unjudged: Sequence[str], failed: Sequence[str], differ: Sequence[str]
-    ) -> str:
+    def _headline(self, names: Mapping[str, Sequence[str]]) -> str:
+        count, missed, failed = len(self.records), len(names["missed"]), len(names["failed"])
         parts = "1 part" if count == 1 else f"{count} parts"
         if self.plan.limits is None:
-            first = f"{count - len(failed)} of {parts} evaluated" if failed else f"{parts} evaluated"
+            clauses = [f"{count - failed} of {parts} evaluated" if failed else f"{parts} evaluated"]
         elif missed:
-            first = f"{len(missed)} of {parts} fail{'s' * (len(missed) == 1)}"
+            clauses = [f"{missed} of {parts} fail{'s' * (missed == 1)}"]
         else:
-            first = f"{count - len(failed) - len(unjudged)} of {parts} pass"
-        clauses = [first]
-        clauses += [f"{len(unjudged)} not judged: poor fit"] if unjudged else []
-        clauses += [f"{len(failed)} could not be evaluated"] if failed else []
-        clauses += [f"{len(differ)} differ{'s' * (len(differ) == 1)} from the others"] if differ else []
-        return "; ".join(clauses)
+            clauses = [f"{count - failed - len(names['not judged'])} of {parts} pass"]
+        counted = {
+            "not judged: poor fit": len(names["not judged"]),
+            "could not be evaluated": failed,
+            "differ from the others": len(names["differ"]),
+        }
+        clauses += [f"{number} {words}" for words, number in counted.items() if number]
+        return "; ".join(clauses).replace("1 differ from", "1 differs from")
 
     def _warnings(self) -> list[str]:
         """Warnings of the whole batch, the important ones first."""
@@ -299,7 +276,7 @@ class BatchResult:
         if poor:
             judged = ", and their limits are judged on measured points where there are some" if self.plan.limits else ""
             warnings.append(f"the model misses the tests of {_listed(poor)}: do not use its parameters{judged}")
-        warnings += self._resolved[1]
+        warnings += self.notes
         if at_bound:
             clauses = [f"{parameter} of {_listed(parts)}" for parameter, parts in at_bound.items()]
             warnings.append(f"at a bound of the fit, which the tests do not determine: {'; '.join(clauses)}")
@@ -308,7 +285,7 @@ class BatchResult:
             warnings.append(
                 f"a point is outside the tested range, where no test confirms the model: {_listed(outside)}"
             )
-        return [*warnings, *self.notes]
+        return warnings
 
     def table(self) -> pd.DataFrame:
         """A row for each part, in the order of the manifest, with a unit in every header.
@@ -326,26 +303,26 @@ class BatchResult:
             "error": [part.error for part in parts],
         }
         if self.plan.limits:
-            texts["limits"] = [judged.result if judged else "" for judged in judgements]
+            texts["limits"] = [(judged and judged.result) or "" for judged in judgements]
             texts["out of limits"] = ["; ".join(judged.misses.values()) if judged else "" for judged in judgements]
             texts["on the edge"] = ["; ".join(judged.doubtful.values()) if judged else "" for judged in judgements]
         last = ("on a bound", "campaign name", "subgroup")
-        texts |= {name: column for name, column in self._labels.items() if name not in last}
+        texts |= {name: column for name, column in self.labels.items() if name not in last}
         numbers, unknown = dict[str, Array](), np.full((4, len(self.records)), np.nan)
         for name, quantity in self.quantities.items():
-            endings = _PARAMETER_COLUMNS if is_parameter(name) else {"": 0} if name in _FIT_NAMES else _POINT_COLUMNS
+            endings = _PARAMETER_COLUMNS if is_parameter(name) else {"": 0} if name in FIT_NAMES else _POINT_COLUMNS
             column = quantity.tabled
             for ending, line in endings.items():
                 numbers[column.header + ending] = self.figures.get(name, unknown)[line] * column.factor
         ending_texts = {
-            "on a bound": self._labels["on a bound"],
+            "on a bound": self.labels["on a bound"],
             "warnings": [BETWEEN.join(record.warnings) for record in self.records],
-            "campaign name": self._labels["campaign name"],
-            "subgroup": self._labels["subgroup"],
+            "campaign name": self.labels["campaign name"],
+            "subgroup": self.labels["subgroup"],
             "differs in": [part.differs for part in parts],
             "poor fit": self.poor_fits,
         }
-        deviations = {f"robust z of {name} [-]": z for name, z in self.outliers[0].items()}
+        deviations = {f"robust z of {name} [-]": z for name, z in self.deviations.items()}
         curve = {"measured stiffness off the median [%]": 100.0 * self.curve_deviation} if self.curves else {}
 
         def as_objects(columns: Mapping[str, Sequence[str]]) -> dict[str, pd.Series[str]]:
@@ -394,7 +371,15 @@ class BatchResult:
         return b'<?xml version="1.0" encoding="utf-8"?>\n' + report.tostring()  # type: ignore[no-untyped-call]
 
 
-_FIT_NAMES = frozenset(quantity.name for quantity in FIT_QUALITY.values())
+def _shared_curve(records: Sequence[RowFile]) -> dict[str, Array]:
+    """Measured |K| at each point of the curve that most parts share, by column; empty if fewer than five share one."""
+    shared = Counter(tuple(record.curve) for record in records if record.curve).most_common(1)
+    curves = dict[str, Array]()
+    for point in shared[0][0] if shared and shared[0][1] >= FEWEST else ():
+        column = point_quantity(parse_point(point), STIFFNESS)
+        values = np.array([record.curve.get(point, np.nan) for record in records])
+        curves[f"measured {column.header}"] = column.factor * values
+    return curves
 
 
 def _listed(names: Sequence[str]) -> str:
