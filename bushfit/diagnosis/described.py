@@ -17,7 +17,7 @@ from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME, Unnamed
 from bushfit.errors import FitError
-from bushfit.fitting.agreement import LeaveOut, left_out
+from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.design import fit_from
@@ -111,7 +111,7 @@ def _held_out(before: Evidence, fitted: Estimate) -> HoldOut:
     solution = before.solution
     both = (
         LeaveOut.of(solution.jacobian[solution.moving], solution.residual),
-        left_out(fitted.solution, fitted.minimised, fitted.solution.moving),
+        LeaveOut.of(fitted.solution.jacobian[fitted.solution.moving], fitted.solution.residual),
     )
     told = dict[str, Array]()
     for part in _inside(before.data_sets):

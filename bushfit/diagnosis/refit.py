@@ -48,7 +48,7 @@ def refitted(
     fits: dict[str, Descent] = {}
     tests: Sequence[DataSet] = evidence.data_sets
     if columns is not None:
-        tests = Joined(evidence.data_sets, CommonError.of_all(columns), freedom=1.0)
+        tests = Joined(evidence.data_sets, CommonError.of_all(columns))
     for proposal in proposed:
         limits = {**within_reach(proposal.model, evidence.data_sets), **bounds}
         known = {name: value for name, value in start.items() if name in proposal.model.values}
@@ -100,7 +100,7 @@ def beside(evidence: Evidence, bare: Evidence, columns: Array, start: Mapping[st
     """The fit that the tests ask for where residuals along columns, whitened by scatter alone as in `bare`, are free;
     the best from the fit without that, and from values to start from."""
     names = evidence.solution.coordinates.names
-    tests = Joined(bare.data_sets, CommonError.of_all(columns), freedom=1.0)
+    tests = Joined(bare.data_sets, CommonError.of_all(columns))
     known = {name: value for name, value in start.items() if name in names}
     starts = [evidence.model, *([evidence.model.with_values(known)] if known else [])]
     fits = [solve(model, tests, names, bounds, strict=False) for model in starts]

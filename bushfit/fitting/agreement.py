@@ -10,8 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.common_error import Joined
-from bushfit.fitting.coordinates import Solution, jacobian, residual
+from bushfit.fitting.coordinates import Solution
 from bushfit.fitting.data_sets import DataSet, SweepData, log_slopes, rows_of
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Usable
@@ -164,7 +163,7 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     The tests have the weights at which the solution is the least sum of squares; `left` are others.
     """
     free = solution.moving
-    whole, parts = left_out(solution, data_sets, free), list[_Part]()
+    whole, parts = LeaveOut.of(solution.jacobian[free], solution.residual), list[_Part]()
     per_coordinate = solution.coordinates.slopes(solution.model.values)[:, None]
     for data_set, rows in zip(data_sets, rows_of(data_sets), strict=True):
         modelled = data_set.noise_free(solution.model).measured
@@ -177,17 +176,6 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
             off = _off(moved[counted], data_set.measured[counted])
             parts.append((str(data_set.direction), off, step is not None))
     return _by_place([*parts, *_as_modelled(solution.model, left, predicted=True)])
-
-
-def left_out(solution: Solution, data_sets: Sequence[DataSet], free: Sequence[int]) -> LeaveOut:
-    """The fit of the parameters of these numbers without some of its residuals in noise; amounts of an error that its
-    tests share stand behind them."""
-    if not isinstance(data_sets, Joined):
-        return LeaveOut.of(solution.jacobian[free], solution.residual)
-    own = data_sets.data_sets
-    names = [solution.coordinates.names[i] for i in free]
-    left = np.pad(residual(solution.model, own), (0, len(data_sets.error.columns)))
-    return LeaveOut.of(data_sets.beside(jacobian(solution.model, own, names)), left)
 
 
 def met_within(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet]) -> tuple[Usable, ...]:

@@ -13,8 +13,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.common_error import Joined
-from bushfit.fitting.coordinates import Coordinates, jacobian, residual, together
+from bushfit.fitting.coordinates import Coordinates, jacobian, residual
 from bushfit.fitting.data_sets import DataSet, LoopData, parted, reached, repeats_of, rows_of
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.covariance import Covariance
@@ -109,8 +108,7 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     by_value, reaction = answer * slopes[:, None], reaction * slopes[:, None]
     carried = reaction[:, : len(held.names)] / slopes[: len(held.names)]
     spread = [carried @ part @ carried.T for part in held.spread]
-    pairs = zip(stages, bases, strict=True)
-    influences = [together(stage.data_sets, reaction[:, own] @ basis) for stage, (own, basis) in pairs]
+    influences = [reaction[:, own] @ basis for own, basis in bases]
     matrix = by_value @ by_value.T
     for stage, influence in zip(stages, influences, strict=True):
         if stage.process:
@@ -174,26 +172,16 @@ def _unsure(stages: Sequence[Stage], influences: Sequence[Array], bases: Sequenc
     """
     parts: dict[Hashable, tuple[Array, Array]] = {}
     for stage, influence, basis in zip(stages, influences, bases, strict=True):
-        unit, moved = together(stage.data_sets, basis / np.linalg.norm(basis[0])), dict[Hashable, list[Array]]()
-        error, taken = None, np.zeros(0)  # share of a square along each direction of the error that whitening takes
-        if isinstance(stage.data_sets, Joined):
-            error, move = stage.data_sets.error, stage.data_sets.unsure(influence)
-            taken = 1.0 - 1.0 / (1.0 + np.square(error.along[1]))
-            along = error.seen.of(move) @ error.along[0]
-            moved[id(stage.data_sets)] = [move @ influence.T, move @ move.T, move @ unit.T, along]
-        for i, (data_set, rows) in enumerate(zip(stage.data_sets, rows_of(stage.data_sets), strict=True)):
-            own = influence[:, rows]
-            for variance, move in data_set.unsure(own).items():
-                along = error.seen.of_part(i, move) @ error.along[0][error.seen.places[i]] if error else move[:, :0]
-                products = [move @ own.T, move @ move.T, move @ unit[:, rows].T, along]
-                so_far = moved.get(variance)
-                moved[variance] = (
-                    [one + other for one, other in zip(products, so_far, strict=True)] if so_far else products
-                )
-        for variance, (along, squared, absorbed, shared) in moved.items():
+        unit, moved = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
+        for data_set, rows in zip(stage.data_sets, rows_of(stage.data_sets), strict=True):
+            taken = influence[:, rows]
+            for variance, move in data_set.unsure(taken).items():
+                products = [move @ taken.T, move @ move.T, move @ unit[:, rows].T]
+                so_far = moved.get(variance, [0.0] * 3)
+                moved[variance] = [one + other for one, other in zip(products, so_far, strict=True)]
+        for variance, (along, squared, absorbed) in moved.items():
             spread, lost = parts.get(variance, (0.0, 0.0))
-            wrong = squared - (shared * taken) @ shared.T - absorbed @ absorbed.T
-            parts[variance] = spread + along, lost + wrong
+            parts[variance] = spread + along, lost + squared - absorbed @ absorbed.T
     return list(parts.values())
 
 

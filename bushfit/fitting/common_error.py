@@ -115,15 +115,10 @@ class ErrorProducts(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Joined(Sequence["DataSet"]):
-    """Tests with an error of the model in common beside the noise of each: their residuals are whitened together.
-
-    Args:
-        freedom: degrees of freedom that tell the size of the error.
-    """
+    """Tests with an error in common beside the noise of each: their residuals are whitened together."""
 
     data_sets: tuple[DataSet, ...]
     error: CommonError
-    freedom: float
 
     @overload
     def __getitem__(self, index: int) -> DataSet: ...
@@ -134,15 +129,3 @@ class Joined(Sequence["DataSet"]):
 
     def __len__(self) -> int:
         return len(self.data_sets)
-
-    def unsure(self, influence: Array) -> Array:
-        """As `DataSet.unsure`, of the variance of the error, (k, n) -> (k, n)."""
-        vectors, size = self.error.along
-        moved = self.error.seen.of(influence) @ vectors * np.square(size) * np.sqrt(2.0 / self.freedom)
-        return self.error.seen.back(moved @ vectors.T)
-
-    def beside(self, jacobian: Array) -> Array:
-        """Derivatives of residuals in units of noise, (k, n), with those by the amounts below, and what is known of the
-        amounts beforehand as q more residuals, (k + q, n + q)."""
-        k, columns = len(jacobian), self.error.seen.back(self.error.columns)
-        return np.block([[jacobian, np.zeros((k, len(columns)))], [columns, np.eye(len(columns))]])

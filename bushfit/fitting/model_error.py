@@ -19,46 +19,42 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import chain, product
+from dataclasses import replace
+from itertools import chain
 
 import numpy as np
-from scipy.linalg import block_diag
 from scipy.optimize import minimize_scalar
-from scipy.special import stdtrit
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.effects.temperature import REFERENCE
-from bushfit.effects.unnamed import Patch, Unnamed
+from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import FitError
 from bushfit.fitting.assess import Process, beyond_noise
-from bushfit.fitting.common_error import CommonError, Seen
+from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, Solution
-from bushfit.fitting.data_sets import DataSet, LoopData, log_slopes, reached, rows_of
+from bushfit.fitting.data_sets import DataSet, LoopData, rows_of
+from bushfit.fitting.discrepancy import (
+    OVER_FREQUENCY,
+    OVER_STRAIN,
+    SIZES,
+    Discrepancy,
+    FittedTests,
+    averaged,
+    discrepancies,
+)
 from bushfit.fitting.levels import level_errors_of
 from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.robust import Estimate
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
-from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood, coordinates, in_lengths, patterns
-from bushfit.model.covariance import Z95
+from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood
 from bushfit.model.model import Model
 from bushfit.units import number
 
-#: Sizes tried, relative to |K|: from what the best rigs repeat to what no one calls a fit.
-_SIZES = np.geomspace(1e-3, 0.4, 25)
-#: Lengths tried, in ln frequency and in ln strain: from next points apart to a decade.
-_OVER_FREQUENCY, _OVER_STRAIN = (0.15, 0.4, 0.9, 2.0), (0.4, 0.9, 2.0)
 #: Size of the process over that of the independent model error, at least and at most: parameters absorb some of what is
 #: smooth, and of many points no more.
 _SMOOTH_RATIO = (1.0, 3.0)
-#: Likelihood of a process relative to the likeliest, from which on it counts; chosen for time.
-_COUNTS = 0.05
-#: Degrees of freedom at least of a size: Student's t of fewer has no variance.
-_MINIMUM_FREEDOM = 3.0
 #: Points of a sweep at most that a process is made of; chosen for time.
 _ENOUGH = 600
 #: Points from which on ripples over frequency are looked for as well.
@@ -71,202 +67,6 @@ _MIDDLING, _SHOWS, _FEW = (0.9, 2.0), 0.5, 16
 #: Rounds of size and parameters at most, and the relative change of the size at which both have settled: far below
 #: how well a size is known.
 _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
-
-#: Directions and specimens, by name, in groups that share a process.
-_Groups = tuple[tuple[str, ...], ...]
-
-
-@dataclass(frozen=True, eq=False)
-class FittedTests:
-    """A fitted model and its tests, for what a relative change of the stiffness does to the residuals.
-
-    Args:
-        solution: residuals and derivatives, each test whitened by itself.
-        rig_errors: of each test, whitened residuals by one standard deviation of each of the rig's errors, (w, n).
-    """
-
-    solution: Solution
-    data_sets: Sequence[DataSet]
-    rig_errors: Sequence[Array]
-
-    @cached_property
-    def directions(self) -> Array:
-        """Direction or specimen of each operating point, by name, (p,)."""
-        counts = [data_set.frequency.size for data_set in self.data_sets]
-        return np.repeat([str(data_set.direction) for data_set in self.data_sets], counts)
-
-    @cached_property
-    def conditions(self) -> list[Array]:
-        """Frequency [Hz], equivalent strain and, if the model knows of it, temperature [K] of each point, (p,) each."""
-        model = self.solution.model
-        axes = [*reached(model.bushing, self.data_sets)]
-        if model.knows_temperature:
-            kelvin = list[Array]()
-            for data_set in self.data_sets:
-                known = data_set.circumstances.temperature
-                kelvin.append(np.broadcast_to(REFERENCE if known is None else known, data_set.frequency.shape))
-            axes.append(np.concatenate(kelvin))
-        return axes
-
-    @property
-    def moving(self) -> Array:
-        """Derivatives of the residuals by coordinate of the parameters that rest on no bound, (k, n)."""
-        return self.solution.jacobian[self.solution.moving]
-
-    @cached_property
-    def slopes(self) -> Array:
-        """Derivatives of ln K at the points by coordinate of these parameters, complex (k, p)."""
-        model, fitted = self.solution.model, self.solution.coordinates
-        names = [fitted.names[i] for i in self.solution.moving]
-        slopes = np.concatenate([log_slopes(model, data_set, names) for data_set in self.data_sets], axis=-1)
-        return slopes * fitted.slopes(model.values)[self.solution.moving, None]
-
-    @cached_property
-    def seen(self) -> Seen:
-        """Residuals that changes of the stiffness can move: all of a sweep, two combinations of a loop."""
-        pairs = zip(rows_of(self.data_sets), self._loops, strict=True)
-        return Seen([(rows, None if loop is None else loop[0]) for rows, loop in pairs])
-
-    def columns(self, shapes: Array) -> Array:
-        """Whitened residuals, as `seen`, by relative changes of the stiffness, complex (c, p) -> (c, d)."""
-        columns, first, changes = [], 0, shapes * self._stiffness
-        for data_set, loop in zip(self.data_sets, self._loops, strict=True):
-            change = changes[:, first : first + data_set.frequency.size]
-            parts = np.concatenate((change.real, change.imag), axis=-1)
-            columns.append(data_set.moved(change, self.solution.model) if loop is None else parts @ loop[1])
-            first += data_set.frequency.size
-        return np.concatenate(columns, axis=-1)
-
-    @cached_property
-    def _stiffness(self) -> Array:
-        return np.concatenate([data_set.noise_free(self.solution.model).measured for data_set in self.data_sets])
-
-    @cached_property
-    def _loops(self) -> list[tuple[Array, Array] | None]:
-        """Of each loop orthonormal directions of these residuals, (n, 2), and the components along them by 1 and i of
-        a change, (2, 2); None of a sweep."""
-        units, loops = np.array([[1.0], [1.0j]]), list[tuple[Array, Array] | None]()
-        for data_set in self.data_sets:
-            if data_set.kind == "loop":
-                directions, components = np.linalg.qr(data_set.moved(units, self.solution.model).T)
-                loops.append((directions, components.T))
-            else:
-                loops.append(None)
-        return loops
-
-    @cached_property
-    def remainder(self) -> tuple[Array, Array]:
-        """Directions that parameters and rig errors absorb, (k, d), orthonormal but for the prior of the latter, and
-        the residual that both leave, (d,), as `seen`."""
-        rows, residual, blocks = self.solution.jacobian, self.solution.residual, rows_of(self.data_sets)
-        pairs = list(zip(blocks, self.rig_errors, strict=True))
-        across = np.concatenate([rows[:, block] @ errors.T for block, errors in pairs], axis=1)
-        among = block_diag(*(errors @ errors.T for errors in self.rig_errors))
-        information = np.block([[rows @ rows.T, across], [across.T, among + np.eye(len(among))]])
-        scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
-        size, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-        known = size > ROUNDING * size.max(initial=0.0)
-        mixed = (vectors[:, known] / np.sqrt(size[known])).T / scale
-        seen = block_diag(*(self.seen.of_part(i, errors) for i, errors in enumerate(self.rig_errors)))
-        span = mixed @ np.concatenate((self.seen.of(rows), seen))
-        along = [rows @ residual, *(errors @ residual[block] for block, errors in pairs)]
-        return span, self.seen.of(residual) - (mixed @ np.concatenate(along)) @ span
-
-
-@dataclass(frozen=True, eq=False)
-class Discrepancy:
-    """A Gaussian process of the relative error of a fitted model.
-
-    Args:
-        groups: directions and specimens that share the process, by name.
-        lengths: in ln frequency and ln strain.
-        nodes: of each group, indices of points, (m,).
-        shapes: patterns at the points, (q, p).
-        sizes: tried, relative to |K|, rising, (s,).
-    """
-
-    tests: FittedTests
-    groups: _Groups
-    lengths: tuple[float, float]
-    nodes: Sequence[Array]
-    shapes: Array
-    sizes: Array
-
-    @classmethod
-    def over(cls, tests: FittedTests, groups: _Groups, lengths: tuple[float, float], most: int) -> Discrepancy:
-        """The process over the points of some tests, with a number of nodes at most in each group."""
-        nodes, shapes = [], []
-        for group in groups:
-            inside = np.flatnonzero(np.isin(tests.directions, group))
-            chosen, near = patterns(in_lengths(coordinates(*tests.conditions)[inside], lengths), most)
-            nodes.append(inside[chosen])
-            shapes.append(np.zeros((len(near), tests.directions.size)))
-            shapes[-1][:, inside] = near
-        return cls(tests, groups, lengths, nodes, np.concatenate(shapes), _SIZES)
-
-    @cached_property
-    def complex_shapes(self) -> Array:
-        """Patterns in phase, then in quadrature, complex (2 q, p)."""
-        return np.concatenate((self.shapes, 1j * self.shapes))
-
-    @cached_property
-    def likelihood(self) -> RestrictedLikelihood:
-        """Restricted likelihood of its size."""
-        span, left = self.tests.remainder
-        return RestrictedLikelihood.of(self.tests.columns(self.complex_shapes), left, span)
-
-    @cached_property
-    def best(self) -> tuple[float, float]:
-        """The largest gain of the log likelihood, and the size that brings it."""
-        gains = self.likelihood.gains(self.sizes)
-        return float(gains.max()), float(self.sizes[gains.argmax()])
-
-    def conditioned(self) -> tuple[Array, Array]:
-        """The process, of its best size, conditioned on the tests.
-
-        Returns:
-            Mean at the operating points, complex (p,), and standard deviation of its two parts with those of the
-            parameters, (2, p).
-        """
-        size, columns, rows = self.best[1], self.tests.columns(self.complex_shapes), self.tests.moving
-        inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
-        mean = (-inverse @ columns @ self.tests.seen.of(self.tests.solution.residual)) @ self.complex_shapes
-        both = np.concatenate((columns, self.tests.seen.of(rows)))
-        information = both @ both.T
-        information[len(columns) :, len(columns) :] = rows @ rows.T  # loops tell more than by a change of stiffness
-        information[np.diag_indices(len(columns))] += 1.0 / size**2
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
-        known, vectors = np.linalg.eigh(information * np.outer(scale, scale))
-        root = (vectors / np.sqrt(np.maximum(known, ROUNDING))).T * scale
-        whole = root @ np.concatenate((self.complex_shapes, self.tests.slopes))
-        return mean, np.array([np.linalg.norm(whole.real, axis=0), np.linalg.norm(whole.imag, axis=0)])
-
-
-def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
-    """Processes conditioned on the tests, averaged by their likelihood: mean and standard deviation at nodes.
-
-    Between the nodes, and in sharing directions, it is as the likeliest, over lengths of the mean logarithm. Its sizes
-    are known by few degrees of freedom: standard deviations are those by which a normal interval is as wide as
-    Student's t has it.
-    """
-    gains = np.array([process.best[0] for process in processes])
-    share = np.exp(gains - gains.max())
-    counted = np.flatnonzero(share > _COUNTS).tolist()
-    share = share[counted] / share[counted].sum()
-    freedom = share @ [processes[i].likelihood.freedom(processes[i].best[1]) for i in counted]
-    wider = float(stdtrit(max(freedom, _MINIMUM_FREEDOM), 0.975)) / Z95
-    means, errors = zip(*(processes[i].conditioned() for i in counted), strict=True)
-    mean = share @ np.array(means)
-    apart = np.array([[np.square((one - mean).real), np.square((one - mean).imag)] for one in means])
-    error = wider * np.sqrt(np.tensordot(share, np.square(errors) + apart, 1))
-    lengths = np.exp(share @ np.log([processes[i].lengths for i in counted]))
-    size = wider * float(np.exp(share @ np.log([processes[i].best[1] for i in counted])))
-    best, patches = processes[int(gains.argmax())], []
-    for group, nodes in zip(best.groups, best.nodes, strict=True):
-        lists = (mean[nodes].real, mean[nodes].imag, *error[:, nodes])
-        frequency, strain, *kelvin = (tuple(axis[nodes].tolist()) for axis in best.tests.conditions)
-        patches.append(Patch(group, frequency, strain, *(tuple(row.tolist()) for row in lists), *kelvin))
-    return Unnamed(size, (float(lengths[0]), float(lengths[1])), tuple(patches))
 
 
 def with_model_error(
@@ -285,19 +85,19 @@ def with_model_error(
     ):
         return found, None
     solution, size = closest_fit(found, bounds)
-    if size >= _SIZES[-1]:  # that is no error of a model, but another thing than it
+    if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
         return found, None
     tests = _in_noise(solution, [_with_shape_error(data_set, size) for data_set in _thinned(found.minimised)])
     sizes = np.geomspace(_SMOOTH_RATIO[0] * size, _SMOOTH_RATIO[1] * size, 9)
-    discrepancies = [replace(process, sizes=sizes) for process in _discrepancies(tests)]
-    discrepancy = max(discrepancies, key=lambda process: process.best[0])
+    processes = [replace(process, sizes=sizes) for process in discrepancies(tests)]
+    discrepancy = max(processes, key=lambda process: process.best[0])
     minimised, weighed = (
         tuple(data_set.with_model_error(size) for data_set in part) for part in (found.minimised, found.weighed)
     )
     whole = Discrepancy.over(_in_noise(solution, weighed), discrepancy.groups, discrepancy.lengths, MAXIMUM_NODES)
     process = Process(discrepancy.best[1] * whole.complex_shapes, discrepancy.likelihood.freedom(discrepancy.best[1]))
-    error = averaged(discrepancies)
-    if error.typical >= _SIZES[-1]:
+    error = averaged(processes)
+    if error.typical >= SIZES[-1]:
         return found, None
     return Estimate(solution, found.data_sets, minimised, weighed, found.outliers, process), error
 
@@ -316,7 +116,7 @@ def closest_fit(found: Estimate, bounds: Bounds) -> tuple[Solution, float]:
         solution = min(ends, key=lambda end: end.chi_square)
         starts, before = [solution.model], size
         size = likeliest_size(solution.model, tests, [names[i] for i in solution.moving])
-        if abs(np.log(size / before)) < _SETTLED or size >= _SIZES[-1]:
+        if abs(np.log(size / before)) < _SETTLED or size >= SIZES[-1]:
             break
     return solution, size
 
@@ -341,7 +141,7 @@ def likeliest_size(model: Model, data_sets: Sequence[DataSet], names: Sequence[s
         information = np.sum(np.log(size[kept])) + 2.0 * np.sum(np.log(units))
         return float(sum(log_sizes) + both[0, 0] - absorbed.sum() + information)
 
-    low, high = np.log(_SIZES[[0, -1]]).tolist()
+    low, high = np.log(SIZES[[0, -1]]).tolist()
     found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": _SETTLED / 2.0})
     return float(np.exp(found.x))
 
@@ -361,13 +161,13 @@ def log_likelihood(found: Estimate, known: Mapping[str, float]) -> float:
     rows, residual = tests.moving, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
     if size:
-        seen, processes = tests.seen.of(residual), _discrepancies(tests)
+        seen, processes = tests.seen.of(residual), discrepancies(tests)
         columns = [process.tests.columns(process.complex_shapes) for process in processes]
         beside = [RestrictedLikelihood.of(rows, seen, np.empty((0, seen.size))) for rows in columns]
-        evidence = np.array([likelihood.log_evidence(_SIZES) for likelihood in beside])
+        evidence = np.array([likelihood.log_evidence(SIZES) for likelihood in beside])
         gain = float(np.logaddexp.reduce(evidence)) - np.log(evidence.size)
         best = int(evidence.argmax())
-        shares = columns[best] * _SIZES[beside[best].gains(_SIZES).argmax()]
+        shares = columns[best] * SIZES[beside[best].gains(SIZES).argmax()]
         across = shares @ tests.seen.of(tests.moving).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
     prior = np.diag([known.get(names[i], 0.0) for i in found.solution.moving])
@@ -405,20 +205,12 @@ def _is_smooth(found: Estimate, rig: RigSettings) -> bool:
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     quick = [Discrepancy.over(tests, (names,), _MIDDLING, _FEW)]
     if tests.directions.size > _DENSE:
-        quick.append(Discrepancy.over(tests, (names,), (_OVER_FREQUENCY[0], _OVER_STRAIN[-1]), MAXIMUM_NODES))
+        quick.append(Discrepancy.over(tests, (names,), (OVER_FREQUENCY[0], OVER_STRAIN[-1]), MAXIMUM_NODES))
     if max(process.best[0] for process in quick) <= _SHOWS:
         return False
-    processes = _discrepancies(tests)
-    evidence = [process.likelihood.log_evidence(_SIZES) for process in processes]
+    processes = discrepancies(tests)
+    evidence = [process.likelihood.log_evidence(SIZES) for process in processes]
     return float(np.logaddexp.reduce(evidence)) - np.log(len(evidence)) + np.log(_ODDS) >= 0.0
-
-
-def _discrepancies(tests: FittedTests) -> list[Discrepancy]:
-    """Processes that all tests share, and one of each direction by itself, of all lengths."""
-    names = tuple(dict.fromkeys(tests.directions.tolist()))
-    shared = dict.fromkeys([(names,), tuple((name,) for name in names)])
-    pairs = product(shared, product(_OVER_FREQUENCY, _OVER_STRAIN))
-    return [Discrepancy.over(tests, groups, lengths, MAXIMUM_NODES) for groups, lengths in pairs]
 
 
 def _restarted(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:

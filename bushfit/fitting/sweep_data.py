@@ -26,6 +26,10 @@ from bushfit.units import number
 _SMOOTH_DEGREE = 3
 #: Points that a sentence lists one by one; chosen: more make it long.
 _MOST_LISTED = 4
+#: Magnitudes per point up to which, and step from one to the next, relative, from which on they are rounded.
+_FEW_SIZES, _COARSE = 0.4, 0.01
+#: Digits of ln|K| that tell magnitudes apart.
+_DIGITS = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +69,6 @@ class Line:
         x = np.log(self.step)
         basis = np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))
         return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]
-
-
-#: Magnitudes per point up to which, and step from one to the next, relative, from which on they are rounded.
-_FEW_SIZES, _COARSE = 0.4, 0.01
-#: Digits of ln|K| that tell magnitudes apart.
-_DIGITS = 9
 
 
 @dataclass(frozen=True, eq=False)
