@@ -64,6 +64,8 @@ _WORD = re.compile(r"[^\W\d_]+|[º˚]")
 _POWER = re.compile(r"(?<=[^\W\d_])(?=(?:[23]|-[123])(?!\d))")
 #: A point or hyphen as the sign of a product: N.m, N-m.
 _JOINT = re.compile(r"(?<=[^\W\d_])[.-](?=[^\W\d_])")
+#: Characters of a header with a unit at most.
+_LONGEST_HEADER = 500
 #: A header's name, and its unit in brackets.
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
 
@@ -75,8 +77,9 @@ def is_number(text: str) -> bool:
 
 def split_header(text: str) -> tuple[str, str | None]:
     """Name and unit of a header cell such as "force [N]" or "force (kN)"; the unit is None if the cell has no unit."""
-    match = _BRACKETS.fullmatch(text.strip())
-    return (match["name"], match["unit"].strip()) if match else (text.strip(), None)
+    text = text.strip()
+    match = _BRACKETS.fullmatch(text) if text.endswith(("]", ")")) and len(text) <= _LONGEST_HEADER else None
+    return (match["name"], match["unit"].strip()) if match else (text, None)
 
 
 def si_factor(text: str, expected: str) -> float:

@@ -94,7 +94,7 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     contents: list[tuple[int, Sequence[str | float], int]] = []
     for line in source.lines(layout.lines_before_data):
         texts = [line.content] if isinstance(line.content, str) else [c for c in line.content if isinstance(c, str)]
-        is_note = is_comment(line.content, layout.delimiter)
+        is_note = not layout.numbered and is_comment(line.content, layout.delimiter)
         if is_note or any(map(_LETTER.search, texts)):
             cells = [str(cell) for cell in cells_of(line, layout)]
             if [plain(cell) for cell in cells] == header:

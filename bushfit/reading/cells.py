@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 from bushfit.errors import MeasurementError
 from bushfit.reading.headers import ROW_COLUMNS, WORDS, Column, Vocabulary, plain
 from bushfit.reading.instruments import word_for_part
-from bushfit.reading.layout import FileFormat, Layout, is_row, is_units_row
+from bushfit.reading.layout import FileFormat, Layout, Line, is_comment, is_row, is_units_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import named_direction
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, is_like_number, weigh
 from bushfit.reading.runs import rows_alike
-from bushfit.reading.source import Channels, RowSource, Sheet, Text, holds_number, rows
+from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of, holds_number, rows
 from bushfit.reading.times import clock
 
 #: Rows per value in the mean of a column that assigns rows to tests; chosen: a column that counts its rows has one.
 _FEWEST_ROWS = 3
+#: Bytes of a text whose columns are read with pandas; chosen: shorter ones take a moment.
+_LARGE = 1 << 20
 #: Rows that are examined first; chosen: a long record need not be read whole.
 _FIRST = 1000
 #: Rows that are left out and look like data, per row of data, at most; chosen: more make the meaning doubtful.
@@ -131,22 +133,24 @@ class Cells:
                 return "missing" if cell.lower() in _MISSING and cell else "cell"
         return None
 
-    def left_out(self) -> Iterator[str]:
+    def left_out(self, rows: Sequence[tuple[int, Sequence[str | float], str]] | None = None) -> Iterator[str]:
         """Sentence on the rows that are left out because they hold no data of the test.
+
+        Args:
+            rows: line number, cells and fault of each such row; default all that are found.
 
         Raises:
             MeasurementError: so many of these rows look like data that their meaning is in doubt.
         """
+        found = [(line, cells, fault) for line, cells, fault in self._all_rows() if fault] if rows is None else rows
         faults: dict[int, tuple[str, Sequence[str | float]]] = {}
-        total, header = 0, [plain(cell) for cell in self.headers]
-        for line, cells, fault in self._all_rows():
-            total += fault is None
+        header = [plain(cell) for cell in self.headers]
+        for line, cells, fault in found:
             texts = [str(cell) for cell in cells]
-            repeated = fault and ([plain(text) for text in texts[: len(header)]] == header or is_units_row(texts))
-            if fault and not repeated:
+            if [plain(text) for text in texts[: len(header)]] != header and not is_units_row(texts):
                 faults[line] = fault, cells
         doubtful = [line for line, (fault, _) in faults.items() if fault in ("cell", "width")]
-        if len(doubtful) > _MOST_LEFT_OUT * total:
+        if len(doubtful) > 1 and len(doubtful) > _MOST_LEFT_OUT * sum(1 for _ in self.rows()):
             raise self.bad_row(doubtful[0], faults[doubtful[0]][1], len(doubtful))
         if faults:
             listed = [
@@ -156,6 +160,27 @@ class Cells:
             ]
             more = ", ..." if len(faults) > _MOST_LISTED else ""
             yield f"{len(faults)} row{'s' * (len(faults) > 1)} left out, without data: {', '.join(listed)}{more}"
+
+    def without_faults(self) -> tuple[Self, list[tuple[int, Sequence[str | float], str]]]:
+        """The table without lines that hold no data, and line number, cells and fault of each such line.
+
+        Most lines of a text are data; only those with letters, dashes or empty cells are examined.
+        """
+        source, layout = self.source, self.layout
+        lines = source.suspicious(layout, _MOST_LEFT_OUT) if isinstance(source, Text) and not layout.numbered else None
+        if not lines or not isinstance(source, Text):
+            return self, []
+        faults: list[tuple[int, Sequence[str | float], str]] = []
+        kept, place = list[bytes](), 0
+        for number, start, end in lines:
+            line = Line(number, source.data[start:end].decode("utf-8", "replace").rstrip())
+            cells = [] if is_comment(line.content, layout.delimiter) else list(cells_of(line, layout))
+            if any(cells) and (fault := self._fault(cells, [*cells, *[""] * (len(self.headers) - len(cells))])):
+                faults.append((number, [*cells, *[""] * (len(self.headers) - len(cells))], fault))
+                kept.append(source.data[place:start])
+                place = end
+        data = b"".join([*kept, source.data[place:]]) if kept else source.data
+        return replace(self, source=Text(data, source.encoding)), faults
 
     def bad_row(
         self, line: int, cells: Sequence[str | float], count: int = 1, column: Column | None = None
@@ -263,6 +288,8 @@ class Cells:
             is_number, header = self.holds_numbers(index), self.headers[index]
             if (is_number and not settled) or not (texts := self._texts_of_tests(index)):
                 continue
+            if len(set(texts)) == 1:
+                continue
             chosen = np.array(texts)[slice(None) if selection is None else selection]
             values, number, counts = np.unique(chosen, return_inverse=True, return_counts=True)
             depends_on = [settled] if is_number else [(quantity,) for quantity in settled]
@@ -280,12 +307,27 @@ class Cells:
 
     def texts(self, index: int, most: int | None = None) -> list[str]:
         """Texts of a column, (n,), or of its first `most` rows; an empty cell, as merged ones are, repeats the last."""
+        column: Iterator[str | float] = (cells[index] if index < len(cells) else "" for _, cells in self.rows())
+        if most is None and index in self.large_texts:
+            column = iter(self.large_texts[index])
         texts, last = [], ""
-        for _, cells in islice(self.rows(), most):
-            cell = cells[index] if index < len(cells) else ""
+        for cell in islice(column, most):
             last = (cell.strip(" #") if isinstance(cell, str) else f"{cell:.12g}") or last
             texts.append(last)
         return texts
+
+    @cached_property
+    def large_texts(self) -> Mapping[int, Sequence[str]]:
+        """Texts of all columns without a role in a large text whose rows all are data, by index; else empty."""
+        if not isinstance(self.source, Text) or len(self.source.data) < _LARGE or self.selected is not None:
+            return {}
+        first = [str(cell) for cell in next(self.rows(), (0, ()))[1]]
+        if len(first) != len(self.headers) or not self.needed or self.needed & self.clocks:
+            return {}
+        if self.source.columns(self.layout, first, dict.fromkeys(self.needed, 1.0), self.numerals) is None:
+            return {}
+        free = sorted(set(range(len(first))) - {column.index for column in self.roles.values()})
+        return (self.source.texts(self.layout, free) if free else None) or {}
 
     def _texts_of_tests(self, index: int) -> list[str]:
         """Texts of a column without a role if it may separate tests; else an empty list."""

@@ -37,6 +37,8 @@ _COMMENT_SIGNS = ("#", "%", "//")
 _NUMBERED = re.compile(r"#\s?\d+\b")
 #: Blanks between a name and the bracket of its unit, which separate no columns.
 _BLANK_BEFORE_BRACKET = re.compile(r" {1,8}(?=[\[(])")
+#: Blanks of which two say as much.
+_WIDE_GAP = re.compile(" {3,}")
 #: Gap between columns whose headers contain single blanks.
 _COLUMN_GAP = re.compile(r"\t|\s{2,}")
 
@@ -117,7 +119,7 @@ def split(content: Content, delimiter: str) -> list[str]:
         return text.split()
     if '"' in text:
         return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True), ())]
-    return [cell.strip() for cell in text.split(delimiter)]
+    return [cell.strip() for cell in text.split(delimiter, _MOST_COLUMNS)]
 
 
 def is_comment(content: Content, delimiter: str) -> bool:
@@ -188,6 +190,7 @@ def header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
     """Cells of a header, without empty ones at its end, for each way to separate them."""
     if isinstance(content, str) and len(content := content.rstrip(f" \t{delimiter}")) > _LONGEST_HEADER:
         return
+    content = _WIDE_GAP.sub("  ", content) if isinstance(content, str) else content
     forms = [] if delimiter == " " and "\t" in content else [split(content, delimiter)]
     if delimiter == " " and isinstance(content, str):
         joined = [split(_BLANK_BEFORE_BRACKET.sub("", content), delimiter)] if forms else []

@@ -140,16 +140,17 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
             expected="times in seconds, or days",
             hint='units = { time = "d" } in the campaign; or subtract the first time from all',
         )
-    later, notes = np.diff(time) > 0.0, ()
-    if not later.all() and (even := spread(time)) is not None:
+    stuck = time[1:] <= time[:-1]
+    if stuck.any() and (even := spread(time)) is not None:
         rate = (time.size - 1) / (even[-1] - even[0])
         return even, (f'"{column.header}" is rounded and repeats: its rows are spread evenly, at {rate:.6g} Hz',)
     hint = "if a column numbers the runs, bushfit init makes a loop of each"
     if "block" in table.headers:
         hint = 'this file has several blocks: rows = { block = "1" } in the campaign takes the first; bushfit init all'
-    elif np.all(np.diff(time) >= 0.0):
+    elif stuck.any() and np.all(np.diff(time) >= 0.0):
         hint = 'take the time out, with columns = { time = "..." } for another column, or state rate or frequency'
-    table.refuse(np.append(False, ~later), column, "time does not increase", "a later time on every row", hint)
+    if stuck.any():
+        table.refuse(np.append(False, stuck), column, "time does not increase", "a later time on every row", hint)
     if time[-1] - time[0] < LEAST_VALUE:
         raise table.error("the record takes no time", column=column, expected=f"{LEAST_VALUE:g} s or more")
-    return time, notes
+    return time, ()

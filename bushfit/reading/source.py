@@ -131,6 +131,58 @@ class Text:
             column *= scales[index]
         return columns
 
+    def texts(self, layout: Layout, indices: Sequence[int]) -> dict[int, list[str]] | None:
+        """Read columns of a large text with pandas.
+
+        Args:
+            layout: header and delimiter.
+            indices: of the columns.
+
+        Returns:
+            Texts of all rows by index, (n,) each; None if rows differ in length, or cells may contain delimiters.
+        """
+        import pandas as pd
+
+        start, mark, width = self.offset(layout.lines_before_data), layout.delimiter, len(layout.headers)
+        if mark == " " or self.has('"', layout):
+            return None
+        stream = io.BytesIO(self.data)
+        stream.seek(start)
+        names = list(range(width))
+        frame = pd.read_csv(
+            stream, sep=mark, header=None, names=names, usecols=list(indices), dtype="category", na_filter=False
+        )
+        if self.data.count(mark.encode(), start) != len(frame) * (width - 1):
+            return None
+        return {index: frame[index].astype(object).tolist() for index in indices}
+
+    def suspicious(self, layout: Layout, most: float) -> list[tuple[int, int, int]] | None:
+        """Find lines below the header that have letters, dashes or an empty cell.
+
+        Args:
+            layout: header and delimiter.
+            most: share of such lines at most.
+
+        Returns:
+            Line number, start and end of each line; None if there are too many.
+        """
+        mark = re.escape(layout.delimiter.encode())
+        pattern = re.compile(
+            rb"[A-DF-Za-df-z#]|--" + (rb"|%s\s*%s|%s[ \t]*\r?\n" % (mark, mark, mark) if mark.strip() else b"")
+        )
+        place = self.offset(layout.lines_before_data)
+        number, lines = layout.lines_before_data + 1, list[tuple[int, int, int]]()
+        limit = most * self.data.count(b"\n", place) + 20
+        counted = place
+        while (match := pattern.search(self.data, place)) and len(lines) <= limit:
+            start = self.data.rfind(b"\n", 0, match.start()) + 1
+            end = self.data.find(b"\n", match.start())
+            end = len(self.data) if end < 0 else end
+            number += self.data.count(b"\n", counted, start)
+            counted, place = start, end
+            lines.append((number, start, end))
+        return lines if len(lines) <= limit else None
+
 
 def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:
     """Filled lines of a stream that begins after line number `after`; closes the stream."""

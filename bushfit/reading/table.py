@@ -272,6 +272,11 @@ class Table(Cells):
         """
         notes, values = self.notes, self._by_library(wanted)
         if values is None:
+            table, faults = self.needing(wanted).without_faults()
+            values = table._by_library(wanted) if faults else None
+            if values is not None:
+                notes = (*notes, *table.left_out(faults))
+        if values is None:
             table = self.needing(wanted)
             notes = (*notes, *table.left_out())
             values = table._row_by_row(wanted)

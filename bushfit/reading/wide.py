@@ -21,7 +21,7 @@ from bushfit import units
 from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import COUNTED
 from bushfit.reading.headers import AmplitudeConvention, Heading, Vocabulary, split_convention
-from bushfit.reading.layout import DELIMITERS, Layout, is_comment, split
+from bushfit.reading.layout import DELIMITERS, Content, Layout, is_comment, split
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import Combined, RowSource
 
@@ -39,8 +39,12 @@ _LEVEL = re.compile(
 )
 #: What a symbol before a level stands for: "A = 0.1".
 _SYMBOLS = {"f": "frequency", "a": "amplitude", "x": "amplitude", "s": "amplitude", "\u03b3": "amplitude"}
+#: Columns of a wide table; chosen: two for each of a hundred levels.
+_MOST_COLUMNS = 200
 #: What joins a level to a quantity in a header, and says no more.
 _JOINTS = re.compile(r"[\[(]\s*(?:at|bei)?\s*[\])]|(?<!\w)(?:at|bei|für|for|à|a|@|:|,|;|=|-)(?!\w)")
+#: Characters of a header; chosen: the rest of a longer text says nothing.
+_LONGEST_HEADER = 200
 #: A level that may have thousands: 1,250.
 _OPEN = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 #: What parts the two roles that a corner names: "f [Hz] \ A [mm]".
@@ -87,13 +91,16 @@ def as_long(
     Raises:
         MeasurementError: blocks that do not belong together, or that do not say what they hold.
     """
+    if len(layout.headers) > _MOST_COLUMNS:
+        return None
     named = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))]
     if len(named) > 2 and len(set(named)) == len(named) and set(named) & set(_STEPPED):
         return None
     for mark in DELIMITERS.values() if delimiter is None else (delimiter,):
         lines = (line for line in source.head() if not is_comment(line.content, mark))
         rows: list[_Row] = [
-            (number, [*split(content, mark)] if isinstance(content, str) else [*content]) for number, content in lines
+            (number, [c[:_LONGEST_HEADER] if isinstance(c, str) else c for c in _cells(content, mark)])
+            for number, content in lines
         ]
         blocks = list(_blocks(rows, vocabulary))
         if series := [one for block in blocks for one in _series(*block, vocabulary)]:
@@ -103,6 +110,10 @@ def as_long(
             written = tuple(cell for cell, parts in read if any(part.role or part.stepped for part in parts))
             return long, replace(long_layout, written=written)
     return None
+
+
+def _cells(content: Content, delimiter: str) -> Sequence[str | float]:
+    return split(content, delimiter) if isinstance(content, str) else content
 
 
 def _blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
