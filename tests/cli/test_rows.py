@@ -144,11 +144,15 @@ def test_a_campaign_that_contradicts_a_column(
 @pytest.mark.parametrize(("label", "values"), [("Direction", ("axial", "radial")), ("Run", ("#1", "#2"))])
 def test_loops_of_one_file(typed: Run, tmp_path: Path, label: str, values: tuple[str, str]) -> None:
     phase = np.linspace(0.0, 6.0 * np.pi, 900)
-    one = [(f"{p:.4f}", f"{np.sin(p):.5f}", f"{600 * np.sin(p + 0.08):.3f}") for p in phase]
+    forces = dict(zip(values, (600.0, 606.0), strict=True))  # equal tests would count once
     export(
         tmp_path / "axial.csv",
         (label, "Time [s]", "Displacement [mm]", "Force [N]"),
-        [(v, *row) for v in values for row in one],
+        [
+            (value, f"{p:.4f}", f"{np.sin(p):.5f}", f"{force * np.sin(p + 0.08):.3f}")
+            for value, force in forces.items()
+            for p in phase
+        ],
     )
     typed("init", "axial.csv", *GEOMETRY, "-o", "x")
     loops = load_campaign(tmp_path / "x/campaign.toml").loops
