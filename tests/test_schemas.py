@@ -110,7 +110,7 @@ def test_what_is_written_has_the_keys_that_are_described_and_no_others(root: Pat
     wrong = [(name, said) for name in OUTPUTS for each in found[name] for said in complaints(name, each, whole=True)]
     assert wrong == []
     assert [name for name in OUTPUTS if not found[name]] == []
-    assert {document["schema"] for document in found["model"]} == {"bushfit/model/1", "bushfit/model/2"}
+    assert {document["schema"] for document in found["model"]} == {"bushfit/model/1"}
     assert {document["status"] for document in found["row"]} == {"done", "failed"}
     assert {"consistent", "named"} <= {document["verdict"] for document in found["diagnosis"]}
     assert any("profile95" in entry for document in found["model"] for entry in document["parameters"].values())

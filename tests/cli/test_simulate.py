@@ -64,7 +64,7 @@ def test_simulated_specimens_are_reduced_and_fitted_as_the_campaign_says(typed: 
     (tmp_path / "plan.toml").write_text(SPECIMENS)
     typed("simulate", "plan.toml", "-o", "sim")
     truth = document(tmp_path / "sim/truth.json")
-    assert [truth["schema"], truth["bushing"], truth["specimens"][1]["name"]] == ["bushfit/model/2", None, "mount"]
+    assert [truth["schema"], truth["bushing"], truth["specimens"][1]["name"]] == ["bushfit/model/1", None, "mount"]
     header = "frequency [Hz],strain amplitude [%],repeat,modulus [MPa],"
     assert (tmp_path / "sim/sweep_DMA.csv").read_text().startswith(header)
     lines = (tmp_path / "sim/campaign.toml").read_text().splitlines()

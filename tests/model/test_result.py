@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from bushfit.effects import Level
-from bushfit.errors import ModelError
 from bushfit.model.covariance import Z95, Covariance
-from bushfit.model.file import SCHEMAS, from_document, load_result, model_document, to_document
+from bushfit.model.document import SCHEMA
+from bushfit.model.file import from_document, load_result, model_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 
@@ -87,27 +86,8 @@ def test_what_is_left_out_where_it_is_not_so(result: Result, document: dict[str,
 
 def test_a_model_alone_is_a_result(paper_model: Model, tmp_path: Path) -> None:
     file = tmp_path / "m.json"
-    file.write_text(json.dumps({"schema": SCHEMAS[0], **model_document(paper_model)}))
+    file.write_text(json.dumps({"schema": SCHEMA, **model_document(paper_model)}))
     result = load_result(file)
     assert result.model == paper_model
     assert result.quality is None
     assert result.interval("mu") is None
-
-
-def test_the_radial_factor_of_older_files_is_read(document: dict[str, Any]) -> None:
-    """An effect that was called radial_factor, with an excess over 1, is a stiffness factor of the radial direction."""
-    entry = {"value": 0.05, "unit": "1", "vary": True, "profile95": [0.04, None]}
-    document["effects"].append("radial_factor")
-    document["parameters"]["radial_factor.excess"] = entry
-    document["covariance"] = {"names": ["radial_factor.excess"], "matrix": [[1e-4]], "spread": []}
-    result = from_document(document)
-    assert result.model.values["stiffness_factor.radial"] == pytest.approx(1.05)
-    assert result.covariance.stderr("stiffness_factor.radial") == pytest.approx(0.01)
-    assert result.profile["stiffness_factor.radial"] == (pytest.approx(1.04), None)
-    plain = result.model.without(Level.COMPONENT)
-    for direction, factor in (("radial", 1.05), ("axial", 1.0)):
-        ratio = result.model.stiffness(direction, 50.0, 1e-4) / plain.stiffness(direction, 50.0, 1e-4)
-        assert abs(ratio) == pytest.approx(factor)
-    document["parameters"]["radial_factor.factor"] = document["parameters"].pop("radial_factor.excess")
-    with pytest.raises(ModelError, match=r"stiffness_factor\.radial"):
-        from_document(document)
