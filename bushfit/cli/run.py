@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
     from bushfit.commands.run import RunOutput
     from bushfit.fitting.procedures import TwoStep
-    from bushfit.model.result import Range, Result
+    from bushfit.model.result import Result
 
 #: Standard errors up to which two fits are said to agree.
 _AGREED = 2
@@ -67,7 +67,7 @@ def print_run(output: Output, name: str, outcome: RunOutput) -> None:
     if diagnosed and diagnosed.diagnosis.verdict != "consistent":
         print_findings(output, diagnosed)
     if result.measured:
-        _print_range(output, outcome, result.measured)
+        _print_range(output, outcome)
     print_origin(output, result)
     print_predictions(output, outcome.predicted)
     if output.verbose:
@@ -87,22 +87,20 @@ def _model_to_use(folder: Path, outcome: RunOutput) -> str:
     return f"the model to use: {folder / 'model.json'}, {which}"
 
 
-def _print_range(output: Output, outcome: RunOutput, measured: Range) -> None:
-    """Print the range of the fitted tests: smallest and largest frequency and amplitude, and the directions."""
-    result, predicted = outcome.result, [p.direction for p in outcome.predicted.predictions]
-    amplitudes = []
-    for direction in dict.fromkeys([*map(result.place, measured.directions), *predicted]):
+def _print_range(output: Output, outcome: RunOutput) -> None:
+    """Print the tested range of each direction, whether or not its tests were fitted."""
+    measured = outcome.result.measured
+    fitted = measured.directions if measured else ()
+    output.console.print("tested range; outside of it the model extrapolates", style="bold")
+    for direction in dict.fromkeys(data_set.direction for data_set in outcome.data.data_sets):
         unit, factor = direction.display.displacement
-        per_strain = factor / result.model.unit_strain(direction)
-        amplitudes.append(f"{direction} {_span([per_strain * end for end in measured.strain], 3)} {unit}")
-    output.console.print("tested range, least and largest of all tests; beyond it the model extrapolates", style="bold")
-    strains = f"{_span([100.0 * end for end in measured.strain], 2)} %"
-    for label, text in (
-        ("frequencies", f"{_span(measured.frequency, 3)} Hz"),
-        ("strains", f"{strains}, which is {', '.join(amplitudes)}"),
-        ("directions", ", ".join(measured.directions)),
-    ):
-        output.print(f"  {label}: {text}")
+        tests = [data_set for data_set in outcome.data.data_sets if data_set.direction == direction]
+        frequency, amplitude = (
+            [min(values.min() for values in arrays), max(values.max() for values in arrays)]
+            for arrays in ([test.frequency for test in tests], [factor * test.amplitude for test in tests])
+        )
+        use = "" if str(direction) in fitted else ", not fitted"
+        output.print(f"  {direction}: {_span(frequency, 3)} Hz, {_span(amplitude, 3)} {unit}{use}")
 
 
 def _span(ends: Sequence[float], digits: int) -> str:

@@ -30,8 +30,6 @@ _AMPLITUDE_KEYS = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", ST
 _FREQUENCIES = 9
 #: Amplitudes of a grid where the paper's were not measured.
 _AMPLITUDES = 3
-#: Frequency that stands for slow where results are compared [Hz]: below the sweeps, above the loops.
-_SLOW = 1.0
 #: Values of a grid at most of what was stepped through as it came: tables stay readable, and lines smooth.
 _MOST_STEPS = 10
 
@@ -84,9 +82,9 @@ def common_grid(
 ) -> tuple[Array, Array]:
     """Frequencies [Hz] and amplitudes [m, rad or 1] at which several results compare at one place, rising.
 
-    It is the default grid of the first, as far as all were fitted there, and 1 Hz where that is within; an even grid
-    over what all were fitted at where fewer than two of its values are. Where their ranges have nothing in common, or
-    are not known, it is that of the first.
+    It is the default grid of the first, as far as all were fitted there, so that differences are stated where something
+    was measured; an even grid over the common range where fewer than two of its values are. Where the ranges have
+    nothing in common, or are not known, it is that of the first.
 
     Args:
         places: the place as each result has it.
@@ -97,8 +95,7 @@ def common_grid(
         return frequency, amplitude
     frequencies = [measured.frequency for measured, _, _ in known]
     strains = [(np.array(measured.strain) / result.model.unit_strain(place)) for measured, place, result in known]
-    with_slow = np.union1d(frequency, _SLOW) if _inside(np.array([_SLOW]), frequencies).size else frequency
-    return _within(with_slow, frequencies, _FREQUENCIES), _within(amplitude, strains, _AMPLITUDES)
+    return _within(frequency, frequencies, _FREQUENCIES), _within(amplitude, strains, _AMPLITUDES)
 
 
 def _within(values: Array, ranges: Sequence[Any], count: int) -> Array:

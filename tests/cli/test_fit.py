@@ -260,8 +260,8 @@ def test_run_and_diagnose_write_the_model_that_fit_writes_where_nothing_is_missi
     ran, _ = both(bushfit, CAMPAIGN, tmp_path)
     words = (
         *("CMP 15 961: consistent", "joint fit", "mu ", "NRMSE", "correlation: ", "tested range"),
-        *("frequencies: 0.1 to 155 Hz", "strains: 0.62 to 6.2 %, which is axial 0.1 to 1 mm, radial "),
-        *("directions: axial", "axial, corners", "radial, corners", "extrapolated beyond"),
+        *("axial: 0.1 to 155 Hz, 0.1 to 1 mm", "radial: 5 to 155 Hz, 0.1 to 0.5 mm, not fitted"),
+        *("axial, corners", "radial, corners", "extrapolated beyond"),
         "two-step procedure (the paper's): 10 passes, agrees with the joint fit within 1 standard error",
         *("times less certain than there (static.json, dynamic.json; -v shows it)", "wrote static.json"),
         "the model to use: ",

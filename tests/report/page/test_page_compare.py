@@ -61,7 +61,7 @@ def test_it_says_what_the_document_says(documents: dict[str, Any], compared: Pat
     low, high = (100 * table.loc[("mu", "B"), f"difference, {end}"] for end in ("low", "high"))
     shown = re.search(r"mu ([\d.]+) ([\d.]+) ([-+][\d.]+) % ([-+][\d.]+) to ([-+][\d.]+)", text)
     assert shown is not None
-    np.testing.assert_allclose([float(shown[4]), float(shown[5])], [low, high], rtol=1e-4, atol=0.06)
+    np.testing.assert_allclose([float(shown[4]), float(shown[5])], [low, high], rtol=3e-4, atol=0.06)
 
 
 @pytest.mark.parametrize("name", HARMFUL)
