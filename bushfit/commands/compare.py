@@ -29,7 +29,7 @@ from bushfit.prediction.comparison import compare as compare_two
 from bushfit.prediction.grid import asked_or, common_grid
 from bushfit.reading.measurement import Source, Sweep
 from bushfit.report import plots
-from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, Family, Pair
+from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparedPair, ComparisonFile, FamilyEntry
 from bushfit.report.compared import SideBySide
 from bushfit.report.page import comparison_page
 from bushfit.report.results import ResultFile, figure_file, json_file, page_file, table_file
@@ -345,7 +345,7 @@ def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
     }
 
 
-def _pair_document(label: str, comparison: Comparison) -> Pair:
+def _pair_document(label: str, comparison: Comparison) -> ComparedPair:
     """Numbers of one result against the first as compare.json has them."""
     return {
         "reference": "A",
@@ -359,7 +359,7 @@ def _pair_document(label: str, comparison: Comparison) -> Pair:
     }
 
 
-def _family_document(label: str, family: FittedFamily, result: Result) -> Family:
+def _family_document(label: str, family: FittedFamily, result: Result) -> FamilyEntry:
     """Fit and held-out error of a family as compare.json has them."""
     evidence, held_out = family.evidence, family.held
     return {

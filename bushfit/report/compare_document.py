@@ -1,6 +1,6 @@
-"""What compare writes as JSON, key by key. Its JSON Schema is made of these types; the type checker holds to them."""
+"""The JSON file of a comparison, `compare.json`, key by key; its JSON Schema is made from these types."""
 
-from typing import Annotated, Literal, NotRequired
+from typing import Annotated, Literal
 
 from typing_extensions import Doc, TypedDict
 
@@ -11,13 +11,13 @@ from bushfit.prediction.comparison import ParameterContrast
 from bushfit.reading.measurement import Source
 from bushfit.validation import Number
 
-#: What "schema" of the document says.
+#: Value of the key `schema`.
 SchemaName = Literal["bushfit/compare/1"]
 SCHEMA: SchemaName = "bushfit/compare/1"
 
 
 class ComparedEntry(TypedDict):
-    """One of what is compared."""
+    """One result of a comparison."""
 
     label: Annotated[str, Doc("A, the reference, or B and so on.")]
     name: Annotated[str, Doc("of the bushing, or the model family.")]
@@ -38,40 +38,40 @@ class ComparedEntry(TypedDict):
     ]
 
 
-class Joint(TypedDict):
-    """All parameters of two results together, correlations counted."""
+class JointContrast(TypedDict):
+    """Difference of all parameters of two results together, with their correlations."""
 
     p: Annotated[Number, Doc("probability by chance of such differences.")]
-    parameters: Annotated[int, Doc("how many count.")]
+    parameters: Annotated[int, Doc("number of parameters that count.")]
 
 
-class Pair(TypedDict):
-    """One result against the reference."""
+class ComparedPair(TypedDict):
+    """One result compared with the reference."""
 
     reference: Annotated[str, Doc("label of the reference.")]
     other: Annotated[str, Doc("label of the other.")]
     shared_inputs: Annotated[list[str], Doc("files that both were fitted to.")]
-    joint: Annotated[Joint | None, Doc("all parameters together; null where none is tested.")]
-    parameters: Annotated[list[ParameterContrast], Doc("each that both have.")]
+    joint: Annotated[JointContrast | None, Doc("all parameters together; null where none is tested.")]
+    parameters: Annotated[list[ParameterContrast], Doc("parameters that both have.")]
     places: Annotated[
         dict[str, dict[str, list[Number | None] | list[Literal["yes", "no"]]]],
-        Doc("by place, the columns of differences.csv: values, differences, and whether they are sure."),
+        Doc("columns of differences.csv by direction: values, differences, and whether they are significant."),
     ]
 
 
 class HeldOutPart(TypedDict):
     """A part of the tests that was held out."""
 
-    part: Annotated[str, Doc("which.")]
-    first: Annotated[Number, Doc("root mean square of the first family there, in units of noise.")]
-    heldout: Annotated[Number, Doc("that of this family.")]
+    part: Annotated[str, Doc("name of the part.")]
+    first: Annotated[Number, Doc("root mean square of the first family on the part, in units of noise.")]
+    heldout: Annotated[Number, Doc("the same of this family.")]
 
 
-class Family(TypedDict):
+class FamilyEntry(TypedDict):
     """A model family on the one campaign."""
 
     label: Annotated[str, Doc("as in `compared`.")]
-    name: Annotated[str, Doc("effects that it adds, or puts in place of a branch, joined by +.")]
+    name: Annotated[str, Doc("effects that it adds or that replace a branch, joined by +.")]
     parameters: Annotated[int, Doc("fitted.")]
     reduced_chi_square: Annotated[Number, Doc("mean square residual in units of noise.")]
     bic: Annotated[Number, Doc("chi-square + parameters ln n; lower is better.")]
@@ -82,33 +82,28 @@ class Family(TypedDict):
     gain: Annotated[
         tuple[Number, Number, Number] | None,
         Doc(
-            "by how much the mean square of what was held out is less than that of the first, low and high of its 95 "
-            "% interval; null where nothing can be held out, and of the first."
+            "mean square of the held-out parts of the first family minus that of this family, with its 95 % interval; "
+            "null where nothing can be held out, and of the first."
         ),
     ]
     p: Annotated[Number | None, Doc("probability by chance of so large a gain or loss, over all families (Holm).")]
-    probability: NotRequired[
-        Annotated[
-            Number,
-            Doc(
-                "of all families compared, by the evidence of the tests, a smooth error of the model counted where "
-                "they are likelier with it; none where an older file does not say."
-            ),
-        ]
+    probability: Annotated[
+        Number,
+        Doc("of the family among those compared, by the evidence of the tests, with a smooth model error if it helps."),
     ]
-    parts: Annotated[list[HeldOutPart], Doc("each part that was held out.")]
-    skipped: Annotated[list[Skipped], Doc("each that was not, and why.")]
-    words: Annotated[str, Doc("whether it is nearer to what was held out than the first; empty of the first.")]
+    parts: Annotated[list[HeldOutPart], Doc("parts that were held out.")]
+    skipped: Annotated[list[Skipped], Doc("parts that were not held out, and why.")]
+    words: Annotated[str, Doc("comparison of its held-out error with that of the first family; empty of the first.")]
 
 
 class ComparisonFile(TypedDict):
     """compare.json: several results side by side, or model families on one campaign."""
 
     schema: Annotated[SchemaName, Doc("of this file.")]
-    compared: Annotated[list[ComparedEntry], Doc("what is compared, the reference first.")]
-    pairs: Annotated[list[Pair], Doc("each other against the reference.")]
-    families: Annotated[list[Family] | None, Doc("how each meets the tests; null where none were asked for.")]
-    words: Annotated[list[str], Doc("what differs, or how much may differ that is not seen.")]
-    warnings: Annotated[list[str], Doc("what a user must know before using the numbers.")]
-    command: Annotated[str, Doc("as it was typed; empty where it was made otherwise.")]
+    compared: Annotated[list[ComparedEntry], Doc("results, the reference first.")]
+    pairs: Annotated[list[ComparedPair], Doc("each other result with the reference.")]
+    families: Annotated[list[FamilyEntry] | None, Doc("agreement with the tests; null without families.")]
+    words: Annotated[list[str], Doc("sentences on what differs.")]
+    warnings: Annotated[list[str], Doc("warnings on the use of the numbers.")]
+    command: Annotated[str, Doc("command line; empty if the comparison was made from Python.")]
     versions: Annotated[dict[str, str], Doc("of bushfit, and of the packages that the numbers rest on.")]

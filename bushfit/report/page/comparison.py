@@ -11,7 +11,7 @@ from bushfit.geometry import Bushing
 from bushfit.model.file import read_document
 from bushfit.report import plots
 from bushfit.report.compare_document import ComparedEntry
-from bushfit.report.compared import FAMILY_HEADS, Heads, SideBySide, chance, parameter_cells, signed
+from bushfit.report.compared import FAMILY_HEADS, ContrastHeaders, SideBySide, chance, parameter_cells, signed
 from bushfit.report.page.report import MOST, conditions, grid_corners, tube_description
 from bushfit.report.page.svg import picture
 from bushfit.report.results import ResultFile, json_file
@@ -69,7 +69,7 @@ def comparison_context(comparison: SideBySide) -> dict[str, Any]:
 
 
 def _is_modulus(comparison: SideBySide, place: str) -> bool:
-    return Heads.of(next(iter(comparison.at(place).values()))).stiffness.startswith("modulus")
+    return ContrastHeaders.of(next(iter(comparison.at(place).values()))).stiffness.startswith("modulus")
 
 
 def _entry(entry: ComparedEntry) -> dict[str, Any]:
@@ -87,7 +87,7 @@ def _entry(entry: ComparedEntry) -> dict[str, Any]:
 def _sizes(comparison: SideBySide, place: str) -> Iterator[dict[str, Any]]:
     """Smallest and largest difference from the first result at a place, and the number of significant points."""
     for label, table in comparison.at(place).items():
-        heads = Heads.of(table)
+        heads = ContrastHeaders.of(table)
         row: dict[str, Any] = {"label": label, "place": place}
         for key, header, scale, unit in (("stiffness", heads.relative, 100.0, " %"), ("loss", heads.loss, 1.0, "")):
             (values,) = scale * numbers(table, header)
@@ -112,7 +112,7 @@ def _tabled(comparison: SideBySide, places: Sequence[str]) -> Iterator[tuple[Any
     most = max(_ROWS // max(len(tables), 1), 1)
     amplitudes = min(most, _AMPLITUDES)
     for label, place, table in tables:
-        heads, loss = Heads.of(table), "loss factor [-]"
+        heads, loss = ContrastHeaders.of(table), "loss factor [-]"
         ((_, length), (_, unit)) = (split_header(header) for header in heads[:2])
         kinds = ((heads.stiffness, heads.relative, f" {unit}", 100.0, " %"), (loss, heads.loss, "", 1.0, ""))
         amplitude, frequency = numbers(table, heads.amplitude, "frequency [Hz]")

@@ -224,4 +224,5 @@ def _workbook(file: Path) -> pd.DataFrame:
     """Cells of the first sheet of a workbook as texts."""
     (first, _), *_ = read_sheets(view_bytes(file, ModelError, largest=_LARGEST), file, kind=ModelError)
     header, *rows = first.content
-    return pd.DataFrame([[str(cell) for cell in row] for row in rows if row], columns=[str(cell) for cell in header])
+    cells = ([*map(str, row), *[""] * (len(header) - len(row))] for row in rows if row)
+    return pd.DataFrame(list(cells), columns=[str(cell) for cell in header])

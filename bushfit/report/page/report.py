@@ -1,8 +1,11 @@
 """The report of a result: what a customer reads first, then figures, parameters and tests, then an appendix."""
 
+from __future__ import annotations
+
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +25,11 @@ from bushfit.report.parameters import interval_kind, parameter_rows
 from bushfit.report.tables import DISPLAYS, spread
 from bushfit.units import display_unit, format_aligned, format_range, number
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: A figure of the page: a name for its identifiers, and a function that makes it.
+NamedFigure = tuple[str, Callable[[], "Figure | None"]]
 #: Colour of the verdict: nothing to do, something to know, something to do.
 _TONES = {"consistent": "good", "named": "good", "unexplained": "bad"}
 #: Consequence of each verdict for the use of the numbers.
@@ -57,6 +65,8 @@ _AGREES = 1.4
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 #: Tests, regions and places that a page lists or draws at most: the files have all.
 MOST, _MOST_PLACES = 12, 6
+#: Characters of all figures of a page at most: the page stays below 500 kB.
+_LARGEST_FIGURES = 440_000
 
 
 class Headline(NamedTuple):
@@ -90,6 +100,9 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
     head = {key.replace("_", " ").capitalize(): value for key, value in (campaign.report if campaign else {}).items()}
     predictions = record.predictions[:_MOST_PLACES]
     place_warnings = [prediction.warnings for prediction in record.predictions]
+    figures, more_figures = _figures(record, predictions)
+    pictures = _drawn(figures, _LARGEST_FIGURES)
+    appendix = _drawn(more_figures, _LARGEST_FIGURES - sum(len(drawn.svg) for drawn in pictures))
     return {
         "name": campaign.name if campaign else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
@@ -102,8 +115,9 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
         "consequence": _CONSEQUENCES[diagnosis["verdict"]] if diagnosis else "",
         "effects": [(effect, [*_sizes(effect)]) for effect in diagnosis["effects"]] if diagnosis else [],
         "odds": odds_in_words(diagnosis) if diagnosis else [],
-        "pictures": [*_pictures(record, predictions)],
-        "appendix": [*_appendix_pictures(record, predictions)],
+        "pictures": pictures,
+        "appendix": appendix,
+        "left_out": len(pictures) < len(figures) or len(record.predictions) > _MOST_PLACES,
         "rows": list(parameter_rows(result)),
         "interval": interval_kind(result),
         "plain": {row.name: row.value for row in parameter_rows(record.joint)} if record.joint else {},
@@ -200,31 +214,44 @@ def _basis(record: ReportRecord, place: str) -> str:
     return f"{source}; the measured sweep differs by {number(100 * worst.nrmse, 2)} %"
 
 
-def _pictures(record: ReportRecord, predictions: Sequence[Prediction]) -> Iterator[Picture]:
-    """Predictions beside measurements, loops, and measured minus model."""
-    result = record.result
-    for count, prediction in enumerate(predictions):
-        title = f"{prediction.direction}: prediction and measurement"
-        figure = plots.prediction.prediction_figure(result, prediction, record.sweeps, title)
-        yield picture(figure, f"p{count}-")
-    if record.loops is not None:
-        yield picture(plots.fits.loops_figure(result, record.loops, "Hysteresis loops"), "l")
-    if record.gap is not None and record.diagnosis is not None:
-        yield picture(plots.gap.gap_figure(record.gap, result, record.diagnosis, "Measured minus model"), "g")
+def _drawn(figures: Sequence[NamedFigure], largest: int) -> list[Picture]:
+    """Draw the first figures, as many as have so many characters together."""
+    pictures = list[Picture]()
+    for name, make in figures:
+        if (figure := make()) is None:
+            continue
+        drawn = picture(figure, name)
+        largest -= len(drawn.svg)
+        if largest < 0:
+            break
+        pictures.append(drawn)
+    return pictures
 
 
-def _appendix_pictures(record: ReportRecord, predictions: Sequence[Prediction]) -> Iterator[Picture]:
-    """Residuals of the sweeps if nothing else shows them, storage and loss stiffness, and confidence ellipses."""
-    result = record.result
-    if record.sweeps is not None and record.gap is None:
-        yield picture(plots.fits.sweeps_figure(result, record.sweeps, "Sweeps and their residuals"), "s")
+def _figures(record: ReportRecord, predictions: Sequence[Prediction]) -> tuple[list[NamedFigure], list[NamedFigure]]:
+    """Figures of the page and of its appendix, each with a name for its identifiers.
+
+    The page shows predictions beside measurements, measured minus model, and loops. The appendix shows the residuals of
+    the sweeps if nothing else does, storage and loss stiffness, and confidence ellipses.
+    """
+    result, sweeps, loops, gap, diagnosis = record.result, record.sweeps, record.loops, record.gap, record.diagnosis
+    page: list[NamedFigure] = []
+    appendix: list[NamedFigure] = []
+    if sweeps is not None and gap is None:
+        appendix.append(("s", lambda: plots.fits.sweeps_figure(result, sweeps, "Sweeps and their residuals")))
     for count, prediction in enumerate(predictions):
+        place = prediction.direction
+        shown = partial(plots.prediction.prediction_figure, result, prediction, sweeps)
+        page.append((f"p{count}-", partial(shown, f"{place}: prediction and measurement")))
         if np.unique(prediction.frequency).size > 1:
-            title = f"{prediction.direction}: storage and loss stiffness, Cole-Cole diagram"
-            figure = plots.appendix.complex_figure(result, prediction, record.sweeps, title)
-            yield picture(figure, f"c{count}-")
-    if ellipses := plots.appendix.ellipses_figure(result, "Confidence regions of pairs of parameters"):
-        yield picture(ellipses, "e")
+            parts = partial(plots.appendix.complex_figure, result, prediction, sweeps)
+            appendix.append((f"c{count}-", partial(parts, f"{place}: storage and loss stiffness, Cole-Cole diagram")))
+    if gap is not None and diagnosis is not None:
+        page.append(("g", lambda: plots.gap.gap_figure(gap, result, diagnosis, "Measured minus model")))
+    if loops is not None:
+        page.append(("l", lambda: plots.fits.loops_figure(result, loops, "Hysteresis loops")))
+    appendix.append(("e", lambda: plots.appendix.ellipses_figure(result, "Confidence regions of pairs of parameters")))
+    return page, appendix
 
 
 def tube_description(bushing: Bushing) -> str:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 _SVG, _HREF = "http://www.w3.org/2000/svg", "{http://www.w3.org/1999/xlink}href"
 _NUMBER = re.compile(r"-?\d+\.\d{2,}")
 _FONT = re.compile(r"(?P<weight>bold )?(?P<size>[\d.]+px) .*")
+#: Length of the path of a marker at most: it is small and needs two decimals.
+_SMALL_SHAPE = 500
 #: Fonts as wide as the one that matplotlib lays out with.
 _FAMILY = "DejaVu Sans, Verdana, sans-serif"
 
@@ -113,7 +115,7 @@ def _rewrite(element: ElementTree.Element, names: Mapping[str, str]) -> None:
     decimals = 1
     if identifier and identifier in names:
         element.set("id", names[identifier])
-        decimals = 2  # the shape of a marker is small
+        decimals = 2 if len(element.get("d", "")) < _SMALL_SHAPE else 1
     for key in ("x", "y", "width", "height", "transform", "d"):
         if key in element.attrib:
             value = _NUMBER.sub(lambda number: _rounded(number[0], decimals), element.attrib[key])

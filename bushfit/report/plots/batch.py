@@ -234,7 +234,7 @@ def comparison_figure(found: SideBySide) -> Figure:
     Drawn over frequency at the smallest and the largest amplitude, or over amplitude where there is one frequency.
     """
     first, *others = found.names
-    shown = [found.sides(place) for place in found.places]
+    shown = [found.curves(place) for place in found.places]
     figure = style.new_figure(f"{', '.join(others)} against {first}", 2 * len(shown) * style.ROW)
     grid = figure.subplots(2 * len(shown), 2, squeeze=False)
     looks = dict(zip(found.names, style.styles(len(found.names), "loop"), strict=True))

@@ -160,7 +160,7 @@ def _draw_map(axes: Axes, group: SweepGroup, header: str, colors: ScalarMappable
         low, high = _cells(x, logarithmic=logarithmic)
         corners = (low, row - 0.5), (high, row - 0.5), (high, row + 0.5), (low, row + 0.5)
         cells = np.stack([np.stack(np.broadcast_arrays(*corner), axis=1) for corner in corners], axis=1)
-        look: dict[str, Any] = {"norm": colors.norm, "cmap": colors.cmap, "ec": "face", "lw": 0.2}
+        look: dict[str, Any] = {"norm": colors.norm, "cmap": colors.cmap, "lw": 0.0, "antialiaseds": False}
         axes.add_collection(PolyCollection(list(cells), array=values, **look), autolim=False)
         below = values < -_BARRED
         inset = 0.3 * (high - low)[below]

@@ -123,7 +123,7 @@ OF_COMPARISON = [
 OF_BATCH = [
     (written("batch.json", "{"), ("not valid JSON",)),
     (written("batch.json", '{"schema": "x"}'), ("not a batch this version reads",)),
-    (without("batch.json"), ("there is no such file",)),
+    (without("batch.json"), ("there is no model in this folder",)),
     (
         written("batch.json", json.dumps(BATCH | {"quantities": {"a [-]": {"median": 1.0}}})),
         ("batch.json, quantities.a [-].", "a key is missing"),
