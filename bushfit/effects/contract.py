@@ -87,8 +87,8 @@ class Parameter:
         typical: a usual distance from the neutral value; the scale on which a fit moves a linear parameter.
         log: whether a fit moves its logarithm (strictly positive parameters).
         scale: what of the tests its size goes with, so that a search knows where to start: "period",
-            "frequency", "displacement", "strain" or "force"; "order" where it is one of derivation, of
-            which there is but one range; none where `typical` is good for any test.
+            "frequency", "displacement", "strain" or "force"; "session" for a share of its duration; "order" where
+            it is one of derivation, of which there is but one range; none where `typical` is good for any test.
     """
 
     name: str
@@ -98,7 +98,7 @@ class Parameter:
     typical: float
     meaning: str
     log: bool = False
-    scale: Literal["period", "frequency", "displacement", "strain", "force", "order"] | None = None
+    scale: Literal["period", "frequency", "displacement", "strain", "force", "order", "session"] | None = None
 
     def sized(self, share: float) -> float:
         """The value at a share of the typical distance from the neutral one, or from 0 where none is neutral.

@@ -1,4 +1,8 @@
-"""Drift: the gain of the force chain moves with time over the session."""
+"""Drift: the gain of the force chain moves over the session, evenly or with the logarithm of time.
+
+What warms up or wears drifts evenly. What settles under a preload, a clamp, an adhesive or the bushing itself, does so
+with the logarithm of time.
+"""
 
 from functools import partial
 
@@ -8,14 +12,20 @@ from bushfit.effects.contract import Setting, Value, Values, scaled_response
 
 
 def _gain(p: Values, setting: Setting) -> Value:
-    """1 + gain t, t from 0 at the first point of the session to 1 at the last; 1 where that is not known.
+    """1 + gain ln(1 + t/onset)/ln(1 + 1/onset), t from 0 at the first point of the session to 1 at the last; 1 if t is
+    not known.
 
     >>> from bushfit.effects.contract import Circumstances
-    >>> float(_gain({"gain": 0.02}, Setting(None, "axial", "sweep", Circumstances(turn=0.5))))
+    >>> halfway = Setting(None, "axial", "sweep", Circumstances(turn=0.5))
+    >>> float(_gain({"gain": 0.02, "onset": 1e6}, halfway).round(6))
     1.01
+    >>> float(_gain({"gain": 0.02, "onset": 0.01}, halfway).round(6))
+    1.017039
     """
     turn = setting.under.turn
-    return 1.0 if turn is None else 1.0 + p["gain"] * np.asarray(turn)
+    if turn is None:
+        return 1.0
+    return 1.0 + p["gain"] * np.log1p(np.asarray(turn) / p["onset"]) / np.log1p(1.0 / p["onset"])
 
 
 stiffness = force = partial(scaled_response, _gain)

@@ -18,6 +18,8 @@ from bushfit.model.model import Model
 _PROBES = 5
 #: Least and largest order of a derivative that is tried: one far below and one far above that of filled rubber, 0.2.
 _ORDERS = (0.05, 0.9)
+#: Least and largest onset of a drift, as a share of the session: from its first points to what is even.
+_SESSION = (0.01, 10.0)
 #: Factors on a shape parameter of an effect in place of a branch, besides 1, that a fit is started from; chosen: within
 #: the decade that the tests of a bushing span, and apart enough to lie in other valleys.
 _FACTORS = (0.25, 4.0)
@@ -117,6 +119,8 @@ def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> 
         case "order":
             low, high = _ORDERS  # steeper than the first, which without it lies between the two
             low = min(max(low, model.values.get("alpha", low)), high)
+        case "session":
+            low, high = _SESSION
         case None:
             return np.array([parameter.typical])
     return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)
