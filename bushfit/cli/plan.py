@@ -224,7 +224,7 @@ def _checked(output: Output, outcome: PlanOutput, count: int, seed: int) -> Chec
         return track("campaigns simulated and fitted", come, count)
 
     found = check(outcome.plan, count, seed, every)
-    title = f"{len(found.off)} simulated campaigns from seed {found.seed} on: standard errors [%]"
+    title = f"{len(found.deviations)} simulated campaigns from seed {found.seed} on: standard errors [%]"
     rows, (low, high) = [], found.interval
     for name, *sizes in zip(found.names, found.predicted, found.found, low, high, strict=True):
         predicted, scatter, *ends = (number(100.0 * size, 3) for size in sizes)

@@ -398,7 +398,7 @@ def _checked(check: Check) -> Checked:
     """Simulations as plan.json has them."""
     low, high = check.interval
     return {
-        "campaigns": len(check.off) + check.failed,
+        "campaigns": len(check.deviations) + check.failed,
         "failed": check.failed,
         "seed": check.seed,
         "predicted": dict(zip(check.names, check.predicted.tolist(), strict=True)),

@@ -1,1 +1,1 @@
-"""Which test next: tests chosen for what they would tell, before the rig is booked."""
+"""The next tests, chosen for their information before the rig is booked."""

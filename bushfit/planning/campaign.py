@@ -3,7 +3,7 @@
 Notes:
     For that it is simulated many times, and each campaign is fitted anew. What is simulated is all that a fit would
     see: noise that it has to estimate from the repeats, errors of runs and levels, start values read off the data.
-    Nothing is told to the fit but the rig's class, which a campaign states too.
+    The fit is given the class of the rig only, which a campaign states too.
 """
 
 from collections import Counter
@@ -52,7 +52,7 @@ Every = Callable[[Sequence[int], Callable[[int], Found]], Iterable[tuple[int, Fo
 
 
 def settings_of(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateSettings:
-    """What the virtual rig does for a plan: each test once, with as many repeats as it stands in the plan.
+    """Settings of the virtual rig for planned tests, each with as many repeats as the plan has runs of it.
 
     Notes:
         Rows of a loop are correlated as those of a filter with one time constant, AR(1) with r; n of them tell as much
@@ -75,19 +75,19 @@ def settings_of(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateS
 
 def campaign_toml(plan: Plan, seed: int = 0) -> str:
     """The planned tests as a campaign file for `bushfit simulate`."""
-    known, settings = plan.knowledge, settings_of(plan.planned.tests, plan.knowledge.noise, seed)
+    knowledge, settings = plan.knowledge, settings_of(plan.planned.tests, plan.knowledge.noise, seed)
     tested = [test.direction for test in plan.planned.tests]
     lines = [
         "# Planned by bushfit plan; bushfit simulate makes these tests of the model below. No rubber was tested.",
         "# All repeats of a sweep follow each other here; the order on the rig is that of the sheet.",
-        *body_lines(known.model.bushing, dict.fromkeys(each for each in tested if isinstance(each, Specimen))),
+        *body_lines(knowledge.model.bushing, dict.fromkeys(each for each in tested if isinstance(each, Specimen))),
         *("", "[simulate]", *(_line(key, getattr(settings, key)) for key in _SETTINGS)),
         *("", "[simulate.parameters]"),
     ]
-    for record in known.model.records:
+    for record in knowledge.model.records:
         lines += [] if record.name in BASE else ["", f"[simulate.effects.{toml_value(record.name)}]"]
         for parameter in record.parameters:
-            value = _number(known.model.values[qualified_name(record, parameter)])
+            value = _number(knowledge.model.values[qualified_name(record, parameter)])
             text = value if parameter.unit == "1" else toml_value(f"{value} {parameter.unit}")
             lines.append(f"{parameter.name} = {text}")
     for kind, tests in (("loops", settings.loops), ("sweeps", settings.sweeps)):
@@ -125,26 +125,26 @@ class Check:
     Args:
         names: of the parameters.
         predicted: by the plan, (k,).
-        off: found less true values of each campaign, relative, (campaigns, k).
+        deviations: found less true values of each campaign, relative, (campaigns, k).
         failed: campaigns that could not be fitted.
         seed: of the first campaign; the others count on.
     """
 
     names: tuple[str, ...]
     predicted: Array
-    off: Array
+    deviations: Array
     failed: int
     seed: int
 
     @property
     def found(self) -> Array:
         """Standard deviation of what the campaigns show about the truth, (k,)."""
-        return np.sqrt(np.mean(np.square(self.off), axis=0))
+        return np.sqrt(np.mean(np.square(self.deviations), axis=0))
 
     @property
     def interval(self) -> tuple[Array, Array]:
         """95 % interval of each standard error found, (k,) each: of n campaigns, n found^2 / chi-square of n."""
-        n = len(self.off)
+        n = len(self.deviations)
         low, high = (self.found * np.sqrt(n / chdtri(n, p)) for p in (0.025, 0.975))
         return low, high
 
@@ -161,15 +161,15 @@ def check(plan: Plan, count: int, seed: int, every: Every) -> Check:
     Raises:
         FitError: none of the campaigns could be fitted.
     """
-    known = plan.knowledge
-    settings = settings_of((*known.tests, *plan.planned.tests), known.noise)
-    work = partial(_fit_one, undisturbed(known.model, settings), settings, plan.wanted.rig, known.names)
+    knowledge = plan.knowledge
+    settings = settings_of((*knowledge.tests, *plan.planned.tests), knowledge.noise)
+    work = partial(_fit_one, undisturbed(knowledge.model, settings), settings, plan.wanted.rig, knowledge.names)
     found = dict(every(range(seed, seed + count), work))
     fitted = [row for _, row in sorted(found.items()) if row is not None]
     if not fitted:
         raise FitError("no simulated campaign of this plan could be fitted", found=f"{count} campaigns")
-    predicted = plan.planned.errors if known.tests else plan.planned.alone
-    return Check(known.names, predicted, np.array(fitted), count - len(fitted), seed)
+    predicted = plan.planned.errors if knowledge.tests else plan.planned.alone
+    return Check(knowledge.names, predicted, np.array(fitted), count - len(fitted), seed)
 
 
 def _fit_one(

@@ -1,7 +1,7 @@
-"""What a plan is made of: what is known before, what is wanted, and what tests would tell.
+"""Records of a plan: the knowledge before it, its aim, and the expected results of tests.
 
 A test is one run of the rig: a stepped sine that holds one amplitude or one frequency (`SimulatedSweep`), or a loop
-(`SimulatedLoop`). A test that is repeated stands in the plan again: its points share their errors anew. Standard errors
+(`SimulatedLoop`). A repeated test is listed again: the points of each run share their own errors. Standard errors
 are of relative changes of parameters, as `fitting.information` counts them.
 """
 
@@ -66,21 +66,21 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """What is known before the tests.
+    """Knowledge before the tests.
 
     Args:
         model: the likeliest values.
-        names: of its k parameters that the tests are to tell.
-        covariance: of their relative changes and those of the bounded, (k + b, k + b), from what is known now.
+        names: of its k parameters that the tests are to determine.
+        covariance: of their relative changes and those of the bounded parameters, (k + b, k + b).
         noise: of the rig.
-        source: where all this comes from, in words.
-        rivals: what is known if another model is the right one, this one's model first; none where there is no doubt.
+        source: origin of the knowledge, as a phrase.
+        rivals: knowledge for each model that may be the right one, this model first; empty if there is no doubt.
         probability: of this model among its rivals.
         strain: largest equivalent strain amplitude measured so far; None where nothing was.
         specimens: bodies of the compound that can be tested in place of the bushing.
         tests: of the campaign so far.
         bounded: its b parameters at rest on a bound, off which noise takes a fit half of the times; in typical sizes.
-        warnings: of the fit that tells it.
+        warnings: of the fit.
         result: the fit itself; None of a guess.
     """
 
@@ -105,7 +105,7 @@ class Knowledge:
 
     @property
     def precision(self) -> Array:
-        """What is known as information, and each parameter beforehand within a factor of 20, (k + b, k + b).
+        """Information of the knowledge, with a prior of each parameter within a factor of 20, (k + b, k + b).
 
         Notes: what tests leave open has errors of a thousand times its size, which rounds all else away.
         """
@@ -149,12 +149,12 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """What the plan is for.
+    """Aim of a plan.
 
     Args:
         parameters: names whose errors count, of aim "parameters".
         targets: of aim "targets": once they are met, no further test is planned.
-        points: where the stiffness is wanted; predictions are told for them whatever the aim.
+        points: where the stiffness is wanted; the plan reports its errors there whatever the aim.
         hours: of the rig, at most.
         rig: its limits, and its time for a point and for a set-up.
         places: directions, or specimens, in which it can test.
@@ -188,16 +188,16 @@ class Visible:
 
 @dataclass(frozen=True, eq=False)
 class Programme:
-    """Tests in their order, and what they would tell together with what is known.
+    """Tests in their order, with their expected results beside the knowledge before them.
 
     Args:
         tests: runs of the rig, in the order in which they are made.
         minutes: that each test takes, with the change of direction before it, (tests,).
         errors: standard error of each parameter's relative change, (k,).
-        alone: the errors by these tests without what is known, (k,).
+        alone: the errors by these tests alone, (k,).
         stiffness: standard error of |K| at the points wanted, relative, all points of all directions, (n,).
         loss: the same of the loss factor, in loss factor, (n,).
-        apart: expected chi-square between the two nearest rivals that any tests tell apart, after the best refit of
+        apart: expected chi-square between the two nearest rivals that can be separated, after the best refit of
             either; None without rivals.
         halves: half of the 95 % interval of each target over its value, the widest of all points.
         visible: of the effects that the standard programme can show, the smallest amount found.
@@ -217,7 +217,7 @@ class Programme:
 
     @property
     def hours(self) -> float:
-        """That the tests take."""
+        """Duration of the tests [h]."""
         return float(np.sum(self.minutes)) / 60.0
 
 
@@ -226,13 +226,13 @@ class Plan:
     """Tests chosen for an aim, and the standard programme of as many hours beside them.
 
     Args:
-        before: no tests, and so what is known without them.
+        before: a programme without tests.
         planned: the tests chosen.
         standard: the paper's tests, as often as the same hours allow.
         purposes: of each test with all its repeats, what would be lost without it, in words.
         missed: by what the planned tests fail each target, in words; None where they meet it.
         enough: why hours stay free, in words; None where they are used.
-        notes: what a user must know.
+        notes: warnings and limits of the plan.
     """
 
     knowledge: Knowledge

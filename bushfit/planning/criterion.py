@@ -1,4 +1,4 @@
-"""Which tests, and in which order: how good a choice is, and the search for the best within the hours."""
+"""Criterion for a choice of tests, search for the best choice within the hours, and order of its runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _STEADY = 100.0
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What tests tell about the parameters of one model, and how well further columns show beside these.
+    """Information of tests on the parameters of one model, and on further columns beside these.
 
     Args:
         information: of every candidate test, made once.
@@ -37,22 +37,22 @@ class View:
     bounded: int = 0
 
     @classmethod
-    def of(cls, grid: Grid, known: Knowledge, further: Array | None = None) -> View:
-        """Of the tests of a grid about what is known of a model, and of further columns of residuals, (e, n)."""
-        slopes = relative_slopes(known, grid.data_sets)
+    def of(cls, grid: Grid, knowledge: Knowledge, further: Array | None = None) -> View:
+        """Information of the tests of a grid on the parameters of a model, and on further columns, (e, n)."""
+        slopes = relative_slopes(knowledge, grid.data_sets)
         columns = np.empty((0, slopes.shape[-1])) if further is None else further
-        return cls(grid.information(slopes, columns), known.precision, grid.level, len(known.bounded))
+        return cls(grid.information(slopes, columns), knowledge.precision, grid.level, len(knowledge.bounded))
 
     def together(self, counts: Array) -> Information:
-        """What so many runs of each test, (tests,), tell together with what is known, (1, ...)."""
+        """Information of the given number of runs of each test, (tests,), with the knowledge before, (1, ...)."""
         total = self._each(counts).total()
         return replace(total, own=total.own + self.prior)
 
     def one_more(self, counts: Array) -> Information:
-        """The same with one run more of each test in turn, (tests, ...)."""
+        """Information with one run more of each test in turn, (tests, ...)."""
         return self.together(counts) + (self._each(counts + 1) - self._each(counts))
 
-    def off(self, found: Information) -> Array:
+    def error_covariance(self, found: Information) -> Array:
         """Expected squares and products of what a fit to such tests finds less the truth, (..., k, k).
 
         Notes:
@@ -65,13 +65,13 @@ class View:
         return free - 0.5 * own @ np.linalg.inv(own[..., first:, :]) @ own.mT
 
     def _each(self, counts: Array) -> Information:
-        """What so many runs of each test tell about the parameters, test by test."""
+        """Information of the given number of runs of each test on the parameters, test by test."""
         return self.information.times(counts).beside(self.level)
 
 
 @dataclass(frozen=True, eq=False)
 class Criterion:
-    """What is made small by a choice of tests.
+    """Criterion that a choice of tests makes small.
 
     Args:
         views: the likeliest model's, whose further columns are effects that it lacks; then those of its rivals.
@@ -89,18 +89,18 @@ class Criterion:
     penalty: float
 
     def together(self, counts: Array) -> float:
-        """Of so many runs of each test, (tests,)."""
+        """Criterion of the given number of runs of each test, (tests,)."""
         return float(self._of([view.together(counts) for view in self.views])[0])
 
     def one_more(self, counts: Array) -> Array:
-        """The same with one run more of each test in turn, (tests,)."""
+        """Criterion with one run more of each test in turn, (tests,)."""
         return self._of([view.one_more(counts) for view in self.views])
 
     def _of(self, found: Sequence[Information]) -> Array:
         if self.weight is None:
             aim = np.log(np.maximum(entropy_left(self.odds, distances(found[1:])), np.finfo(float).tiny))
         else:
-            aim = np.log(np.einsum("tij,ij->t", self.views[0].off(found[0]), self.weight))
+            aim = np.log(np.einsum("tij,ij->t", self.views[0].error_covariance(found[0]), self.weight))
         asked = self.least > 0.0
         reached = noncentrality_of(found[0])[:, asked] / self.least[asked]
         return aim - self.penalty * np.sum(np.log(np.clip(reached, 1e-12, 1.0)), axis=1)  # finite
@@ -125,7 +125,7 @@ def root_of(information: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """What tests cost.
+    """Duration and limits of tests.
 
     Args:
         minutes: of each test, (tests,).
@@ -155,7 +155,7 @@ class Budget:
 
 
 def best_runs(criterion: Criterion, budget: Budget, start: Array, kept: Array) -> Array:
-    """So many runs of each test within the budget, (tests,), that the criterion is small; those `kept` at least.
+    """Number of runs of each test within the budget, (tests,), with a small criterion; at least those `kept`.
 
     Notes: greedy from `start` by what the logarithm falls per minute; then exchanges (Fedorov 1972): one run of each
     test, and all of them, are given up for the best that can be had in their time, as long as that helps.
@@ -197,7 +197,7 @@ def filled(
 
 @dataclass(frozen=True, eq=False)
 class Drifting:
-    """What a drift of the gain over the session does to tests, of which each is made so many times.
+    """Effect of a drift of the gain over the session on a given number of runs of each test.
 
     Its noncentrality beside the parameters, with S1 and S2 the sums of t and of t^2 over the runs of each test, is
     sum(seen S2 - shared S1^2) - |sum(S1 pull)|^2; t is the turn of a run, from -1/2 to 1/2 over the session.
@@ -213,13 +213,13 @@ class Drifting:
     pull: Array
 
     def noncentrality(self, runs: Sequence[int]) -> float:
-        """Of a drift of 1 by runs in their order, by the numbers of their tests."""
+        """Noncentrality of a drift of 1 over runs in their order, by the numbers of their tests."""
         first, second = self._sums(np.array(runs, dtype=int))
         shift = first @ self.pull
         return float(self.seen @ second - self.shared @ first**2 - shift @ shift)
 
     def shift(self, runs: Sequence[int]) -> Array:
-        """What the parameters take of a drift of 1, (k,)."""
+        """Shift of the parameters by a drift of 1, (k,)."""
         return self._sums(np.array(runs, dtype=int))[0] @ self.pull
 
     def _sums(self, runs: Array) -> tuple[Array, Array]:
@@ -227,9 +227,9 @@ class Drifting:
         return first, second
 
     def exchanged(self, runs: Array) -> Array:
-        """By how much the noncentrality grows where two runs change places, (runs, runs).
+        """Growth of the noncentrality if two runs change places, (runs, runs).
 
-        What the parameters take of the drift counts _STEADY times.
+        The shift of the parameters is weighted by _STEADY.
         """
         turn = turns(runs.size)
         first = self._sums(runs)[0]
@@ -247,7 +247,7 @@ def turns(count: int) -> Array:
 
 
 def ordered(counts: Array, places: Array, drifting: Drifting) -> list[int]:
-    """So many runs of each test, place by place, each place begun and ended with one test where one is repeated.
+    """Order of the runs, place by place; each place begins and ends with the same test if one is repeated.
 
     Args:
         counts: (tests,).
@@ -258,11 +258,11 @@ def ordered(counts: Array, places: Array, drifting: Drifting) -> list[int]:
     """
     order, held = list[int](), list[int]()
     for place in np.unique(places[counts > 0]):
-        mine = np.where(places == place, counts, 0)
-        twice = np.flatnonzero(mine > 1)
+        chosen = np.where(places == place, counts, 0)
+        twice = np.flatnonzero(chosen > 1)
         ends = [int(twice[np.argmax(drifting.seen[twice])])] if twice.size else []
-        mine[ends] -= 2
-        inner = np.repeat(np.arange(mine.size), mine).tolist()
+        chosen[ends] -= 2
+        inner = np.repeat(np.arange(chosen.size), chosen).tolist()
         if ends:
             held += [len(order), len(order) + len(inner) + 1]
         order += [*ends, *inner[::2], *inner[1::2][::-1], *ends]

@@ -1,4 +1,4 @@
-"""What is known before tests are planned: from a campaign and its diagnosis, a model, or hardness and filler."""
+"""Knowledge before tests are planned: from a campaign and its diagnosis, a model, or hardness and filler."""
 
 from collections import defaultdict
 from collections.abc import Container, Iterable, Iterator, Sequence
@@ -65,7 +65,7 @@ _NETWORK_ERROR = 1.0
 
 
 def of_result(result: Result, noise: Noise | None = None, source: str = "") -> Knowledge:
-    """What a fitted model tells; of one that was not fitted, the values within a factor of 2.7."""
+    """Knowledge from a fitted model; values of a model that was not fitted are within a factor of 2.7."""
     model, fitted = result.model, result.covariance
     names = tuple(name for name in fitted.names if fitted.stderr(name)) or tuple(model.parameters)
     covariance, words = np.eye(len(names)) / 4.0, "values given by hand, taken as right within a factor of 2.7"
@@ -87,14 +87,14 @@ def of_result(result: Result, noise: Noise | None = None, source: str = "") -> K
 
 
 def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
-    """What the tests of a campaign tell, fitted together; and of each rival effect, added to the model in turn.
+    """Knowledge from the tests of a campaign, fitted together, and with each rival effect added in turn.
 
     The class of the rig counts as noise, stated or not, as it does in what is planned. Beside rivals the model has
     what a diagnosis is sure of, and the leaders of its other sets of look-alikes.
 
     Args:
-        rivals: names of effects, of twins any; none for those that a diagnosis of these tests cannot tell apart, None
-            for no rivals.
+        rivals: names of effects; empty for those that a diagnosis of these tests cannot separate, None for no
+            rivals.
 
     Raises:
         FitError: data that cannot support the fit.
@@ -109,7 +109,7 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
     held = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
     source = f"the tests of {data.campaign.name}"
 
-    def known(evidence: Evidence) -> Knowledge:
+    def knowledge(evidence: Evidence) -> Knowledge:
         result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
         strain = max(float(np.max(each.amplitude)) * model.unit_strain(each.direction) for each in data_sets)
         plain = replace(of_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
@@ -117,7 +117,7 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
         return _with_bounded(plain, bounded, data_sets) if bounded else plain
 
     if found is None or rivals is None:
-        return known(fit(model, data_sets, held, data.bounds))
+        return knowledge(fit(model, data_sets, held, data.bounds))
     sets = look_alikes(found)
     names = list(dict.fromkeys(twins_of(name)[0] for name in rivals or next(iter(sets), ())))
     if not names:
@@ -142,7 +142,7 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
         for name in label.split(" + "):
             odds[name] += share
     least = min(odds.values(), default=1.0)
-    every = [replace(known(rivalling[name]), probability=odds[name] or least) for name in names]
+    every = [replace(knowledge(rivalling[name]), probability=odds[name] or least) for name in names]
     return replace(every[0], rivals=tuple(every))
 
 
@@ -158,25 +158,26 @@ def _check_rivals(names: Iterable[str], possible: Container[str]) -> None:
         )
 
 
-def _with_bounded(known: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[DataSet]) -> Knowledge:
-    """What the tests tell where parameters at rest on a bound count as free, but those of which they tell nothing; what
-    noise is more than was counted is told by the errors of the others, with those held."""
-    k = len(known.names)
-    slopes = relative_slopes(replace(known, bounded=bounded), data_sets)
+def _with_bounded(knowledge: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[DataSet]) -> Knowledge:
+    """Knowledge in which parameters at a bound count as free, except those that the tests do not show.
+
+    Noise beyond the one that was counted is taken from the errors of the other parameters."""
+    k = len(knowledge.names)
+    slopes = relative_slopes(replace(knowledge, bounded=bounded), data_sets)
     own, others = slopes[:k], slopes[k:]
     answer = -np.linalg.lstsq(own.T, others.T)[0]
     beside = others + answer.T @ own
     seen = np.linalg.norm(beside, axis=1) > 1e-6 * np.linalg.norm(others, axis=1)  # of rounding
     if not seen.any():
-        return known
+        return knowledge
     information = own @ own.T
     live = np.diag(information) > 0.0
-    excess = float(np.mean(np.diag(known.covariance @ information)[live])) if live.any() else 1.0
+    excess = float(np.mean(np.diag(knowledge.covariance @ information)[live])) if live.any() else 1.0
     answer, beside = answer[:, seen], beside[seen]
     alone = excess * np.linalg.inv(beside @ beside.T)
     shared = answer @ alone
-    covariance = np.block([[known.covariance + shared @ answer.T, shared], [shared.T, alone]])
-    return replace(known, bounded=tuple(np.array(bounded)[seen].tolist()), covariance=covariance)
+    covariance = np.block([[knowledge.covariance + shared @ answer.T, shared], [shared.T, alone]])
+    return replace(knowledge, bounded=tuple(np.array(bounded)[seen].tolist()), covariance=covariance)
 
 
 def _each_added(plain: Evidence, names: Sequence[str], held: Sequence[str], bounds: Bounds) -> dict[str, Evidence]:
@@ -186,8 +187,9 @@ def _each_added(plain: Evidence, names: Sequence[str], held: Sequence[str], boun
 
 
 def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:
-    """The sets of effects that a diagnosis cannot tell apart; without mistakes and faults, which no plan tells, and of
-    effects that make one explanation together without those that every explanation has."""
+    """Sets of effects that a diagnosis cannot separate, without mistakes and faults, which no test separates.
+
+    Effects that all explanations of a set share are left out."""
     sets, every = [], [each.name for each in found.effects]
     for named in found.effects:
         if named.alternatives and not named.test and not named.alternatives[0].startswith("fault:"):
@@ -199,7 +201,7 @@ def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:
 
 
 def noise_of(data: Data) -> Noise:
-    """How well the rig of a campaign measures, as its tests show; what they do not show is assumed."""
+    """Noise of the rig of a campaign, from its tests where they show it, else assumed."""
     loops, sweeps = parted(data.data_sets)
     found = replace(Noise(), level=of_class(data.campaign.rig))
     if sweeps:
@@ -240,7 +242,7 @@ def gent_modulus(shore: float) -> float:
 
 
 def guess(bushing: Bushing, compound: Compound) -> Knowledge:
-    """What hardness and filler tell of a bushing's parameters, and how wide this guess of a rubber not tested is.
+    """Guess of the parameters of a rubber that was not tested, from hardness and filler, with its uncertainty.
 
         E   = 0.0981 (56 + 7.66 S) / (0.137505 (254 - 2.54 S)) MPa, S in Shore A               (Gent 1958)
         G   = E/3 = mu + Re m/2 (i omega_S)^alpha        a durometer is read some seconds after it is put down

@@ -1,4 +1,4 @@
-"""What is on offer: the runs that a rig can make, their cost, the standard programme, and what each run would tell."""
+"""Candidates of a plan: runs that the rig can make, with their duration and information, and the standard programme."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -59,33 +59,33 @@ def minutes(test: Test, rig: RigSettings) -> float:
     return (_RUN_SECONDS + per_point * test.points[0].size) / 60.0
 
 
-def standard_tests(known: Knowledge, wanted: Wanted) -> list[Test]:
+def standard_tests(knowledge: Knowledge, wanted: Wanted) -> list[Test]:
     """Every run of the standard programme once: the paper's, axial and radial; of specimens, the axial ones.
 
     Displacements are those that make the paper's axial strains, within the limits of the rig.
     """
-    if known.model.bushing is None:
-        return [test for place in wanted.places for test in _of_paper(known, wanted.rig, place)]
-    loops = [test for test in _of_paper(known, wanted.rig, Direction.AXIAL) if isinstance(test, SimulatedLoop)]
-    sweeps = [test for place in (Direction.AXIAL, Direction.RADIAL) for test in _of_paper(known, wanted.rig, place)]
+    if knowledge.model.bushing is None:
+        return [test for place in wanted.places for test in _of_paper(knowledge, wanted.rig, place)]
+    loops = [test for test in _of_paper(knowledge, wanted.rig, Direction.AXIAL) if isinstance(test, SimulatedLoop)]
+    sweeps = [test for place in (Direction.AXIAL, Direction.RADIAL) for test in _of_paper(knowledge, wanted.rig, place)]
     return [*loops, *(test for test in sweeps if isinstance(test, SimulatedSweep))]
 
 
-def candidates(known: Knowledge, wanted: Wanted) -> list[Test]:
+def candidates(knowledge: Knowledge, wanted: Wanted) -> list[Test]:
     """Runs to choose from: the standard programme's, and others of few points, over its amplitudes and beyond.
 
     Raises:
         ModelError: there is none within the limits of the rig.
     """
-    found = [test for test in standard_tests(known, wanted) if test.direction in wanted.places]
+    found = [test for test in standard_tests(knowledge, wanted) if test.direction in wanted.places]
     found += [replace(test, cycles=_LOOP_CYCLES[-1]) for test in found if isinstance(test, SimulatedLoop)]
     for place in wanted.places:
         wished = [points for points in wanted.points if points.place == place]
-        usual = [test for test in _of_paper(known, wanted.rig, place) if isinstance(test, SimulatedSweep)]
+        usual = [test for test in _of_paper(knowledge, wanted.rig, place) if isinstance(test, SimulatedSweep)]
         if usual:
             sizes = np.concatenate([*(each.amplitude for each in wished), *(each.amplitudes for each in usual)])
             rates = np.concatenate([*(each.frequency for each in wished), *(each.frequencies for each in usual)])
-            found += _runs(known, wanted.rig, place, sizes, rates)
+            found += _runs(knowledge, wanted.rig, place, sizes, rates)
     if not found:
         places = " and ".join(map(str, wanted.places))
         raise ModelError(
@@ -97,18 +97,18 @@ def candidates(known: Knowledge, wanted: Wanted) -> list[Test]:
     return list(dict.fromkeys(found))
 
 
-def _of_paper(known: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
-    """The paper's loop and axial sweeps at a place, as far as the rig can make them; a run for each amplitude."""
+def _of_paper(knowledge: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
+    """The paper's loop and axial sweeps at a place, within the limits of the rig; a run for each amplitude."""
     of_strain = Direction.AXIAL if place is Direction.RADIAL else place  # the paper's radial displacements are axial
-    scale = _PAPER_STRAIN / known.model.unit_strain(of_strain)
+    scale = _PAPER_STRAIN / knowledge.model.unit_strain(of_strain)
     loops = [replace(loop, direction=place, amplitude=_rounded(loop.amplitude * scale)) for loop in PAPER_LOOPS]
     sweep = PAPER_SWEEPS[0]
     sweeps = [replace(sweep, direction=place, amplitudes=(_rounded(x * scale),)) for x in sweep.amplitudes]
     tests: list[Test] = [*loops, *sweeps]
-    return [kept for test in tests if (kept := _within(known, rig, test)) is not None]
+    return [kept for test in tests if (kept := _within(knowledge, rig, test)) is not None]
 
 
-def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates: Array) -> Iterator[Test]:
+def _runs(knowledge: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates: Array) -> Iterator[Test]:
     """Sweeps and loops at one place over amplitudes [m or rad] and frequencies [Hz], and beyond.
 
     Frequencies go to twice those of the standard programme, where [rig] says that the rig can; those near the top show
@@ -123,14 +123,14 @@ def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates:
     runs += [SimulatedSweep(place, tuple(amplitudes), (frequencies[i],), "amplitude") for i in (0, 2, 4, 9)]
     # quasi-static loops, and as fast as most rigs still record
     runs += [SimulatedLoop(place, x, f, n) for x in amplitudes for f in (0.1, 1.0) for n in _LOOP_CYCLES]
-    yield from (kept for run in runs if (kept := _within(known, rig, run)) is not None)
+    yield from (kept for run in runs if (kept := _within(knowledge, rig, run)) is not None)
 
 
-def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
+def _within(knowledge: Knowledge, rig: RigSettings, test: Test) -> Test | None:
     """A test less the steps that are beyond the limits of the rig or what rubber bears; None where too few are left."""
     (frequency, size), place = operating_points(test), test.direction
-    bearable = size * known.model.unit_strain(place) <= max(0.5, known.strain or 0.0)  # what it has borne
-    bearable &= within_limits(known.model, rig, place, frequency, size)
+    bearable = size * knowledge.model.unit_strain(place) <= max(0.5, knowledge.strain or 0.0)  # what it has borne
+    bearable &= within_limits(knowledge.model, rig, place, frequency, size)
     if isinstance(test, SimulatedLoop):
         return test if bearable.all() else None
     kept = np.array(test.steps)[bearable]
@@ -140,11 +140,11 @@ def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
     return replace(test, frequencies=steps) if test.stepped == "frequency" else replace(test, amplitudes=steps)
 
 
-def unlimited_rig(known: Knowledge, wanted: Wanted, tests: Sequence[Test]) -> Iterator[str]:
+def unlimited_rig(knowledge: Knowledge, wanted: Wanted, tests: Sequence[Test]) -> Iterator[str]:
     """A warning on what tests ask of a rig whose limits are not stated.
 
     Args:
-        known: whose model gives the forces.
+        knowledge: whose model gives the forces.
         wanted: with the rig.
         tests: of the plan.
     """
@@ -156,7 +156,7 @@ def unlimited_rig(known: Knowledge, wanted: Wanted, tests: Sequence[Test]) -> It
     fastest = int(np.argmax(frequency * amplitude))
     velocity = 2.0 * np.pi * float(frequency[fastest] * amplitude[fastest])
     acceleration = float(np.max(np.square(2.0 * np.pi * frequency) * amplitude)) / 9.80665
-    force = max(float(np.max(np.abs(known.model.stiffness(place, f, x)) * x)) for place, f, x in points)
+    force = max(float(np.max(np.abs(knowledge.model.stiffness(place, f, x)) * x)) for place, f, x in points)
     where = f"{number(1e3 * amplitude[fastest], 3)} mm at {number(frequency[fastest], 3)} Hz"
     yield (
         f"[rig] states no limits: the plan reaches {number(velocity, 3)} m/s ({where}), "
@@ -166,7 +166,7 @@ def unlimited_rig(known: Knowledge, wanted: Wanted, tests: Sequence[Test]) -> It
 
 
 def _rounded(value: float) -> float:
-    """To two digits, as a set point is typed."""
+    """Value with two digits, as a set point is typed."""
     return float(f"{value:.2g}")
 
 
@@ -174,27 +174,27 @@ def _rounded(value: float) -> float:
 class Offer:
     """The tests to choose from for what is wanted, whatever the hours."""
 
-    known: Knowledge
+    knowledge: Knowledge
     wanted: Wanted
 
     @cached_property
     def tests(self) -> tuple[Test, ...]:
         """The candidates first, then what only the standard programme has."""
-        every = [*candidates(self.known, self.wanted), *standard_tests(self.known, self.wanted)]
+        every = [*candidates(self.knowledge, self.wanted), *standard_tests(self.knowledge, self.wanted)]
         return tuple(dict.fromkeys(every))
 
     @cached_property
     def grid(self) -> Grid:
-        return Grid(self.known, self.tests)
+        return Grid(self.knowledge, self.tests)
 
     @cached_property
     def views(self) -> list[View]:
         """The likeliest model's, beside the effects that it lacks; each rival's, beside what the others differ by."""
         data_sets = self.grid.data_sets
         effects = np.array([column.values for column in self.grid.columns])
-        views = [View.of(self.grid, self.known, effects)]
-        left = [residual(rival.model, data_sets) for rival in self.known.rivals]
-        for i, rival in enumerate(self.known.rivals):
+        views = [View.of(self.grid, self.knowledge, effects)]
+        left = [residual(rival.model, data_sets) for rival in self.knowledge.rivals]
+        for i, rival in enumerate(self.knowledge.rivals):
             others = np.array([other - left[i] for j, other in enumerate(left) if j != i])
             views.append(View.of(self.grid, rival, others))
         return views
@@ -203,47 +203,47 @@ class Offer:
     def slopes(self) -> Array:
         """Gain and phase of the stiffness at the points wanted by change of the parameters, (k + b, 2, n)."""
         sweeps = [
-            new_sweep(self.known.model, points.place, points.frequency, points.amplitude, (1.0, 1.0), (0.0, 0.0))
+            new_sweep(self.knowledge.model, points.place, points.frequency, points.amplitude, (1.0, 1.0), (0.0, 0.0))
             for points in self.wanted.points
         ]
-        each = [np.stack(np.split(relative_slopes(self.known, [sweep]), 2, axis=-1), axis=1) for sweep in sweeps]
+        each = [np.stack(np.split(relative_slopes(self.knowledge, [sweep]), 2, axis=-1), axis=1) for sweep in sweeps]
         return np.concatenate(each, axis=-1)
 
     @cached_property
     def model_error(self) -> Array:
         """Standard errors by the model's own error at the points wanted: |K|, relative, and loss factor, (2, n)."""
-        bands = [own_bands(self.known, points) for points in self.wanted.points]
+        bands = [own_bands(self.knowledge, points) for points in self.wanted.points]
         stiffness = np.concatenate([error / value for (value, error, _), _ in bands])
         return np.stack([stiffness, np.concatenate([error for _, (_, error, _) in bands])])
 
     @cached_property
     def goals(self) -> tuple[Goal, ...]:
-        """What the targets ask for."""
-        return tuple(goals(self.known, self.wanted, self.slopes))
+        """Goal of each target."""
+        return tuple(goals(self.knowledge, self.wanted, self.slopes))
 
-    def off(self, counts: Array) -> Array:
+    def error_covariance(self, counts: Array) -> Array:
         """Covariance of the parameters by so many runs of each test, (k, k)."""
-        return np.asarray(self.views[0].off(self.views[0].together(counts))[0])
+        return np.asarray(self.views[0].error_covariance(self.views[0].together(counts))[0])
 
     @cached_property
     def endless(self) -> Array:
-        """The same of all tests on offer, each again and again, (k, k): no plan leaves less."""
-        return self.off(ENDLESS * (self.budget.runs > 0))
+        """Covariance by endless repeats of all candidates, (k, k): the limit of every plan."""
+        return self.error_covariance(ENDLESS * (self.budget.runs > 0))
 
     @cached_property
     def weight(self) -> Array | None:
-        """Of the parameters' covariance in what is to be small; None where rivals are to be told apart."""
+        """Weight of the parameters' covariance in the criterion, (k, k); None if rivals are to be separated."""
         if self.wanted.aim == "rivals":
             return None
         if self.wanted.aim == "targets":
             return np.sum([goal.weight(self.endless) for goal in self.goals], axis=0)
         if self.wanted.aim == "predictions":
             return np.asarray(np.einsum("kcn,lcn->kl", self.slopes, self.slopes) / self.slopes.shape[-1])
-        return np.diag(np.isin((*self.known.names, *self.known.bounded), self.wanted.parameters).astype(float))
+        return np.diag(np.isin((*self.knowledge.names, *self.knowledge.bounded), self.wanted.parameters).astype(float))
 
     @cached_property
     def budget(self) -> Budget:
-        """What the tests cost, without a limit of hours."""
+        """Duration of the tests, without a limit of hours."""
         places = list(dict.fromkeys([*self.wanted.places, *(test.direction for test in self.tests)]))
         lines = [
             (test.direction, test.amplitude, test.frequency)
@@ -251,11 +251,11 @@ class Offer:
             else (test.direction, test.stepped, test.held)
             for test in self.tests
         ]
-        known, setup = list(dict.fromkeys(lines)), self.wanted.rig.minutes_per_setup
+        knowledge, setup = list(dict.fromkeys(lines)), self.wanted.rig.minutes_per_setup
         return Budget(
             np.array([minutes(test, self.wanted.rig) for test in self.tests]),
             np.array([places.index(test.direction) for test in self.tests]),
-            np.array([known.index(line) for line in lines]),
+            np.array([knowledge.index(line) for line in lines]),
             np.array([1000 * (test.direction in self.wanted.places) for test in self.tests]),
             30.0 if setup is None else setup / 60.0,  # half an hour where the rig states none (chosen)
             np.inf,
@@ -264,12 +264,12 @@ class Offer:
     @cached_property
     def pairs(self) -> Array:
         """Any two rivals by their numbers, (2, pairs)."""
-        return np.stack(np.triu_indices(len(self.known.rivals), 1))
+        return np.stack(np.triu_indices(len(self.knowledge.rivals), 1))
 
     @cached_property
     def tellable(self) -> Array:
-        """Those that all tests together would tell apart, (2, pairs); all where none are."""
-        if not self.known.rivals:
+        """Pairs that all tests together would separate, (2, pairs); all pairs if there are none."""
+        if not self.knowledge.rivals:
             return self.pairs
         told = self.apart(np.ones(len(self.tests), dtype=int), self.pairs) >= RIVALS_APART
         return self.pairs[:, told] if told.any() else self.pairs

@@ -44,20 +44,20 @@ _WORTH_SAYING = 1.005
 _MOST_MINUTES = 60.0 * 2000.0
 
 
-def plan(known: Knowledge, wanted: Wanted) -> Plan:
+def plan(knowledge: Knowledge, wanted: Wanted) -> Plan:
     """Tests for an aim within the hours and the limits of the rig, in as few hours as part rivals or meet targets.
 
     Raises:
         ModelError: no test is possible, none fits into the hours, or there are no rivals to be told apart.
     """
-    if wanted.aim == "rivals" and len(known.rivals) < 2:
+    if wanted.aim == "rivals" and len(knowledge.rivals) < 2:
         raise ModelError(
             "there are no rivals to be told apart",
-            found=known.source,
+            found=knowledge.source,
             expected="tests of a campaign that two effects or more explain alike",
             hint="plan from the campaign, or for parameters or predictions",
         )
-    offer = Offer(known, wanted)
+    offer = Offer(knowledge, wanted)
     few = [_Planner(offer, share * wanted.hours) for share in _SHARES.get(wanted.aim, ())]
     for sound in (True, False) if offer.goals else (False,):  # blind, or without repeats, only where it has to be
         least = bisect_left(few, True, key=lambda each: each.reaches and (each.sound or not sound))
@@ -68,7 +68,7 @@ def plan(known: Knowledge, wanted: Wanted) -> Plan:
 
 @dataclass(frozen=True, eq=False)
 class _Planner:
-    """Of what is on offer, the best within so many hours."""
+    """Search for the best candidates within some hours."""
 
     offer: Offer
     hours: float
@@ -79,8 +79,9 @@ class _Planner:
 
     @cached_property
     def best(self) -> Array:
-        """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be; none
-        where no test fits into the hours."""
+        """Number of runs of each test, (tests,), by which all effects show as in the standard programme, if possible.
+
+        Zero for all if no test fits into the hours."""
         kept, standard = self.kept, self._counts(self.standard_runs)
         best = best_runs(self._criterion(_PENALTY), self.budget, kept, kept)
         if self._lacking(best):
@@ -91,17 +92,17 @@ class _Planner:
 
     @property
     def reaches(self) -> bool:
-        """Whether they part the rivals, which may be smaller than they seem, or meet the targets that can be met."""
+        """True if the tests separate the rivals with a margin of two, or meet the targets that can be met."""
         if self.offer.wanted.aim == "rivals":
             return bool(self.offer.apart(self.best, self.offer.tellable).min() >= 2.0 * RIVALS_APART)
-        offer, off = self.offer, self.offer.off(self.best)
-        told = all(goal.reached(off, offer.endless) for goal in offer.goals)
+        offer, error_covariance = self.offer, self.offer.error_covariance(self.best)
+        told = all(goal.reached(error_covariance, offer.endless) for goal in offer.goals)
         here = [goal for goal in offer.goals if goal.target.place in offer.wanted.places]
         return bool(offer.goals) and told and not any(self._untold(goal, self.best) for goal in here)
 
     @property
     def sound(self) -> bool:
-        """Whether all effects show as in the standard programme, and repeats tell the scatter."""
+        """True if all effects show as in the standard programme, and repeats determine the scatter."""
         return not self._lacking(self.best) and self._scatter_freedom(self.best) >= [_SCATTER_FREEDOM]
 
     def plan(self) -> Plan:
@@ -121,17 +122,17 @@ class _Planner:
             lost = self._lost(best, np.where(np.arange(best.size) == test, 0, best))
             reasons[self.offer.tests[test]] = lost or "shows effects that the model lacks"
         enough, notes = self._enough(planned, missed), tuple(self._notes(planned, missed))
-        return Plan(self.offer.known, self.offer.wanted, before, planned, standard, reasons, missed, enough, notes)
+        return Plan(self.offer.knowledge, self.offer.wanted, before, planned, standard, reasons, missed, enough, notes)
 
     def _with_repeats(self, counts: Array) -> Array:
         """The runs with a test of each place made twice, that a drift shows as in the standard programme, in place of
         what is least useful."""
         standard = self._drifting(self._counts(self.standard_runs)).noncentrality(self.standard_runs)
         for place in np.unique(self.budget.place[counts > 0]):
-            mine = np.flatnonzero((counts > 0) & (self.budget.place == place))
-            again, drifting = mine[self.budget.runs[mine] > 1], self._drifting(counts)
-            if mine.size > 2 and (
-                counts[mine].max() < 2
+            chosen = np.flatnonzero((counts > 0) & (self.budget.place == place))
+            again, drifting = chosen[self.budget.runs[chosen] > 1], self._drifting(counts)
+            if chosen.size > 2 and (
+                counts[chosen].max() < 2
                 or drifting.noncentrality(ordered(counts, self.budget.place, drifting)) < standard
             ):
                 quickest = again[np.argsort(self.budget.minutes[again])][:4]
@@ -145,20 +146,22 @@ class _Planner:
         nothing = np.zeros(len(self.offer.tests), dtype=int)
         kept, worth = nothing.copy(), self.strict.one_more(nothing) if self.offer.goals else nothing
         for goal in self.offer.goals:
-            mine = np.array([test.direction == goal.target.place for test in self.offer.tests]) & (self.budget.runs > 0)
-            if mine.any() and (not self._tested(kept) or self._untold(goal, kept)):
-                kept[int(np.argmin(np.where(mine, worth, np.inf)))] = 1
+            chosen = np.array([test.direction == goal.target.place for test in self.offer.tests]) & (
+                self.budget.runs > 0
+            )
+            if chosen.any() and (not self._tested(kept) or self._untold(goal, kept)):
+                kept[int(np.argmin(np.where(chosen, worth, np.inf)))] = 1
         return kept if self.budget.spent(kept) <= self.budget.most else nothing
 
     def _tested(self, counts: Array) -> list[str]:
         """Directions, and specimens, of the tests so far and of so many runs of each test."""
         planned = (self.offer.tests[test] for test in np.flatnonzero(counts))
-        return [str(test.direction) for test in (*self.offer.known.tests, *planned)]
+        return [str(test.direction) for test in (*self.offer.knowledge.tests, *planned)]
 
     def _untold(self, goal: Goal, counts: Array) -> str | None:
-        """What the interval of a goal does not hold because nothing was tested there, nor is by so many runs."""
+        """Error that the interval of a goal lacks because its place is not tested; None if it lacks none."""
         place = goal.target.place
-        return untested(self.offer.known, place, self._tested(counts)) if place else None
+        return untested(self.offer.knowledge, place, self._tested(counts)) if place else None
 
     def _with_scatter(self, counts: Array) -> Array:
         """The runs with further repeats of sweeps, until a fit can tell their scatter from what repeats differ by, as
@@ -194,7 +197,7 @@ class _Planner:
 
         Of each rig, the bushing's and each specimen's, up to what is enough; the fewest first.
         """
-        runs = Counter(self.offer.known.tests)
+        runs = Counter(self.offer.knowledge.tests)
         runs.update({test: int(n) for test, n in zip(self.offer.tests, counts, strict=True) if n})
         freedom = Counter[Place | None]()
         for test, times in runs.items():
@@ -204,12 +207,12 @@ class _Planner:
         return sorted(min(each, _SCATTER_FREEDOM) for each in freedom.values())
 
     def _criterion(self, penalty: float) -> Criterion:
-        odds = np.array([rival.probability for rival in self.offer.known.rivals])
+        odds = np.array([rival.probability for rival in self.offer.knowledge.rivals])
         return Criterion(self.offer.views, self.offer.weight, odds, self.least, penalty)
 
     @cached_property
     def strict(self) -> Criterion:
-        """With more weight on what effects show less than in the standard programme."""
+        """Criterion with more weight on effects that show less than in the standard programme."""
         return self._criterion(_STRICT)
 
     def _counts(self, runs: Sequence[int]) -> Array:
@@ -225,7 +228,7 @@ class _Planner:
     @cached_property
     def standard_runs(self) -> list[int]:
         """The standard programme over and over, as long as it fits into the hours; by direction, as labs do."""
-        places = [self.offer.tests.index(test) for test in standard_tests(self.offer.known, self.offer.wanted)]
+        places = [self.offer.tests.index(test) for test in standard_tests(self.offer.knowledge, self.offer.wanted)]
         counts, runs = np.zeros(len(self.offer.tests), dtype=int), list[int]()
         while places:
             counts[test := places[len(runs) % len(places)]] += 1
@@ -242,8 +245,8 @@ class _Planner:
         return np.where(reach * np.sqrt(reached) >= FOUND, reached, 0.0)
 
     def _drifting(self, counts: Array) -> Drifting:
-        """What a drift does to so many runs of each test."""
-        view, k = self.offer.views[0], len(self.offer.known.names) + len(self.offer.known.bounded)
+        """Effect of a drift on the given number of runs of each test."""
+        view, k = self.offer.views[0], len(self.offer.knowledge.names) + len(self.offer.knowledge.bounded)
         own, seen = view.information.own, view.information.own[:, k, k]
         one = Information(own * counts[:, None, None], own[..., k : k + 1], seen[:, None])  # by the gain of one run
         level = np.square(view.level[:, 0])
@@ -252,13 +255,13 @@ class _Planner:
         return Drifting(seen, level * seen**2 / (1.0 + counts * level * seen), pull)
 
     def _programme(self, runs: Sequence[int]) -> Programme:
-        """What runs in their order tell."""
+        """Programme of runs in their order, with their expected results."""
         counts, places = self._counts(runs), self.budget.place[list(runs)]
-        view, k, drifting = self.offer.views[0], len(self.offer.known.names), self._drifting(counts)
+        view, k, drifting = self.offer.views[0], len(self.offer.knowledge.names), self._drifting(counts)
         found = view.together(counts)
-        off, covariance = view.off(found)[0], np.linalg.inv(found.own[0])
-        gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.offer.slopes, off, self.offer.slopes))
-        wanted, model = self.offer.wanted.points, self.offer.known.model
+        error_covariance, covariance = view.error_covariance(found)[0], np.linalg.inv(found.own[0])
+        gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.offer.slopes, error_covariance, self.offer.slopes))
+        wanted, model = self.offer.wanted.points, self.offer.knowledge.model
         loss = np.concatenate([loss_factor(model.stiffness(at.place, at.frequency, at.amplitude)) for at in wanted])
         moved = root_of(found.own[0]) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
         # tests alone leave open what they tell less of than rounding; without tests errors are beyond all use
@@ -267,12 +270,12 @@ class _Planner:
         return Programme(
             tuple(self.offer.tests[run] for run in runs),
             self.budget.minutes[list(runs)] + self.budget.setup * (np.diff(places, prepend=-1) != 0),
-            np.sqrt(np.diag(off))[:k],
+            np.sqrt(np.diag(error_covariance))[:k],
             np.linalg.norm(alone, axis=1)[:k],
             np.hypot(gain, self.offer.model_error[0]),
             np.hypot(phase * (1.0 + np.square(loss)), self.offer.model_error[1]),
-            float(self.offer.apart(counts, self.offer.tellable).min()) if self.offer.known.rivals else None,
-            tuple(goal.half(off) for goal in self.offer.goals),
+            float(self.offer.apart(counts, self.offer.tellable).min()) if self.offer.knowledge.rivals else None,
+            tuple(goal.half(error_covariance) for goal in self.offer.goals),
             tuple(self._visible(noncentrality_of(found)[0], drifting.noncentrality(runs))),
             0.01 * float(np.abs(moved[:k]).max()),
         )
@@ -280,8 +283,8 @@ class _Planner:
     def _visible(self, reached: Array, drifting: float) -> Iterator[Visible]:
         """The smallest amount found of each effect that the standard programme shows, in the shape it shows best."""
         for effect in dict.fromkeys(column.effect for column in self.offer.grid.columns):
-            mine = [i for i, column in enumerate(self.offer.grid.columns) if column.effect is effect]
-            best = mine[int(np.argmax(self.least[mine]))]
+            chosen = [i for i, column in enumerate(self.offer.grid.columns) if column.effect is effect]
+            best = chosen[int(np.argmax(self.least[chosen]))]
             if self.least[best] > 0.0:
                 amount = effect.amount
                 yield Visible(
@@ -293,51 +296,56 @@ class _Planner:
         yield Visible("drift", "drift.gain", "1", smallest_found(drifting))
 
     def _missed(self, counts: Array, goal: Goal) -> str | None:
-        """By what so many runs of each test fail a target; None where they meet it."""
+        """Reason why the given number of runs of each test misses a target; None if they meet it."""
         offer = self.offer
         if sentence := self._untold(goal, counts):
             which = "in the plan" if goal.target.place in offer.wanted.places else "on offer"
             return f"no test so far or {which} is made there: {sentence}"
         if not goal.met(offer.endless):
-            limit, why = percent(goal.half(offer.endless)), goal.why_not(offer.known, offer.endless)
+            limit, why = percent(goal.half(offer.endless)), goal.why_not(offer.knowledge, offer.endless)
             return f"no test on offer meets it, {ENDLESS} runs of each would reach {limit}: {why}"
-        return None if goal.met(offer.off(counts)) else self._more_hours(counts, goal)
+        return None if goal.met(offer.error_covariance(counts)) else self._more_hours(counts, goal)
 
     def _more_hours(self, counts: Array, goal: Goal) -> str:
-        """In how many hours a target would be met, at the runs that are best per minute after those planned."""
+        """Sentence on the hours that would meet a target, by the best runs per minute after those planned."""
         more = filled(
             replace(self.strict, weight=goal.weight(self.offer.endless)),
             self.offer.budget,
             counts,
-            lambda runs: goal.met(self.offer.off(runs)) or self.offer.budget.spent(runs) > _MOST_MINUTES,
+            lambda runs: goal.met(self.offer.error_covariance(runs)) or self.offer.budget.spent(runs) > _MOST_MINUTES,
         )
         hours = number(self.offer.budget.spent(more) / 60.0, 2)
-        if goal.met(self.offer.off(more)):
+        if goal.met(self.offer.error_covariance(more)):
             return f"{number(self.hours, 3)} h are too few, about {hours} h would do"
-        reached = percent(goal.half(self.offer.off(more)))
+        reached = percent(goal.half(self.offer.error_covariance(more)))
         return f"{hours} h would reach {reached}, and no further run would take a quarter per cent off that"
 
     def _lost(self, counts: Array, without: Array) -> str | None:
-        """What fewer runs lose of the aim, the worst of it; None of next to nothing."""
-        offer, off, less = self.offer, self.offer.off(counts), self.offer.off(without)
+        """Sentence on the largest loss by leaving out runs; None if next to nothing is lost."""
+        offer, error_covariance, less = (
+            self.offer,
+            self.offer.error_covariance(counts),
+            self.offer.error_covariance(without),
+        )
         if offer.wanted.aim == "rivals":
             apart, closer = (float(offer.apart(runs, offer.tellable).min()) for runs in (counts, without))
             far = f"rivals {number(closer, 2)} apart in expected chi-square without it, {number(apart, 2)} with it"
             return far if closer * _WORTH_SAYING <= apart else None
         if offer.goals:
-            wider = [goal for goal in offer.goals if goal.half(less) >= _WORTH_SAYING * goal.half(off)]
+            wider = [goal for goal in offer.goals if goal.half(less) >= _WORTH_SAYING * goal.half(error_covariance)]
             for goal in sorted(wider, key=lambda goal: -goal.half(less) / goal.target.half):
-                return f"{goal.target}: {percent(goal.half(less), 3)} without it, {percent(goal.half(off), 3)} with it"
+                fewer, planned = (percent(goal.half(errors), 3) for errors in (less, error_covariance))
+                return f"{goal.target}: {fewer} without it, {planned} with it"
             return None
-        growths = dict(zip(offer.known.names, np.sqrt(np.diag(less) / np.diag(off)), strict=False))
+        growths = dict(zip(offer.knowledge.names, np.sqrt(np.diag(less) / np.diag(error_covariance)), strict=False))
         if offer.wanted.aim == "predictions":
-            growths = {"stiffness": np.sqrt(np.sum(less * offer.weight) / np.sum(off * offer.weight))}
+            growths = {"stiffness": np.sqrt(np.sum(less * offer.weight) / np.sum(error_covariance * offer.weight))}
         growth, name = max((growths[name], name) for name in growths if name in ("stiffness", *offer.wanted.parameters))
         more = number(100.0 * (growth - 1.0), 2)
         return f"{name}: error {more} % larger without it" if growth >= _WORTH_SAYING else None
 
     def _enough(self, planned: Programme, missed: Sequence[str | None]) -> str | None:
-        """Why hours stay free, if they do."""
+        """Reason why hours stay free; None if they are used."""
         asked, left = self.offer.wanted.hours, self.offer.wanted.hours - planned.hours
         if left <= float(self.budget.minutes.max() + self.budget.setup) / 60.0:
             return None
@@ -355,21 +363,21 @@ class _Planner:
 
     def _notes(self, planned: Programme, missed: Sequence[str | None]) -> Iterator[str]:
         """Warnings and limits of the plan, the important ones first."""
-        yield from unlimited_rig(self.offer.known, self.offer.wanted, planned.tests)
+        yield from unlimited_rig(self.offer.knowledge, self.offer.wanted, planned.tests)
         worst = float(self.offer.model_error[0].max(initial=0.0))
         if worst > _WORTH_SAYING - 1.0:
             yield (
                 f"the errors of the stiffness contain the model error, up to {number(100.0 * worst, 2)} %, which no "
                 "test lowers; bushfit diagnose looks for the effect that the model lacks"
             )
-        yield from self.offer.known.warnings
+        yield from self.offer.knowledge.warnings
         for target, half, why in zip(self.offer.wanted.targets, planned.halves, missed, strict=True):
             if why:
                 yield f"{target}: {percent(target.half)} asked for, {percent(half)} planned: {why}"
-        if self.offer.known.bounded:
+        if self.offer.knowledge.bounded:
             yield (
-                f"{' and '.join(self.offer.known.bounded)} came to rest on a bound: the errors of the others count that"
-                " noise takes it off there half of the times"
+                f"{' and '.join(self.offer.knowledge.bounded)} came to rest on a bound: the errors of the others count "
+                "that noise takes it off there half of the times"
             )
         if missed and self._scatter_freedom(self.best) < [_SCATTER_FREEDOM]:
             yield "too few repeats tell how sweeps scatter: intervals may come out half as wide again as planned"
@@ -378,7 +386,7 @@ class _Planner:
         tellable = {tuple(pair) for pair in self.offer.tellable.T.tolist()}
         for one, other in self.offer.pairs.T.tolist():
             if (one, other) not in tellable:
-                names = (self.offer.known.rivals[place].model.effects[-1] for place in (one, other))
+                names = (self.offer.knowledge.rivals[place].model.effects[-1] for place in (one, other))
                 yield f"no test of this rig would tell {' from '.join(names)}: they are left out"
         if planned.apart is not None and planned.apart < RIVALS_APART:
             yield (

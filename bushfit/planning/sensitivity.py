@@ -1,4 +1,4 @@
-"""What each test would tell, all tests in one go: inner products of whitened sensitivities, which add up over tests.
+"""Information of each candidate test: inner products of whitened sensitivities, which add up over tests.
 
 Notes:
     The stiffness is asked once at all operating points of a place. Each run then takes its points, whitened as a fit
@@ -75,10 +75,10 @@ class Information:
         k = self.own.shape[-1] - 2
         line = level[..., None] * np.concatenate((self.own[..., k:, :], self.cross[..., k:, :]), axis=-1)
         solved = np.linalg.solve(np.eye(2) + line[..., k : k + 2] * level[..., None, :], line)
-        mine = np.swapaxes(line[..., :k], -1, -2)
+        chosen = np.swapaxes(line[..., :k], -1, -2)
         return Information(
-            self.own[..., :k, :k] - mine @ solved[..., :k],
-            self.cross[..., :k, :] - mine @ solved[..., k + 2 :],
+            self.own[..., :k, :k] - chosen @ solved[..., :k],
+            self.cross[..., :k, :] - chosen @ solved[..., k + 2 :],
             self.size - np.sum(line[..., k + 2 :] * solved[..., k + 2 :], axis=-2),
         )
 
@@ -102,25 +102,25 @@ class Grid:
     """Tests that are not made yet, and the data sets that they share: a loop each, and all points of each place.
 
     Args:
-        known: its model's stiffness is what the tests would measure.
+        knowledge: its model's stiffness is what the tests would measure.
         tests: runs of the rig.
     """
 
-    known: Knowledge
+    knowledge: Knowledge
     tests: tuple[Test, ...]
 
     @cached_property
     def data_sets(self) -> list[DataSet]:
         """A cycle of each loop, in units of its noise, and of each place one sweep of all points, in units of ln K;
         after the largest strain so far."""
-        model, noise = self.known.model, self.known.noise
+        model, noise = self.knowledge.model, self.knowledge.noise
         per_row = noise.force * float(np.sqrt(_ROWS * noise.rows_as_one / ROWS_PER_CYCLE))
         loops = [new_loop(model, *motion, per_row, rows=_ROWS) for motion in self._loops]
         sweeps = [
             new_sweep(model, place, points[:, 1], points[:, 0], (1.0, 1.0), (0.0, 0.0))
             for place, points in self._points.items()
         ]
-        under = Circumstances(strained=self.known.strain) if self.known.strain else UNKNOWN
+        under = Circumstances(strained=self.knowledge.strain) if self.knowledge.strain else UNKNOWN
         return [*(replace(loop, under=under) for loop in loops), *(replace(sweep, under=under) for sweep in sweeps)]
 
     @cached_property
@@ -139,7 +139,7 @@ class Grid:
         return {place: np.unique(np.concatenate(points), axis=0) for place, points in of_place.items()}
 
     def information(self, own: Array, further: Array) -> Information:
-        """What each test tells by columns of all data sets' residuals: of parameters, (k, n), and others, (e, n)."""
+        """Information of each test, from columns of all residuals: of parameters, (k, n), and further ones, (e, n)."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets])
         parts = np.split(np.concatenate((own, further)), ends[:-1], axis=-1)
         of_loops = dict(zip(self._loops, zip(parted(self.data_sets)[0], parts, strict=False), strict=True))
@@ -152,18 +152,18 @@ class Grid:
                 rows, line = cycles * rows, cycles * np.array([loop.unit_gain, np.zeros(loop.size)])
             else:
                 rows, line = self._whitened(test, of_places[test.direction])
-            mine = np.concatenate((rows[:k], line))
-            products.append(mine @ np.concatenate((mine, rows[k:])).T)
+            chosen = np.concatenate((rows[:k], line))
+            products.append(chosen @ np.concatenate((chosen, rows[k:])).T)
             size.append(np.square(rows[k:]).sum(axis=1))
         both = np.array(products)
         return Information(both[..., : k + 2], both[..., k + 2 :], np.array(size))
 
     def _whitened(self, test: SimulatedSweep, rows: Array) -> tuple[Array, Array]:
         """The columns of a place, and those of gain and phase of the line, at the points of one run; whitened."""
-        known = {tuple(point): number for number, point in enumerate(self._points[test.direction].tolist())}
-        chosen = [known[tuple(point)] for point in _points_of(test).tolist()]
-        first, random = np.array([0]), np.repeat(np.array(self.known.noise.scatter)[:, None], len(chosen), axis=1)
-        noise = SweepNoise({}, self.known.noise.shared, "stated", 0)
+        knowledge = {tuple(point): number for number, point in enumerate(self._points[test.direction].tolist())}
+        chosen = [knowledge[tuple(point)] for point in _points_of(test).tolist()]
+        first, random = np.array([0]), np.repeat(np.array(self.knowledge.noise.scatter)[:, None], len(chosen), axis=1)
+        noise = SweepNoise({}, self.knowledge.noise.shared, "stated", 0)
         whitening = Whitening(first, first, random, noise, np.ones(len(chosen)), np.arange(len(chosen)))
         gain, phase = np.split(rows, 2, axis=-1)
         line = np.array([[1.0], [1.0j]]) * np.ones(len(chosen))
@@ -172,29 +172,29 @@ class Grid:
     @cached_property
     def level(self) -> Array:
         """Standard deviations of what all runs of a test share, gain and phase, (tests, 2); a loop's lag is known."""
-        gain, phase = self.known.noise.level
+        gain, phase = self.knowledge.noise.level
         return np.array([(gain, 0.0 if isinstance(test, SimulatedLoop) else phase) for test in self.tests])
 
     @cached_property
     def columns(self) -> list[Column]:
         """Effects that the model lacks and these tests might show, a column for each shape.
 
-        What depends on the order of the tests or on their temperature is not among them, nor what stands in place of a
+        What depends on the order of the tests or on their temperature is not among them, nor an effect that replaces a
         branch: it has no amount that could be small.
         """
-        model, places = self.known.model, dict.fromkeys(str(test.direction) for test in self.tests)
+        model, places = self.knowledge.model, dict.fromkeys(str(test.direction) for test in self.tests)
         missing = [effect for effect in missing_effects(model, places) if not (effect.replaces or effect.under)]
         of_effects = [(effect, sensitivity(model, self.data_sets, effect)[1]) for effect in missing]
         return [Column(effect, row) for effect, rows in of_effects for row in rows]
 
 
-def relative_slopes(known: Knowledge, data_sets: Sequence[DataSet]) -> Array:
+def relative_slopes(knowledge: Knowledge, data_sets: Sequence[DataSet]) -> Array:
     """Derivatives of whitened residuals by relative change of each parameter, of the bounded by typical size, (k + b,
     n)."""
-    model, bounded = known.model, Coordinates.of(known.model, known.bounded)
+    model, bounded = knowledge.model, Coordinates.of(knowledge.model, knowledge.bounded)
     typical = np.array([parameter.typical for parameter in bounded.parameters]) / bounded.slopes(model.values)
-    sizes = np.concatenate((relative_sizes(model, known.names), typical))
-    return jacobian(model, data_sets, (*known.names, *known.bounded)) * sizes[:, None]
+    sizes = np.concatenate((relative_sizes(model, knowledge.names), typical))
+    return jacobian(model, data_sets, (*knowledge.names, *knowledge.bounded)) * sizes[:, None]
 
 
 def _points_of(test: SimulatedSweep) -> Array:

@@ -24,7 +24,7 @@ _NEARLY = 1.1
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """What a target asks for, as tests tell it; k parameters, the bounded among them, at n operating points.
+    """A target as a function of the parameters' covariance; k parameters, with those at a bound, at n points.
 
     Args:
         rows: relative change of the quantity at each point by relative change of the parameters, (n, k).
@@ -39,38 +39,41 @@ class Goal:
     open: Array
     points: Points | None = None
 
-    def halves(self, off: Array) -> Array:
+    def halves(self, error_covariance: Array) -> Array:
         """Half of the 95 % interval over the value at each point, (n,), of a covariance of the parameters, (k, k)."""
-        return self.open + Z95 * np.sqrt(self._variance(off) + self.own**2)
+        return self.open + Z95 * np.sqrt(self._variance(error_covariance) + self.own**2)
 
-    def half(self, off: Array) -> float:
+    def half(self, error_covariance: Array) -> float:
         """The widest of them."""
-        return float(self.halves(off).max())
+        return float(self.halves(error_covariance).max())
 
-    def met(self, off: Array) -> bool:
-        """Whether it is as narrow as asked for, but for rounding."""
-        return self.half(off) <= self.target.half * (1.0 + 1e-9)
+    def met(self, error_covariance: Array) -> bool:
+        """True if the interval is as narrow as the target."""
+        return self.half(error_covariance) <= self.target.half * (1.0 + 1e-9)
 
-    def reached(self, off: Array, endless: Array) -> bool:
-        """Whether it is met; or where not even tests without end meet it, nearly as narrow as those make it."""
-        return self.met(off) or (not self.met(endless) and self.half(off) <= _NEARLY * self.half(endless))
+    def reached(self, error_covariance: Array, endless: Array) -> bool:
+        """True if the target is met, or nearly as narrow as endless tests make it if these miss it, too."""
+        return self.met(error_covariance) or (
+            not self.met(endless) and self.half(error_covariance) <= _NEARLY * self.half(endless)
+        )
 
     def weight(self, endless: Array) -> Array:
-        """Of the parameters' covariance, (k, k): its mean variance over what the target leaves to them, or over what is
-        nearly as little as endless tests leave."""
+        """Weight of the parameters' covariance, (k, k): mean variance relative to the one that the target allows.
+
+        If endless tests miss the target, relative to nearly the variance that these leave."""
         left = np.square(np.maximum(self.target.half - self.open, 0.0) / Z95) - self.own**2
         nearly = np.square(_NEARLY * self.halves(endless) / Z95) - self.own**2 - np.square(self.open / Z95)
         allowed = np.where(self.met(endless), left, nearly)
         return np.asarray((self.rows / allowed[:, None]).T @ self.rows / len(self.rows))
 
-    def why_not(self, known: Knowledge, endless: Array) -> str:
-        """By what the target fails even with endless tests: what is widest at the widest point."""
+    def why_not(self, knowledge: Knowledge, endless: Array) -> str:
+        """Sentence on the largest error that remains with endless tests, at the widest point."""
         worst, variance = int(np.argmax(self.halves(endless))), self._variance(endless)
         by = np.abs(self.rows[worst]) * np.sqrt(np.diag(endless))
-        name = (*known.names, *known.bounded)[int(np.argmax(by))]
-        gain, phase = known.noise.level
+        name = (*knowledge.names, *knowledge.bounded)[int(np.argmax(by))]
+        gain, phase = knowledge.noise.level
         of_class = f"{number(100.0 * gain, 2)} % of gain and {number(1e3 * phase, 2)} mrad of phase"
-        if variance[worst] > 0.25 * self._variance(known.covariance)[worst]:
+        if variance[worst] > 0.25 * self._variance(knowledge.covariance)[worst]:
             of_tests = f"{name}, which no test on offer tells well enough"
         else:
             of_tests = f"the class of the rig, {of_class} that all repeats of a test share, in {name}"
@@ -86,35 +89,38 @@ class Goal:
             where = f" at {format_range('Hz', frequency)} and {format_range(unit, factor * amplitude)}"
         return f"{percent(size)}{where} is {words}"
 
-    def _variance(self, off: Array) -> Array:
-        """What the parameters' errors make of the quantity, relative, (n,)."""
-        return np.asarray(np.einsum("nk,kl,nl->n", self.rows, off, self.rows))
+    def _variance(self, error_covariance: Array) -> Array:
+        """Relative variance of the quantity by the parameters' errors, (n,)."""
+        return np.asarray(np.einsum("nk,kl,nl->n", self.rows, error_covariance, self.rows))
 
 
-def goals(known: Knowledge, wanted: Wanted, slopes: Array) -> Iterator[Goal]:
+def goals(knowledge: Knowledge, wanted: Wanted, slopes: Array) -> Iterator[Goal]:
     """A goal for each target.
 
     Args:
         slopes: gain and phase of the stiffness at all points wanted by relative change of the parameters, (k, 2, n).
     """
-    names, ends = (*known.names, *known.bounded), np.cumsum([each.frequency.size for each in wanted.points])[:-1]
+    names, ends = (
+        (*knowledge.names, *knowledge.bounded),
+        np.cumsum([each.frequency.size for each in wanted.points])[:-1],
+    )
     at = {each.place: (each, part) for each, part in zip(wanted.points, np.split(slopes, ends, axis=-1), strict=True)}
     for target in wanted.targets:
         if target.place is None:
             row = np.array([[float(name == target.quantity) for name in names]])
             yield Goal(target, row, np.zeros(1), np.zeros(1))
         else:
-            yield _of_points(known, target, *at[target.place])
+            yield _of_points(knowledge, target, *at[target.place])
 
 
-def own_bands(known: Knowledge, points: Points) -> tuple[tuple[Array, Array, Array], ...]:
+def own_bands(knowledge: Knowledge, points: Points) -> tuple[tuple[Array, Array, Array], ...]:
     """Errors of a prediction that no further test lowers: those of the model itself, and of readings left undecided.
 
     Returns:
         Of the stiffness and of the loss factor at each point: value, standard error of the model, and the half width
         that undecided readings add, (n,) each [SI].
     """
-    exact = replace(known.result or Result(known.model), covariance=Covariance())
+    exact = replace(knowledge.result or Result(knowledge.model), covariance=Covariance())
     found, sizes, rates = (
         predict(exact, points.place, points.frequency, points.amplitude),
         points.amplitude,
@@ -129,21 +135,21 @@ def own_bands(known: Knowledge, points: Points) -> tuple[tuple[Array, Array, Arr
     return tuple(bands)
 
 
-def _of_points(known: Knowledge, target: Target, points: Points, slopes: Array) -> Goal:
+def _of_points(knowledge: Knowledge, target: Target, points: Points, slopes: Array) -> Goal:
     """The goal of a predicted quantity."""
-    stiffness, loss_factor = own_bands(known, points)
+    stiffness, loss_factor = own_bands(knowledge, points)
     value, error, undecided = stiffness if target.quantity == "stiffness" else loss_factor
     loss = loss_factor[0]
     rows = slopes[:, 0] if target.quantity == "stiffness" else slopes[:, 1] * (1.0 + loss**2) / loss
     return Goal(target, rows.T, error / value, undecided / value, points)
 
 
-def untested(known: Knowledge, place: Place, tested: Iterable[str]) -> str | None:
-    """What no interval at a place holds where no test was or will be made there; None where it holds all."""
-    measured = known.result.measured if known.result else None
+def untested(knowledge: Knowledge, place: Place, tested: Iterable[str]) -> str | None:
+    """Sentence on the error that intervals at an untested place lack; None if they lack none."""
+    measured = knowledge.result.measured if knowledge.result else None
     directions = dict.fromkeys([*(measured.directions if measured else ()), *tested])
     reached = measured or Range((1.0, 1.0), (1.0, 1.0))
-    result = Result(known.model, known.names, measured=replace(reached, directions=tuple(directions)))
+    result = Result(knowledge.model, knowledge.names, measured=replace(reached, directions=tuple(directions)))
     return next(unfitted(result, place), None) if str(place) not in directions else None
 
 

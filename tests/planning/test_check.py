@@ -44,7 +44,7 @@ def test_simulated_campaigns_show_the_errors_promised(small: Plan) -> None:
     low, high = found.interval
     print("found over predicted", (found.found / found.predicted).round(2))
     assert found.failed == 0
-    assert found.off.shape == (20, len(found.names))
+    assert found.deviations.shape == (20, len(found.names))
     assert np.all(low < 1.2 * found.predicted)
     assert np.all(high > found.predicted / 1.2)
 
@@ -192,7 +192,7 @@ def test_what_a_fit_within_bounds_finds_scatters_as_counted() -> None:
     free = rng.multivariate_normal(np.zeros(3), covariance, 400_000)
     held = free - np.outer(free[:, 2], covariance[:, 2] / covariance[2, 2])
     found = np.where(free[:, 2:] > 0.0, free, held)
-    counted = view.off(Information((root @ root.T)[None], np.empty((1, 3, 0)), np.empty((1, 0))))[0]
+    counted = view.error_covariance(Information((root @ root.T)[None], np.empty((1, 3, 0)), np.empty((1, 0))))[0]
     scale = np.sqrt(np.outer(np.diag(counted), np.diag(counted)))
     np.testing.assert_allclose(found.T @ found / len(found) / scale, counted / scale, atol=0.01)
     assert counted[0, 0] < 0.97 * covariance[0, 0]
