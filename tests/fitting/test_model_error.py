@@ -12,19 +12,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tries import SEEDS
+from scipy.optimize import least_squares
+from tries import SEEDS, some
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting
 from bushfit.errors import FitError
+from bushfit.fitting.assess import Stage, covariance
+from bushfit.fitting.coordinates import Coordinates, jacobian
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import SweepData
+from bushfit.fitting.model_error import with_model_error
 from bushfit.fitting.procedures import fit_joint
+from bushfit.fitting.robust import estimate
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction, predict
-from bushfit.reading.measurement import Loop
+from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reduction.harmonics import basis
 
 Rig = Callable[..., Campaign]
@@ -193,3 +199,64 @@ def test_parameters_on_their_bounds_beside_a_model_error(rig: Rig, paper_model: 
     assert result.at_bound == {"mu": "max"}
     assert result.covariance.stderr("mu") is None
     assert any("mu rests on the max given in [fit]" in line for line in result.warnings)
+
+
+def test_the_closest_fit_is_as_near_as_five_parameters_can_be(off_by_waves: tuple[Campaign, Result]) -> None:
+    """Root mean square of the relative misfit, each operating point alike, against plain least squares from there."""
+    campaign, result = off_by_waves
+    data_sets = Data.of(campaign).chosen(None)
+    coordinates = Coordinates.of(result.model, FIVE)
+
+    def misfit(point: np.ndarray) -> np.ndarray:
+        model, parts = result.model.with_values(coordinates.values(point)), []
+        for data_set in data_sets:
+            rows = data_set.off(model)
+            parts.append(rows[:, :: rows.shape[1] // 40] if data_set.kind == "loop" else rows)
+        return np.concatenate([part.ravel() for part in parts])
+
+    start = coordinates.point(result.model.values)
+    least = least_squares(misfit, start, x_scale=0.3).fun
+    ratio = float(np.linalg.norm(misfit(start)) / np.linalg.norm(least))
+    print(f"misfit over the least that five parameters reach: {ratio:.3f}")
+    assert ratio < 1.1
+
+
+@pytest.mark.parametrize("seed", some(range(12), {0, 3}))
+def test_a_ripple_of_a_dense_sweep_bends_no_parameter(rig: Rig, paper_model: Model, seed: int) -> None:
+    """Three levels of 600 frequencies, a ripple of 0.3 to 1 %, noise of 0.5 %."""
+    rng = np.random.default_rng(seed)
+    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(np.geomspace(5.0, 155.0, 600), [1e-4, 2e-4, 5e-4]))
+    silent = paper_model.stiffness(Direction.AXIAL, frequency, amplitude)
+    silent = silent * (1.0 + rng.uniform(3e-3, 1e-2) * np.sin(4.0 * np.pi * np.log(frequency) + rng.uniform(0.0, 6.0)))
+    noise = np.exp(rng.normal(0.0, 5e-3, silent.size) + 1j * rng.normal(0.0, 5e-3, silent.size))
+    sweep = Sweep("dense", Direction.AXIAL, frequency, amplitude, silent * noise)
+    loops = tuple(loop for loop in rig(seed).loops if loop.direction is Direction.AXIAL)
+    result = fit_joint(Data.of(replace(rig(seed), loops=loops, sweeps=(sweep,))))
+    apart = np.abs(result.model.stiffness(Direction.AXIAL, frequency, amplitude) / silent) - 1.0
+    assert np.abs(apart).max() < 0.02
+    assert result.model.values["mu"] == pytest.approx(paper_model.values["mu"], rel=0.01)
+    assert result.model_error is not None
+    low, high = result.interval("mu") or (0.0, 0.0)
+    assert low < paper_model.values["mu"] < high
+
+
+def test_the_covariance_is_the_sandwich_of_noise_and_process(rig: Rig) -> None:
+    """In full, J^+ V J^+^T, V by one standard deviation of each independent source of error."""
+    campaign = replace(spoiled(rig(3, shared=True), waves(0.03, 3)), loops=())
+    data = Data.of(campaign)
+    plain = estimate(data.started(data.effects, data.sweeps, {}), data.sweeps, FIVE, data.bounds)
+    found, _ = with_model_error(plain, data.bounds)
+    (sweep,) = found.weighed
+    assert found.process is not None
+    assert isinstance(sweep, SweepData)
+    model, random = found.solution.model, sweep.noise.scatter(sweep.name, sweep.held, sweep.step)
+    run = np.unique(np.stack((sweep.held, sweep.repeat)), axis=1, return_inverse=True)[1]
+    sources = [
+        sweep.moved(found.process.shapes * sweep.stiffness(model), model),
+        *(sweep.whiten(unit * np.diag(size).astype(complex)) for unit, size in zip((1.0, 1.0j), random, strict=True)),
+        *(np.array(sweep.moved_together(run == i)) * np.array(sweep.noise.shared)[:, None] for i in np.unique(run)),
+    ]
+    slopes = found.solution.coordinates.slopes(model.values)
+    moved = np.linalg.pinv(jacobian(model, [sweep], FIVE).T) @ np.concatenate(sources).T * slopes[:, None]
+    known = covariance(model, [Stage(FIVE, found.weighed, found.process)])
+    np.testing.assert_allclose(known.matrix, moved @ moved.T, rtol=1e-6)
