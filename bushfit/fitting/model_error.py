@@ -29,7 +29,7 @@ from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Unnamed
-from bushfit.errors import FitError
+from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import Process, beyond_noise
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, Solution
@@ -109,10 +109,13 @@ def closest_fit(found: Estimate, bounds: Bounds) -> tuple[Solution, float]:
     """
     tests, names = found.minimised, found.solution.coordinates.names
     starts = [found.solution.model, *_restarted(found.solution, tests)]
-    size = min(likeliest_size(start, tests, names) for start in starts)
+    sizes = [likeliest_size(start, tests, names) for start in starts]
+    size = min(size for size in sizes if np.isfinite(size))
     for _ in range(_MAXIMUM_ROUNDS):
-        weighted = [data_set.with_model_error(size) for data_set in tests]
-        ends = [solve(start, weighted, names, bounds, strict=False) for start in starts]
+        weighted, ends = [data_set.with_model_error(size) for data_set in tests], list[Solution]()
+        for start in starts:
+            with suppress(FitError, ModelError):  # no response from values that were read off the tests
+                ends.append(solve(start, weighted, names, bounds, strict=False))
         solution = min(ends, key=lambda end: end.chi_square)
         starts, before = [solution.model], size
         size = likeliest_size(solution.model, tests, [names[i] for i in solution.moving])

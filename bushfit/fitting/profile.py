@@ -150,5 +150,6 @@ def _allowed(best: Solution, data_sets: Sequence[DataSet], covariance: Covarianc
     """Root of the rise of chi-square that each parameter's interval may reach."""
     names = best.coordinates.names  # of what counts as held where it rests on a bound the covariance tells nothing
     half = np.array([covariance.half(name) if name in covariance.names else 0.0 for name in names])
-    widest = _WIDEST * Z95 * np.sqrt(_excess(best, data_sets))
+    missed = any(data_set.model_error for data_set in data_sets)  # how far it bends parameters, no weight tells
+    widest = np.inf if missed else _WIDEST * Z95 * np.sqrt(_excess(best, data_sets))
     return np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, widest)
