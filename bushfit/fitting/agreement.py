@@ -34,7 +34,7 @@ _Part = tuple[str, Array, bool]
 
 
 class _Run(NamedTuple):
-    """What of a test was recorded with one value held, in which unit, and which of its points it is, (n,) bool."""
+    """Run of a test: the quantity held, its value and unit, and a mask of the points of the run, (n,)."""
 
     held: Literal["amplitude", "frequency"] | None
     value: float | None
@@ -60,7 +60,7 @@ class LeaveOut:
 
     @classmethod
     def of(cls, jacobian: Array, residual: Array) -> "LeaveOut":
-        """The same from the derivatives of the whitened residuals by coordinate, (k, n), and the residuals, (n,).
+        """Build it from the derivatives of the whitened residuals by coordinate, (k, n), and the residuals, (n,).
 
         What all rows together leave open moves no residual, and stays where it is.
         """
@@ -70,7 +70,7 @@ class LeaveOut:
         return cls(basis, directions[seen].T / size[seen], basis.T @ residual, residual)
 
     def open(self, rows: Array) -> Array:
-        """Which parameters the fit leaves open without these rows, (k,) bool."""
+        """Mask of the parameters that the fit leaves open without these rows, (k,)."""
         size, vectors = np.linalg.eigh(self._rest(rows))
         without = np.square(self.back @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
         return without > _MOST_GROWTH * np.sum(np.square(self.back), axis=1)
@@ -113,8 +113,9 @@ class LeaveOut:
         return plain, plain - along @ ((1.0 - 1.0 / np.hypot(1.0, scale)) * (along.T @ plain))
 
     def pulled(self, rows: Array, predicted: Array) -> Array:
-        """By how much half the sum of squares of these rows, as predicted from the rest, moves with the noise of each
-        row of all, (all rows,): with their own, and with that of the rest, through the parameters."""
+        """Slopes of half the sum of squares of these rows, predicted from the rest, by the noise of each row, (all
+        rows,): directly, and through the parameters that the rest determines.
+        """
         through = self.basis @ np.linalg.solve(self._rest(rows), self.basis[rows].T @ predicted)
         pull = -through
         pull[rows] = predicted
@@ -179,7 +180,7 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
 
 
 def met_within(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet]) -> tuple[Usable, ...]:
-    """As `usable` of a model whose fit is not at hand: the tests that it was fitted to count as the fit has them."""
+    """Usable range of a model whose fit is not at hand: residuals of the fitted tests stand for held-out ones."""
     return _by_place([*_as_modelled(model, fitted, predicted=False), *_as_modelled(model, left, predicted=True)])
 
 
@@ -208,7 +209,7 @@ def _off(modelled: Array, measured: Array) -> Array:
 
 
 def _runs(data_set: DataSet) -> Iterator[_Run]:
-    """What was recorded with each value held; a loop, and a sweep that holds nothing, is one run."""
+    """Runs of a test, one for each value held; a loop, and a sweep that holds nothing, is one run."""
     if not isinstance(data_set, SweepData) or data_set.sweep.stepped is None:
         yield _Run(None, None, None, np.ones(data_set.frequency.size, dtype=bool))
         return

@@ -127,7 +127,7 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
 
 
 def _of_gains(stage: Stage, influence: Array) -> Array:
-    """What errors of gains that do not weigh add to the covariance, (k, k), by the influence of residuals, (k, n)."""
+    """Covariance, (k, k), by gain errors that have no part in the weights, from the influence of residuals, (k, n)."""
     added = np.zeros((len(influence), len(influence)))
     for data_set, rows in zip(stage.data_sets, rows_of(stage.data_sets), strict=True):
         if isinstance(data_set, LoopData) and not data_set.gain_weighs:
@@ -137,7 +137,7 @@ def _of_gains(stage: Stage, influence: Array) -> Array:
 
 
 def _excess(model: Model, stage: Stage) -> list[float]:
-    """By how much each test of a stage exceeds its noise, reduced chi-square, and as all together; else 1."""
+    """Factor of each test's variance: reduced chi-square where a test, or all together, exceed the noise; else 1."""
     together = lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0
     return [max(together, own or 1.0) for own in missed(model, stage.data_sets)]
 
@@ -227,7 +227,7 @@ def lack_of_fit(model: Model, data_sets: Sequence[DataSet], parameters: int) -> 
 
 
 def missed(model: Model, data_sets: Sequence[DataSet]) -> list[float | None]:
-    """The same of each test by itself, an error that all share counted."""
+    """Reduced chi-square of each test that the model misses by more than its noise, shared errors counted; else None."""
     residuals, parts = residual(model, data_sets), zip(rows_of(data_sets), data_sets, strict=True)
     return [beyond_noise(*_over_freedom(residuals[rows], [data_set], 0)) for rows, data_set in parts]
 
@@ -331,7 +331,7 @@ def unfitted(model: Model, data_sets: Sequence[DataSet], advice: str) -> list[st
 
 
 def _missed_at(place: str, found: Sequence[tuple[float, float, str]]) -> str:
-    """What is said of the tests of a place that are missed, each by times its noise, by per cent, and by its name."""
+    """Sentence on the tests of a place that are missed, from times the noise, per cent and name of each."""
     noises, share, worst = max(found)
     times = f"{number(noises, 2)} times its noise"
     if len(found) == 1:

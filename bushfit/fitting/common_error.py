@@ -21,7 +21,7 @@ _ROUNDING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What an error can move of residuals: all of some rows, and few directions of many others.
+    """Residuals that an error can move: all of some rows, and few directions of many others.
 
     Args:
         parts: rows that stand together, with orthonormal directions of them, (rows, d), or None for all.
@@ -34,7 +34,7 @@ class Seen:
         return np.concatenate([self.of_part(i, rows[..., own]) for i, (own, _) in enumerate(self.parts)], axis=-1)
 
     def of_part(self, number: int, rows: Array) -> Array:
-        """The same of the rows of one part."""
+        """Components of the rows of one part."""
         along = self.parts[number][1]
         return rows if along is None else rows @ along
 
@@ -48,7 +48,7 @@ class Seen:
 
     @cached_property
     def places(self) -> list[slice]:
-        """Where the directions of each part stand."""
+        """Slices of the directions of each part."""
         sizes = [own.stop - own.start if along is None else along.shape[1] for own, along in self.parts]
         ends = np.cumsum([0, *sizes]).tolist()
         return [slice(*pair) for pair in itertools.pairwise(ends)]

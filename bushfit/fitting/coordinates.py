@@ -47,7 +47,7 @@ class Coordinates:
         return float(np.log(value)) if parameter.log else value / parameter.typical
 
     def point(self, values: Mapping[str, float]) -> Array:
-        """Where those values lie, (k,)."""
+        """Coordinates of parameter values, (k,)."""
         return np.array([self.forward(name, values[name]) for name in self.names])
 
     def values(self, point: Sequence[float] | Array) -> dict[str, float]:
@@ -70,7 +70,7 @@ class Coordinates:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where a fit ended.
+    """End of a fit.
 
     Args:
         residual: whitened residuals, model less measured, (n,).
@@ -92,14 +92,14 @@ class Solution:
         return float(self.residual @ self.residual)
 
     def gain(self, beside: Collection[str]) -> float:
-        """By how much one Gauss-Newton step would lower chi-square, the parameters `beside` held."""
+        """Fall of chi-square by one Gauss-Newton step, the parameters `beside` held."""
         free = [i for i, name in enumerate(self.coordinates.names) if name not in beside]
         left, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
         seen = values > ROUNDING * values.max(initial=0.0)
         return float(np.sum(np.square(left[:, seen].T @ self.residual)))
 
     def at(self, model: Model, data_sets: Sequence[DataSet]) -> Solution:
-        """The same fit with its parameters at the values of a model, and with residuals of these tests."""
+        """Move the parameters of the fit to the values of a model, with the residuals of these tests."""
         rows = jacobian(model, data_sets, self.coordinates.names)
         return replace(self, model=model, residual=residual(model, data_sets), jacobian=rows)
 
@@ -110,7 +110,7 @@ class Solution:
 
     @property
     def flat(self) -> bool:
-        """Whether the next step would lower chi-square, in units of the misfit's variance, no more than chance does."""
+        """True if the next step would lower chi-square, in units of the misfit's variance, no more than chance does."""
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
 

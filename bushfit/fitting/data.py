@@ -60,7 +60,7 @@ class Data:
         return data.in_session()
 
     def in_session(self) -> "Data":
-        """The same data, each point with what it was measured under."""
+        """Data whose points know what they were measured under."""
         under = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
         loops = tuple(replace(loop, under=next(under).select(0)) for loop in self.loops)
         return replace(self, loops=loops, sweeps=tuple(replace(sweep, under=next(under)) for sweep in self.sweeps))
@@ -72,13 +72,13 @@ class Data:
 
     @property
     def notes(self) -> list[str]:
-        """What is odd about the tests themselves, whatever is fitted to them."""
+        """Warnings on the tests themselves, whatever is fitted to them."""
         of_tests = [f"{test.name}: {note}" for test in self.data_sets for note in test.notes]
         return [*of_tests, *mixed_conditions(self.data_sets)]
 
     @property
     def assumed(self) -> list[str]:
-        """What is said of the class of the rig where nothing was repeated and not all of it is stated."""
+        """Warning on an assumed class of the rig, where nothing was repeated and not all of the class is stated."""
         if None not in self.campaign.rig.stated or all(sweep.noise.origin != "assumed" for sweep in self.sweeps):
             return []
         shared = class_words(self.campaign.rig)
@@ -86,19 +86,19 @@ class Data:
 
     @property
     def robust(self) -> bool:
-        """Whether outliers are left out."""
+        """True if outliers are left out."""
         return self.campaign.fit.loss != "linear"
 
     def some(
         self, tests: Sequence[_Kind], message: str, hint: str, found: str = "no [[loops]] and no [[sweeps]]"
     ) -> Sequence[_Kind]:
-        """Those tests, or a FitError where there is none."""
+        """Return the tests, or raise a FitError where there is none."""
         if not tests:
             raise FitError(message, file=self.campaign.path, found=found, hint=hint)
         return tests
 
     def without(self, outliers: Sequence[Outlier]) -> "Data":
-        """The same data with no weight on these outliers of the sweeps; those of loops have none where `robust`."""
+        """Data without weight on these outliers of the sweeps; those of loops have none where `robust`."""
         sweeps = []
         for data_set in self.sweeps:
             rows = [outlier.row - 1 for outlier in outliers if outlier.test == data_set.name]
@@ -106,7 +106,7 @@ class Data:
         return replace(self, sweeps=tuple(sweeps))
 
     def with_sweeps(self, sweeps: Sequence[Sweep]) -> "Data":
-        """The same data with its sweeps read anew, row by row: noise is estimated again, rows left out stay so."""
+        """Data with its sweeps read anew, row by row: noise is estimated again, rows left out stay so."""
         fit, new = self.campaign.fit, []
         for old, data_set in zip(self.sweeps, sweep_data(sweeps, fit.residuals, self.campaign.rig), strict=True):
             rows = old.order[old.weights == 0.0]
@@ -147,7 +147,7 @@ class Data:
         return designed(model, plain, data_sets, still, self.bounds)
 
     def free(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Those names that the campaign does not hold."""
+        """Names of the parameters that the campaign does not hold."""
         settings = self.campaign.fit.parameters
         return tuple(name for name in names if name not in settings or settings[name].vary)
 

@@ -1,4 +1,4 @@
-"""What a loop and a sweep have in common as data sets: one measured test with its noise."""
+"""Base class of loops and sweeps as data: one measured test with its noise."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -31,7 +31,7 @@ class MeasuredTest(ABC):
     @property
     @abstractmethod
     def test(self) -> Loop | Sweep:
-        """What was measured."""
+        """Measurement behind the test."""
 
     @property
     @abstractmethod

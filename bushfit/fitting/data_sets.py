@@ -45,7 +45,7 @@ def loop_data(
 
 
 def with_gain_errors(loops: Sequence[LoopData], stated: RigSettings) -> list[LoopData]:
-    """The same loops with the error of their gain that a rig of the class makes, stated or assumed.
+    """Loops with the gain error that a rig of the class makes, stated or assumed.
 
     Notes:
         All repeats of a loop share it. Independent errors larger by the root of their number leave the mean of the
@@ -59,12 +59,12 @@ def with_gain_errors(loops: Sequence[LoopData], stated: RigSettings) -> list[Loo
 
 
 def with_gains(data_sets: Iterable[DataSet], *, weigh: bool) -> list[DataSet]:
-    """The same tests with the errors of the loops' gains part of their noise, or not."""
+    """Tests whose loops' gain errors are part of their noise, or not."""
     return [replace(each, gain_weighs=weigh) if isinstance(each, LoopData) else each for each in data_sets]
 
 
 def repeats_of(loops: Sequence[LoopData]) -> Array:
-    """Which loops repeat which, themselves among them, (n, n) bool."""
+    """Mask of the loops that repeat one another, themselves among them, (n, n)."""
     at = np.log([(loop.drive.amplitude, loop.drive.frequency) for loop in loops]).reshape(-1, 2)
     place = np.array([str(loop.direction) for loop in loops])
     return np.all(np.abs(at[:, None] - at) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
@@ -125,8 +125,9 @@ def _sessions(temperature: Array) -> Array:
 
 
 def with_level_errors(sweeps: Sequence[SweepData], error: tuple[float, float], freedom: int) -> tuple[SweepData, ...]:
-    """The same sweeps with gain and phase errors [rad] that all runs of a level share, told by so many degrees of
-    freedom; 0 where they count as known."""
+    """Sweeps with gain and phase errors [rad] that all runs of a level share, known by so many degrees of freedom; 0
+    where they count as exact.
+    """
     noises = {id(sweep.noise): replace(sweep.noise, level=error, level_freedom=freedom) for sweep in sweeps}
     return tuple(replace(sweep, noise=noises[id(sweep.noise)]) for sweep in sweeps)
 
@@ -139,7 +140,7 @@ def parted(data_sets: Iterable[DataSet]) -> tuple[list[LoopData], list[SweepData
 
 
 def rows_of(data_sets: Iterable[DataSet]) -> list[slice]:
-    """Where the residuals of each data set stand among those of all."""
+    """Slices of the residuals of each data set among those of all."""
     ends = accumulate((data_set.size for data_set in data_sets), initial=0)
     return [slice(*pair) for pair in pairwise(ends)]
 

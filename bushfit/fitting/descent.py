@@ -126,12 +126,12 @@ class Descent:
 
     @property
     def expected_fall(self) -> float:
-        """By how much chi-square would yet fall were the model linear."""
+        """Fall of chi-square that is left if the model is linear."""
         return max(self._step(0.0)[1], 0.0)
 
     @property
     def solution(self) -> Solution:
-        """Where the fit is."""
+        """State of the fit as a solution."""
         ends = at_bound(self.coordinates.names, self.point, self.low, self.high)
         return Solution(
             self.model, self.coordinates, self.residual, self.jacobian, self.evaluations, ends, not self.converged
@@ -225,7 +225,7 @@ class Descent:
         return step, float(-(2.0 * slope + curvature @ step) @ step)
 
     def _bend(self, step: Array, damping: float) -> Array:
-        """What a damped step is to be bent by to follow the valley, (k,); 0 where the last one led another way."""
+        """Correction that bends a damped step along the valley, (k,); 0 where the last step led another way."""
         if self.last is None:
             return np.zeros_like(step)
         before, second = self.last

@@ -103,8 +103,9 @@ class FittedTests:
 
     @cached_property
     def _loops(self) -> list[tuple[Array, Array] | None]:
-        """Of each loop orthonormal directions of these residuals, (n, 2), and the components along them by 1 and i of
-        a change, (2, 2); None of a sweep."""
+        """Orthonormal directions of the residuals of each loop, (n, 2), and the components along them by 1 and i of a
+        change, (2, 2); None of a sweep.
+        """
         units, loops = np.array([[1.0], [1.0j]]), list[tuple[Array, Array] | None]()
         for data_set in self.data_sets:
             if data_set.kind == "loop":

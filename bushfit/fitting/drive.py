@@ -1,4 +1,4 @@
-"""What drives the model in a loop: the measured displacement, cleared of its noise.
+"""Motion that drives the model in a loop: the measured displacement, cleared of its noise.
 
 A loop's displacement is periodic. It is written as the harmonics that rise above its noise, found by least
 squares at the samples as they are (any number of cycles, sine or triangle, evenly sampled or not), so the
@@ -121,7 +121,7 @@ class Drive:
 
     @property
     def follows(self) -> bool:
-        """Whether other rows of its record went before, which the rubber remembers."""
+        """True if other rows of its record went before, which the rubber remembers."""
         return self.loop.part is not None and self.loop.part.first_row > 0
 
     @property
@@ -212,7 +212,7 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
 
 
 def _of_the_record(loop: Loop) -> Iterator[str]:
-    """What is to be said of the record that a loop was taken from, and of its first cycle."""
+    """Notes on the record that a loop was taken from, and on its first cycle."""
     yield from loop.source.notes if loop.source else ()
     if loop.part and loop.part.left_out:
         yield loop.part.left_out
@@ -275,8 +275,9 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
 
 
 def _evened(weight: Array, turn: Array) -> Array:
-    """Of bins of rows that depend on one another one weight for each turn: a row more or less in a bin tells nothing
-    more, and a filter would take the step between their weights for information."""
+    """Average the weights of bins of rows that depend on one another, one weight for each turn: a row more or less in a
+    bin tells nothing.
+    """
     held = weight > 0.0
     count = np.bincount(turn[held], minlength=turn.max() + 1)
     mean = np.bincount(turn[held], weight[held], minlength=count.size) / np.maximum(count, 1)

@@ -1,4 +1,4 @@
-"""What tests leave open, in words: parameters, the reason, what is known all the same, and the best further test.
+"""Parameters that tests leave open, in words: the reason, what is known all the same, and the best further test.
 
 A direction is an eigenvector of the Fisher information, with parameters scaled by their size; its standard error is one
 over the root of the eigenvalue, which is a singular value of the Jacobian scaled by noise and size.
@@ -145,13 +145,13 @@ def _groups(known: Information) -> list[list[str]]:
 
 
 def _is_zero(model: Model, name: str, covariance: Covariance) -> bool:
-    """Whether noise alone explains that the size of an added effect is not its neutral value."""
+    """True if noise alone explains that the size of an added effect is not its neutral value."""
     neutral, noise = model.parameters[name].neutral, Z95 * (covariance.stderr(name) or 0.0)
     return "." in name and neutral is not None and abs(model.values[name] - neutral) < noise
 
 
 def _meaning(known: Information, group: Sequence[str]) -> str:
-    """What is not known about a group of parameters."""
+    """Sentence on the combination of a group of parameters that is not known."""
     if set(group) == set(_FRICTION) and known.error(dict(zip(_FRICTION, (1.0, -1.0), strict=True))) < _KNOWN:
         return "sigma_fmax and eps_half are known only as a ratio"
     if len(group) > 1:
@@ -160,7 +160,7 @@ def _meaning(known: Information, group: Sequence[str]) -> str:
 
 
 def _reasons(model: Model, data_sets: Sequence[DataSet], involved: Sequence[str]) -> Iterator[str]:
-    """What the tests lack that would tell the parameters involved."""
+    """Reasons why tests leave parameters open: conditions that the tests lack."""
     reach = measured_range(model, data_sets)
     (slow, fast), (small, large) = reach.frequency, reach.strain
     loops, _ = parted(data_sets)

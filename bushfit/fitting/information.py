@@ -1,4 +1,4 @@
-"""What tests tell about parameters: Fisher information, standard errors, and the further test that would help most.
+"""Fisher information of tests on parameters, standard errors, and the further test that would help most.
 
 Each test that a lab could add is simulated as data sets with the noise of the campaign, and what it would tell is added
 to what the campaign tells.
@@ -38,7 +38,7 @@ _HOPELESS = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """What tests tell about parameters, each relative to its size.
+    """Fisher information of tests on parameters, each relative to its size.
 
     Args:
         names: of the k parameters.
@@ -51,12 +51,12 @@ class Information:
 
     @classmethod
     def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> "Information":
-        """What some data sets tell about the named parameters of a model at its values."""
+        """Information of data sets on the named parameters of a model at its values."""
         slope = jacobian(model, data_sets, names) * relative_sizes(model, names)[:, None]
         return cls(tuple(names), slope @ slope.T)
 
     def with_more(self, model: Model, data_sets: Sequence[DataSet]) -> "Information":
-        """What further data sets tell as well."""
+        """Information with that of further data sets added."""
         return replace(self, matrix=self.matrix + Information.of(model, data_sets, self.names).matrix)
 
     def directions(self) -> tuple[Array, Array]:

@@ -273,7 +273,7 @@ def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) ->
 
 
 def _repeats(clock: Array, x: Array, period: float) -> bool:
-    """Whether what comes after one period is what the motion began with."""
+    """True if the motion after one period repeats its beginning."""
     begin = int(np.searchsorted(clock, period))
     if x.size - begin < 2:
         return True

@@ -83,7 +83,7 @@ class LoopData(MeasuredTest):
 
     @property
     def notes(self) -> Sequence[str]:
-        """What is odd about the record, for the user."""
+        """Notes on the record for the user."""
         return (*self.drive.notes, *filter(None, [self.contradiction]))
 
     @property
@@ -93,17 +93,17 @@ class LoopData(MeasuredTest):
 
     @property
     def frequency(self) -> Array:
-        """Of the operating points [Hz], (n,); a loop has one."""
+        """Frequencies of the operating points [Hz], (n,); a loop has one."""
         return np.array([self.drive.frequency])
 
     @property
     def amplitude(self) -> Array:
-        """Of the operating points, zero-to-peak [m or rad], (n,)."""
+        """Amplitudes of the operating points, zero-to-peak [m or rad], (n,)."""
         return np.array([self.drive.amplitude])
 
     @property
     def circumstances(self) -> Circumstances:
-        """What the operating points were measured under."""
+        """Circumstances of the operating points."""
         return self.under
 
     @cached_property
@@ -143,9 +143,10 @@ class LoopData(MeasuredTest):
         return self._whitened(self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise)
 
     def moved(self, change: Array, model: Model, beside: Array | float = 0.0) -> Array:
-        """What a small change of the model's stiffness at the operating points, complex (..., n) [N/m or N m/rad], does
-        to the whitened residuals, (..., size), with another stiffness beside the model's; a loop changes by its first
-        harmonic."""
+        """Change of the whitened residuals, (..., size), by a small change of the model's stiffness at the operating
+        points, complex (..., n) [N/m or N m/rad], with another stiffness beside the model's; a loop changes by its
+        first harmonic.
+        """
         return np.concatenate((change.real, change.imag), axis=-1) @ self._unit_changes
 
     def residual_with(self, added: Array, model: Model) -> Array:
@@ -153,7 +154,9 @@ class LoopData(MeasuredTest):
         return self.residual(model) + self.moved(added, model)
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
-        """As `jacobian`, of `residual_with`: what is added stays as it is, or stays the same share of the model's."""
+        """Derivatives of `residual_with` by parameter: what is added stays as it is, or stays the same share of the
+        model's.
+        """
         slopes = self.jacobian(model, names)
         if as_share:
             test = self.direction, self.frequency, self.amplitude
@@ -165,16 +168,16 @@ class LoopData(MeasuredTest):
         return self.drive.history(any(effect.settles for effect in model.records))
 
     def noise_free(self, model: Model) -> Self:
-        """The same test as the model would have it, without noise."""
+        """Test as the model would have it, without noise."""
         force = self.force(model)
         return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
 
     def fundamental(self) -> Self:
-        """The same test as far as an addition without a law in time can answer it: a loop by its first harmonic."""
+        """Test as far as an addition without a law in time can answer it: a loop by its first harmonic."""
         return replace(self, fundamental_only=True)
 
     def with_noise(self, relative: float) -> Self:
-        """The same loop with another standard deviation of one row, relative to half the force range."""
+        """Loop with another standard deviation of one row, relative to half the force range."""
         return replace(self, drive=replace(self.drive, noise=relative * self.drive.half_range))
 
     def off(self, model: Model) -> Array:
@@ -185,20 +188,20 @@ class LoopData(MeasuredTest):
         return np.abs(self.misfit(model))
 
     def misfit(self, model: Model) -> Array:
-        """As `residual`, but each row of a loop in units of its own noise, whatever those before it tell, (size,)."""
+        """Residuals, (size,), each row of a loop in units of its noise, whatever the rows before it tell."""
         return (self.force(model) - self.drive.force) * self._per_noise
 
     def shown(self, model: Model) -> Array:
-        """As `misfit`, and of points without weight how far one lies off, in units of noise, (size,)."""
+        """Residuals as `misfit`, and distances of points without weight, in units of noise, (size,)."""
         off = (self.force(model) - self.drive.force) / self.drive.noise
         return np.where(self.weights > 0.0, self.misfit(model), off)
 
     def weighted(self, weight: Array) -> Self:
-        """The same test with the weight of each point, (n,), times a share."""
+        """Test with the weight of each point, (n,), times a share."""
         return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
 
     def without(self, points: Array) -> Self:
-        """The same test with no weight on some of its points, by number; a loop's outliers have none from the start."""
+        """Test with no weight on some of its points, by number; a loop's outliers have none from the start."""
         return self
 
     def with_weight(self) -> Self:
@@ -251,12 +254,12 @@ class LoopData(MeasuredTest):
         return float(np.abs(sizes @ self._waves[:, self.weights > 0.0]).max())
 
     def gain_and_offset(self) -> Array:
-        """What a unit of gain, and half the force range of offset, make of the whitened residuals, (2, n)."""
+        """Whitened residuals by a unit of gain, and by half the force range of offset, (2, n)."""
         offset = np.full(self.drive.force.size, self.drive.half_range)
         return np.array([self._less_common(self.unit_gain), self._whitened(offset * self._per_noise)])
 
     def columns(self) -> dict[str, Any]:
-        """What names each residual's point in a table: columns by header."""
+        """Columns by header that name the point of each residual in a table."""
         unit, factor = self.direction.display.displacement
         return {
             "time [s]": self.drive.phase / self.drive.frequency,
@@ -312,7 +315,7 @@ class LoopData(MeasuredTest):
         return self.drive.row_noise.whiten(waves * (self._per_noise * self.drive.half_range)) * self._counting
 
     def with_model_error(self, size: float) -> Self:
-        """The same test with a relative model error beside its noise."""
+        """Test with a relative model error beside its noise."""
         test = replace(self, model_error=size)
         test.__dict__["_error_directions"] = self._error_directions
         return test
@@ -346,18 +349,18 @@ class LoopData(MeasuredTest):
         return np.asarray(np.outer(gain, gain) - first @ first.T)
 
     def _counted(self, white: Array) -> Array:
-        """Of whitened rows, (..., n), what counts as its residuals."""
+        """Select what counts as residuals of whitened rows, (..., n)."""
         return white @ self._fundamental if self.fundamental_only else white
 
     @cached_property
     def _unit_changes(self) -> Array:
-        """What 1 and i of a change of stiffness do to the residuals, (2, n)."""
+        """Whitened residuals by 1 and i of a change of stiffness, (2, n)."""
         wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
         return self._whitened(np.array([wave.real, -wave.imag]) * self._per_noise)
 
     @cached_property
     def unit_gain(self) -> Array:
-        """What a unit of gain makes of the residuals, (n,).
+        """Whitened residuals by a unit of gain, (n,).
 
         Notes: of the force without its noise. With it, a fit would take the noise for what the gain makes, and make
         the model smaller than it is (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences 27

@@ -44,7 +44,7 @@ _NO_OUTLIERS = OutlierRows(np.empty(0, dtype=np.intp), np.empty(0))
 
 
 class LoopHarmonics(NamedTuple):
-    """What the rows of a loop tell about its motion and its noise.
+    """Motion and noise of a loop as its rows show them.
 
     Args:
         motion: complex harmonics of the displacement that rise above its noise, mean first.

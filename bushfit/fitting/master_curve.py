@@ -50,7 +50,7 @@ def master_curve(result: Result, sweeps: Sequence[SweepData]) -> tuple[Shifted, 
 
 
 def can_shift(sweep: Sweep) -> bool:
-    """Whether a sweep is over frequency, and its temperature known."""
+    """True if a sweep is over frequency, and its temperature known."""
     return sweep.temperature is not None and np.unique(sweep.frequency).size >= _FREQUENCIES
 
 
@@ -79,7 +79,7 @@ def _shifted(result: Result, sweep: SweepData) -> Shifted:
 
 
 def _more(model: Model, sweep: SweepData) -> tuple[float, float]:
-    """By how much more a sweep would have its time scale shifted than the model does [neper], and the standard error.
+    """Further shift of a sweep's time scale beyond that of the model [neper], and its standard error.
 
     Notes: Gauss-Newton steps in the one number, all points weighing alike: what is left is mostly no noise;
     nan where the stiffness does not change with frequency.

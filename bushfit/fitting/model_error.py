@@ -187,7 +187,7 @@ def model_error_warning(error: Unnamed) -> str:
 
 
 def _exceeds_noise(found: Estimate, rig: RigSettings) -> bool:
-    """Whether chi-square of all tests, or of one, exceeds what noise and a rig of the class make."""
+    """True if chi-square of all tests, or of one, exceeds what noise and a rig of the class make."""
     data_sets, residual = found.minimised, found.solution.residual
     errors = [_errors_of_class(data_set, rig) for data_set in data_sets]
     squares = [
@@ -201,7 +201,7 @@ def _exceeds_noise(found: Estimate, rig: RigSettings) -> bool:
 
 
 def _is_smooth(found: Estimate, rig: RigSettings) -> bool:
-    """Whether the tests are likelier with something smooth beside noise and a rig of the class, prior odds counted."""
+    """True if the tests are likelier with something smooth beside noise and a rig of the class, prior odds counted."""
     thinned = _thinned(found.minimised)
     solution = found.solution.at(found.solution.model, thinned)
     tests = FittedTests(solution, thinned, [_errors_of_class(data_set, rig) for data_set in thinned])

@@ -56,7 +56,7 @@ def from_neighbours(values: Array, rows: Array, window: int = NEIGHBOURS) -> Arr
 
 
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
-    """Whether rows lie farther than a limit off a curve, by `residual`, and off neighbours, or are stuck, (n,)."""
+    """Mask of rows that lie farther than a limit off a curve, by `residual`, and off neighbours, or are stuck, (n,)."""
     far = np.abs(residual) > limit
     if not far.any():
         return far
@@ -68,7 +68,7 @@ def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
 
 
 def are_stuck(recorded: Array) -> Array:
-    """Whether rows repeat the one before them over and over, where the channel has noise that forbids it, (n,).
+    """Mask of rows that repeat the one before over and over, where the channel has noise that forbids it, (n,).
 
     Notes:
         The chance that two neighbours are equal, by the resolution of the record, is counted outside such runs. A run

@@ -184,7 +184,7 @@ def _springpot(data: Data, springpot: Result | None) -> tuple[dict[str, float], 
 
 
 def _without_springpot(data: Data, solution: Solution, loops: Sequence[LoopData]) -> str:
-    """What leaving the springpot out did to the static parameters, in words and per cent."""
+    """Sentence on how leaving the springpot out changed the static parameters, in per cent."""
     found = solution.model.values
     try:
         better, source = fit_two_step(data).result.model.values, "with m and alpha from this campaign's sweep"
@@ -222,7 +222,7 @@ def _result(
     notes: Sequence[str] = (),
     left: Sequence[DataSet] = (),
 ) -> Result:
-    """What the steps of a procedure found, the last one's model, with the uncertainty of all of them."""
+    """Collect the result of the steps of a procedure: the last model, with the uncertainty of all of them."""
     model, data_sets = steps[-1].solution.model, [data_set for step in steps for data_set in step.data_sets]
     stages = [Stage(_moving(step), step.weighed, step.process) for step in steps]
     fitted = tuple(name for step in steps for name in step.solution.coordinates.names)
@@ -282,7 +282,7 @@ def _checked(model: Model, data_sets: Sequence[DataSet]) -> str:
 
 
 def _at_edge(name: str, end: End, solution: Solution, data_sets: Sequence[DataSet], bounds: Bounds) -> str:
-    """What a parameter that rests on a bound means: how far from there the tests let it be."""
+    """Sentence on a parameter that rests on a bound: how far from there the tests let it be."""
     if bounds.get(name, (None, None))[end == "max"] is not None:
         return f"{name} rests on the {end} given in [fit]"
     limit = limit95(solution, data_sets, name, bounds)

@@ -1,4 +1,4 @@
-"""What one line of a sweep tells of its noise: by what repeats differ in, or about a smooth curve without repeats.
+"""Noise that one line of a sweep shows: by what repeats differ in, or about a smooth curve without repeats.
 
 A line is what was stepped through while one of frequency and amplitude was held. All is counted on ln K = ln|K| +
 i phase, so gain errors are real and phase errors imaginary, both relative to |K|.
@@ -40,7 +40,7 @@ _OUTLIER = 6.0
 
 @dataclass(frozen=True)
 class LineNoise:
-    """What the repeats of one line of a sweep tell about the noise.
+    """Noise of one line of a sweep as its repeats show it.
 
     Args:
         scatter: deviations of gain and phase from point to point, (k, 2).
@@ -62,13 +62,14 @@ class LineNoise:
 
     @property
     def variance(self) -> Array:
-        """Of gain and phase from point to point, (2,)."""
+        """Variances of gain and phase from point to point, (2,)."""
         return np.asarray(np.square(self.scatter).sum(axis=0) / max(self.freedom, 1))
 
 
 def line_noise(sweep: Sweep, log_stiffness: Array, held: float, disturbed: Collection[float] = ()) -> LineNoise:
-    """What one line of a sweep tells, but for disturbed steps: by pairs of repeats, or about a smooth curve where there
-    is no pair."""
+    """Estimate the noise of one line of a sweep without disturbed steps: by pairs of repeats, or about a smooth curve
+    where there is no pair.
+    """
     chosen = (sweep.held == held) & ~np.isin(sweep.step, [*disturbed])
     steps, column = np.unique(sweep.step[chosen], return_inverse=True)
     numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
@@ -100,7 +101,8 @@ def free_of(steps: int) -> float:
 
 
 def _usual(difference: Array, log_step: Array) -> Array:
-    """Where two repeats were both measured and differ as they do elsewhere, (n,) bool: single outliers are faults.
+    """Mask of steps at which two repeats were both measured and differ as they do elsewhere, (n,): single outliers are
+    faults.
 
     Elsewhere is all along the run, and nearby where differences grow along it: by Theil's (1950) median slope.
     """
@@ -118,7 +120,7 @@ def _usual(difference: Array, log_step: Array) -> Array:
 
 
 def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
-    """What a line without repeats tells: its scatter about a smooth curve; of one or two points this is assumed."""
+    """Noise of a line without repeats: its scatter about a smooth curve; of one or two points this is assumed."""
     degree = min(_SMOOTH_DEGREE, steps.size - 2)
     if degree < 1:
         return LineNoise(np.full((1, 2), ASSUMED[0]), 1, np.empty((0, 2)))
@@ -159,8 +161,9 @@ def unit(values: Array) -> Array:
 
 
 def _freed(basis: Array, values: Array) -> Array:
-    """What a curve, (n, k), leaves of values, (n, m) -> (n - k, m), in orthonormal coordinates: they scatter
-    independently. No matrix of n by n is made."""
+    """Residuals of values about a curve, (n, k), (n, m) -> (n - k, m), in orthonormal coordinates: they scatter
+    independently. No matrix of n by n is made.
+    """
     (reflections, factors), _ = qr(basis, mode="raw")
     turned, *_ = lapack.dormqr("L", "T", reflections, factors, values, lwork=values.shape[1])
     return np.asarray(turned[basis.shape[1] :])

@@ -136,7 +136,7 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
 
 
 def _places(outliers: Sequence[Outlier]) -> str:
-    """Where outliers are, and the first of their rows."""
+    """List files and columns of outliers with the first of their rows."""
     rows: defaultdict[str, list[str]] = defaultdict(list)
     for entry in outliers:
         rows[entry.place].append(str(entry.row))

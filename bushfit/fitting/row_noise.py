@@ -68,11 +68,13 @@ class RowNoise:
 
     @property
     def rows_as_one(self) -> float:
-        """So many rows tell as much as an independent one about what is slow, at least 1."""
+        """Number of rows that tell as much as one independent row about what is slow, at least 1."""
         return max(1.0 / float(np.sum(self.filter)) ** 2, 1.0)
 
     def counting(self, weight: Array) -> Array:
-        """Which whitened rows count, (n,) bool: those that have weight, as all have that their noise is told from."""
+        """Mask of the whitened rows that count, (n,): those that have weight, as have all from which their noise is
+        known.
+        """
         counts = weight > 0.0
         counting = counts.copy()
         for k in range(1, self.order + 1):
@@ -94,7 +96,7 @@ class RowNoise:
         return white
 
     def unsure(self, influence: Array) -> list[Array]:
-        """As `DataSet.unsure`, one per parameter of the noise, (k, n) each.
+        """Reactions of an estimator to each parameter of the noise, (k, n) each, as `DataSet.unsure`.
 
         Notes:
             Of V = L^-1 L^-T, L the filter, the whitened derivative is -(G + G^T) with G = dL L^-1.
@@ -161,7 +163,7 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
 
 
 def of_a_lone_cycle(number: Array) -> Array:
-    """Which harmonics of a lone cycle are noise, (n,) bool."""
+    """Mask of the harmonics of a lone cycle that are noise, (n,)."""
     return (number % 2 == 0) & (number >= _FIRST_EVEN)
 
 

@@ -69,7 +69,7 @@ def solve(
 def solve_with_lmfit(
     model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds | None = None
 ) -> Solution:
-    """The same by lmfit's MINPACK, as the paper's own procedure, static and dynamic fit in turn, is made.
+    """Fit by lmfit's MINPACK, as the paper's procedure, static and dynamic fit in turn, is made.
 
     Raises:
         FitError: as of `solve`, which goes on where a step leaves the bounds or MINPACK comes to no end.

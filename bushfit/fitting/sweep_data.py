@@ -53,12 +53,12 @@ class Line:
 
     @property
     def step(self) -> Array:
-        """What changes along the line, (n,)."""
+        """Values stepped along the line, (n,)."""
         return self.amplitude if self.stepped == "amplitude" else self.frequency
 
     @property
     def words(self) -> str:
-        """What the line holds, for people: "0.1 mm" or "10 Hz"; the test where neither."""
+        """Value that the line holds, for people: "0.1 mm" or "10 Hz"; the name of the test where neither."""
         if self.stepped == "frequency":
             return shown_amplitude(self.direction, float(self.amplitude[0]))
         return f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
@@ -132,7 +132,7 @@ class SweepData(MeasuredTest):
 
     @property
     def temperature(self) -> Array:
-        """Of each point [K], (n,); nan where it is not known."""
+        """Temperature of each point [K], (n,); nan where it is not known."""
         kelvin = np.nan if self.sweep.temperature is None else self.sweep.temperature
         return np.broadcast_to(kelvin, self.sweep.frequency.size)[self.order]
 
@@ -202,12 +202,14 @@ class SweepData(MeasuredTest):
 
     @cached_property
     def held(self) -> Array:
-        """What each point's run holds, (n,): amplitude [m or rad] or frequency [Hz], or else the number of the run."""
+        """Value held by the run of each point, (n,): amplitude [m or rad] or frequency [Hz], or else the number of the
+        run.
+        """
         return self.sweep.held[self.order]
 
     @cached_property
     def step(self) -> Array:
-        """What changes within each point's run, (n,): frequency [Hz] or amplitude [m or rad]."""
+        """Value stepped within the run of each point, (n,): frequency [Hz] or amplitude [m or rad]."""
         return self.sweep.step[self.order]
 
     @cached_property
@@ -313,7 +315,7 @@ class SweepData(MeasuredTest):
         return self.whiten(self._relative(change, self.stiffness(model) + beside))
 
     def _relative(self, change: Array, stiffness: Array) -> Array:
-        """What small changes of a stiffness at the points, (..., n) each, do to the deviation, (..., n)."""
+        """Change of the deviation, (..., n), by small changes of a stiffness at the points, (..., n) each."""
         relative = change / stiffness
         if self.residuals == "complex":
             return relative

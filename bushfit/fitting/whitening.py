@@ -60,11 +60,11 @@ class _Shared:
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
     def along(self, parts: Array) -> Array:
-        """What lies along the unit error of each group, (..., 2, n) -> (..., 2, groups)."""
+        """Components along the unit error of each group, (..., 2, n) -> (..., 2, groups)."""
         return np.add.reduceat(parts * self.unit, self.starts, axis=-1)
 
     def made(self, error: Array) -> Array:
-        """What an error of each group makes of its points, (..., 2, groups) -> (..., 2, n)."""
+        """Deviations by an error of each group, (..., 2, groups) -> (..., 2, n)."""
         return error[..., self.group] * self.unit
 
     def less(self, parts: Array) -> Array:
@@ -142,7 +142,7 @@ class Whitening:
 
     @cached_property
     def _point(self) -> _Shared:
-        """What the rows of an operating point share, in their order, in units of their own noise."""
+        """Error that the rows of an operating point share, in their order, in units of their noise."""
         order, starts = self._by_point
         return _Shared(starts, self._block.unit[:, order], np.full((2, 1), self.model_error**2))
 
@@ -162,7 +162,7 @@ class Whitening:
         return parts / self.random
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        """As `DataSet.unsure`, (k, 2 n).
+        """Reactions of an estimator to each variance of the noise, (k, 2 n) each, as `DataSet.unsure`.
 
         Notes:
             Within a block V has the derivatives I by s^2 and 1 1^T by t^2, whitened W^2 and (W 1)(W 1)^T. The estimate
@@ -190,12 +190,12 @@ class Whitening:
 
     @cached_property
     def _block(self) -> _Shared:
-        """What the points of a block share, in units of their own noise."""
+        """Error that the points of a block share, in units of their noise."""
         return _Shared(self.starts, np.sqrt(self.weights) / self.random, np.square(self.noise.shared)[:, None])
 
     @cached_property
     def _line(self) -> _Shared:
-        """What the blocks of a line share, less what is taken out of each block."""
+        """Error that the blocks of a line share, less what is taken out of each block."""
         unit = (1.0 - self._block.share)[:, self._block.group] * self._block.unit
         return _Shared(self.lines, unit, np.square(self.noise.level)[:, None])
 
