@@ -227,7 +227,7 @@ def lack_of_fit(model: Model, data_sets: Sequence[DataSet], parameters: int) -> 
 
 
 def missed(model: Model, data_sets: Sequence[DataSet]) -> list[float | None]:
-    """Reduced chi-square of each test that the model misses by more than its noise, shared errors counted; else None."""
+    """Reduced chi-square of each test that the model misses by more than its noise; else None."""
     residuals, parts = residual(model, data_sets), zip(rows_of(data_sets), data_sets, strict=True)
     return [beyond_noise(*_over_freedom(residuals[rows], [data_set], 0)) for rows, data_set in parts]
 
