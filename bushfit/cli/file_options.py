@@ -57,7 +57,7 @@ _ENTRY = re.compile(r'(\w+) = "([^"]*)"')
 
 
 def with_stated(*, sweeps: bool = True) -> Parameter:
-    """Decorator of a command on test `files`: what its options say of them becomes one `stated`.
+    """Decorator of a command on test `files`: what its options say of them becomes one `test_options`.
 
     Beside loops there are `sweeps`, with all keys of a campaign, or else resonance tests, with those of any file.
     """
@@ -75,7 +75,7 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
             stated = {key: given.pop(key) for key in told}
             stated["columns"] = _pairs(columns, "--column", "force=Kraft", known())
             stated["units"] = _pairs(units, "--unit", "force=kN", known())
-            return function(stated={key: value for key, value in stated.items() if value}, **given)
+            return function(test_options={key: value for key, value in stated.items() if value}, **given)
 
         return in_order(
             wrapped,

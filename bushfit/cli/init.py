@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from bushfit.cli.file_options import STATED, TYPES, direction_error, options_named, with_stated
-from bushfit.cli.inspect import tell_left_out
+from bushfit.cli.inspect import print_left_out
 from bushfit.cli.options import command_called, flag, option, option_of, under
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, error_location, quote_path
@@ -23,8 +23,8 @@ from bushfit.units import parse_quantity
 
 if TYPE_CHECKING:
     from bushfit.geometry import Bushing
-    from bushfit.inspection.gathering import Source
-    from bushfit.inspection.record import Inspected, InspectionDocument
+    from bushfit.inspection.gathering import TestSource
+    from bushfit.inspection.record import Inspection, InspectionDocument
 
 #: Sides of the rubber whose radius or diameter is asked for.
 _SIDES = ("inner", "outer")
@@ -49,7 +49,7 @@ _WORDS = {
 _Key = tuple[str, str]
 #: What is asked for once for all files, with what is offered.
 _ONCE: dict[_Key, str] = {("amplitude", ""): "zero-to-peak", ("preload", ""): ""}
-_Seen = TypeVar("_Seen")
+_Read = TypeVar("_Read")
 
 
 @command_called(
@@ -73,7 +73,7 @@ def command(
     files: tuple[Path, ...],
     name: str | None,
     no_input: bool,
-    stated: Mapping[str, Any],
+    test_options: Mapping[str, Any],
     output: Output,
     **sizes: str | None,
 ) -> None:
@@ -85,36 +85,36 @@ def command(
     from bushfit.geometry import Specimen
     from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named
 
-    questions = Questions.of(output, no_input=no_input)
+    questions = Questions.for_command(output, no_input=no_input)
     usual = (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
-    if name is None and questions.asked and not any(sizes.values()):
+    if name is None and questions.enabled and not any(sizes.values()):
         name = click.prompt("name of the bushing", default=usual, err=True)
     name = name or usual
     folder, target = output.folder(name), "campaign.toml"
     if output.output and output.output.suffix == ".toml":
         folder, target = output.output.parent, output.output.name
     size = partial(_bushing, name)
-    bushing = questions.settled(sizes, size) if any(sizes.values()) else None
+    bushing = questions.complete(sizes, size) if any(sizes.values()) else None
     check_free(folder, [target], overwrite=output.force)
-    seen, left_out = _usable(files, stated, questions, is_sized=bushing is not None)
-    seen = with_specimens_named(seen)
-    if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
-        bushing = questions.settled(sizes, size)
+    inspections, left_out = _inspect_files(files, test_options, questions, is_sized=bushing is not None)
+    inspections = with_specimens_named(inspections)
+    if bushing is None and not all(isinstance(inspection.direction, Specimen) for inspection in inspections):
+        bushing = questions.complete(sizes, size)
     table = bushing and bushing[1]
-    if len({one.part for one in seen if one.part}) > 1:
+    if len({inspection.part for inspection in inspections if inspection.part}) > 1:
         target = target if output.output and output.output.suffix == ".toml" else "batch.toml"
-        written = campaigns_of_parts(name, table, seen, folder, target)
+        written = campaigns_of_parts(name, table, inspections, folder, target)
         check_free(folder, list(written), overwrite=output.force)
     else:
-        written = {target: campaign_text(name, table, seen, folder)}
+        written = {target: campaign_text(name, table, inspections, folder)}
     if bushing:
-        _tell_bushing(output, bushing[0])
-    for one in seen:
-        _tell(output, one)
-    tell_left_out(output, left_out)
+        _print_bushing(output, bushing[0])
+    for inspection in inspections:
+        _print_inspection(output, inspection)
+    print_left_out(output, left_out)
     document: InspectionDocument = {
         "campaign": written[target],
-        "files": [one.to_document() for one in seen],
+        "files": [inspection.to_document() for inspection in inspections],
         "left_out": left_out,
     }
     results = [raw_file(file, text.encode()) for file, text in written.items()]
@@ -123,7 +123,7 @@ def command(
 
 
 def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
-    """A radius as the campaign has it, from the one of the two options that was given."""
+    """Radius as the campaign states it, from the option of the radius or of the diameter."""
     radius, diameter = sizes[f"{side}_radius"], sizes[f"{side}_diameter"]
     options = f"--{side}-radius", f"--{side}-diameter"
     if radius is not None and diameter is not None:
@@ -138,7 +138,7 @@ def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
 
 
 def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[str, str]]:
-    """The bushing of the campaign to be, and the keys of its sizes there.
+    """Bushing of the new campaign, and the keys of its [bushing] table.
 
     Errors name the options, diameters where these were given and halved.
     """
@@ -166,138 +166,171 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
         raise
 
 
-def _usable(
-    files: Sequence[Path], stated: Mapping[str, Any], questions: Questions, *, is_sized: bool
-) -> tuple[list[Inspected], list[str]]:
-    """The loops and sweeps among files, each of a known direction or specimen, and why others are left out.
+def _inspect_files(
+    files: Sequence[Path], test_options: Mapping[str, Any], questions: Questions, *, is_sized: bool
+) -> tuple[list[Inspection], list[str]]:
+    """Inspect the loops and sweeps among files, each of a known direction or specimen.
 
-    `is_sized` says whether sizes of a bushing are given: then a file that names a direction is a test of it, and no
-    block in shear.
+    Args:
+        files: files and folders.
+        test_options: options that hold for all tests.
+        questions: of the command.
+        is_sized: whether sizes of a bushing are given: then a file that names a direction is a test of the bushing, and
+            not of a block in shear.
+
+    Returns:
+        The inspections, and a sentence on each file that is left out.
     """
     from bushfit.inspection.gathering import gather
 
-    sources, left_out = gather(files, stated)
-    places = [(source.file.resolve(), str(source.stated)) for source in sources]
-    if twice := [source for source, place in zip(sources, places, strict=True) if places.count(place) > 1]:
+    sources, left_out = gather(files, test_options)
+    keys = [(source.file.resolve(), str(source.test_options)) for source in sources]
+    if twice := [source for source, key in zip(sources, keys, strict=True) if keys.count(key) > 1]:
         raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
-    seen: list[Inspected] = []
-    others = list(left_out)
-    for source in sources if questions.asked else track("tests looked at", sources):
-        one = questions.settled(source.stated, partial(_look, source, is_sized=is_sized, is_asked=questions.asked))
-        if one.kind != "history":
-            seen.append(one)
+    inspections: list[Inspection] = []
+    sentences = list(left_out)
+    for source in sources if questions.enabled else track("tests looked at", sources):
+        look = partial(_inspect_source, source, is_sized=is_sized, is_asking=questions.enabled)
+        try:
+            inspection = questions.complete(source.test_options, look)
+        except click.UsageError as error:
+            if source.is_named:
+                raise
+            sentences.append(f"{source}: {error.message}")
             continue
-        hint = f"bushfit reduce {quote_path(one.file)} --direction {one.direction or '...'} makes a sweep.csv of it"
+        if inspection.kind != "history":
+            inspections.append(inspection)
+            continue
+        direction = inspection.direction or "..."
+        hint = f"bushfit reduce {quote_path(inspection.file)} --direction {direction} makes a sweep.csv of it"
         if source.is_named:
             raise MeasurementError(
                 "this is a raw stepped-sine history, not a sweep",
-                file=one.file,
+                file=inspection.file,
                 expected="hysteresis loops and sweeps",
                 hint=f"{hint}; give that instead",
             )
-        others.append(f"{source}: a raw stepped-sine history; {hint}")
-    return seen, others
+        sentences.append(f"{source}: a raw stepped-sine history; {hint}")
+    return inspections, sentences
 
 
-def _look(source: Source, stated: Mapping[str, Any], *, is_sized: bool, is_asked: bool) -> Inspected:
-    """A test of which this is stated; where somebody `is_asked`, what it needs not say is asked for as well."""
+def _inspect_source(
+    source: TestSource, test_options: Mapping[str, Any], *, is_sized: bool, is_asking: bool
+) -> Inspection:
+    """Inspect a test with these options; raise an error for what is missing, and at a terminal for what may be."""
     from bushfit.geometry import Specimen
     from bushfit.inspection.opening import BLOCK_KEYS
 
-    source = replace(source, stated={key: value for key, value in stated.items() if value != ""})
+    source = replace(source, test_options={key: value for key, value in test_options.items() if value != ""})
     with options_named():
-        one = source.inspect()
-        if is_sized and isinstance(one.direction, Specimen) and one.direction.kind == "shear":
-            named = source.without(*BLOCK_KEYS, "direction").inspect().direction
-            one = source.without(*BLOCK_KEYS).inspect() if named else one
-    if not (is_sized or "specimen" not in stated or isinstance(one.direction, Specimen)):
+        inspection = source.inspect()
+        if is_sized and isinstance(inspection.direction, Specimen) and inspection.direction.kind == "shear":
+            direction = source.without(*BLOCK_KEYS, "direction").inspect().direction
+            inspection = source.without(*BLOCK_KEYS).inspect() if direction else inspection
+    if not (is_sized or "specimen" not in test_options or isinstance(inspection.direction, Specimen)):
         raise click.UsageError(
             "These are tests of a stiffness: of a specimen in shear, which needs --area and --thickness, or of a "
             "bushing, which needs --inner-radius, --outer-radius and --length."
         )
-    if one.kind != "history" and one.direction is None:
+    if inspection.kind == "history":
+        return inspection
+    if inspection.direction is None:
         raise direction_error(source.file, source.sheet)
-    if is_asked and one.is_counting_open:
+    if is_asking and inspection.is_counting_open:
         raise MeasurementError("no header says how amplitudes are counted", file=source.file, hint="--amplitude")
-    if is_asked and one.kind != "history" and "preload" not in {*one.entry, *stated}:
+    if is_asking and "preload" not in {*inspection.entry, *test_options}:
         raise MeasurementError("nothing says under which preload this was tested", file=source.file, hint="--preload")
-    return one
+    return inspection
 
 
-def _tell_bushing(output: Output, bushing: Bushing) -> None:
+def _print_bushing(output: Output, bushing: Bushing) -> None:
     inner, outer, long = (1e3 * size for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length))
     across = f"from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick"
     output.print(f"{bushing.name}: rubber {across}, {long:.6g} mm long")
 
 
-def _tell(output: Output, seen: Inspected) -> None:
-    """One line of what a file is, what was assumed, and what is odd."""
-    facts = seen.facts
+def _print_inspection(output: Output, inspection: Inspection) -> None:
+    """Print one line on a file, then what was assumed and what is odd."""
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
-    kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
-    output.print(f"{seen.file.parent / seen.label}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
-    output.warn([f"{seen.label}: {sentence}" for sentence in seen.odd])
-    if seen.assumed:
-        output.print(f"  {seen.assumed}")
+    facts = [f"{key}: {value}" for key, value in inspection.facts.items() if key in wanted or key.startswith("from ")]
+    name = inspection.file.parent / inspection.label
+    output.print(f"{name}: {inspection.kind}, {inspection.direction}; {'; '.join(facts)}")
+    output.warn([f"{inspection.label}: {sentence}" for sentence in inspection.odd])
+    if inspection.assumed:
+        output.print(f"  {inspection.assumed}")
 
 
 @dataclass(frozen=True)
 class Questions:
-    """Questions of one command, where somebody is `asked`; the last answer to one is offered when it comes again."""
+    """Questions of one command at a terminal; the last answer is offered where a question comes again.
+
+    Args:
+        output: of the command.
+        enabled: whether somebody is there to answer, and no option forbids questions.
+    """
 
     output: Output
-    asked: bool
+    enabled: bool
     _answers: dict[_Key, Any] = field(default_factory=lambda: dict.fromkeys(_ONCE))
 
     @classmethod
-    def of(cls, output: Output, *, no_input: bool) -> Questions:
-        """Those of a command, none where nobody is there to answer, or wants to be asked."""
-        asked = not (no_input or output.quiet or output.as_json) and sys.stdin is not None and sys.stdin.isatty()
-        return cls(output, asked)
+    def for_command(cls, output: Output, *, no_input: bool) -> Questions:
+        """Questions of a command; not enabled where nobody can answer, or wants to."""
+        enabled = not (no_input or output.quiet or output.as_json) and sys.stdin is not None and sys.stdin.isatty()
+        return cls(output, enabled)
 
-    def settled(self, stated: Mapping[str, Any], look: Callable[[Mapping[str, Any]], _Seen]) -> _Seen:
-        """What comes of what is stated, with answers to what the errors of that ask for."""
-        given: dict[_Key, Any] = {}
+    def complete(self, options: Mapping[str, Any], read: Callable[[Mapping[str, Any]], _Read]) -> _Read:
+        """Call a function with options, and ask for those that its errors name until it succeeds.
+
+        Args:
+            options: those of the command line.
+            read: function that needs options.
+
+        Returns:
+            What `read` returns.
+        """
+        answers: dict[_Key, Any] = {}
         while True:
             try:
-                every = dict(stated)
-                for (name, role), answer in given.items():
-                    every |= {f"{name}s": {**every.get(f"{name}s", {}), role: answer}} if role else {name: answer}
-                return look(every)
+                completed = dict(options)
+                for (name, role), answer in answers.items():
+                    entry = {f"{name}s": {**completed.get(f"{name}s", {}), role: answer}} if role else {name: answer}
+                    completed |= entry
+                return read(completed)
             except BushfitError as error:
-                if not self.asked:
+                if not self.enabled:
                     raise
-                told = type(error)(**{**vars(error), "hint": None})
-                wanted = _wanted(error)
-                new = [key for key in wanted if key not in given and not stated.get(key[0])]
-                wrong = [key for key, answer in given.items() if key in wanted or _is_about(told, key, answer)]
+                bare_error = type(error)(**{**vars(error), "hint": None})
+                wanted = _wanted_options(error)
+                new = [key for key in wanted if key not in answers and not options.get(key[0])]
+                wrong = [key for key, answer in answers.items() if key in wanted or _mentions(bare_error, key, answer)]
                 if not (new or wrong):
                     raise
-                for key in [] if new else [*given][[*given].index(wrong[0]) :]:  # and what was asked for after it
-                    del given[key], self._answers[key]
-                given |= self._answer((new or wrong)[0], told)
+                for key in [] if new else [*answers][[*answers].index(wrong[0]) :]:  # and the answers after it
+                    del answers[key], self._answers[key]
+                answers |= self._ask((new or wrong)[0], bare_error)
 
-    def _answer(self, key: _Key, told: BushfitError) -> dict[_Key, Any]:
+    def _ask(self, key: _Key, error: BushfitError) -> dict[_Key, Any]:
         name, role = key
-        known = self._answers.get(key)
-        if key not in _ONCE or known is None:
-            self.output.print(f"\n{told}")
-            words = _WORDS.get(name, name.replace("_", " ")).format(role=role.replace("_", " "))
-            usual = _ONCE.get(key, known)
-            known = click.prompt(words, default=usual, type=TYPES.get(name), show_default=usual != "", err=True)
-            key = ("frequency", "") if name == "rate" and "Hz" in known else key
-        self._answers[key] = known
-        return {key: known}
+        answer = self._answers.get(key)
+        if key not in _ONCE or answer is None:
+            self.output.print(f"\n{error}")
+            question = _WORDS.get(name, name.replace("_", " ")).format(role=role.replace("_", " "))
+            default = _ONCE.get(key, answer)
+            answer = click.prompt(question, default=default, type=TYPES.get(name), show_default=default != "", err=True)
+            key = ("frequency", "") if name == "rate" and "Hz" in answer else key
+        self._answers[key] = answer
+        return {key: answer}
 
 
-def _wanted(error: BushfitError) -> list[_Key]:
-    """What an error asks for, a column last: that a file has one is seldom not known to bushfit."""
-    found = [(kind or option.replace("-", "_"), role) for kind, role, option in _NAMED.findall(error.hint or "")]
-    known = [(name, role) for name, role in found if role or name in STATED or name in _WORDS]
-    return sorted(known, key=lambda key: key[0] == "column")
+def _wanted_options(error: BushfitError) -> list[_Key]:
+    """Options that the hint of an error names; a column last, since files without one are more frequent."""
+    options = [(kind or option.replace("-", "_"), role) for kind, role, option in _NAMED.findall(error.hint or "")]
+    known_options = [(name, role) for name, role in options if role or name in STATED or name in _WORDS]
+    return sorted(known_options, key=lambda key: key[0] == "column")
 
 
-def _is_about(error: BushfitError, key: _Key, answer: Any) -> bool:
-    """Whether an error tells of an answer."""
+def _mentions(error: BushfitError, key: _Key, answer: Any) -> bool:
+    """Return True if an error is about an answer."""
     place, quoted = option_of(key[0]) in (error.place or ""), f'"{answer}"' in error.problem
     return place or quoted or (error.found or "").strip('"') == str(answer)

@@ -20,7 +20,7 @@ from bushfit.report import plots
 from bushfit.report.results import figure_file
 
 if TYPE_CHECKING:
-    from bushfit.inspection.record import Inspected, InspectionDocument
+    from bushfit.inspection.record import Inspection, InspectionDocument
 
 #: Kinds of test file, in words.
 _KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw stepped-sine history"}
@@ -31,54 +31,54 @@ _FILES_A_PICTURE = 5
 @command_called("inspect", "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv")
 @with_stated()
 @with_output("results/<first file>", "pictures")
-def command(files: tuple[Path, ...], stated: Mapping[str, Any], output: Output) -> None:
+def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Output) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw histories.
 
     FILE may be a folder, or a workbook with several tests. For each test: how every column was understood, in which
     unit; cycles, noise, frequencies, amplitudes; and what is odd: gaps, outliers, drift, cut-off tops, copied rows,
     repeats that disagree. Rows count from 1 below the header. The text for the campaign goes to standard output. If a
-    file cannot be used, the others are told, nothing is written, exit status 2. Writes inspect.png, and inspect_2.png
+    file cannot be used, the others are shown, nothing is written, exit status 2. Writes inspect.png, and inspect_2.png
     and so on of more than five files.
     """
     from bushfit.inspection.gathering import gather, with_contradictions
     from bushfit.inspection.record import pasted_text, with_specimens_named
 
-    sources, left_out = gather(files, stated)
-    tell_left_out(output, left_out)
+    sources, left_out = gather(files, test_options)
+    print_left_out(output, left_out)
     last = math.ceil(len(sources) / _FILES_A_PICTURE)
     pages = ["inspect", *(f"inspect_{page}" for page in range(2, last + 1))]
     folder = output.folder(files[0].stem)
-    seen: list[Inspected] = []
-    failed: list[BushfitError] = []
+    inspections: list[Inspection] = []
+    errors: list[BushfitError] = []
     for source in track("tests looked at", sources):
         try:
             with options_named():
-                seen.append(source.inspect())
+                inspections.append(source.inspect())
         except BushfitError as error:
-            failed.append(error)
+            errors.append(error)
         else:
-            tell(output, seen[-1])
-    for alone, beside in zip(seen, together := with_contradictions(seen), strict=True):
-        for sentence in beside.odd[len(alone.odd) :]:
-            output.console.print(f"[yellow]odd:[/yellow] {escape(beside.label)}: {escape(sentence)}")
-    seen = with_specimens_named(together)
-    text = pasted_text(seen)
+            print_inspection(output, inspections[-1])
+    compared = with_contradictions(inspections)
+    for alone, inspection in zip(inspections, compared, strict=True):
+        for sentence in inspection.odd[len(alone.odd) :]:
+            output.console.print(f"[yellow]odd:[/yellow] {escape(inspection.label)}: {escape(sentence)}")
+    inspections = with_specimens_named(compared)
+    text = pasted_text(inspections)
     if not output.as_json:
         click.echo(text, nl=False)
-    if failed:
-        for other in failed[:-1]:
-            click.echo(f"cannot be used: {other}", err=True)
-        raise failed[-1]
+    if errors:
+        for earlier in errors[:-1]:
+            click.echo(f"cannot be used: {earlier}", err=True)
+        raise errors[-1]
     document: InspectionDocument = {
-        "files": [one.to_document() for one in seen],
+        "files": [inspection.to_document() for inspection in inspections],
         "left_out": list(left_out),
         "campaign": text,
     }
     if output.formats.pictures:
+        draw = plots.inspection.inspection_figure
         figures = [
-            figure_file(
-                page, partial(plots.inspection.inspection_figure, seen, number * _FILES_A_PICTURE, _FILES_A_PICTURE)
-            )
+            figure_file(page, partial(draw, inspections, number * _FILES_A_PICTURE, _FILES_A_PICTURE))
             for number, page in enumerate(pages)
         ]
         output.write(folder, figures, document, files)
@@ -86,27 +86,28 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], output: Output) 
         output.print_json(document)
 
 
-def tell(output: Output, seen: Inspected) -> None:
-    """One file in words: columns, facts, oddities."""
+def print_inspection(output: Output, inspection: Inspection) -> None:
+    """Print columns, facts and oddities of a file."""
     console = output.console
-    written = ", ".join(f"{label} {value}" for label, value in seen.written.items())
-    title = f"{seen.file.parent / seen.label}: {_KINDS[seen.kind]}, {seen.direction or 'direction unknown'}"
+    written = ", ".join(f"{label} {value}" for label, value in inspection.written.items())
+    place = inspection.direction or "direction unknown"
+    title = f"{inspection.file.parent / inspection.label}: {_KINDS[inspection.kind]}, {place}"
     rows = []
-    for column in seen.columns:
+    for column in inspection.columns:
         ends = ("" if end is None else f"{end:.6g}" for end in (column.low, column.high))
         rows.append((column.header, column.role or "(not needed)", column.unit or "", *ends))
     output.print_table(title, ("column", "taken for", "unit", "from", "to"), rows)
-    for label, value in {"written with": written, **seen.facts}.items():
+    for label, value in {"written with": written, **inspection.facts}.items():
         output.print(f"  {label}: {value}")
-    if seen.assumed:
-        output.print(f"  {seen.assumed}")
-    for sentence in seen.odd:
+    if inspection.assumed:
+        output.print(f"  {inspection.assumed}")
+    for sentence in inspection.odd:
         console.print(f"  [yellow]odd:[/yellow] {escape(sentence)}")
-    if not seen.odd:
+    if not inspection.odd:
         console.print("  nothing odd")
 
 
-def tell_left_out(output: Output, left_out: Sequence[str]) -> None:
-    """A line for each file or sheet that holds no test."""
+def print_left_out(output: Output, left_out: Sequence[str]) -> None:
+    """Print a line for each file or sheet without a test."""
     for sentence in left_out:
         output.print(f"left out: {sentence}")

@@ -55,7 +55,7 @@ _LINES_AN_OCTAVE = 3
 @with_output("results/<first file>", "tables", "pictures")
 def command(
     files: tuple[Path, ...],
-    stated: Mapping[str, Any],
+    test_options: Mapping[str, Any],
     levels: str | None,
     cycles: int,
     output: Output,
@@ -70,9 +70,11 @@ def command(
     Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """
     folder = output.free_folder(files[0].stem, output.formats.table("sweep"))
-    table = _resonance_table(files[0], stated, shaker)
+    table = _resonance_table(files[0], test_options, shaker)
     found = (
-        _histories(files, stated, levels, cycles) if table is None else _resonance(files, table, stated, shaker, levels)
+        _histories(files, test_options, levels, cycles)
+        if table is None
+        else _resonance(files, table, test_options, shaker, levels)
     )
     found.tell(output)
     file = output.formats.table("sweep")
@@ -100,12 +102,12 @@ class _Reduced:
     document: Mapping[str, Any] = field(default_factory=dict)
 
 
-def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | None, cycles: int) -> _Reduced:
+def _histories(files: Sequence[Path], test_options: Mapping[str, Any], levels: str | None, cycles: int) -> _Reduced:
     """Raw stepped-sine histories, reduced."""
     from bushfit.reduction.steps import reduce
     from bushfit.report.tables import reduced_table
 
-    histories = _read(files, stated)
+    histories = _read(files, test_options)
     direction = histories[0].direction
     asked = parse_grid(levels, "--levels", direction.motion.displacement_unit) or ()
     reduction = reduce(histories, fewest_cycles=cycles, levels=asked)
@@ -122,7 +124,7 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
     )
 
 
-def _resonance_table(file: Path, stated: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
+def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
     """The table of a resonance test; None of a file without any of its columns, unless a mass or the like is stated."""
     from bushfit.inspection.opening import open_table
     from bushfit.reading.headers import RESONANCE_COLUMNS
@@ -131,7 +133,7 @@ def _resonance_table(file: Path, stated: Mapping[str, Any], shaker: Mapping[str,
     said = any(value is not None for value in shaker.values())
     try:
         with options_named():
-            table = open_table(file, RESONANCE_COLUMNS, stated)
+            table = open_table(file, RESONANCE_COLUMNS, test_options)
     except BushfitError:  # which the reading of a history tells as well
         if said:
             raise
@@ -140,11 +142,15 @@ def _resonance_table(file: Path, stated: Mapping[str, Any], shaker: Mapping[str,
 
 
 def _resonance(
-    files: Sequence[Path], table: Table, stated: Mapping[str, Any], shaker: Mapping[str, str | None], levels: str | None
+    files: Sequence[Path],
+    table: Table,
+    test_options: Mapping[str, Any],
+    shaker: Mapping[str, str | None],
+    levels: str | None,
 ) -> _Reduced:
     """A resonance test, reduced."""
     from bushfit.geometry import Direction
-    from bushfit.inspection.opening import direction_of
+    from bushfit.inspection.opening import test_direction
     from bushfit.reading.resonance import read_resonance
     from bushfit.reduction.resonance import reduce_resonance
     from bushfit.report.tables import resonance_table
@@ -157,7 +163,7 @@ def _resonance(
             expected="one file, and no levels: the amplitude follows the resonance",
             hint="call bushfit reduce for each of them, with its own mass",
         )
-    direction, specimen = direction_of(table.file, table, stated), shaker["specimen"] or None
+    direction, specimen = test_direction(table.file, table, test_options), shaker["specimen"] or None
     if direction is None and specimen is None:
         error = direction_error(table.file)
         error.hint = f'{error.hint}; or name the specimen that was tested: --specimen "mount"'
@@ -200,17 +206,17 @@ def _mass(table: Table, direction: Direction | None, shaker: Mapping[str, str | 
     return mass + (positive(shaker["mass_added"], "--mass-added", "kg") or 0.0)
 
 
-def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:
+def _read(files: Sequence[Path], test_options: Mapping[str, Any]) -> list[Loop]:
     """The histories, of one direction, named by their stems, or by their paths where stems agree."""
-    from bushfit.inspection.gathering import Source, stated_of_each
+    from bushfit.inspection.gathering import TestSource, distribute_options
     from bushfit.inspection.opening import read_history
 
     stems = [file.stem for file in files]
     histories: list[Loop] = []
-    sources = stated_of_each([Source(file) for file in files], stated)
+    sources = distribute_options([TestSource(file) for file in files], test_options)
     for file, stem, source in zip(files, stems, sources, strict=True):
         with options_named():
-            history, direction = read_history(file, source.stated or {})
+            history, direction = read_history(file, source.test_options or {})
         if direction is None:
             raise direction_error(file)
         if histories and direction is not histories[0].direction:

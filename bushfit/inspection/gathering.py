@@ -13,8 +13,8 @@ from bushfit.errors import BushfitError, NoColumnError, NoTestError, printable
 from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.geometry import Direction
 from bushfit.inspection.labels import temperatures_of
-from bushfit.inspection.opening import inspect, open_table, recognised
-from bushfit.inspection.record import Inspected
+from bushfit.inspection.opening import inspect_file, open_table, recognize_table
+from bushfit.inspection.record import Inspection
 from bushfit.reading.cells import same_text
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
@@ -24,7 +24,7 @@ from bushfit.reading.parts import parts_of
 
 
 @dataclass(frozen=True)
-class Source:
+class TestSource:
     """A file, or a sheet of a workbook with several, that holds a test.
 
     Args:
@@ -37,22 +37,22 @@ class Source:
     file: Path
     sheet: str | None = None
     is_named: bool = True
-    stated: Mapping[str, Any] = field(default_factory=dict)
+    test_options: Mapping[str, Any] = field(default_factory=dict)
     of_book: Labels = NO_LABELS
 
     def __str__(self) -> str:
         return f"{self.file}, {word_for_part(self.file)} {self.sheet}" if self.sheet else str(self.file)
 
-    def without(self, *keys: str) -> "Source":
+    def without(self, *keys: str) -> "TestSource":
         """The same of which some keys are not stated."""
-        return replace(self, stated={key: value for key, value in self.stated.items() if key not in keys})
+        return replace(self, test_options={key: value for key, value in self.test_options.items() if key not in keys})
 
-    def inspect(self) -> Inspected:
-        """See `opening.inspect`."""
-        return inspect(self.file, self.stated, self.of_book)
+    def inspect(self) -> Inspection:
+        """Inspection of the test, see `opening.inspect_file`."""
+        return inspect_file(self.file, self.test_options, self.of_book)
 
 
-def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Source], tuple[str, ...]]:
+def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list[TestSource], tuple[str, ...]]:
     """The tests among files, the sheets of workbooks, and the files of folders and of the folders in them.
 
     A file that the user names and that is no workbook with several sheets is not opened. `stated` are the keys of
@@ -61,22 +61,22 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
     Raises:
         NoTestError: a folder without a test.
     """
-    sources: list[Source] = []
+    sources: list[TestSource] = []
     left_out: list[str] = []
     for path in paths:
         if path.is_dir():
-            files, others = _in_folder(path)
-            left_out += others
+            files, sentences = _list_folder(path)
+            left_out += sentences
         else:
-            files = [Source(path)]
-        found: list[Source] = []
+            files = [TestSource(path)]
+        found: list[TestSource] = []
         for file in files:
-            parts = stated_of_each(_sheets_of(file, stated), stated)
-            tests, others = _holding_tests(parts) if len(parts) > 1 or not file.is_named else (parts, [])
+            parts = distribute_options(_sheets_of(file, test_options), test_options)
+            tests, sentences = _keep_tests(parts) if len(parts) > 1 or not file.is_named else (parts, [])
             if not tests and file.is_named:  # the error of the whole file says why
-                tests, others = stated_of_each([file], stated), []
+                tests, sentences = distribute_options([file], test_options), []
             found += tests
-            left_out += others
+            left_out += sentences
         if not found:
             raise NoTestError(
                 "no file of this folder holds a test",
@@ -86,37 +86,41 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
                 hint="bushfit inspect FILE says what it makes of one",
             )
         sources += found
-    by_rows = [_tests_by_rows(source) for source in stated_of_each(sources, stated)]
-    left_out += [sentence for _, others in by_rows for sentence in others]
+    by_rows = [_tests_by_rows(source) for source in distribute_options(sources, test_options)]
+    left_out += [sentence for _, sentences in by_rows for sentence in sentences]
     return [test for tests, _ in by_rows for test in tests], tuple(left_out)
 
 
-def with_contradictions(files: Sequence[Inspected]) -> list[Inspected]:
+def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
     """Files that were inspected, each with a sentence more where another one of the same part, in the same direction,
     contradicts it."""
     contradictions: dict[int, str] = {}
-    placed = [seen for seen in files if seen.direction is not None and seen.kind != "history"]
-    for part in dict.fromkeys(seen.part for seen in placed):
-        tests = [seen.measured for seen in placed if seen.part == part]
+    placed = [inspection for inspection in files if inspection.direction is not None and inspection.kind != "history"]
+    for part in dict.fromkeys(inspection.part for inspection in placed):
+        tests = [inspection.measured for inspection in placed if inspection.part == part]
         loops = [test for test in tests if isinstance(test, Loop)]
         sweeps = [test for test in tests if isinstance(test, Sweep)]
         data_sets = [*(loop_data(loops) if len(loops) > 1 else ()), *(sweep_data(sweeps) if len(sweeps) > 1 else ())]
         contradictions |= {id(one.test): one.contradiction for one in data_sets if one.contradiction}
     return [
-        replace(seen, odd=(*seen.odd, said)) if (said := contradictions.get(id(seen.measured))) else seen
-        for seen in files
+        replace(inspection, odd=(*inspection.odd, sentence))
+        if (sentence := contradictions.get(id(inspection.measured)))
+        else inspection
+        for inspection in files
     ]
 
 
-def _tests_by_rows(source: Source) -> tuple[list[Source], list[str]]:
+def _tests_by_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
     """The tests of a file that its columns tell apart, by direction, part and run, and which rows are left out.
 
     The runs of a sweep are repeats; so are tests those of a loop alone, where time does not go on from one to the next.
     """
-    stated = source.stated
-    own = {key: value for key, value in stated.items() if key not in ("direction", "specimen_number")}
+    test_options = source.test_options
+    whole_file_options = {
+        key: value for key, value in test_options.items() if key not in ("direction", "specimen_number")
+    }
     try:
-        table, _ = recognised(source.file, own)
+        table, _ = recognize_table(source.file, whole_file_options)
         columns = dict(table.row_labels)
         if "run" in columns and "time" in table.roles:
             time = table.read({"time": table.roles["time"]}, fewest_rows=1)["time"]
@@ -124,49 +128,49 @@ def _tests_by_rows(source: Source) -> tuple[list[Source], list[str]]:
                 del columns["run"]
     except BushfitError:  # which the inspection of the file tells
         return [source], []
-    tests: list[Source] = []
+    tests: list[TestSource] = []
     left_out: list[str] = []
     for texts in dict.fromkeys(zip(*(texts for _, texts in columns.values()), strict=True)):
         keys: dict[str, Any] = dict(zip(columns, texts, strict=True))
         run = {"rows": {table.headers[columns["run"][0]]: keys.pop("run")}} if "run" in keys else {}
-        known = keys.get("direction", "axial") in [*Direction]
-        if known and all(same_text(str(stated.get(key, text)), text) for key, text in keys.items()):
-            tests.append(replace(source, stated={**stated, **keys, **run}))
+        is_direction = keys.get("direction", "axial") in [*Direction]
+        if is_direction and all(same_text(str(test_options.get(key, text)), text) for key, text in keys.items()):
+            tests.append(replace(source, test_options={**test_options, **keys, **run}))
         else:
-            why = "as stated" if known else "no direction that is known"
+            why = "as stated" if is_direction else "no direction that is known"
             left_out.append(f"{source}: its rows of {', '.join(texts)}, {why}")
     return (tests, left_out) if tests else ([source], [])
 
 
-def stated_of_each(sources: Sequence[Source], stated: Mapping[str, Any]) -> list[Source]:
+def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str, Any]) -> list[TestSource]:
     """Sources with what the user states of each.
 
     A column that is stated for all, and that only some of them have, is left out for the others; so is a unit for those
     whose headers say it, and a temperature that is to choose rows, one of several in a file, for files that have no
     column for it.
     """
-    tables: Mapping[str, Mapping[str, str]] = {key: stated.get(key, {}) for key in ("columns", "units")}
-    own = [{**stated, **tables, **({"sheet": source.sheet} if source.sheet else {})} for source in sources]
+    tables: Mapping[str, Mapping[str, str]] = {key: test_options.get(key, {}) for key in ("columns", "units")}
+    by_source = [{**test_options, **tables, **({"sheet": source.sheet} if source.sheet else {})} for source in sources]
     for key, role in ((key, role) for key, stated_by_role in tables.items() for role in stated_by_role):
-        needs = [_needs(source.file, key, role, keys) for source, keys in zip(sources, own, strict=True)]
-        for keys in (keys for keys, one in zip(own, needs, strict=True) if one is False and True in needs):
-            keys[key] = {other: text for other, text in keys[key].items() if other != role}
-    if stated.get("temperature") and len(sources) > 1:
+        needs = [_needs_option(source.file, key, role, keys) for source, keys in zip(sources, by_source, strict=True)]
+        for keys in (keys for keys, one in zip(by_source, needs, strict=True) if one is False and True in needs):
+            keys[key] = {name: text for name, text in keys[key].items() if name != role}
+    if test_options.get("temperature") and len(sources) > 1:
         counts = {}
         for index, source in enumerate(sources):
             with suppress(BushfitError):  # which the inspection of the file tells
-                counts[index] = temperatures_of(recognised(source.file, own[index])[0])
+                counts[index] = temperatures_of(recognize_table(source.file, by_source[index])[0])
         for index in (index for index, count in counts.items() if count == 0 and 2 in counts.values()):
-            own[index]["temperature"] = None
-    return [replace(source, stated=keys) for source, keys in zip(sources, own, strict=True)]
+            by_source[index]["temperature"] = None
+    return [replace(source, test_options=keys) for source, keys in zip(sources, by_source, strict=True)]
 
 
-def _needs(file: Path, key: str, role: str, stated: Mapping[str, Any]) -> bool | None:
+def _needs_option(file: Path, key: str, role: str, test_options: Mapping[str, Any]) -> bool | None:
     """Whether a file has the column that is stated for a role, or lacks its unit; None where it cannot be told."""
     names = LOOP_COLUMNS if role in LOOP_COLUMNS else SWEEP_COLUMNS
-    mine = {"columns": {role: stated["columns"][role]}} if key == "columns" else {"units": {}}
+    mine = {"columns": {role: test_options["columns"][role]}} if key == "columns" else {"units": {}}
     try:
-        column = open_table(file, names, {**stated, "units": {}, **mine}).roles.get(role)
+        column = open_table(file, names, {**test_options, "units": {}, **mine}).roles.get(role)
     except NoColumnError:
         return False
     except BushfitError:  # which the inspection of the file tells
@@ -176,10 +180,10 @@ def _needs(file: Path, key: str, role: str, stated: Mapping[str, Any]) -> bool |
     return key == "columns" or column.unit is None
 
 
-def _in_folder(folder: Path) -> tuple[list[Source], list[str]]:
+def _list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
     """Files of a folder, and of the folders in it, that may hold tests, in order of their names, and a sentence on each
     of the others."""
-    files: list[Source] = []
+    files: list[TestSource] = []
     left_out: list[str] = []
     for path in sorted(folder.iterdir()):
         if path.name.startswith((".", "~$")):
@@ -189,19 +193,19 @@ def _in_folder(folder: Path) -> tuple[list[Source], list[str]]:
         elif printable(path.name) != path.name:
             left_out.append(f"{printable(str(path))}: its name holds characters that are no text; rename it")
         elif path.is_dir() and not path.is_symlink():
-            inner_files, inner_left_out = _in_folder(path)
+            inner_files, inner_left_out = _list_folder(path)
             files += inner_files
             left_out += inner_left_out
         elif path.is_file() and path.suffix.lower() in TEST_FILES:
-            files.append(Source(path, is_named=False))
+            files.append(TestSource(path, is_named=False))
         else:
             left_out.append(f"{path}: {'a link to a folder' if path.is_dir() else 'no table, by its ending'}")
     return files, left_out
 
 
-def _sheets_of(source: Source, stated: Mapping[str, Any]) -> list[Source]:
+def _sheets_of(source: TestSource, test_options: Mapping[str, Any]) -> list[TestSource]:
     """The sheets of a workbook with several of which the user states none; else the file itself."""
-    if stated.get("sheet"):
+    if test_options.get("sheet"):
         return [source]
     try:
         names = [part.sheet for part in parts_of(source.file)]
@@ -210,14 +214,14 @@ def _sheets_of(source: Source, stated: Mapping[str, Any]) -> list[Source]:
     return [replace(source, sheet=name) for name in names] if len(names) > 1 else [source]
 
 
-def _holding_tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
+def _keep_tests(parts: Sequence[TestSource]) -> tuple[list[TestSource], list[str]]:
     """Those of some sheets, or of one file, that hold a test or might, and why the others do not."""
-    tests: list[Source] = []
+    tests: list[TestSource] = []
     left_out: list[str] = []
     without: set[str | None] = set()
     for part in parts:
         try:
-            recognised(part.file, part.stated)
+            recognize_table(part.file, part.test_options)
         except NoTestError as error:
             without.add(part.sheet)
             why = f"{error.problem} ({error.found})" if error.found else f"{error.problem}; {error.hint}"
@@ -227,7 +231,7 @@ def _holding_tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
             pass
         tests.append(part)
     if tests and tests[0].sheet and without:
-        others = [part for part in parts_of(tests[0].file) if part.sheet in without]
-        of_book = labels_above(line for part in others for line in part.head())
+        sentences = [part for part in parts_of(tests[0].file) if part.sheet in without]
+        of_book = labels_above(line for part in sentences for line in part.head())
         tests = [replace(test, of_book=of_book) for test in tests]
     return tests, left_out

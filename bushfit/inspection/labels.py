@@ -16,7 +16,7 @@ from bushfit.reading.table import Table
 #: Conditions of a test, which a campaign carries on, in words.
 _CONDITIONS = {key: key for key in ("temperature", "preload", "date", "operator")} | {"specimen_number": "specimen"}
 #: What a sweep may hold, by the key that states it.
-_HELD = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
+_HELD_ROLES = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
 
 #: Relative difference up to which a file contains what its name states; chosen: rigs miss a level by that much.
 _AGREEMENT = 0.03
@@ -30,19 +30,22 @@ def temperatures_of(table: Table) -> int:
     return 1 if np.ptp(found) <= ONE_TEST else 2
 
 
-def labels_of_file(file: Path, sheet: str, stated: Mapping[str, Any]) -> Labels:
+def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> Labels:
     """What the name of a sheet and of its file say of a test; they count amplitudes as is stated, if it is."""
-    said = labels_in_names(sheet, file.stem)
-    counting = stated.get("amplitude")
+    labels = labels_in_names(sheet, file.stem)
+    counting = test_options.get("amplitude")
     if counting is None:
-        return said
-    held = said.of("Hz")
-    counted = tuple(each if each in held else each._replace(convention=counting) for each in said.quantities)
-    return replace(said, quantities=counted)
+        return labels
+    frequencies = labels.of("Hz")
+    quantities = tuple(
+        quantity if quantity in frequencies else quantity._replace(convention=counting)
+        for quantity in labels.quantities
+    )
+    return replace(labels, quantities=quantities)
 
 
 def keys_from_labels(
-    table: Table, place: Place, stated: Mapping[str, Any], by_name: Labels, of_book: Labels, *, is_sweep: bool
+    table: Table, place: Place, test_options: Mapping[str, Any], by_name: Labels, of_book: Labels, *, is_sweep: bool
 ) -> tuple[dict[str, Any], dict[str, str], bool]:
     """What is said of a test outside its columns: keys of its table in a campaign, where what was found, by label, and
     whether it is known how an amplitude counts that no column has.
@@ -60,11 +63,11 @@ def keys_from_labels(
     keys: dict[str, Any] = {}
     facts: dict[str, list[str]] = {}
     is_counted = True
-    for key in _HELD if is_sweep else ():
-        role = _HELD[key]
-        if role not in table.roles and key not in stated:
-            label, found = _held(table, place, key, sources)
-            counted = stated.get("amplitude") or found.convention
+    for key in _HELD_ROLES if is_sweep else ():
+        role = _HELD_ROLES[key]
+        if role not in table.roles and key not in test_options:
+            label, found = _held_quantity(table, place, key, sources)
+            counted = test_options.get("amplitude") or found.convention
             keys[key] = words = found.text
             if role == "amplitude" and counted == "peak-to-peak":
                 number, _, unit = found.text.partition(" ")
@@ -73,25 +76,29 @@ def keys_from_labels(
             facts.setdefault(label, []).append(f"{role} {words}")
             is_counted &= role != "amplitude" or counted is not None
     for key, word in _CONDITIONS.items():
-        label, text = next(((label, text) for label, said in sources.items() if (text := getattr(said, key))), ("", ""))
-        if text and key not in table.roles and key not in stated:
+        label, text = next(
+            ((label, text) for label, labels in sources.items() if (text := getattr(labels, key))), ("", "")
+        )
+        if text and key not in table.roles and key not in test_options:
             keys[key] = text
             facts.setdefault(label, []).append(f"{word} {text}")
     return keys, {label: ", ".join(words) for label, words in facts.items()}, is_counted
 
 
-def _held(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -> tuple[str, Quantity]:
+def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -> tuple[str, Quantity]:
     """Where the amplitude or frequency is said that a sweep held, and what."""
-    role = _HELD[key]
+    role = _HELD_ROLES[key]
     expected = place.motion.displacement_unit if role == "amplitude" else "Hz"
-    label, found = next(((label, own) for label, said in sources.items() if (own := said.of(expected))), ("", []))
+    label, found = next(
+        ((label, quantities) for label, labels in sources.items() if (quantities := labels.of(expected))), ("", [])
+    )
     if len(found) == 1:
         return label, found[0]
     usual = {"m": "0.1 mm", "Hz": "10 Hz", "1": "0.1 %"}
     example = found[0].text if found else usual.get(expected, "1 deg")
     raise table.header_error(
         f"nothing says at which {role} this was tested",
-        found=f"{label}: {' and '.join(each.text for each in found)}" if found else None,
+        found=f"{label}: {' and '.join(quantity.text for quantity in found)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
         hint=f'state {key} = "{example}" in the campaign, or name the column: {table.columns_key(role, expected)}',
     )
@@ -103,27 +110,31 @@ def wrong_labels(
     """A sentence where the name of a file states an amplitude or a frequency that the file does not contain."""
     unit, factor = direction.display.displacement
     expected = direction.motion.displacement_unit
-    stated = [
-        units.parse_quantity(each.text, expected) / (2.0 if each.convention == "peak-to-peak" else 1.0)
-        for each in labels.of(expected)
+    amplitudes_in_name = [
+        units.parse_quantity(quantity.text, expected) / (2.0 if quantity.convention == "peak-to-peak" else 1.0)
+        for quantity in labels.of(expected)
     ]
-    if stated and not any(_near(value, x) for value in stated for x in amplitudes):
-        double = any(_near(value, 2.0 * x) for value in stated for x in amplitudes)
+    if amplitudes_in_name and not any(_is_close(value, x) for value in amplitudes_in_name for x in amplitudes):
+        double = any(_is_close(value, 2.0 * x) for value in amplitudes_in_name for x in amplitudes)
         found = _listed([factor * x for x in amplitudes])
-        yield f"the name says {_or(labels.of(expected))}, the amplitude is {found} {unit} zero-to-peak" + (
+        yield f"the name says {_join_quantities(labels.of(expected))}, the amplitude is {found} {unit} zero-to-peak" + (
             ": the name may count peak-to-peak" if double else ""
         )
-    said = labels.of("Hz")
-    if said and not any(_near(units.parse_quantity(each.text, "Hz"), f) for each in said for f in frequencies):
-        yield f"the name says {_or(said)}, the frequency is {_listed(frequencies)} Hz"
+    frequencies_in_name = labels.of("Hz")
+    if frequencies_in_name and not any(
+        _is_close(units.parse_quantity(quantity.text, "Hz"), f) for quantity in frequencies_in_name for f in frequencies
+    ):
+        yield f"the name says {_join_quantities(frequencies_in_name)}, the frequency is {_listed(frequencies)} Hz"
 
 
-def _near(one: float, other: float) -> bool:
-    return abs(one - other) <= _AGREEMENT * other
+def _is_close(value: float, reference: float) -> bool:
+    return abs(value - reference) <= _AGREEMENT * reference
 
 
-def _or(stated: Sequence[Quantity]) -> str:
-    return " or ".join(dict.fromkeys(f"{each.text} {each.convention or ''}".rstrip() for each in stated))
+def _join_quantities(quantities: Sequence[Quantity]) -> str:
+    return " or ".join(
+        dict.fromkeys(f"{quantity.text} {quantity.convention or ''}".rstrip() for quantity in quantities)
+    )
 
 
 def _listed(values: Sequence[float]) -> str:

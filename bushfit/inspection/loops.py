@@ -55,7 +55,7 @@ _FEWEST_RIPPLE_ROWS = 200
 _LONGEST_CYCLE = 3000.0
 
 
-def sampling(history: Loop) -> str:
+def describe_sampling(history: Loop) -> str:
     """How the rows of a record lie in time, in words: "even, every 0.01 s"."""
     steps = np.diff(history.time)
     usual = float(np.median(steps))
@@ -64,7 +64,7 @@ def sampling(history: Loop) -> str:
     return f"uneven, every {steps.min():.3g} to {steps.max():.3g} s, mostly {usual:.3g} s"
 
 
-class Channel(NamedTuple):
+class RecordedChannel(NamedTuple):
     """A recorded channel: its values in SI, (n,), and the unit in which they are told with the factor to it."""
 
     name: str
@@ -72,7 +72,7 @@ class Channel(NamedTuple):
     factor: float
     values: Floats
 
-    def shown(self, row: int) -> str:
+    def format_row(self, row: int) -> str:
         """The value of a row in words, without its unit."""
         return number(self.factor * self.values[row], 4)
 
@@ -80,8 +80,8 @@ class Channel(NamedTuple):
 def odd_channels(history: Loop) -> Iterator[str]:
     """A sentence for each fault in the channels of a loop or a raw history."""
     names, units = history.direction.motion.words, history.direction.display
-    motion = Channel(names[0], *units.displacement, history.displacement)
-    force = Channel(names[1], *units.force, history.force)
+    motion = RecordedChannel(names[0], *units.displacement, history.displacement)
+    force = RecordedChannel(names[1], *units.force, history.force)
     yield from _gaps(motion, history.time, timed=history.timed)
     yield from _stuck(motion, force)
     for channel in (motion, force):
@@ -89,7 +89,7 @@ def odd_channels(history: Loop) -> Iterator[str]:
         yield from _outliers(channel, history.time)
 
 
-def _gaps(motion: Channel, time: Floats, *, timed: bool) -> Iterator[str]:
+def _gaps(motion: RecordedChannel, time: Floats, *, timed: bool) -> Iterator[str]:
     """A sentence on gaps in a recorded time; in a file without it, only the motion tells of them."""
     steps = np.diff(time) if timed else np.abs(np.diff(motion.values))
     widest = np.quantile(steps, 0.99)  # gaps left out
@@ -99,23 +99,24 @@ def _gaps(motion: Channel, time: Floats, *, timed: bool) -> Iterator[str]:
         wide &= (steps > least_prominence(motion.values)) & ~(outliers[1:] | outliers[:-1])
     if wide.any():
         first, count = int(np.argmax(wide)), int(wide.sum())
-        what = (
+        description = (
             f"{steps[first]:.3g} s without a row, else mostly {np.median(steps):.3g} s"
             if timed
-            else f"the {motion.name} goes from {motion.shown(first)} to {motion.shown(first + 1)} {motion.unit} at once"
+            else f"the {motion.name} goes from {motion.format_row(first)} to {motion.format_row(first + 1)} "
+            f"{motion.unit} at once"
         )
-        where = "time" if timed else "the motion"
-        yield f"{count} gap{'s' * (count > 1)} in {where}, the first after data row {first + 1}: {what}"
+        channel = "time" if timed else "the motion"
+        yield f"{count} gap{'s' * (count > 1)} in {channel}, the first after data row {first + 1}: {description}"
 
 
-def _stuck(motion: Channel, force: Channel) -> Iterator[str]:
+def _stuck(motion: RecordedChannel, force: RecordedChannel) -> Iterator[str]:
     """A sentence on rows in which the recorder stood still though the motion went on."""
-    still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(np.int8), [0]))))
+    standing = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], standing.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2]
     after = np.minimum(ends + 1, motion.values.size - 1)  # a record may end stuck: then nothing went on
-    moved = np.abs(motion.values[after] - motion.values[starts])
-    stuck = (ends - starts + 1 >= _STUCK_ROWS) & (moved > _STUCK_MOTION * np.ptp(motion.values))
+    travel = np.abs(motion.values[after] - motion.values[starts])
+    stuck = (ends - starts + 1 >= _STUCK_ROWS) & (travel > _STUCK_MOTION * np.ptp(motion.values))
     if stuck.any():
         longest = int(np.argmax(np.where(stuck, ends - starts, 0)))
         yield (
@@ -124,7 +125,7 @@ def _stuck(motion: Channel, force: Channel) -> Iterator[str]:
         )
 
 
-def _cut_off(channel: Channel) -> Iterator[str]:
+def _cut_off(channel: RecordedChannel) -> Iterator[str]:
     """A sentence on each end of its range at which a channel is cut off."""
     values, span = channel.values, float(np.ptp(channel.values))
     rounding = 1e-9 * span
@@ -133,22 +134,22 @@ def _cut_off(channel: Channel) -> Iterator[str]:
     width = max(1.01 * finest, _JUST_BELOW * span)  # one step of the converter, rounded
     for side, row in (("top", int(np.argmax(values))), ("bottom", int(np.argmin(values)))):
         depth = np.abs(values - values[row])
-        same = int(np.count_nonzero(depth <= rounding))
-        below = int(np.count_nonzero(depth <= width)) - same
-        if same >= _FLAT_ROWS and same >= _FLAT_RATIO * below:
+        flat_rows = int(np.count_nonzero(depth <= rounding))
+        below = int(np.count_nonzero(depth <= width)) - flat_rows
+        if flat_rows >= _FLAT_ROWS and flat_rows >= _FLAT_RATIO * below:
             yield (
-                f"the {channel.name} is cut off at its {side}: {same} rows hold exactly {channel.shown(row)} "
+                f"the {channel.name} is cut off at its {side}: {flat_rows} rows hold exactly {channel.format_row(row)} "
                 f"{channel.unit}"
             )
 
 
-def _outliers(channel: Channel, time: Floats) -> Iterator[str]:
+def _outliers(channel: RecordedChannel, time: Floats) -> Iterator[str]:
     """A sentence on rows that lie alone far off their neighbours."""
     rows = np.flatnonzero(lone_outliers(time, channel.values))
     if rows.size:
         listed = ", ".join(
-            f"data row {row + 1} ({channel.shown(row)} {channel.unit} between {channel.shown(row - 1)} and "
-            f"{channel.shown(row + 1)})"
+            f"data row {row + 1} ({channel.format_row(row)} {channel.unit} between {channel.format_row(row - 1)} and "
+            f"{channel.format_row(row + 1)})"
             for row in rows[:3]
         )
         more = f" and {rows.size - 3} more" if rows.size > 3 else ""
@@ -172,7 +173,7 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     facts = {
         "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'taken as steady'}",
         "frequency": f"{drive.frequency:.4g} Hz, {waveform(drive.coefficients)}",
-        "sampling": f"{sampling(loop) if loop.timed else 'no time in the file'}, "
+        "sampling": f"{describe_sampling(loop) if loop.timed else 'no time in the file'}, "
         f"{loop.time.size / drive.cycles:.4g} rows a cycle",
         "amplitude": f"{number(to_length * amplitude, 4)} {length} zero-to-peak",
         # as far down as the amplitude is told: what lies below is noise
@@ -221,7 +222,8 @@ def describe_history(history: Loop, labels: Labels) -> Findings:
         "steps": f"{len(steps)} with steady cycles, {max(step.repeat for step in steps)} at most at one point",
         "frequencies": format_frequencies(frequencies),
         "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels)} {unit} zero-to-peak, as reached",
-        "sampling": f"{sampling(history)}, {min(step.rows_per_cycle for step in steps):.3g} rows a cycle at least",
+        "sampling": f"{describe_sampling(history)}, "
+        f"{min(step.rows_per_cycle for step in steps):.3g} rows a cycle at least",
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
     }
     odd = [
@@ -260,7 +262,7 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
         odd += [
             f"loop {place}: {note}" for note in (*drive.notes, *_changing(drive), *_ripple(drive)) if note != left_out
         ]
-    facts["sampling"] = sampling(record) if record.timed else "no time in the file"
+    facts["sampling"] = describe_sampling(record) if record.timed else "no time in the file"
     return facts, odd
 
 
@@ -269,23 +271,24 @@ def _listed(values: Sequence[float], between: str = ", ") -> str:
     return between.join(dict.fromkeys(f"{value:.3g}" for value in values))
 
 
-def _settling(force: Array, error: float, least: float, name: str, unit: Unit) -> Iterator[str]:
+def _settling(force: Array, error: float, smallest: float, name: str, unit: Unit) -> Iterator[str]:
     """A sentence where the force amplitude of the end cycles, (k,), changes by `least` or more [N or N m]."""
     change, last_change = force[-1] - force[0], force[-1] - force[-2]
     # the standard error of an amplitude is sqrt(2) `error`, that of a difference of two is 2 `error`
-    if abs(change) > max(_REAL_CHANGE * 2.0 * error, least):
-        shown, factor = display_unit(*unit, float(force[-1]))
+    if abs(change) > max(_REAL_CHANGE * 2.0 * error, smallest):
+        unit_name, factor = display_unit(*unit, float(force[-1]))
         last, first = format_aligned([factor * force[-1], factor * force[0]], 4)
-        settled = abs(last_change) < max(_REAL_CHANGE * error, least / 2.0) and force.size > 2
+        settled = abs(last_change) < max(_REAL_CHANGE * error, smallest / 2.0) and force.size > 2
         yield (
             f"the cycles {'settle' if settled else 'are still settling'}: the {name} amplitude goes from "
-            f"{first} {shown} in the first cycle to {last} in the last ({number(100 * change / force[0], 2, '+')} %)"
+            f"{first} {unit_name} in the first cycle to {last} in the last "
+            f"({number(100 * change / force[0], 2, '+')} %)"
         )
 
 
-def _drifting(mean: Array, least: float, name: str, unit: Unit) -> Iterator[str]:
+def _drifting(mean: Array, smallest: float, name: str, unit: Unit) -> Iterator[str]:
     """A sentence where the mean of a channel changes over the cycles by more than `least`."""
-    if abs(mean[-1] - mean[0]) > least:
+    if abs(mean[-1] - mean[0]) > smallest:
         last, first = format_aligned([unit.factor * mean[-1], unit.factor * mean[0]], 3, minimum_digits=1)
         yield f"the {name} drifts: its mean goes from {first} to {last} {unit.name}"
 
@@ -338,11 +341,11 @@ def _changing(drive: Drive) -> Iterator[str]:
     fitted = [cycle_harmonics(phase[part], both[part], order) for part in parts]
     mean_force, mean_motion = np.array([mean for mean, *_ in fitted]).T
     amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
-    error = max(drive.noise, *(left[0] for *_, left in fitted)) * np.sqrt(1.0 / rows)  # of the force [N or N m]
+    error = max(drive.noise, *(scatter[0] for *_, scatter in fitted)) * np.sqrt(1.0 / rows)  # of the force [N or N m]
     (motion, force, _), units = loop.direction.motion.words, loop.direction.display
-    least = _WORTH_TELLING * np.ptp(loop.force) / 2.0
-    yield from _settling(amplitude, error, least, force, units.force)
-    yield from _drifting(mean_force, max(_REAL_CHANGE * 1.5 * error, least), force, units.force)
+    smallest = _WORTH_TELLING * np.ptp(loop.force) / 2.0
+    yield from _settling(amplitude, error, smallest, force, units.force)
+    yield from _drifting(mean_force, max(_REAL_CHANGE * 1.5 * error, smallest), force, units.force)
     # a time that was made from the motion turns its noise into drift
-    least_drift = 2.0 * _WORTH_TELLING * drive.amplitude if loop.timed else least_prominence(loop.displacement)
-    yield from _drifting(mean_motion, least_drift, motion, units.displacement)
+    smallest_drift = 2.0 * _WORTH_TELLING * drive.amplitude if loop.timed else least_prominence(loop.displacement)
+    yield from _drifting(mean_motion, smallest_drift, motion, units.displacement)

@@ -16,7 +16,7 @@ from bushfit.errors import BushfitError, MeasurementError, NoTestError, error_lo
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.inspection.labels import keys_from_labels, labels_of_file, temperatures_of
 from bushfit.inspection.loops import describe_history, describe_loop, describe_programme
-from bushfit.inspection.record import ColumnSeen, Findings, Inspected, Kind
+from bushfit.inspection.record import ColumnSeen, Findings, Inspection, Kind
 from bushfit.inspection.sweeps import describe_sweep
 from bushfit.reading.cells import Rows
 from bushfit.reading.headers import LOOP_COLUMNS, PAIRS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary, of_motion
@@ -31,7 +31,7 @@ from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep, refuse_ambiguous_damping
 from bushfit.reading.table import Table
 from bushfit.reduction.programme import programme
-from bushfit.reduction.steps import sines
+from bushfit.reduction.steps import steady_sines
 from bushfit.validation import validate_tables
 
 #: Sizes of a block in shear, as [[specimens]] has them.
@@ -42,7 +42,7 @@ _TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zu
 _QUASI_STATIC = 1.0
 
 
-def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
+def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table, bool]:
     """The table of a file, and whether it is a sweep's and not a loop's.
 
     The user states keys of [[loops]] and [[sweeps]], as TOML has them; each is used where it fits.
@@ -55,13 +55,13 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
     failed: list[tuple[Mapping[str, Sequence[str]], BushfitError]] = []
     kinds = [(names, motion) for names in (SWEEP_COLUMNS, LOOP_COLUMNS) for motion in (TRANSLATION, STRAINING)]
     try:
-        content = open_content(file, stated)
+        content = open_content(file, test_options)
     except BushfitError as error:
         raise NoTestError(**vars(error)) from None
     for names, motion in kinds:
         is_sweep = names is SWEEP_COLUMNS
         try:
-            table = open_table(content, names, stated, motion)
+            table = open_table(content, names, test_options, motion)
         except BushfitError as error:
             failed.append((of_motion(names, motion), error))
             continue
@@ -70,7 +70,7 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
             return table, is_sweep
         if is_sweep:
             refuse_ambiguous_damping(table)
-    _refuse_resonance(file, stated)
+    _refuse_resonance(file, test_options)
     if not opened:
         errors = [error for _, error in failed]
         raise NoTestError(**vars(next((one for one in errors if one.problem != "there is no header"), errors[0])))
@@ -78,7 +78,7 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
     for usual, failure in failed:
         if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):
             raise failure
-    known = ", ".join(role.replace("_", " ") for role in best.roles)
+    understood = ", ".join(role.replace("_", " ") for role in best.roles)
     lacking = _missing(best, is_sweep=is_sweep) or "force"
     unit = {"displacement": "m", "force": "N", "stiffness": "N/m", "storage_stiffness": "N/m", "phase": "rad"}.get(
         lacking, "1"
@@ -86,16 +86,16 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
     raise best.header_error(
         "the columns do not make a test",
         kind=NoTestError,
-        found=", ".join(best.headers) + (f" (understood: {known})" if known else ""),
+        found=", ".join(best.headers) + (f" (understood: {understood})" if understood else ""),
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
         hint=f"correct the header, or name the column: {best.columns_key(lacking, unit)}",
     )
 
 
-def _refuse_resonance(file: Path, stated: Mapping[str, Any]) -> None:
+def _refuse_resonance(file: Path, test_options: Mapping[str, Any]) -> None:
     """Refuse a resonance test, with the way to make a sweep of it."""
     try:
-        table = open_table(file, RESONANCE_COLUMNS, stated)
+        table = open_table(file, RESONANCE_COLUMNS, test_options)
     except BushfitError:  # then it is none
         return
     if is_resonance(table):
@@ -107,7 +107,7 @@ def _refuse_resonance(file: Path, stated: Mapping[str, Any]) -> None:
         )
 
 
-def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | None:
+def test_place(file: Path, table: Table, test_options: Mapping[str, Any]) -> Place | None:
     """What a test was made on: a specimen, or the bushing in a direction, as stated or as the file says; else None.
 
     A modulus is that of a specimen, a stiffness that of the bushing unless sizes of a block in shear are stated.
@@ -116,17 +116,17 @@ def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | Non
         MeasurementError: units of torsion where the user states another direction.
         CampaignError, UnitError, ModelError: sizes that make no specimen.
     """
-    keys: dict[str, Any] = {"kind": "shear"} | {key: stated[key] for key in BLOCK_KEYS if key in stated}
+    keys: dict[str, Any] = {"kind": "shear"} | {key: test_options[key] for key in BLOCK_KEYS if key in test_options}
     if table.motion is STRAINING:
         headers = table.layout.written or [column.header for column in table.roles.values()]
         keys = {"kind": "modulus"} | ({"strain": "tension"} if any(map(_TENSILE.search, headers)) else {})
     elif len(keys) == 1:
-        return direction_of(file, table, stated)
-    name = stated.get("specimen", "bar" if "strain" in keys else "coupon")
+        return test_direction(file, table, test_options)
+    name = test_options.get("specimen", "bar" if "strain" in keys else "coupon")
     return Specimen(**vars(validate_tables({"name": name, **keys}, None, SpecimenTable)))
 
 
-def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Direction | None:
+def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) -> Direction | None:
     """The direction of a test of the bushing as the user states it, or else as its file does; None where neither does.
 
     Raises:
@@ -137,19 +137,19 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     in_column = dict.fromkeys(table.row_labels.get("direction", (0, ()))[1])
     named = direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
     found = Direction(*in_column) if len(in_column) == 1 else named
-    if "direction" not in stated:
+    if "direction" not in test_options:
         if len(in_column) > 1:
             problem, hint = "this file holds tests in several directions", "state one: --direction axial"
             raise table.header_error(problem, found=", ".join(in_column), expected="one direction", hint=hint)
         return found
-    if found and found != stated["direction"] and len(in_column) < 2:
+    if found and found != test_options["direction"] and len(in_column) < 2:
         raise table.header_error(
-            f"{'the units say' if turns else 'the file says'} {found}, and --direction {stated['direction']}",
+            f"{'the units say' if turns else 'the file says'} {found}, and --direction {test_options['direction']}",
             found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),
             expected="one direction",
             hint="leave --direction out; or give the file a name that says its direction, which goes before its header",
         )
-    return Direction(stated["direction"])
+    return Direction(test_options["direction"])
 
 
 def _missing(table: Table, *, is_sweep: bool) -> str | None:
@@ -165,31 +165,32 @@ def _missing(table: Table, *, is_sweep: bool) -> str | None:
     return next((role for role in nearest if role not in roles), None)
 
 
-def open_content(file: Path, stated: Mapping[str, Any]) -> OpenedFile:
+def open_content(file: Path, test_options: Mapping[str, Any]) -> OpenedFile:
     """Open a test file with its format as the user states it.
 
     Raises:
         MeasurementError: the file cannot be read.
     """
-    return open_file(file, FileFormat(**{field.name: stated.get(field.name) for field in fields(FileFormat)}))
+    return open_file(file, FileFormat(**{field.name: test_options.get(field.name) for field in fields(FileFormat)}))
 
 
 def open_table(
     file: Path | OpenedFile,
     names: Mapping[str, Sequence[str]],
-    stated: Mapping[str, Any],
+    test_options: Mapping[str, Any],
     motion: Motion = TRANSLATION,
 ) -> Table:
     """The table of a file if it is that of a test whose columns go by `names`, with what the user states of those."""
-    own = {
-        key: {role: text for role, text in stated.get(key, {}).items() if role in names} for key in ("columns", "units")
+    relevant = {
+        key: {role: text for role, text in test_options.get(key, {}).items() if role in names}
+        for key in ("columns", "units")
     }
-    rows = Rows(stated.get("direction"), stated.get("specimen_number"), stated.get("rows", {}))
-    opened = file if isinstance(file, OpenedFile) else open_content(file, stated)
-    return Table.open(opened, names, own["columns"], own["units"], None, motion, rows if any(rows) else None)
+    rows = Rows(test_options.get("direction"), test_options.get("specimen_number"), test_options.get("rows", {}))
+    opened = file if isinstance(file, OpenedFile) else open_content(file, test_options)
+    return Table.open(opened, names, relevant["columns"], relevant["units"], None, motion, rows if any(rows) else None)
 
 
-def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) -> Inspected:
+def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = NO_LABELS) -> Inspection:
     """Recognise a test file, and say what it holds and what is odd about it.
 
     The user states keys of [[loops]] and [[sweeps]], as TOML has them, and sizes of a specimen in shear; each is used
@@ -199,63 +200,65 @@ def inspect(file: Path, stated: Mapping[str, Any], of_book: Labels = NO_LABELS) 
         NoTestError: a file that holds no test.
         MeasurementError, UnitError, CampaignError, FitError: a file or a statement that cannot be used.
     """
-    table, is_sweep = recognised(file, stated)
-    direction = place_of(file, table, stated)
+    table, is_sweep = recognize_table(file, test_options)
+    direction = test_place(file, table, test_options)
     # which of two translations it is makes no difference to reading
     read_as = direction or Direction.AXIAL
-    entry = _entry(SweepFile if is_sweep else LoopFile, stated, table, direction)
-    by_name = labels_of_file(file, table.source.sheet or "", stated)
-    said, told, counted = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
-    if "at_amplitude" in said:
+    entry = _entry(SweepFile if is_sweep else LoopFile, test_options, table, direction)
+    by_name = labels_of_file(file, table.source.sheet or "", test_options)
+    label_keys, label_facts, counted = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
+    if "at_amplitude" in label_keys:
         entry.pop("amplitude", None)  # counted already
-    entry |= said
+    entry |= label_keys
     turned: list[str] = []
     measured: Loop | Sweep
     kind: Kind
     if is_sweep:
         measured = read_sweep(**_keywords(file, read_as, entry, SweepFile))
-        kind, (facts, odd) = "sweep", describe_sweep(measured, by_name)
+        kind, (facts, oddities) = "sweep", describe_sweep(measured, by_name)
     else:
         measured, entry, turned = _read_loop(file, read_as, entry, table)
-        kind, (facts, odd) = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile)["test"])
+        kind, (facts, oddities) = _classify_recording(
+            measured, by_name, _keywords(file, read_as, entry, LoopFile)["test"]
+        )
     columns = _columns(table, is_sweep=is_sweep)
-    facts |= told
+    facts |= label_facts
     if is_sweep and (amplitude := table.roles.get("amplitude")):
         counted = amplitude.convention is not None
         if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):
             facts["amplitudes"] += f', half of "{amplitude.header}", which counts peak-to-peak'
-    found = tuple(turned + odd)
-    return Inspected(file, kind, direction, _written(table), columns, facts, found, entry, measured, counted)
+    all_oddities = tuple(turned + oddities)
+    return Inspection(file, kind, direction, _written(table), columns, facts, all_oddities, entry, measured, counted)
 
 
-def read_history(file: Path, stated: Mapping[str, Any]) -> tuple[Loop, Direction | None]:
+def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Direction | None]:
     """A raw history, and its direction where the file or `stated` say it.
 
     Raises:
         MeasurementError, UnitError, CampaignError: a file or a statement that cannot be used.
     """
-    table, is_sweep = recognised(file, stated)
+    table, is_sweep = recognize_table(file, test_options)
     if is_sweep:
         raise table.header_error(
             "this is a sweep already",
             expected="a raw history: time, displacement, force",
             hint="name it in the campaign under [[sweeps]]",
         )
-    direction = direction_of(file, table, stated)
-    entry = _entry(LoopFile, stated, table, direction)
+    direction = test_direction(file, table, test_options)
+    entry = _entry(LoopFile, test_options, table, direction)
     return read_loop(**_keywords(file, direction or Direction.AXIAL, entry, LoopFile)), direction
 
 
 def _entry(
-    schema: type[LoopFile | SweepFile], stated: Mapping[str, Any], table: Table, place: Place | None
+    schema: type[LoopFile | SweepFile], test_options: Mapping[str, Any], table: Table, place: Place | None
 ) -> dict[str, Any]:
     """The stated keys that a file's table in a campaign has, less those that the file makes needless."""
     roles = LOOP_COLUMNS if schema is LoopFile else SWEEP_COLUMNS
-    known = {field.name for field in fields(schema)} - {"direction"}
-    entry = {key: value for key, value in stated.items() if key in known and value not in (None, {})}
+    keys = {field.name for field in fields(schema)} - {"direction"}
+    entry = {key: value for key, value in test_options.items() if key in keys and value not in (None, {})}
     for key in ("columns", "units"):
-        if own := {role: text for role, text in entry.pop(key, {}).items() if role in roles}:
-            entry[key] = own
+        if by_role := {role: text for role, text in entry.pop(key, {}).items() if role in roles}:
+            entry[key] = by_role
     needless = {"specimen"} | {f"at_{role}" for role in table.roles}
     if "time" in table.roles:
         needless |= {"rate", "frequency", "waveform"}
@@ -296,9 +299,9 @@ def _read_loop(
     return turned, entry, [odd]
 
 
-def _look(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findings]:
+def _classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findings]:
     """The kind of a recorded test, a loop, a programme of loops or a history, with its facts and oddities."""
-    steps = sines(measured)
+    steps = steady_sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in steps}
     frequencies = [frequency for frequency, *_ in steps] or [0.0]
     fast = max(frequencies) > _QUASI_STATIC
@@ -310,9 +313,10 @@ def _look(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findin
         return "loop", describe_programme(measured, loops, by_name)
     facts, odd = describe_loop(loops[0], by_name)
     if fast or len(points) > 1:
-        what = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
+        description = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
         odd.append(
-            f"a motion {what} is taken for a loop; should it be a stepped sine, bushfit reduce makes points of it"
+            f"a motion {description} is taken for a loop; should it be a stepped sine, bushfit reduce makes points of "
+            "it"
         )
     return "loop", (facts, odd)
 

@@ -78,7 +78,7 @@ class InspectionDocument(TypedDict):
 
 
 @dataclass(frozen=True, eq=False)
-class Inspected:
+class Inspection:
     """A test file that can be used, with all that an inspection finds.
 
     Args:
@@ -124,16 +124,20 @@ class Inspected:
     @property
     def assumed(self) -> str | None:
         """What was assumed, with the option or key that says otherwise; None where nothing was."""
-        said = []
+        assumptions = []
         if isinstance(self.direction, Specimen) and self.direction.kind == "modulus":
-            taken, other = "the engineering shear strain", "tension"
+            meaning, alternative = "the engineering shear strain", "tension"
             if self.direction.strain == "tension":
-                taken, other = "that of a bar in tension", "engineering"
-            said.append(f'its strain is taken as {taken}, else strain = "{other}" or "tensor" in [[specimens]]')
+                meaning, alternative = "that of a bar in tension", "engineering"
+            assumptions.append(
+                f'its strain is taken as {meaning}, else strain = "{alternative}" or "tensor" in [[specimens]]'
+            )
         if self.is_counting_open:
-            what = "nothing says" if "at_amplitude" in self.entry else "its header does not say"
-            said.append(f"{what} how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak")
-        return "; ".join(said) or None
+            missing = "nothing says" if "at_amplitude" in self.entry else "its header does not say"
+            assumptions.append(
+                f"{missing} how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak"
+            )
+        return "; ".join(assumptions) or None
 
     def to_document(self) -> InspectedFile:
         """All of it but the content, as JSON has it."""
@@ -150,28 +154,28 @@ class Inspected:
         }
 
 
-def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspected], folder: Path) -> str:
+def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspection], folder: Path) -> str:
     """The text of a whole campaign file.
 
     The name is that of the bushing, too, of which `bushing` has the other keys, quantities as texts; None where
     specimens alone were tested. Loops and sweeps are named from the folder where the campaign will lie.
     """
     head = _key_lines({"name": name, **(bushing or {})})
-    order = [seen for kind in _TABLES for seen in files if seen.kind == kind]
-    tables = [*_specimens(files), *(file_text(seen, folder) for seen in order)]
+    order = [inspection for kind in _TABLES for inspection in files if inspection.kind == kind]
+    tables = [*_specimens(files), *(file_text(inspection, folder) for inspection in order)]
     report = '# [report] heads the report: customer = "...", part_number = "...", drawing, laboratory, date, logo\n'
     return "\n".join([*(["[bushing]"] if bushing else []), *head, "", *tables, report])
 
 
 def campaigns_of_parts(
-    name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspected], folder: Path, listed_in: str
+    name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspection], folder: Path, listed_in: str
 ) -> dict[str, str]:
     """The text of a campaign of each part whose number a column tells, and of the manifest of them, by their files.
 
     Raises:
         CampaignError: a file of which nothing tells the part.
     """
-    of_parts: list[Any] = [seen.entry.get("specimen_number") for seen in files]
+    of_parts: list[Any] = [inspection.entry.get("specimen_number") for inspection in files]
     if None in of_parts:
         raise CampaignError(
             "nothing says of which part this is",
@@ -184,31 +188,35 @@ def campaigns_of_parts(
     for number, part in enumerate(dict.fromkeys(of_parts), start=1):
         file = f"{folder_name(part)}.toml"
         file = f"{number}_{file}" if file.casefold() in map(str.casefold, texts) else file
-        tests = [seen for own, seen in zip(of_parts, files, strict=True) if own == part]
+        tests = [
+            inspection for number_of_test, inspection in zip(of_parts, files, strict=True) if number_of_test == part
+        ]
         texts[file] = campaign_text(f"{name} {part}", bushing, tests, folder)
         entry = _key_lines({"campaign": file, "name": f"{name} {part}"})
         texts[listed_in] += "\n".join(["", "[[bushings]]", *entry, ""])
     return texts
 
 
-def with_specimens_named(files: Sequence[Inspected]) -> list[Inspected]:
+def with_specimens_named(files: Sequence[Inspection]) -> list[Inspection]:
     """Files that were inspected, with specimens that differ under names that differ: coupon, coupon_2 and so on."""
     named: dict[Specimen, Specimen] = {}
-    for body in (seen.direction for seen in files):
+    for body in (inspection.direction for inspection in files):
         if isinstance(body, Specimen) and body not in named:
-            taken = {other.name for other in named.values()}
+            taken_names = {specimen.name for specimen in named.values()}
             names = chain([body.name], (f"{body.name}_{number}" for number in count(2)))
-            named[body] = replace(body, name=next(name for name in names if name not in taken))
+            named[body] = replace(body, name=next(name for name in names if name not in taken_names))
     return [
-        replace(seen, direction=body, entry={**seen.entry, "specimen": body.name})
-        if isinstance(seen.direction, Specimen) and (body := named[seen.direction])
-        else seen
-        for seen in files
+        replace(inspection, direction=body, entry={**inspection.entry, "specimen": body.name})
+        if isinstance(inspection.direction, Specimen) and (body := named[inspection.direction])
+        else inspection
+        for inspection in files
     ]
 
 
-def _specimens(files: Sequence[Inspected]) -> Iterator[str]:
-    for body in dict.fromkeys(seen.direction for seen in files if isinstance(seen.direction, Specimen)):
+def _specimens(files: Sequence[Inspection]) -> Iterator[str]:
+    for body in dict.fromkeys(
+        inspection.direction for inspection in files if isinstance(inspection.direction, Specimen)
+    ):
         yield "\n".join([*specimen_lines(body), ""])
 
 
@@ -217,27 +225,29 @@ def _key_lines(keys: Mapping[str, Any]) -> Iterator[str]:
     return (f"{key} = {toml_value(value)}" for key, value in keys.items())
 
 
-def pasted_text(files: Sequence[Inspected]) -> str:
+def pasted_text(files: Sequence[Inspection]) -> str:
     """Tables to paste into a campaign in any folder: files are named by their full path."""
     head = "# files by their full path, which holds in any folder; bushfit init writes them as seen from the campaign\n"
-    tables = [*_specimens(files), *(file_text(seen) for seen in files)]
-    return head * any(seen.kind in _TABLES for seen in files) + "\n".join(tables)
+    tables = [*_specimens(files), *(file_text(inspection) for inspection in files)]
+    return head * any(inspection.kind in _TABLES for inspection in files) + "\n".join(tables)
 
 
-def file_text(seen: Inspected, folder: Path | None = None) -> str:
+def file_text(inspection: Inspection, folder: Path | None = None) -> str:
     """The table of one file in a campaign that lies in a folder; for a raw history, a comment on what to do first.
 
     Without a folder the file is named by its full path.
     """
-    name = seen.file.resolve().as_posix()
+    name = inspection.file.resolve().as_posix()
     with suppress(ValueError):  # another drive, where no path leads
-        name = Path(os.path.relpath(seen.file, folder)).as_posix() if folder else name
-    direction = f'"{seen.direction}"' if seen.direction else '"..."  # axial or radial: the file does not say'
-    if seen.kind == "history":
+        name = Path(os.path.relpath(inspection.file, folder)).as_posix() if folder else name
+    direction = (
+        f'"{inspection.direction}"' if inspection.direction else '"..."  # axial or radial: the file does not say'
+    )
+    if inspection.kind == "history":
         name = printable(name)
         word = f'"{name}"' if " " in name else name
-        stated = seen.direction or "..."
-        return f"# {name} is a raw history: bushfit reduce {word} --direction {stated} makes a sweep of it\n"
-    lines = [f"[[{_TABLES[seen.kind]}]]", f"file = {toml_value(name)}"]
-    lines += [] if isinstance(seen.direction, Specimen) else [f"direction = {direction}"]
-    return "\n".join([*lines, *_key_lines(seen.entry), ""])
+        direction_word = inspection.direction or "..."
+        return f"# {name} is a raw history: bushfit reduce {word} --direction {direction_word} makes a sweep of it\n"
+    lines = [f"[[{_TABLES[inspection.kind]}]]", f"file = {toml_value(name)}"]
+    lines += [] if isinstance(inspection.direction, Specimen) else [f"direction = {direction}"]
+    return "\n".join([*lines, *_key_lines(inspection.entry), ""])

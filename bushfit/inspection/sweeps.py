@@ -94,8 +94,8 @@ def _copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
         copies += int((count - 1).sum())
         first = min([first, *rows[start[count > 1]].tolist()])
         scatter = noise.random[sweep.name, float(sweep.held[rows[0]])][0] * magnitude[rows[0]]
-        same = min(float(finest[rows[0]] / scatter), 1.0)  # two draws fall on the same last digit
-        expected += rows.size * (rows.size - 1) / 2.0 * same * max(same, _SAME_PHASE_P)
+        same_digit = min(float(finest[rows[0]] / scatter), 1.0)  # two draws fall on the same last digit
+        expected += rows.size * (rows.size - 1) / 2.0 * same_digit * max(same_digit, _SAME_PHASE_P)
     if copies and pdtrc(copies - 1, expected) < _CHANCE:
         verb = "s repeat others" if copies > 1 else " repeats another"
         yield (
@@ -131,9 +131,9 @@ def _missing_frequencies(sweep: Sweep) -> Iterator[str]:
     for (level, repeat), has in zip(names, measured, strict=True):
         absent = frequencies[usual & ~has]
         if absent.size and len(names) > 1:
-            which = f", repeat {repeat:.0f}," if np.unique(sweep.repeat).size > 1 else ""
+            of_repeat = f", repeat {repeat:.0f}," if np.unique(sweep.repeat).size > 1 else ""
             listed = ", ".join([*(f"{f:.4g}" for f in absent[:_MOST_LISTED]), *["..."] * (absent.size > _MOST_LISTED)])
-            yield f"{shown_amplitude(sweep.direction, level)}{which} lacks {listed} Hz, which most others have"
+            yield f"{shown_amplitude(sweep.direction, level)}{of_repeat} lacks {listed} Hz, which most others have"
 
 
 def _outliers(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:

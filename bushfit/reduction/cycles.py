@@ -73,8 +73,8 @@ class Cycles:
         gap = np.maximum.reduceat(np.diff(self.time[: before[-1] + 2]), before[:-1])
         hole = gap > HOLE * period
         change = np.abs(np.diff(np.log([period, self.range])))
-        other = (change[0] > _OTHER_PERIOD) | (change[1] > _OTHER_RANGE) | hole[1:] | hole[:-1]
-        return [run for run in stretches(other) if not hole[run.start]]
+        changes = (change[0] > _OTHER_PERIOD) | (change[1] > _OTHER_RANGE) | hole[1:] | hole[:-1]
+        return [run for run in stretches(changes) if not hole[run.start]]
 
     def fundamentals(self, run: slice, *channels: Floats) -> Complex:
         """Complex fundamental of channels, (n,) each, in each cycle of a run, (channels, k), by least squares."""
@@ -121,21 +121,21 @@ def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
         however few rows it has, nor the kink of dry friction.
     """
     outliers = np.zeros(values.size, dtype=bool)
-    least = least_prominence(values)
+    smallest = least_prominence(values)
     for start in range(0, values.size - 4, CHUNK):
         rows = slice(start, start + CHUNK + 4)
-        own, clock = values[rows], time[rows]
-        stop = own.size - 4
-        near = [own[place : stop + place] for place in (0, 1, 3, 4)]
-        apart = [clock[place : stop + place] - clock[2 : stop + 2] for place in (0, 1, 3, 4)]
+        chunk_values, clock = values[rows], time[rows]
+        stop = chunk_values.size - 4
+        near = [chunk_values[place : stop + place] for place in (0, 1, 3, 4)]
+        nodes = [clock[place : stop + place] - clock[2 : stop + 2] for place in (0, 1, 3, 4)]
         cubic, gain = np.zeros(stop), np.ones(stop)
-        for value, node in zip(near, apart, strict=True):
-            weight = prod(other / (other - node) for other in apart if other is not node)
+        for value, node in zip(near, nodes, strict=True):
+            weight = prod(node_b / (node_b - node) for node_b in nodes if node_b is not node)
             cubic += weight * value
             gain += weight * weight
         # at even times the weights are -1/6, 4/6, 4/6 and -1/6
-        reach = least * np.sqrt(gain / (1.0 + 34.0 / 36.0))
-        outliers[start + 2 : start + 2 + stop] = np.abs(own[2:-2] - cubic) > np.ptp(near, axis=0) + reach
+        reach = smallest * np.sqrt(gain / (1.0 + 34.0 / 36.0))
+        outliers[start + 2 : start + 2 + stop] = np.abs(chunk_values[2:-2] - cubic) > np.ptp(near, axis=0) + reach
     return outliers
 
 
@@ -183,8 +183,8 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
         for part, m in zip(parts, middle, strict=True)
     ]
     curve, period, _ = np.array(fits).T
-    within, between = 2.0 * curve / period, np.gradient(np.log(period), middle)
-    return bool(np.median(within / np.where(between == 0.0, np.inf, between)) > 0.5)
+    within_parts, between_parts = 2.0 * curve / period, np.gradient(np.log(period), middle)
+    return bool(np.median(within_parts / np.where(between_parts == 0.0, np.inf, between_parts)) > 0.5)
 
 
 def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
@@ -196,15 +196,15 @@ def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
     count = level.size
     if count < 2 * _FEWEST_CYCLES:
         return 0
-    at = np.arange(_FEWEST_CYCLES, count - _FEWEST_CYCLES + 1)
+    places = np.arange(_FEWEST_CYCLES, count - _FEWEST_CYCLES + 1)
     # a cut after `k` cycles gives the crossings 0..k to the first part and k..count to the second
-    before, after = _line_squares(phase)[at], _line_squares(phase[::-1])[::-1][at]
-    first = np.cumsum(level)[at - 1] / at
-    second = (level.sum() - np.cumsum(level)[at - 1]) / (count - at)
-    level_gain = at * (count - at) / count * (first - second) ** 2
+    before, after = _line_squares(phase)[places], _line_squares(phase[::-1])[::-1][places]
+    first = np.cumsum(level)[places - 1] / places
+    second = (level.sum() - np.cumsum(level)[places - 1]) / (count - places)
+    level_gain = places * (count - places) / count * (first - second) ** 2
     gain = _line_squares(phase)[-1] - before - after + level_gain
     best = int(np.argmax(gain))
-    k = int(at[best])
+    k = int(places[best])
     if gain[best] < _SPLIT_GAIN:
         return 0
     slopes = [np.polyfit(np.arange(part.size), part, 1)[0] * jitter for part in (phase[: k + 1], phase[k:])]
@@ -242,12 +242,12 @@ def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
     return slice(start, count - ending)
 
 
-def _truncation(series: Complex, most: int) -> int:
+def _truncation(series: Complex, most_cut: int) -> int:
     """Entries of series, (k, m), to cut at the start, up to `most`, so that the means have the least squared error."""
-    if most < 1:
+    if most_cut < 1:
         return 0
     back = (series - series.mean(axis=1, keepdims=True))[:, ::-1]
     n = np.arange(1, series.shape[1] + 1)
     squares = np.cumsum(np.abs(back) ** 2, axis=1) - np.abs(np.cumsum(back, axis=1)) ** 2 / n
     error = (squares.sum(axis=0) / n**2)[::-1]
-    return int(np.argmin(error[: most + 1]))
+    return int(np.argmin(error[: most_cut + 1]))

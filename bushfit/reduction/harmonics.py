@@ -72,14 +72,14 @@ def series(coefficients: Complex, phase: Floats) -> Floats:
     return polyval(np.exp(2j * np.pi * phase), coefficients).real
 
 
-def resolved_order(rows_per_cycle: float, most: int) -> int:
+def resolved_order(rows_per_cycle: float, max_order: int) -> int:
     """As many harmonics as the rows of one cycle carry, from 1 to `most`."""
-    return int(np.clip(rows_per_cycle / _ROWS_PER_HARMONIC, 1, most))
+    return int(np.clip(rows_per_cycle / _ROWS_PER_HARMONIC, 1, max_order))
 
 
-def spread_rows(rows: int, most: int) -> NDArray[np.intp]:
+def spread_rows(rows: int, max_rows: int) -> NDArray[np.intp]:
     """Rows that stand for all: every one of few, else `most`, spread by a step that keeps time with no cycle."""
-    count = min(rows, most)
+    count = min(rows, max_rows)
     number = np.arange(count)
     golden = 0.6180339887498949  # ratio less 1: its multiples, less whole numbers, spread evenly
     return (number if count == rows else (number + number * golden % 1.0) * (rows / count)).astype(np.intp)
@@ -135,28 +135,28 @@ class HarmonicFit:
         thin = slice(None, None, max(1, time.size // _FREQUENCY_ROWS))
         number = np.arange(count) - (count - 1) / 2.0
         for _ in range(4):  # each squares what the frequency is off by, so that fewer do
-            fit = cls._at(frequency, time[thin], values[:, thin], count, _FREQUENCY_HARMONICS)
+            fit = cls._fit_at(frequency, time[thin], values[:, thin], count, _FREQUENCY_HARMONICS)
             phase = np.unwrap(np.angle(fit.coefficients[0, 1] + fit.left_over[0]))
             drift = float(number @ phase / (number @ number)) / (2.0 * np.pi)
             frequency *= 1.0 + drift
             if abs(drift) * count < _SETTLED_DRIFT:
                 break
-        return cls._at(frequency, time, values, count, _HARMONICS)
+        return cls._fit_at(frequency, time, values, count, _HARMONICS)
 
     @classmethod
-    def _at(cls, frequency: float, time: Floats, values: Floats, count: int, order: int) -> "HarmonicFit":
+    def _fit_at(cls, frequency: float, time: Floats, values: Floats, count: int, order: int) -> "HarmonicFit":
         """The fit over `count` cycles about time 0, with `order` harmonics or fewer, at a frequency that is given."""
         order, solution, covariance = _drift_and_harmonics(time, values, frequency, order)
         squares, sums, rows_in = np.zeros((2, 2)), np.zeros((2, count), dtype=complex), np.zeros(count)
         for rows, columns in _chunks(time, frequency, order):
-            left = values[:, rows] - solution.T @ columns
-            squares += left @ left.T
+            residual = values[:, rows] - solution.T @ columns
+            squares += residual @ residual.T
             cosine, sine = columns[_DRIFT_TERMS], columns[_DRIFT_TERMS + order]
             number = np.clip(time[rows] * frequency + count / 2.0, 0, count - 1).astype(np.intp)
             rows_in += np.bincount(number, minlength=count)
             for channel in range(2):
-                sums[channel].real += np.bincount(number, left[channel] * cosine, count)
-                sums[channel].imag += np.bincount(number, left[channel] * sine, count)
+                sums[channel].real += np.bincount(number, residual[channel] * cosine, count)
+                sums[channel].imag += np.bincount(number, residual[channel] * sine, count)
         sums *= 2.0 / np.maximum(rows_in, 1.0)
         cosines, sines = np.split(np.arange(_DRIFT_TERMS, len(solution)), 2)
         coefficients = np.vstack((solution[:1], solution[cosines] + 1j * solution[sines])).T
@@ -180,10 +180,10 @@ class HarmonicFit:
         cycles = self.left_over.shape[1]
         if cycles > 2:
             scatter = (self.left_over[1] - k * self.left_over[0]) / (f / abs(f))
-            own = np.array([scatter.real.var(ddof=1), scatter.imag.var(ddof=1)]) / cycles
+            cycle_variance = np.array([scatter.real.var(ddof=1), scatter.imag.var(ddof=1)]) / cycles
             high = fdtri(2 * (cycles - 1), self.freedom, 1.0 - _WHITE_P)
-            if own.mean() > high * white:
-                variance = own
+            if cycle_variance.mean() > high * white:
+                variance = cycle_variance
         return np.sqrt(variance) / abs(f)
 
     def distortion(self) -> Floats:
@@ -197,20 +197,22 @@ class HarmonicFit:
 def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: int) -> tuple[int, Floats, Floats]:
     """How many harmonics the rows tell apart, `order` at most, the drift and these of both channels, (p, 2), and the
     covariance of that for unit variance of the values, (p, p)."""
-    most = order = max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
-    size = _DRIFT_TERMS + 2 * most
+    max_order = order = max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
+    size = _DRIFT_TERMS + 2 * max_order
     gram, moments = np.zeros((size, size)), np.zeros((size, 2))
-    for rows, columns in _chunks(time, frequency, most):
+    for rows, columns in _chunks(time, frequency, max_order):
         gram += columns @ columns.T
         moments += columns @ values[:, rows].T
     scale = 1.0 / np.sqrt(np.diag(gram))
     scale[_DRIFT_TERMS:] = np.sqrt(2.0 / time.size)  # by its own norm, a wave all but zero at the rows would pass
-    unit, kept = gram * np.outer(scale, scale), np.arange(size)
-    while order > 1 and np.linalg.cond(unit[np.ix_(kept, kept)]) > _WORST_CONDITION:
+    unit, columns_kept = gram * np.outer(scale, scale), np.arange(size)
+    while order > 1 and np.linalg.cond(unit[np.ix_(columns_kept, columns_kept)]) > _WORST_CONDITION:
         order -= 1
-        kept = np.r_[: _DRIFT_TERMS + order, _DRIFT_TERMS + most : _DRIFT_TERMS + most + order]
-    covariance = np.linalg.inv(unit[np.ix_(kept, kept)]) * np.outer(scale[kept], scale[kept])
-    return order, covariance @ moments[kept], covariance
+        columns_kept = np.r_[: _DRIFT_TERMS + order, _DRIFT_TERMS + max_order : _DRIFT_TERMS + max_order + order]
+    covariance = np.linalg.inv(unit[np.ix_(columns_kept, columns_kept)]) * np.outer(
+        scale[columns_kept], scale[columns_kept]
+    )
+    return order, covariance @ moments[columns_kept], covariance
 
 
 def _chunks(time: Floats, frequency: float, order: int) -> Iterator[tuple[slice, Floats]]:

@@ -45,7 +45,7 @@ _TIMED = LoopFile(file="")
 
 
 @dataclass(frozen=True)
-class _Span:
+class _SteadySpan:
     """A part of a record: crossings of the middle it lies between, and what they settle.
 
     Args:
@@ -64,9 +64,9 @@ class _Span:
         """Number of its cycles."""
         return (self.end - self.begin) / self.period
 
-    def like(self, other: "_Span") -> bool:
+    def is_like(self, span: "_SteadySpan") -> bool:
         """Whether two parts have one amplitude and one rate."""
-        ranges, periods = np.log(self.range / other.range), np.log(self.period / other.period)
+        ranges, periods = np.log(self.range / span.range), np.log(self.period / span.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
 
@@ -92,15 +92,15 @@ def programme(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
     spans = _spans(loop, time, motion)
     if not spans:
         return (loop,)
-    if all(span.like(spans[0]) for span in spans[1:]):
+    if all(span.is_like(spans[0]) for span in spans[1:]):
         return (replace(loop, softening=_softening(loop, spans[0], from_rest=True)),)
     return tuple(_loops(loop, time, spans, test))
 
 
 def _thinned(loop: Loop) -> tuple[Floats, Floats]:
     """Time [s], or number of the row where none was recorded, and displacement of rows enough to find the parts."""
-    every = slice(None, None, -(-loop.displacement.size // ENOUGH_ROWS))
-    time, motion = _clock(loop)[every], loop.displacement[every]
+    step = slice(None, None, -(-loop.displacement.size // ENOUGH_ROWS))
+    time, motion = _clock(loop)[step], loop.displacement[step]
     sound = ~lone_outliers(time, motion)
     return time[sound], motion[sound]
 
@@ -110,35 +110,35 @@ def _clock(loop: Loop) -> Floats:
     return loop.time if loop.timed else np.arange(loop.displacement.size, dtype=float)
 
 
-def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_Span]:
+def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_SteadySpan]:
     """The parts of a motion.
 
     Raises:
         MeasurementError: there are cycles, but no two alike.
     """
-    turns, _, least = motion_turns(time, motion)
+    turns, _, prominence = motion_turns(time, motion)
     if turns.size < 4:
         return []
     height = motion[turns]
     size = np.abs(np.diff(height))
     across = middle_crossings(time, motion, turns, (height[1:] + height[:-1]) / 2.0)
     # ranges are alike within 3 %, which rigs keep better and step by more, and within three deviations of the noise
-    same_size = 0.03 * size + 0.3 * least
-    found: list[_Span] = []
-    for strokes in _alike(size, same_size):
+    same_size = 0.03 * size + 0.3 * prominence
+    spans: list[_SteadySpan] = []
+    for strokes in _alike_runs(size, same_size):
         halves = np.diff(across[strokes])
-        for run in _alike(halves, _SAME_RATE * halves):
+        for run in _alike_runs(halves, _SAME_RATE * halves):
             first, last = strokes.start + run.start, strokes.start + run.stop
             period = 2.0 * float(across[last] - across[first]) / (last - first)
             part = float(np.median(size[first : last + 1]))
-            found.append(_Span(float(across[first]), float(across[last]), period, part))
-    if not found:
+            spans.append(_SteadySpan(float(across[first]), float(across[last]), period, part))
+    if not spans:
         _check_not_changing(loop, size[1:-1])
         return []
-    joined: list[_Span] = []
-    for span in found:
+    joined: list[_SteadySpan] = []
+    for span in spans:
         last = joined[-1] if joined else None
-        if last and last.like(span) and resumes_in_phase((span.begin - last.end) / last.period, step=0.5):
+        if last and last.is_like(span) and resumes_in_phase((span.begin - last.end) / last.period, step=0.5):
             joined[-1] = replace(last, end=span.end)  # a disturbance broke it off
         else:
             joined.append(span)
@@ -161,7 +161,7 @@ def _check_not_changing(loop: Loop, size: Floats) -> None:
         )
 
 
-def _alike(values: Floats, reach: Floats) -> Iterator[slice]:
+def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
     """Runs of two or more values, (n,), each within its `reach`, (n,), of its neighbours, and of what comes after.
 
     Up and down may differ by three times as much, which a drift makes, where each is like the next of its kind. Over
@@ -170,40 +170,40 @@ def _alike(values: Floats, reach: Floats) -> Iterator[slice]:
     change = np.abs(np.diff(values))
     of_a_kind = np.concatenate(([False], np.abs(values[2:] - values[:-2]) <= reach[2:], [False]))
     drifts = (of_a_kind[1:] | of_a_kind[:-1]) & (change <= 3.0 * reach[1:])
-    for run in _runs((change > np.minimum(reach[1:], reach[:-1])) & ~drifts):
-        own, ahead = values[run], 4  # strokes
-        creeping = np.flatnonzero(np.abs(own[ahead:] - own[:-ahead]) > 1.5 * reach[run][ahead:])
-        changes = np.zeros(own.size - 1, dtype=bool)
+    for run in _long_stretches((change > np.minimum(reach[1:], reach[:-1])) & ~drifts):
+        run_values, ahead = values[run], 4  # strokes
+        creeping = np.flatnonzero(np.abs(run_values[ahead:] - run_values[:-ahead]) > 1.5 * reach[run][ahead:])
+        changes = np.zeros(run_values.size - 1, dtype=bool)
         changes[(creeping[:, None] + np.arange(ahead)).ravel()] = True
-        for part in _runs(changes):
+        for part in _long_stretches(changes):
             yield slice(run.start + part.start, run.start + part.stop)
 
 
-def _runs(changes: NDArray[np.bool_]) -> list[slice]:
+def _long_stretches(changes: NDArray[np.bool_]) -> list[slice]:
     """Those stretches between changes, (n - 1,), that have two entries or more."""
     return [run for run in stretches(changes) if run.stop - run.start > 1]
 
 
-def _to_its_ends(span: _Span, time: Floats, motion: Floats, before: float, after: float) -> _Span:
+def _to_its_ends(span: _SteadySpan, time: Floats, motion: Floats, before: float, after: float) -> _SteadySpan:
     """A part with the half cycle that lies beyond its crossings on either side, where that is as a period on.
 
     `before` is where the part before it ends, or the record begins; `after` where the next begins, or the record ends.
     """
     begin, end = max(span.begin - span.period / 2.0, before), min(span.end + span.period / 2.0, after)
 
-    def same(low: float, high: float, shift: float) -> bool:
+    def repeats(low: float, high: float, shift: float) -> bool:
         rows = slice(*np.searchsorted(time, [low, high]))
-        off = change_after(time, motion, shift, rows)
-        return float(np.quantile(off, 0.9)) < SAME_MOTION * span.range if off.size else True
+        change = change_after(time, motion, shift, rows)
+        return float(np.quantile(change, 0.9)) < SAME_MOTION * span.range if change.size else True
 
-    begin = begin if same(begin, span.begin, span.period) else span.begin
-    end = end if same(span.end, end, -span.period) else span.end
+    begin = begin if repeats(begin, span.begin, span.period) else span.begin
+    end = end if repeats(span.end, end, -span.period) else span.end
     near = _AT_END * span.period
     begin = float(time[0]) if begin - time[0] < near else begin
     return replace(span, begin=begin, end=float(time[-1]) if time[-1] - end < near else end)
 
 
-def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], test: LoopFile) -> Iterator[Loop]:
+def _loops(loop: Loop, time: Floats, spans: Sequence[_SteadySpan], test: LoopFile) -> Iterator[Loop]:
     """A loop for each part, with what was left out between them."""
     whole, last_end = _clock(loop), float(time[0])
     for number, span in enumerate(spans, start=1):
@@ -213,14 +213,14 @@ def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], test: LoopFile) -> 
         ends = np.searchsorted(whole, [begin, span.end])
         rows = slice(int(ends[0]), int(ends[1]) + (span.end == time[-1]))
         gaps = begin - last_end, float(time[-1]) - span.end if number == len(spans) else 0.0
-        left = [
+        gap_texts = [
             "" if gap <= _AT_END * span.period else f"{gap:.3g} s" if loop.timed else f"{gap:.0f} rows" for gap in gaps
         ]
-        said = left_out(left, (span.end - begin) / span.period) if any(left) else None
+        sentence = left_out(gap_texts, (span.end - begin) / span.period) if any(gap_texts) else None
         part = replace(
             loop.at(rows),
             name=f"{loop.name}_part_{number}",
-            part=Part(rows.start, said),
+            part=Part(rows.start, sentence),
             softening=_softening(loop, span, from_rest=number == 1),
         )
         yield part if loop.timed else replace(part, time=test.clock(part.displacement))
@@ -229,11 +229,11 @@ def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], test: LoopFile) -> 
 
 def left_out(gaps: Iterable[str], cycles: float) -> str:
     """A sentence on how much of a record lies before and after its steady cycles, "" for nothing; so many are used."""
-    parts = [f"{gap} {where} its steady cycles" for gap, where in zip(gaps, ("before", "after"), strict=True) if gap]
+    parts = [f"{gap} {side} its steady cycles" for gap, side in zip(gaps, ("before", "after"), strict=True) if gap]
     return f"{' and '.join(parts)} are left out; {cycles:.3g} cycles are used"
 
 
-def _softening(loop: Loop, span: _Span, *, from_rest: bool) -> float | None:
+def _softening(loop: Loop, span: _SteadySpan, *, from_rest: bool) -> float | None:
     """By how much the first cycle of a part is stiffer than its last; None where that is chance or what rubber keeps
     in memory of what came before, which any model has."""
     if span.cycles < 1.95:  # first and last are one
@@ -242,8 +242,8 @@ def _softening(loop: Loop, span: _Span, *, from_rest: bool) -> float | None:
     last, last_error = _stiffness(loop, span.end - span.period, span.period)
     softening = abs(first / last) - 1.0
     remembered = (_MEMORY_FROM_REST if from_rest else _MEMORY) * abs(last.imag / last.real)
-    least = max(_LEAST_SOFTENING, remembered, 6.0 * float(np.hypot(first_error, last_error)))
-    return softening if softening > least else None
+    smallest = max(_LEAST_SOFTENING, remembered, 6.0 * float(np.hypot(first_error, last_error)))
+    return softening if softening > smallest else None
 
 
 def _stiffness(loop: Loop, begin: float, period: float) -> tuple[complex, float]:

@@ -74,11 +74,12 @@ class Resonance:
     def warnings(self) -> tuple[str, ...]:
         """Sentences on points left out, the sign of the phases, and a resonance that was not reached."""
         sentences = []
-        left, total = self.left_out, self.left_out.size + self.frequency.size
-        if left.size:
+        omitted, total = self.left_out, self.left_out.size + self.frequency.size
+        if omitted.size:
             sentences.append(
-                f"{left.size} of {total} points left out, {left.min():.4g} to {left.max():.4g} Hz: the standard error "
-                f"of K is beyond {100 * LARGEST_ERROR:g} % there, because the mass moves almost as the base does"
+                f"{omitted.size} of {total} points left out, {omitted.min():.4g} to {omitted.max():.4g} Hz: the "
+                f"standard error of K is beyond {100 * LARGEST_ERROR:g} % there, because the mass moves almost as "
+                "the base does"
             )
         if self.turned:
             sentences.append(
@@ -167,8 +168,8 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
     if np.count_nonzero(moving) >= 8:  # twice the terms of the smooth curve
         around = _scatter(frequency[moving], amplitude[moving], thinned[moving])
         error[moving] = around / np.abs(thinned[moving] - 1.0)
-    kept = (error <= LARGEST_ERROR) & (stiffness.real > 0.0)
-    if not kept.any():
+    is_kept = (error <= LARGEST_ERROR) & (stiffness.real > 0.0)
+    if not is_kept.any():
         raise MeasurementError(
             "no point of this test tells the stiffness",
             file=test.source.file,
@@ -177,7 +178,15 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
             hint="sweep through the resonance, or look at the accelerations: they scatter",
         )
     return Resonance(
-        test, mass, turned, frequency[kept], amplitude[kept], stiffness[kept], error[kept], rows[kept], frequency[~kept]
+        test,
+        mass,
+        turned,
+        frequency[is_kept],
+        amplitude[is_kept],
+        stiffness[is_kept],
+        error[is_kept],
+        rows[is_kept],
+        frequency[~is_kept],
     )
 
 
@@ -229,9 +238,9 @@ def _scatter(frequency: Floats, amplitude: Floats, ratio: Complex) -> Floats:
     weight = np.ones_like(frequency)
     for _ in range(10):  # in which the weights settle; chosen: they change by per cents after five
         root = np.sqrt(weight)
-        left = np.abs(measured - design @ np.linalg.lstsq(root[:, None] * design, root * measured, rcond=None)[0])
-        sigma = np.median(left) / _MEDIAN_TO_SIGMA
-        weight = np.minimum(1.0, 2.0 * sigma / np.maximum(left, np.finfo(float).tiny))
+        residual = np.abs(measured - design @ np.linalg.lstsq(root[:, None] * design, root * measured, rcond=None)[0])
+        sigma = np.median(residual) / _MEDIAN_TO_SIGMA
+        weight = np.minimum(1.0, 2.0 * sigma / np.maximum(residual, np.finfo(float).tiny))
     nearest = np.argsort(np.abs(logs[0][:, None] - logs[0]), axis=1, kind="stable")[:, :15]
     freedom = frequency.size / (frequency.size - terms.shape[1])
-    return np.median(left[nearest], axis=1) / _MEDIAN_TO_SIGMA * np.sqrt(freedom)
+    return np.median(residual[nearest], axis=1) / _MEDIAN_TO_SIGMA * np.sqrt(freedom)

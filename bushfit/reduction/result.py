@@ -77,7 +77,7 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Skipped:
+class SkippedStretch:
     """A stretch of a history [s] with cycles that make no operating point, and why.
 
     `steady` is whether it has as many cycles as a step needs, and is no mere ramp or pause.
@@ -102,7 +102,7 @@ class Reduction:
 
     direction: Place
     steps: tuple[Step, ...]
-    skipped: tuple[Skipped, ...]
+    skipped: tuple[SkippedStretch, ...]
     outliers: int = 0
 
     @property
@@ -120,13 +120,13 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
     yield from _preload(reduction)
     slope = _amplitude_slope(steps)
     for level in sorted({step.level for step in steps}):
-        off = np.array([step.amplitude / level - 1.0 for step in steps if step.level == level])
-        if np.abs(off).max() > MISSED_LEVEL:
-            low, high = (factor * level * (1.0 + end) for end in (off.min(), off.max()))
+        miss = np.array([step.amplitude / level - 1.0 for step in steps if step.level == level])
+        if np.abs(miss).max() > MISSED_LEVEL:
+            low, high = (factor * level * (1.0 + end) for end in (miss.min(), miss.max()))
             yield (
                 f"the rig reached {low:.4g} to {high:.4g} {unit} at the level of {factor * level:.4g} {unit}: |K| "
-                f"there is up to {number(100 * abs(slope) * np.abs(off).max(), 2)} % off that at the level (fits count "
-                "with what was reached)"
+                f"there is up to {number(100 * abs(slope) * np.abs(miss).max(), 2)} % off that at the level (fits "
+                "count with what was reached)"
             )
     coarse = [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]
     if coarse:

@@ -18,7 +18,7 @@ from bushfit.progress import track
 from bushfit.reading.measurement import Complex, Floats, Loop
 from bushfit.reduction.cycles import Cycles, keeps_changing, lone_outliers, mean_from_steady, pieces, resumes_in_phase
 from bushfit.reduction.harmonics import HarmonicFit
-from bushfit.reduction.result import Reduction, Skipped, Step
+from bushfit.reduction.result import Reduction, SkippedStretch, Step
 
 #: Rows a cycle that make a point; chosen: drift and fundamental have five unknowns.
 _FEWEST_ROWS_PER_CYCLE = 5.0
@@ -66,7 +66,7 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
     return Reduction(direction, tuple(_grouped(steps, levels)), skipped, outliers)
 
 
-def sines(history: Loop) -> list[tuple[float, float, int]]:
+def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
     """Frequency [Hz], rough amplitude [m or rad] and number of cycles of each steady stretch of a history."""
     cycles = Cycles.of(history.time, history.displacement)
     found = []
@@ -81,17 +81,17 @@ def sines(history: Loop) -> list[tuple[float, float, int]]:
     return found
 
 
-def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[Skipped]]:
+def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStretch]]:
     """The steps of a history with `fewest` cycles or more, and the stretches that make none."""
     found: list[tuple[float, float, Step]] = []
-    skipped: list[Skipped] = []
+    skipped: list[SkippedStretch] = []
     cycles = Cycles.of(history.time, history.displacement)
     for run in cycles.runs():
         motion, force = cycles.fundamentals(run, history.displacement, history.force)
         edges = cycles.edges[run.start : run.stop + 1]
         parts = pieces(edges, np.log(np.abs(motion)))
         if keeps_changing(edges, parts):
-            skipped.append(Skipped(history.name, float(edges[0]), float(edges[-1]), _CHANGING, True))
+            skipped.append(SkippedStretch(history.name, float(edges[0]), float(edges[-1]), _CHANGING, True))
             continue
         for part in parts:
             inside = slice(run.start + part.start, run.start + part.stop)
@@ -102,7 +102,7 @@ def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[Skipped]]:
                 found.append((start, end, step))
             else:
                 steady = part.stop - part.start >= fewest
-                skipped.append(Skipped(history.name, start, end, why or _CHANGING, steady))
+                skipped.append(SkippedStretch(history.name, start, end, why or _CHANGING, steady))
     return _joined(found), skipped
 
 
@@ -112,21 +112,21 @@ def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
     An outlier, or an amplitude that creeps, breaks a step: its sine goes on in phase after a cycle or two. If one of
     the parts is brief, their frequencies may differ by more.
     """
-    kept: list[Step] = []
+    joined: list[Step] = []
     last_end = -np.inf
     for start, end, step in found:
         if resumes_in_phase((start - last_end) * step.frequency):
-            counts = sorted((kept[-1].found, step.found))
+            counts = sorted((joined[-1].found, step.found))
             reach = _SETTLING_FREQUENCY if 2 * counts[0] < counts[1] else _SAME_FREQUENCY
-            same = (
-                abs(np.log(kept[-1].frequency / step.frequency)) < reach
-                and abs(np.log(kept[-1].amplitude / step.amplitude)) < _LEVEL_GAP
+            is_same_sine = (
+                abs(np.log(joined[-1].frequency / step.frequency)) < reach
+                and abs(np.log(joined[-1].amplitude / step.amplitude)) < _LEVEL_GAP
             )
-            if same:
-                step = max(kept.pop(), step, key=lambda one: one.found)
-        kept.append(step)
+            if is_same_sine:
+                step = max(joined.pop(), step, key=lambda one: one.found)
+        joined.append(step)
         last_end = end
-    return kept
+    return joined
 
 
 def _unusable(cycles: Cycles, inside: slice, fewest: int) -> str:
@@ -150,9 +150,11 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
     used = slice(inside.start + steady.start, inside.start + steady.stop)
     edges = cycles.edges[used.start : used.stop + 1]
     count = used.stop - used.start
-    own = motion[steady]
-    starts = edges[:-1] - np.angle(1j * own) / (2.0 * np.pi) * np.diff(edges)  # nearer than single crossings are
-    if _creeps(np.log(np.diff(starts)), _SETTLING_FREQUENCY) or _creeps(np.log(np.abs(own)), 0.03):
+    steady_motion = motion[steady]
+    starts = edges[:-1] - np.angle(1j * steady_motion) / (2.0 * np.pi) * np.diff(
+        edges
+    )  # nearer than single crossings are
+    if _creeps(np.log(np.diff(starts)), _SETTLING_FREQUENCY) or _creeps(np.log(np.abs(steady_motion)), 0.03):
         return None
     rows = slice(cycles.first_rows[used.start], cycles.first_rows[used.stop])
     fit = HarmonicFit.of(history.time[rows], history.displacement[rows], history.force[rows], edges)
@@ -177,16 +179,16 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
     )
 
 
-def _creeps(values: Floats, least: float) -> bool:
+def _creeps(values: Floats, smallest: float) -> bool:
     """Whether values, (n,), change steadily from first to last, by more than `least` and beyond their scatter."""
     if values.size < 3:
         return False
     number = np.arange(values.size) - (values.size - 1) / 2.0
     squares = float(number @ number)
     slope = float(number @ values) / squares
-    left = values - values.mean() - slope * number
-    error = np.sqrt(float(left @ left) / (values.size - 2) / squares)
-    return bool(abs(slope) * values.size > least and abs(slope) > 4.0 * error)  # noise hardly ever goes that far
+    residual = values - values.mean() - slope * number
+    error = np.sqrt(float(residual @ residual) / (values.size - 2) / squares)
+    return bool(abs(slope) * values.size > smallest and abs(slope) > 4.0 * error)  # noise hardly ever goes that far
 
 
 def _check_reach(steps: Sequence[Step], levels: Sequence[float], direction: Place) -> None:
@@ -210,11 +212,11 @@ def _grouped(steps: Sequence[Step], levels: Sequence[float]) -> list[Step]:
     groups = _clusters(np.log(frequency), _SAME_FREQUENCY)
     nominal = np.array([np.median(frequency[groups == group]) for group in groups])
     if levels:
-        stated = np.array(levels, dtype=float)
-        level = stated[np.argmin(np.abs(np.log(amplitude[:, None] / stated)), axis=1)]
+        levels_asked = np.array(levels, dtype=float)
+        level = levels_asked[np.argmin(np.abs(np.log(amplitude[:, None] / levels_asked)), axis=1)]
     else:
         rank = _clusters(np.log(amplitude), _LEVEL_GAP)
-        level = np.array([amplitude[rank == own].mean() for own in rank])
+        level = np.array([amplitude[rank == group_number].mean() for group_number in rank])
     repeats: defaultdict[tuple[float, float], Iterator[int]] = defaultdict(lambda: count(1))
     return [
         replace(step, nominal_frequency=f, level=x, repeat=next(repeats[f, x]))

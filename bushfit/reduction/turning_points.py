@@ -32,8 +32,8 @@ def turning_points(values: Floats, prominence: float) -> Integers:
     Returns:
         Row numbers, (turns,), increasing.
     """
-    moved = np.concatenate(([0], 1 + np.flatnonzero(np.diff(values) != 0.0)))
-    return prominent_turns(values, _reversals(values, moved), prominence)
+    moving = np.concatenate(([0], 1 + np.flatnonzero(np.diff(values) != 0.0)))
+    return prominent_turns(values, _reversals(values, moving), prominence)
 
 
 def _reversals(values: Floats, rows: Integers) -> Integers:
@@ -172,7 +172,7 @@ def least_prominence(values: Floats) -> float:
     """
     change = np.abs(np.diff(values))
     converter_step = float(change[change > 0.0].min(initial=np.inf))
-    least = 1e-3 * float(np.ptp(values))
+    smallest = 1e-3 * float(np.ptp(values))
     rows, order = min(256, values.size), 6
     if rows > order:
         starts = np.linspace(0, values.size - rows, min(2000, values.size // rows)).astype(np.intp)
@@ -180,5 +180,5 @@ def least_prominence(values: Floats) -> float:
         differences = np.median(np.abs(np.diff(windows, order, axis=1)), axis=1)
         # of white noise, the squared weights of such differences sum up to this binomial
         noise = differences * (MEDIAN_TO_SIGMA / comb(2 * order, order) ** 0.5)
-        least = max(least, 10.0 * float(np.quantile(noise, 0.1)))
-    return max(least, 4.0 * converter_step if converter_step < least else 0.0)
+        smallest = max(smallest, 10.0 * float(np.quantile(noise, 0.1)))
+    return max(smallest, 4.0 * converter_step if converter_step < smallest else 0.0)

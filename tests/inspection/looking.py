@@ -10,8 +10,8 @@ import pytest
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.geometry import Direction
-from bushfit.inspection.opening import inspect
-from bushfit.inspection.record import Inspected
+from bushfit.inspection.opening import inspect_file
+from bushfit.inspection.record import Inspection
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.tablefile import to_csv
 from bushfit.simulation.files import raw_loop_table, raw_sweep_table
@@ -36,11 +36,11 @@ def plan(**settings: float) -> SimulateSettings:
     return SimulateSettings(repeats=3, loops=loops, sweeps=(sweep,), **settings)
 
 
-def look(folder: Path, test: Loop | Sweep, name: str = "axial.csv", **stated: object) -> Inspected:
+def look(folder: Path, test: Loop | Sweep, name: str = "axial.csv", **stated: object) -> Inspection:
     """A test written as a file and looked at."""
     table = raw_sweep_table(test) if isinstance(test, Sweep) else raw_loop_table(test)
     (folder / name).write_bytes(to_csv(table))
-    return inspect(folder / name, stated)
+    return inspect_file(folder / name, stated)
 
 
 def without(sweep: Sweep, rows: np.ndarray) -> Sweep:

@@ -17,7 +17,7 @@ from bushfit.errors import BushfitError, FitError
 from bushfit.geometry import Direction, Specimen
 from bushfit.inspection.gathering import gather
 from bushfit.inspection.loops import describe_loop
-from bushfit.inspection.opening import inspect
+from bushfit.inspection.opening import inspect_file
 from bushfit.inspection.record import file_text
 from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
@@ -198,7 +198,7 @@ def test_repeats_that_nothing_tells_are_asked_for(sweep: Sweep, tmp_path: Path, 
     by_amplitude = table.sort_values(["frequency [Hz]", "amplitude [mm]"])
     table = by_amplitude if order == "by amplitude" else table.sample(frac=1.0, random_state=1)
     table.to_csv(tmp_path / "axial.csv", index=False)
-    odd = inspect(tmp_path / "axial.csv", {}).odd
+    odd = inspect_file(tmp_path / "axial.csv", {}).odd
     assert any("if they are repeats, a column repeat with their numbers tells so" in sentence for sentence in odd)
 
 
@@ -245,7 +245,7 @@ def held(sweep: Sweep, file: Path, level: float = 1e-4, drop: str = "amplitude [
 def test_an_amplitude_without_a_column_is_read_from_the_name_unless_stated(
     sweep: Sweep, tmp_path: Path, name: str, stated: dict[str, str], entry: dict[str, str], amplitude: float
 ) -> None:
-    seen = inspect(held(sweep, tmp_path / f"{name}.csv"), stated)
+    seen = inspect_file(held(sweep, tmp_path / f"{name}.csv"), stated)
     assert seen.entry == entry
     assert seen.measured.amplitude[0] == pytest.approx(amplitude)
     assert ("from its name" in seen.facts) == ("at_amplitude" not in stated)
@@ -268,17 +268,17 @@ def test_an_amplitude_without_a_column_is_read_from_the_name_unless_stated(
 def test_moduli_are_those_of_a_specimen(header: str, cells: str, name: str, strain: str, tmp_path: Path) -> None:
     rows = "\n".join(f"{f},{cells.format(1.2 + f / 1e3)}" for f in range(5, 60, 5))
     (tmp_path / f"{name}.csv").write_text(f"frequency [Hz],{header}\n{rows}\n", encoding="utf-8")
-    seen = inspect(tmp_path / f"{name}.csv", {"specimen": "DMA"})
+    seen = inspect_file(tmp_path / f"{name}.csv", {"specimen": "DMA"})
     assert seen.direction == Specimen("DMA", "modulus", strain=strain)
     assert seen.entry == {"specimen": "DMA"} | ({"at_amplitude": "0.1 %"} if "%" in name else {})
     assert "its strain is taken as" in seen.assumed
-    assert inspect(tmp_path / f"{name}.csv", {}).direction.name == ("bar" if strain == "tension" else "coupon")
+    assert inspect_file(tmp_path / f"{name}.csv", {}).direction.name == ("bar" if strain == "tension" else "coupon")
 
 
 @pytest.mark.parametrize("text", ["0 mm", "-0.1 mm", "0.1", "0.1 N", "wide"])
 def test_an_amplitude_that_is_none_is_refused(sweep: Sweep, tmp_path: Path, text: str) -> None:
     with pytest.raises(BushfitError, match=r"axial\.csv, at_amplitude: "):
-        inspect(held(sweep, tmp_path / "axial.csv"), {"at_amplitude": text})
+        inspect_file(held(sweep, tmp_path / "axial.csv"), {"at_amplitude": text})
 
 
 def test_a_temperature_is_stated_for_files_with_several(tmp_path: Path) -> None:
@@ -298,7 +298,7 @@ def test_a_temperature_is_stated_for_files_with_several(tmp_path: Path) -> None:
     # it chooses rows of another file, and tells nothing of the one without
     assert entries() == {"axial_several": {"temperature": "25 degC"}, "axial_one": {}, "radial_none": {}}
     with pytest.raises(BushfitError, match=r"several temperatures(.|\n)*temperature = "):
-        inspect(tmp_path / "axial_several.csv", {})
+        inspect_file(tmp_path / "axial_several.csv", {})
     (tmp_path / "axial_several.csv").unlink()
     assert entries() == {"axial_one": {}, "radial_none": {"temperature": "25 degC"}}
 
@@ -313,7 +313,7 @@ def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str,
         seen = [look(tmp_path, test) for test in (*made.loops, *made.sweeps)]
         for loop, waveform, frequency in zip(made.loops, ("sine", "triangle"), ("0.1 Hz", "0.2 Hz"), strict=True):
             raw_loop_table(loop).iloc[:, 1:].to_csv(file, index=False)
-            seen.append(inspect(file, {"frequency": frequency, "waveform": waveform}))
+            seen.append(inspect_file(file, {"frequency": frequency, "waveform": waveform}))
         raised += [f"seed {seed}, {one.file.name}: {sentence}" for one in seen for sentence in one.odd]
     assert raised == []
 
@@ -323,7 +323,7 @@ def test_gaps_in_a_motion_are_told_and_slow_loops_are_no_stepped_sine(
 ) -> None:
     table = raw_loop_table(loop).iloc[:, 1:].drop(index=range(500, 530))
     table.to_csv(tmp_path / "axial.csv", index=False)
-    odd = inspect(tmp_path / "axial.csv", {"frequency": "0.1 Hz", "waveform": "sine"}).odd
+    odd = inspect_file(tmp_path / "axial.csv", {"frequency": "0.1 Hz", "waveform": "sine"}).odd
     assert any("1 gap in the motion, the first after data row 500: the displacement goes from " in line for line in odd)
     planned = SimulatedLoop(Direction.AXIAL, 5e-4, cycles=4, frequencies=(0.1, 0.3))
     (record,) = simulate(paper_model, SimulateSettings(loops=(planned,))).loops
@@ -336,7 +336,7 @@ def test_the_data_of_the_repository_raise_only_what_is_there(root: Path) -> None
     """Two practice campaigns lag so much that loss factors fall below zero; nothing else is odd in a single file."""
     sound = [*root.glob("data/cmp_15961*/*.csv"), *root.glob("data/arm_bushing/*.csv")]
     practice = [*root.glob("data/practice/*/*.csv"), *root.glob("data/mystery_mount/*.csv")]
-    odd = {file: found for file in (*sound, *practice) if (found := inspect(file, {}).odd)}
+    odd = {file: found for file in (*sound, *practice) if (found := inspect_file(file, {}).odd)}
     assert len(sound) == 8
     assert len(odd) <= 2
     assert not set(odd) & set(sound)
@@ -373,7 +373,7 @@ def test_a_programme_of_loops_is_described(paper_model: Model, tmp_path: Path, *
     (record,) = simulate(paper_model, SimulateSettings(seed=1, force_noise=3e-3, loops=(planned,))).loops
     table = raw_loop_table(record)
     (table if timed else table.iloc[:, 1:]).to_csv(tmp_path / "axial.csv", index=False)
-    seen = inspect(tmp_path / "axial.csv", {} if timed else {"frequency": "0.1 Hz", "waveform": "sine"})
+    seen = inspect_file(tmp_path / "axial.csv", {} if timed else {"frequency": "0.1 Hz", "waveform": "sine"})
     said = "3 loops in one record: 0.2, 0.5, 1 mm at 0.1 Hz, 4 to 5 cycles used of each; 25 % of the rows left out"
     assert seen.kind == "loop"
     assert seen.facts["programme"] == said

@@ -11,7 +11,7 @@ from matplotlib.gridspec import SubplotSpec
 
 from bushfit.effects.contract import Array
 from bushfit.geometry import TRANSLATION, Place
-from bushfit.inspection.record import Inspected
+from bushfit.inspection.record import Inspection
 from bushfit.reading.measurement import Loop, Sweep, loss_factor
 from bushfit.reduction.resonance import LARGEST_ERROR, Resonance
 from bushfit.reduction.result import Reduction
@@ -34,7 +34,7 @@ _MOST_HISTORIES = 4
 
 
 @style.in_own_style
-def inspection_figure(files: Sequence[Inspected], first: int = 0, count: int = 5) -> Figure:
+def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 5) -> Figure:
     """Test files as recorded, a row of panels per file: loops over displacement and time, sweeps over frequency.
 
     Args:

@@ -36,8 +36,8 @@ from tries import some
 
 from bushfit.fitting.data_sets import loop_data, sweep_data
 from bushfit.geometry import Direction
-from bushfit.inspection.opening import inspect
-from bushfit.inspection.record import Inspected
+from bushfit.inspection.opening import inspect_file
+from bushfit.inspection.record import Inspection
 from bushfit.model.arms import model_arms
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
@@ -105,7 +105,7 @@ def test_loops_show_model_and_residuals(paper_model: Model, looped: Looped) -> N
 def test_files_are_drawn_as_they_are_together_and_alone(root: Path) -> None:
     names = ("cmp_15961/loop_axial_1.csv", "arm_bushing/loop_axial_2.csv")
     others = ("cmp_15961/sweep_radial.csv", "cmp_15961_raw/stepped_sine_axial.csv")
-    seen = [inspect(root / "data" / name, {}) for name in (*names, *others)]
+    seen = [inspect_file(root / "data" / name, {}) for name in (*names, *others)]
     figure = whole(inspection_figure(seen))
     shown = {"time [s]", "displacement [mm]", "force [N]", "frequency [Hz]", "radial stiffness |K| [N/mm]"}
     assert shown <= set(labels(figure))
@@ -259,7 +259,7 @@ def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int)
         assert len(legend(figure.axes[1])) == count
     checked(gap(paper_model, paper_model, [data_set]))
     checked(prediction(Result(paper_model), Direction.AXIAL, data_set, amplitudes=amplitudes))
-    seen = Inspected(Path(f"{LONG_NAME}.csv"), "sweep", Direction.AXIAL, {}, (), {}, (), {}, data_set.sweep)
+    seen = Inspection(Path(f"{LONG_NAME}.csv"), "sweep", Direction.AXIAL, {}, (), {}, (), {}, data_set.sweep)
     (left, right, *bar) = checked(inspection_figure([seen])).axes
     assert len(points(left)) == count
     assert len(bar) == (count > 8)
