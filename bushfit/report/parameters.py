@@ -1,4 +1,4 @@
-"""Parameters as people read them: digits that carry meaning, units in which they read them, intervals."""
+"""Parameters as texts: significant digits, common units, intervals."""
 
 import math
 from collections.abc import Iterator
@@ -16,8 +16,18 @@ _FEWEST_DIGITS = 2
 _MOST_DIGITS = 6
 
 
-class Row(NamedTuple):
-    """One parameter in words; `error` and `interval` are empty where they are not known, `state` says what is odd."""
+class ParameterRow(NamedTuple):
+    """One parameter as texts.
+
+    Args:
+        name: of the parameter.
+        state: "held", "at min" or "at max"; empty otherwise.
+        value: in the unit.
+        error: standard error; empty where it is not known.
+        interval: ends of the 95 % interval; empty where it is not known.
+        unit: common unit.
+        meaning: of the parameter.
+    """
 
     name: str
     state: str
@@ -29,17 +39,17 @@ class Row(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The name, and what is odd in brackets."""
+        """Name with the state in brackets."""
         return f"{self.name} ({self.state})" if self.state else self.name
 
 
 def interval_kind(result: Result) -> str:
-    """What the intervals of a result are."""
+    """Kind of the intervals of a result, as a heading."""
     return "95 % by profile" if result.profile else "95 % interval"
 
 
-def parameter_rows(result: Result) -> Iterator[Row]:
-    """The paper's Table 1 with uncertainty: value, standard error, 95 % interval (by profile, if any), unit."""
+def parameter_rows(result: Result) -> Iterator[ParameterRow]:
+    """Rows of the parameters of a result with standard errors and 95 % intervals, by profile if there are any."""
     for name, parameter in result.model.parameters.items():
         value, stderr = result.model.values[name], result.covariance.stderr(name)
         interval = result.profile.get(name) or result.interval(name)
@@ -56,4 +66,4 @@ def parameter_rows(result: Result) -> Iterator[Row]:
         ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
         error = "" if stderr is None else format_aligned([stderr * factor], 2)[0]
         state = f"at {result.at_bound[name]}" if name in result.at_bound else "held" * (name not in result.fitted)
-        yield Row(name, state, shown, error, " to ".join(ends), unit, parameter.meaning)
+        yield ParameterRow(name, state, shown, error, " to ".join(ends), unit, parameter.meaning)

@@ -1,4 +1,4 @@
-"""A model as tables for spreadsheets: its predictions, long and wide, its parameters, and where it comes from."""
+"""A model as tables for spreadsheets: predictions, long and wide, parameters, and provenance."""
 
 from collections.abc import Iterator
 
@@ -28,7 +28,7 @@ def xlsx(order: Order) -> Exported:
 
 
 def _tables(order: Order) -> dict[str, pd.DataFrame]:
-    """All tables by name: two for each place, the parameters, and the provenance."""
+    """Tables by name: two for each place, parameters, and provenance."""
     found = {
         "parameters": parameters_table(order.result),
         "provenance": pd.DataFrame(_said(order), columns=["what", "value"]),
@@ -63,7 +63,7 @@ def parameters_table(result: Result) -> pd.DataFrame:
 
 
 def _said(order: Order) -> Iterator[tuple[str, str]]:
-    """Where the tables come from, and what a user must know: a line each."""
+    """Rows of the table of provenance: names and values, with the warnings."""
     result, bushing = order.result, order.result.model.bushing
     yield "bushing", result.name
     if bushing:

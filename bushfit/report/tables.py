@@ -37,16 +37,16 @@ TEXTS = frozenset(
         *("named effects", "cannot be told from", "on a bound", "warnings", "campaign name", "subgroup", "differs in"),
     )
 )
-#: What stands between the warnings of a bushing in the table of a batch: they hold semicolons.
+#: Separator of the warnings of a bushing in the table of a batch.
 BETWEEN = " | "
 #: Units of amplitudes, by SI, as people read them.
 DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
-#: End of the headers, and name of the line, of what holds where an unresolved effect belongs to the rig.
+#: End of headers and name of lines that assume an unresolved effect to belong to the rig.
 IF_RIGS = "if it is the rig's"
 
 
 def words(place: Place) -> tuple[str, str, str]:
-    """What headers call amplitude, force and stiffness at a place; a modulus test has other words."""
+    """Names of amplitude, force and stiffness in the headers of a place, or of strain, stress and modulus."""
     if place.motion is not STRAINING:
         return "amplitude", "force", "stiffness"
     strain, stress, modulus = STRAINING.words
@@ -61,40 +61,47 @@ def columns_of(place: Place) -> tuple[str, str, str]:
 
 
 def moved_of(place: Place) -> str:
-    """The header of displacement or rotation, or strain, in the tables of a place."""
+    """Header of displacement, rotation or strain in the tables of a place."""
     moved = "strain" if place.motion is STRAINING else "displacement"
     return f"{moved} [{place.display.displacement.name}]"
 
 
 def _amplitudes(place: Place, amplitude: Array) -> dict[str, Array]:
-    """The column of amplitudes [SI] at a place."""
+    """Column of amplitudes at a place, by its header; `amplitude` in SI."""
     return {columns_of(place)[0]: amplitude * place.display.displacement.factor}
 
 
 def _responses(place: Place, stiffness: Array, before: str = "") -> dict[str, Array]:
-    """The columns of |K| and loss factor of complex stiffnesses [SI] at a place; `before` begins their headers."""
+    """Columns of |K| and loss factor of complex stiffnesses [SI] at a place, whose headers begin with `before`."""
     magnitude = np.abs(stiffness) * place.display.stiffness.factor
     return {f"{before}{columns_of(place)[1]}": magnitude, f"{before}loss factor [-]": loss_factor(stiffness)}
 
 
 def prediction_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
-    """The table of `predict`: six columns, then low and high of the last four; where something is unresolved these four
-    if it is the rig's; and where sweeps are known what they measured at each point. Its units are those of the place,
-    or of `display`."""
+    """Predicted stiffness and loss over operating points, with the ends of the 95 % bands.
+
+    Args:
+        prediction: of one place.
+        display: units; those of the place if None.
+
+    Returns:
+        A row per point: frequency, amplitude, stiffness, loss factor, storage and loss stiffness; low and high of the
+        last four; the four if an unresolved effect belongs to the rig; and the measured stiffness and loss factor.
+    """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     moved, _, resisted = words(prediction.direction)
     force = f"{resisted} [{stiffness}]"
     names, scales = (force, "loss factor [-]", f"storage {force}", f"loss {force}"), (factor, 1.0, factor, factor)
 
-    def four(of: Prediction) -> list[tuple[str, Band, float]]:
-        bands = of.stiffness, of.loss_factor, of.storage_stiffness, of.loss_stiffness
-        return list(zip(names, bands, scales, strict=True))
+    def bands(reading: Prediction) -> list[tuple[str, Band, float]]:
+        quantities = reading.stiffness, reading.loss_factor, reading.storage_stiffness, reading.loss_stiffness
+        return list(zip(names, quantities, scales, strict=True))
 
     columns = {"frequency [Hz]": prediction.frequency, f"{moved} [{length}]": prediction.amplitude * length_factor}
-    columns |= {name: band.value * scale for name, band, scale in four(prediction)}
-    for name, band, scale in four(prediction):
+    columns |= {name: band.value * scale for name, band, scale in bands(prediction)}
+    for name, band, scale in bands(prediction):
         columns |= {f"{name}, low": band.low * scale, f"{name}, high": band.high * scale}
-    for name, band, scale in four(prediction.if_rigs) if prediction.if_rigs else ():
+    for name, band, scale in bands(prediction.if_rigs) if prediction.if_rigs else ():
         columns[f"{name}, {IF_RIGS}"] = band.value * scale
     if (measured := prediction.measured) is not None:
         columns |= {f"measured {force}": np.abs(measured) * factor, "measured loss factor [-]": loss_factor(measured)}
@@ -102,9 +109,15 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
 
 
 def wide_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
-    """The same with frequency down and amplitude across: a column of stiffness for each amplitude, then of loss factor.
+    """Predicted stiffness and loss factor with frequency down and amplitude across.
 
-    A point that the grid lacks is an empty cell.
+    Args:
+        prediction: of one place.
+        display: units; those of the place if None.
+
+    Returns:
+        A row per frequency: a column of stiffness for each amplitude, then of loss factor; empty where the grid has no
+        point.
     """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     resisted = words(prediction.direction)[2]
@@ -118,7 +131,7 @@ def wide_table(prediction: Prediction, display: Display | None = None) -> pd.Dat
 
 
 def shaken_table(found: PredictedResonance) -> pd.DataFrame:
-    """The table of a mass on a mount: transmissibility, deformation and stiffness over frequency."""
+    """Transmissibility, deformation and stiffness of a mass on a mount over frequency, a row per frequency."""
     table = pd.DataFrame(
         {
             "frequency [Hz]": found.frequency,
@@ -135,8 +148,16 @@ def shaken_table(found: PredictedResonance) -> pd.DataFrame:
 
 
 def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:
-    """Maxwell arms, a row an arm, and before them the spring that stands beside: modulus, stiffness at each place,
-    relaxation time."""
+    """Maxwell arms, a row per arm, with the parallel spring first.
+
+    Args:
+        model: whose effects the arms replace.
+        arms: of each effect.
+        places: directions and specimens whose stiffness is listed.
+
+    Returns:
+        Relaxation time, shear modulus and stiffness at each place.
+    """
     names, moduli, times = zip(*arm_rows(model, arms), strict=True)
     modulus = np.array(moduli)
     columns = {"in place of": names, "relaxation time [s]": times, "shear modulus [MPa]": 1e-6 * modulus}
@@ -223,7 +244,7 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """Measured minus model before and after a diagnosis, in units of noise and in percent.
 
     A row is a sweep point or a row of a loop, where it was recorded, also if the record was mistaken. Percent are of
-    |K| or of half the range of a loop's force. The response of the model to use stands beside the measured one.
+    |K| or of half the range of a loop's force. The table also has the response of the model to use.
     """
     before, after = diagnosis.before, diagnosis.after
 
@@ -244,10 +265,10 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
 
 
 def master_curve_table(found: Sequence[Shifted]) -> pd.DataFrame:
-    """Every point of sweeps at several temperatures, as measured, and brought to 23 degC over reduced frequency."""
+    """Points of sweeps at several temperatures, as measured and shifted to 23 degC, a row per point."""
 
-    def rows(each: Shifted) -> pd.DataFrame:
-        sweep, place = each.sweep, each.sweep.direction
+    def rows(shifted: Shifted) -> pd.DataFrame:
+        sweep, place = shifted.sweep, shifted.sweep.direction
         return pd.DataFrame(
             {
                 "sweep": sweep.name,
@@ -256,21 +277,21 @@ def master_curve_table(found: Sequence[Shifted]) -> pd.DataFrame:
                 "frequency [Hz]": sweep.frequency,
                 **_amplitudes(place, sweep.amplitude),
                 **_responses(place, sweep.measured),
-                "reduced frequency [Hz]": each.reduced_frequency,
-                **_responses(place, each.reduced_stiffness, "reduced "),
+                "reduced frequency [Hz]": shifted.reduced_frequency,
+                **_responses(place, shifted.reduced_stiffness, "reduced "),
             }
         )
 
-    return pd.concat([rows(each) for each in found], ignore_index=True)
+    return pd.concat([rows(shifted) for shifted in found], ignore_index=True)
 
 
 def shift_factors_table(found: Sequence[Shifted]) -> pd.DataFrame:
-    """log10 of the shift factor of each sweep, by the fitted law and as it asks for by itself, with 95 % intervals."""
-    both = {"log10 a_T": [each.shift for each in found], "own log10 a_T": [each.own for each in found]}
+    """log10 of the shift factor of shifted sweep, by the fitted law and fitted alone, with 95 % intervals."""
+    both = {"log10 a_T": [shifted.shift for shifted in found], "own log10 a_T": [shifted.own for shifted in found]}
     columns: dict[str, Any] = {
-        "sweep": [each.sweep.name for each in found],
-        "direction": [str(each.sweep.direction) for each in found],
-        "temperature [degC]": [each.temperature - CELSIUS for each in found],
+        "sweep": [shifted.sweep.name for shifted in found],
+        "direction": [str(shifted.sweep.direction) for shifted in found],
+        "temperature [degC]": [shifted.temperature - CELSIUS for shifted in found],
     }
     for name, pairs in both.items():
         value, error = np.array(pairs).T / np.log(10.0)
@@ -280,7 +301,7 @@ def shift_factors_table(found: Sequence[Shifted]) -> pd.DataFrame:
 
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Every effect of the library, judged: score, gain, probability, parameters, and why it won or lost."""
+    """Every effect of the library: score, gain in chi-square, probability, parameters, and the reason of the result."""
     rows = [
         {
             "effect": judged.name,
@@ -296,27 +317,31 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def contrast_table(found: Comparison, each: Contrast) -> pd.DataFrame:
-    """Stiffness and loss factor of two results over operating points of a place, with 95 % bands, and how far the other
-    is off the reference.
+def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
+    """Stiffness and loss factor of two results over operating points of a place, and their differences.
 
-    Stiffness in the units of its place; `sure` is what differs where the bands of all points hold at once.
+    Args:
+        comparison: comparison that the contrast belongs to; it widens the bands so that all points hold at once.
+        contrast: contrast of one place.
+
+    Returns:
+        A row per point: values, differences, the ends of their 95 % bands, and whether differences are significant.
     """
-    name, factor = columns_of(each.place)[1], each.place.display.stiffness.factor
+    name, factor = columns_of(contrast.place)[1], contrast.place.display.stiffness.factor
     values: dict[str, Any] = {
-        "frequency [Hz]": each.reference.frequency,
-        **_amplitudes(each.place, each.reference.amplitude),
+        "frequency [Hz]": contrast.reference.frequency,
+        **_amplitudes(contrast.place, contrast.reference.amplitude),
     }
-    for who, side in (("reference", each.reference), ("other", each.other)):
+    for who, side in (("reference", contrast.reference), ("other", contrast.other)):
         for what, band, scale in ((name, side.stiffness, factor), ("loss factor [-]", side.loss_factor, 1.0)):
             for end, of in _ends(band).items():
                 values[f"{who} {what}{end}"] = of * scale
     differences = (
-        (f"relative difference of {words(each.place)[2]} [-]", each.stiffness, relative),
-        ("difference of loss factor [-]", each.loss_factor, np.asarray),
+        (f"relative difference of {words(contrast.place)[2]} [-]", contrast.stiffness, relative),
+        ("difference of loss factor [-]", contrast.loss_factor, np.asarray),
     )
     for what, band, shown in differences:
-        wide = found.widened(band)
+        wide = comparison.widened(band)
         sure = bool(len(band.root)) & ((wide.low > 0.0) | (wide.high < 0.0))
         values |= {f"{what}{end}": shown(of) for end, of in _ends(band).items()}
         values[f"{what}, sure"] = np.where(sure, "yes", "no")
@@ -324,11 +349,11 @@ def contrast_table(found: Comparison, each: Contrast) -> pd.DataFrame:
 
 
 def _ends(band: Band) -> dict[str, Array]:
-    """A band by the end of its columns' names."""
+    """Value, low and high of a band by the ends of their headers."""
     return {"": band.value, ", low": band.low, ", high": band.high}
 
 
-#: Columns of a reduced sweep that tell how each point came about, and what each is of a step.
+#: Columns of a reduced sweep on the origin of each point, and the attributes of a step.
 _OF_STEPS = {
     "frequency found [Hz]": "frequency",
     "displacement distortion [-]": "displacement_distortion",
@@ -342,7 +367,7 @@ _OF_STEPS = {
 
 
 def reduced_table(reduction: Reduction) -> pd.DataFrame:
-    """Raw histories reduced to a sweep: what the sweep reader takes, then what tells how good each point is."""
+    """Raw histories reduced to a sweep: columns of a sweep file, then columns on the quality of each point."""
     place, steps = reduction.direction, pd.DataFrame([vars(step) for step in reduction.steps])
     (length, length_factor), _, (stiffness, _) = place.display
     responses = _responses(place, steps["stiffness"].to_numpy())
@@ -364,7 +389,7 @@ def reduced_table(reduction: Reduction) -> pd.DataFrame:
 
 
 def resonance_table(found: Resonance) -> pd.DataFrame:
-    """A resonance test reduced to a sweep: what the sweep reader takes, then what tells how each point came about."""
+    """A resonance test reduced to a sweep: columns of a sweep file, then columns on the origin of each point."""
     return pd.DataFrame(
         {
             "frequency [Hz]": found.frequency,
@@ -378,33 +403,33 @@ def resonance_table(found: Resonance) -> pd.DataFrame:
 
 
 def shortened(name: str, letters: int) -> str:
-    """A name of at most so many letters: what is too long loses its middle."""
+    """A name of at most so many letters, without its middle if it is too long."""
     return name if len(name) <= letters else f"{name[: (letters - 1) // 2]}…{name[-(letters // 2) :]}"
 
 
 def spread(count: int, most: int) -> Array:
-    """Places of at most so many of `count` things, evenly from the first to the last, (min(count, most),)."""
+    """Indices of at most so many of `count` elements, evenly from the first to the last, (min(count, most),)."""
     return np.linspace(0, count - 1, min(most, count)).round().astype(int)
 
 
 def numbers(rows: pd.DataFrame, *headers: str) -> Array:
-    """Columns of a table, (k, n).
+    """Columns of a table as numbers, (k, n).
 
     Raises:
-        ModelError: one of them is not there.
+        ModelError: a column is missing.
     """
     return required(rows, *headers)[list(headers)].to_numpy(dtype=float).T
 
 
 def required(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
-    """A table that has these columns.
+    """The table, checked for these columns.
 
     Raises:
-        ModelError: one of them is not there.
+        ModelError: a column is missing.
     """
     for header in headers:
         if header not in rows:
-            hint = "write the results anew, or take the table away: the page then goes without it"
+            hint = "write the results anew, or remove the table: the page then goes without it"
             raise ModelError("a column of a table is missing", expected=header, hint=hint)
     return rows
 

@@ -1,5 +1,4 @@
-"""The pages of a result, `report.html`, of a comparison, `compare.html`, and of a batch, `index.html`: one file each,
-complete without a network."""
+"""Pages of a result (report.html), a comparison (compare.html) and a batch (index.html), one file each."""
 
 from __future__ import annotations
 
@@ -26,7 +25,7 @@ def report_page(documents: Documents, tables: Tables) -> str:
 
     Args:
         documents: model, plain fit and diagnosis by the names of their files without endings.
-        tables: sweeps, loops, gap and those of predicted places, likewise.
+        tables: sweeps, loops, gap and predicted places by the names of their files without endings.
 
     Raises:
         ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
@@ -38,10 +37,10 @@ def report_page(documents: Documents, tables: Tables) -> str:
 
 
 def comparison_page(documents: Documents, _: Tables) -> str:
-    """The page of a comparison as HTML, made of its document alone.
+    """The page of a comparison as HTML, made from its document.
 
     Raises:
-        ModelError: a spoiled document.
+        ModelError: a document that is not as bushfit writes it.
     """
     from bushfit.report.compared import SideBySide
     from bushfit.report.page.comparison import comparison_context
@@ -50,7 +49,7 @@ def comparison_page(documents: Documents, _: Tables) -> str:
 
 
 def rendered(template: str, context: dict[str, Any]) -> str:
-    """A template with its context; no style or script but the page's own may run, and nothing may be loaded."""
+    """A page from a template, with a content policy that allows only its own style and script."""
     from markupsafe import Markup
 
     style, script = (Markup((_TEMPLATES / name).read_text(encoding="utf-8")) for name in ("style.css", "script.js"))
@@ -61,12 +60,12 @@ def rendered(template: str, context: dict[str, Any]) -> str:
 
 
 def filled(template: str, context: dict[str, Any]) -> str:
-    """A template with its context; all texts that come from elsewhere are escaped."""
+    """A template filled with its context; texts are escaped."""
     return _environment().get_template(template).render(context)
 
 
 def _hash(text: str) -> str:
-    """A text as a content policy names it."""
+    """Hash of a text as a content policy states it."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 

@@ -64,7 +64,7 @@ class ReportRecord:
 
     @property
     def tests(self) -> Sequence[TestTable]:
-        """Tests of the campaign, as far as they are known."""
+        """Tests of the campaign; empty if they are not known."""
         return self.campaign.tests if self.campaign else ()
 
 
@@ -143,7 +143,7 @@ def _levels(values: Array, as_predicted: bool) -> Array:
 
 
 def has_model(folder: Path) -> bool:
-    """Whether a folder holds a model."""
+    """Check for a model in a folder."""
     return any((folder / f"{name}.json").exists() for name in MODELS)
 
 

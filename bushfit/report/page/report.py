@@ -373,7 +373,7 @@ def _files(record: ReportRecord) -> list[tuple[str, str]]:
 
 
 def _stiffness_levels(predictions: Sequence[Prediction]) -> str:
-    """Lowest and highest level of the predicted stiffness re 1 N/m [dB]; empty where there is none."""
+    """Lowest and highest level of the predicted stiffness re 1 N/m [dB]; empty without a stiffness."""
     sizes = [p.stiffness.value for p in predictions if p.direction.motion is TRANSLATION]
     if not sizes:
         return ""

@@ -13,7 +13,7 @@ from bushfit.effects.contract import Array
 from bushfit.model.model import FIVE
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction
-from bushfit.report.parameters import Row, parameter_rows
+from bushfit.report.parameters import ParameterRow, parameter_rows
 from bushfit.report.plots import style
 from bushfit.report.plots.measured import sweep_groups
 from bushfit.report.plots.prediction import lines_of
@@ -121,7 +121,7 @@ def ellipses_figure(result: Result, title: str) -> Figure | None:
     )
 
 
-def _name(row: Row) -> str:
+def _name(row: ParameterRow) -> str:
     """Name of a parameter, with its unit unless the unit has an exponent."""
     return row.name if "^" in row.unit else f"{row.name} [{row.unit}]"
 

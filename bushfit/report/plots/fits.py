@@ -152,7 +152,7 @@ def points_note(table: pd.DataFrame) -> str:
 
 
 def thinned_note(groups: Sequence[SweepGroup]) -> str:
-    """Sentence on groups of which not all levels are drawn."""
+    """Sentence that states that not all levels are drawn; empty otherwise."""
     full = any(len(group.curves) == MOST_CURVES for group in groups)
     return f"Of more than {MOST_CURVES} levels {MOST_CURVES} are drawn." * full
 

@@ -95,7 +95,7 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
 
 
 def _sides(table: pd.DataFrame, diagnosis: Mapping[str, Any]) -> dict[str, str]:
-    """Columns of the figure, "before" and "after" as far as they differ, and the title of each."""
+    """Title of each column of the figure: "before" and, if it differs, "after"."""
     changed = any(
         not np.allclose(table[name], table[str(name).replace("before", "after")], equal_nan=True)
         for name in table
@@ -183,7 +183,7 @@ def _binned(x: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _is_logarithmic(along: Array) -> bool:
-    """Whether values are spaced more evenly by ratio than by difference."""
+    """Check for values that are spaced more evenly by ratio than by difference."""
     distinct = np.unique(along)
     if distinct.size < 3:
         return False

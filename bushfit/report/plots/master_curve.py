@@ -25,29 +25,35 @@ _BEYOND = 4.0
 
 @style.in_own_style
 def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> Figure:
-    """Stiffness and loss factor over reduced frequency, a row a place: at the amplitude with most temperatures."""
-    places = list(dict.fromkeys(each.sweep.direction for each in found))
-    degrees = sorted({_degree(each) for each in found})
+    """Stiffness and loss factor over reduced frequency, a row of panels per place.
+
+    Args:
+        model: fitted.
+        found: sweeps shifted to 23 degC.
+        title: of the figure.
+    """
+    places = list(dict.fromkeys(shifted.sweep.direction for shifted in found))
+    degrees = sorted({_degree(shifted) for shifted in found})
     figure = style.new_figure(title, style.ROW * len(places))
     grid, levels = figure.subplots(len(places), 2, squeeze=False), []
     for place, (stiffness, loss) in zip(places, grid, strict=True):
-        mine = [each for each in found if each.sweep.direction is place]
-        reached = np.sort(np.concatenate([each.sweep.amplitude for each in mine]))
+        of_place = [shifted for shifted in found if shifted.sweep.direction is place]
+        reached = np.sort(np.concatenate([shifted.sweep.amplitude for shifted in of_place]))
         near = np.searchsorted(reached, _NEAR * reached) - np.arange(reached.size)
         level = float(np.median(reached[near.argmax() :][: near.max()]))  # near it most points lie
         moved, length = place.display.displacement
         levels.append(f"{place} {number(level * length, 3)} {moved}")
         unit, factor = display_unit(
-            *place.display.stiffness, max(np.abs(each.reduced_stiffness).max() for each in mine)
+            *place.display.stiffness, max(np.abs(shifted.reduced_stiffness).max() for shifted in of_place)
         )
-        reach = np.concatenate([each.reduced_frequency for each in mine])
+        reach = np.concatenate([shifted.reduced_frequency for shifted in of_place])
         frequency = np.geomspace(reach.min(), reach.max(), _FINE)
         line = model.stiffness(place, frequency, level)
         for axes, part in ((stiffness, lambda k, by=factor: by * np.abs(k)), (loss, loss_factor)):
-            for each in mine:
-                look = style.styles(len(degrees), "temperature")[degrees.index(_degree(each))]
-                at = np.abs(np.log(each.sweep.amplitude / level)) < np.log(_NEAR)
-                points = each.reduced_frequency[at], part(each.reduced_stiffness[at])
+            for shifted in of_place:
+                look = style.styles(len(degrees), "temperature")[degrees.index(_degree(shifted))]
+                near_level = np.abs(np.log(shifted.sweep.amplitude / level)) < np.log(_NEAR)
+                points = shifted.reduced_frequency[near_level], part(shifted.reduced_stiffness[near_level])
                 axes.plot(*points, "o", color=look.color, **style.DOT)
             axes.plot(frequency, part(line), color=style.INK, lw=1.1, zorder=3)
             style.logarithmic(axes, reach)
@@ -56,43 +62,55 @@ def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> F
         style.name_levels(loss, [f"{degree:g}" for degree in degrees], "temperature", [True] * len(degrees))
     return style.explained(
         figure,
-        f"Line: the model at 23 degC, {', '.join(levels)}. Points: measured at the temperatures beside [degC], brought",
-        "to 23 degC by the model's shift factors, and by how its moduli change.",
+        f"Line: model at 23 °C, {', '.join(levels)}. Points: measured at the temperatures in the legend [°C], shifted",
+        "to 23 °C by the model.",
     )
 
 
 @style.in_own_style
 def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -> Figure:
-    """Shift factors over temperature, by the law and as each sweep asks for, and how far these are off the law."""
+    """Shift factors over temperature by the law and of sweep sweep alone, and their difference.
+
+    Args:
+        result: fitted, with the error of the law.
+        found: sweeps shifted to 23 degC.
+        title: of the figure.
+    """
     figure = style.new_figure(title, style.ROW)
     factors, off = figure.subplots(1, 2)
-    kelvin = np.array([each.temperature for each in found])
+    kelvin = np.array([shifted.temperature for shifted in found])
     fine = np.linspace(kelvin.min(), kelvin.max(), _FINE)
     line, error = (values / np.log(10.0) for values in law(result, fine))
-    own, unsure = np.array([each.own for each in found]).T / np.log(10.0)
-    at_law = np.array([each.shift[0] for each in found]) / np.log(10.0)
+    own, unsure = np.array([shifted.own for shifted in found]).T / np.log(10.0)
+    at_law = np.array([shifted.shift[0] for shifted in found]) / np.log(10.0)
     color = style.styles(1, "amplitude")[0].color
     for axes, base, points in ((factors, line, own), (off, 0.0 * line, own - at_law)):
         axes.fill_between(fine - CELSIUS, base - Z95 * error, base + Z95 * error, color="#ebebeb", lw=0)
         axes.plot(fine - CELSIUS, base, color=style.INK, lw=1.1)
         axes.errorbar(kelvin - CELSIUS, points, Z95 * unsure, fmt="o", color=color, lw=0.8, **style.POINT)
     style.label_axes(factors, "temperature [degC]", "log10 a_T [-]")
-    style.label_axes(off, "temperature [degC]", "log10 a_T, own less law [-]")
+    style.label_axes(off, "temperature [degC]", "log10 a_T, sweep minus law [-]")
     return style.explained(
         figure,
-        f"Line: the law, with a shift of {number(result.model.values[SHIFT], 3)} 1/K at 23 degC, grey its 95 % band.",
-        "Points: what each sweep asks for by itself, bars 95 %.",
+        f"Line: law, with a shift of {number(result.model.values[SHIFT], 3)} 1/K at 23 °C; grey: its 95 % band.",
+        "Points: shift factor of sweep sweep alone, with 95 % intervals.",
     )
 
 
 def _degree(found: Shifted) -> float:
-    """The temperature of a sweep to a degree [degC]."""
+    """Temperature of a sweep, rounded [degC]."""
     return float(np.round(found.temperature - CELSIUS))
 
 
 @style.in_own_style
 def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
-    """Storage and loss modulus of each part and of its arms, and the relative error within the band."""
+    """Storage and loss modulus of sweep part and of its Maxwell arms, and the relative error within the band.
+
+    Args:
+        model: whose effects the arms replace.
+        arms: of sweep effect.
+        title: of the figure.
+    """
     figure = style.new_figure(title, style.ROW)
     moduli, errors = figure.subplots(1, 2)
     low, high = arms[0].band
@@ -115,6 +133,6 @@ def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
     errors.set_ylim(bottom=0.0)
     return style.explained(
         figure,
-        "Wide grey: the model; coloured: its arms; solid storage, dashed loss. Shaded: where the arms were fitted.",
+        "Wide grey lines: model; coloured: Maxwell arms; solid: storage, dashed: loss. Shaded: band of the fit.",
         *(f"{part.sentence}." for part in arms),
     )

@@ -70,7 +70,7 @@ class SweepGroup(NamedTuple):
 
     @property
     def shares_levels(self) -> bool:
-        """Whether levels alone tell the curves apart: no temperatures, parts or free sweeps."""
+        """True if the curves differ by their level alone: no temperatures, parts or free sweeps."""
         return self.palette in ("amplitude", "frequency")
 
 

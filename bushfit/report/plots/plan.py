@@ -1,4 +1,4 @@
-"""A plan beside the standard programme: operating points by direction, and the errors that both would leave."""
+"""A plan and the standard programme: operating points by direction, and the expected errors of both."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from bushfit.report.plots import style
 from bushfit.report.tables import spread
 from bushfit.units import number
 
-#: Colours of the plan, of the standard programme and of what is known before: apart in grey print too.
+#: Colours of the plan, of the standard programme and of present knowledge, distinct in grey print.
 _COLORS = {"planned": "#1b6ca8", "standard programme": "#d98324", "known now": style.GREY}
 #: Markers of sweeps and loops.
 _MARKERS = {False: "o", True: "D"}
@@ -26,7 +26,7 @@ _ONE_RUN = 2.8
 
 @style.in_own_style
 def plan_figure(plan: Plan) -> Figure:
-    """Two panels a direction, the plan left and the standard programme right, and below the errors of both."""
+    """Operating points of the plan (left) and the standard programme (right) by direction, and the errors of both."""
     programmes = {"planned": plan.planned, "standard programme": plan.standard}
     tests = [test for programme in programmes.values() for test in programme.tests]
     places = list(dict.fromkeys(test.direction for test in tests))
@@ -49,9 +49,9 @@ def plan_figure(plan: Plan) -> Figure:
     _draw_stiffness(grid[-1, 1], programmes)
     return style.explained(
         figure,
-        "Above: what each run of the rig measures; a line joins the points of a sweep. Below: relative standard errors "
-        "of the parameters and of the stiffness at the points that are wanted, with what either programme would add to "
-        "what is known now. All of it is computed from a model: nothing was tested.",
+        "Above: points of each run of the rig; a line joins the points of a sweep. Below: expected relative standard "
+        "errors of the parameters and of the stiffness at the wanted points after each programme. All values are "
+        "computed from a model: nothing was tested.",
     )
 
 
@@ -62,7 +62,7 @@ def _points(test: Test) -> Array:
 
 
 def _draw(axes: Axes, tests: Sequence[Test], color: str) -> None:
-    """The points of each run, the larger the more often it is repeated; runs of many points first."""
+    """Draw the points of each run, larger the more often it is repeated; runs of many points first."""
     for test, count in sorted(Counter(tests).items(), key=lambda pair: -len(_points(pair[0]))):
         loop = isinstance(test, SimulatedLoop)
         diameter = _ONE_RUN * np.sqrt(count)
@@ -91,7 +91,7 @@ def _draw_errors(axes: Axes, plan: Plan, programmes: dict[str, Programme]) -> No
 
 
 def _draw_stiffness(axes: Axes, programmes: dict[str, Programme]) -> None:
-    """The error of the stiffness at each point that is wanted, from the smallest to the largest."""
+    """Draw the error of the stiffness at each wanted point, from the smallest to the largest."""
     for (name, programme), marker in zip(programmes.items(), "os", strict=True):
         values = 100.0 * np.sort(programme.stiffness)
         share = 100.0 * (np.arange(values.size) + 0.5) / values.size

@@ -54,13 +54,13 @@ NAMES: dict[str, Any] = {"fontsize": TEXT, "color": INK}
 WORDS: dict[str, Any] = {"fontsize": SMALL, "color": INK}
 #: Resolution of a picture [dots per inch]: sharp in a report, and small enough to be mailed.
 _DPI = 150
-#: By format: what it would say of when and by which version it was written.
+#: Metadata that would hold date and version, by format.
 _UNSAID = {"png": ["Software"], "svg": ["Creator", "Date"], "pdf": ["Creator", "Producer", "CreationDate"]}
-#: Most lines that a legend names: more do not fit beside a panel, and more colours are not told apart.
+#: Most lines that a legend names: more do not fit beside a panel.
 MOST_NAMED = 8
-#: Right of the panel, in matplotlib's words.
+#: Options of a legend right of the panel.
 _LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "frameon": False, "handlelength": 3.2}
-#: Colours of what a figure tells apart: a scale each, so that no colour means two things. Loops stay off black.
+#: Colour scale of each kind of level, with its ends: no colour means two things.
 _SCALES = {
     "amplitude": ("viridis", 0.0, 0.8),
     "frequency": ("inferno", 0.1, 0.76),
@@ -76,9 +76,9 @@ _LOG_RATIO = 40.0
 #: Letters in a line of the title and of the explanation, as many as the width of a figure holds, and of the name of a
 #: panel at its left, as many as its height holds.
 _TITLE_LETTERS, _NOTE_LETTERS, _LABEL_LETTERS = 64, 112, 27
-#: Letters of the warnings below a picture: five lines or so, beside which the panels keep their size.
+#: Letters of the warnings below a figure at most: about five lines.
 _MOST_LETTERS = 600
-#: Fonts that help out for names beyond Latin, Greek and Cyrillic, where they are installed.
+#: Fonts for names beyond Latin, Greek and Cyrillic, if they are installed.
 _WIDER_FONTS = {"Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "Microsoft YaHei", "SimHei", "PingFang SC"}
 #: matplotlib's defaults without those that choose a window system.
 _SETTINGS: dict[str, Any] = {
@@ -117,12 +117,12 @@ class Style(NamedTuple):
     marker: str
 
     def handle(self, marked: bool) -> Line2D:
-        """The line that stands for it in a legend, with its marker or without."""
+        """Line for a legend, with the marker or without."""
         return Line2D([], [], color=self.color, ls=self.dashes, lw=1.3, marker=self.marker * marked, **POINT)
 
 
 def styles(count: int, what: str) -> list[Style]:
-    """A style for each of so many amplitudes, frequencies or loops; by colour alone where a colour bar names them."""
+    """Styles of so many levels, by colour alone where a colour bar names them; `what` chooses the colour scale."""
     name, first, last = _SCALES[what]
     colors = colormaps[name](np.linspace(first, last, count))
     if count > MOST_NAMED and what != "loop":
@@ -131,7 +131,7 @@ def styles(count: int, what: str) -> list[Style]:
 
 
 def new_figure(title: str, height: float) -> Figure:
-    """An empty figure as wide as a page, of so many centimetres for its panels, under a title of any letters."""
+    """An empty figure as wide as a page; `height` is the height of its panels [cm], the title any text."""
     lines = textwrap.wrap(title, _TITLE_LETTERS)
     height += FRAME + LINE * max(0, len(lines) - 1)
     size = _WIDTH / 2.54, height / 2.54
@@ -146,7 +146,13 @@ def fonts() -> list[str]:
 
 
 def label_axes(axes: Axes, x_label: str, y_label: str, x: Array | None = None) -> None:
-    """Give a panel its labels, ticks and a grid behind all that is drawn; logarithmic where its `x` span decades."""
+    """Give a panel its labels, ticks and a grid.
+
+    Args:
+        axes: panel.
+        x_label, y_label: with units.
+        x: values along x; the axis is logarithmic if they span decades.
+    """
     axes.set_xlabel(x_label, **NAMES)
     label_left(axes, y_label)
     axes.tick_params(labelsize=SMALL, colors=INK)
@@ -159,14 +165,20 @@ def label_axes(axes: Axes, x_label: str, y_label: str, x: Array | None = None) -
 
 
 def label_left(axes: Axes, label: str, **place: Any) -> None:
-    """Write what a panel shows at its left, in several lines where one would be longer than the panel is high."""
+    """Write the label left of a panel, in several lines if one is longer than the panel is high."""
     whole = re.sub(r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), label)
     lines = [part for line in whole.splitlines() for part in textwrap.wrap(line, _LABEL_LETTERS)]
     axes.set_ylabel("\n".join(lines), family=fonts(), parse_math=False, **NAMES, **place)
 
 
 def logarithmic(axes: Axes, values: Array, along: Literal["x", "y"] = "x") -> None:
-    """Make an axis logarithmic, with plain numbers."""
+    """Make an axis logarithmic, with plain numbers.
+
+    Args:
+        axes: panel.
+        values: that the axis shows.
+        along: "x" or "y".
+    """
     axis = {"x": axes.xaxis, "y": axes.yaxis}[along]
     axes.set(**{f"{along}scale": "log"})
     axis.set_major_locator(LogLocator(subs=(1, 3) if values.max() < _LOG_RATIO**2 * values.min() else (1,)))
@@ -175,21 +187,21 @@ def logarithmic(axes: Axes, values: Array, along: Literal["x", "y"] = "x") -> No
 
 
 def least_span(axes: Axes, least: float) -> None:
-    """Widen a y axis to at least this span, so that rounding errors of a constant do not fill the panel."""
+    """Widen a y axis to at least this span, so that rounding errors do not fill the panel."""
     low, high = axes.get_ylim()
     if high - low < least:
         axes.set_ylim((low + high - least) / 2.0, (low + high + least) / 2.0)
 
 
 def noise_band(axes: Axes) -> None:
-    """Shade in grey where 95 % of the residuals should lie."""
+    """Shade the band in which 95 % of the residuals should be."""
     axes.axhspan(-Z95, Z95, color="#ebebeb", lw=0, zorder=0)
     axes.axhline(0.0, color=GREY, lw=0.6, zorder=1)
     least_span(axes, 7.0)
 
 
 def mark_outliers(axes: Axes, x: Array, y: Array) -> None:
-    """Draw crosses at outliers, at the edge of the panel where they lie beyond it."""
+    """Draw crosses at outliers, (n,) each, at the edge of the panel if they are beyond it."""
     low, high = axes.get_ylim()
     if x.size:
         axes.plot(x, np.clip(y, low, high), "x", color="#c1121f", ms=4.5, mew=1.2, zorder=5, clip_on=False)
@@ -205,10 +217,14 @@ def legend(
     besides: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
     **place: Any,
 ) -> None:
-    """Name the lines of a panel; of more than eight name eight, spread from first to last, and say how many more.
+    """Add a legend to a panel, by default at its right.
 
-    `besides` are named after the levels, by their labels; `place` says where the legend stands, in matplotlib's words,
-    or else right of the panel.
+    Args:
+        axes: panel.
+        handles, labels: of the lines; of more than eight, eight are named, and the number of the others.
+        title: of the legend.
+        besides: further lines by their labels.
+        place: options of matplotlib's legend.
     """
     named = [(handles[place], labels[place]) for place in spread(len(handles), MOST_NAMED)]
     if left := len(handles) - len(named):
@@ -225,9 +241,14 @@ def name_levels(
     marked: Sequence[bool],
     besides: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
 ) -> None:
-    """Say which line is which level: by a legend, the stiffest on top, or of more than eight by a colour bar.
+    """Name the levels of a panel by a legend, or of more than eight by a colour bar.
 
-    `levels` are amplitudes or frequencies in words, rising, (k,); `marked`, whether each has points, (k,).
+    Args:
+        axes: panel.
+        levels: amplitudes or frequencies as texts, rising, (k,).
+        what: "amplitude" or "frequency", the title.
+        marked: whether each level has points, (k,).
+        besides: further lines by their labels.
     """
     looks = styles(len(levels), what)
     if len(levels) <= MOST_NAMED:
@@ -247,15 +268,12 @@ def name_levels(
 
 
 def file_name(name: str, letters: int = 20) -> str:
-    """The name of a file as text of a figure: its dollars are no formulas, and what is too long loses its middle.
-
-    Three columns of a legend with names of twenty letters fill the width of a figure.
-    """
+    """The name of a file as text of a figure, shortened, in which dollars start no formula."""
     return shortened(name, letters).replace("$", r"\$")
 
 
 def first_sentences(sentences: Sequence[str]) -> str:
-    """The first of some sentences, as many as leave room for the picture, and how many more there are."""
+    """The first sentences, as many as leave room for the panels, and the number of the others."""
     ends = np.cumsum([len(sentence) for sentence in sentences])
     kept = max(int(np.searchsorted(ends, _MOST_LETTERS)), 1)
     more = len(sentences) - kept
@@ -264,7 +282,7 @@ def first_sentences(sentences: Sequence[str]) -> str:
 
 
 def explained(figure: Figure, *sentences: str) -> Figure:
-    """The figure, which says below its panels what lines, shades and points are."""
+    """The figure with an explanation of lines, shades and points below its panels."""
     text = textwrap.fill(" ".join(filter(None, sentences)), _NOTE_LETTERS)
     figure.supxlabel(text, x=0.01, ha="left", fontsize=SMALL, color=GREY, parse_math=False)
     return figure
