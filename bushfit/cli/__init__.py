@@ -5,6 +5,7 @@ import importlib
 import io
 import os
 import re
+import signal
 import sys
 from collections.abc import Callable
 from typing import Any, TextIO
@@ -49,6 +50,8 @@ _LONGEST = max(map(len, _COMMANDS))
 
 #: Linear algebra on one thread: the matrices are small, and a sum split over threads ends in other digits.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+#: Longest path that a message quotes, in characters.
+_LONGEST_PATH = 300
 #: Widest text of a help, in characters: longer lines are hard to read.
 _HELP_WIDTH = 110
 
@@ -99,6 +102,7 @@ def main(command: click.Command = cli) -> None:
     os.environ["MPLBACKEND"] = _BACKEND
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # whatever the code page: programs read it
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # temporary files are removed, as after Ctrl-C
     heard, read = _Stream(sys.stderr, is_needed=False), _Stream(sys.stdout, is_needed=True)
     with contextlib.redirect_stderr(heard), contextlib.redirect_stdout(read):
         sys.exit(_status(command))
@@ -123,6 +127,11 @@ def _status(command: click.Command) -> int:
         message = f"error: {error}"
     except MemoryError:
         message = "error: out of memory"
+    except OSError as error:  # of a path that was typed or that a file names
+        path = printable(str(error.filename or ""))
+        message = (
+            f"error: {f'{path[:_LONGEST_PATH]}: ' if path else ''}this cannot be opened\n  found: {error.strerror}"
+        )
     except Exception as error:  # a fault of bushfit, not of its user
         if os.environ.get("BUSHFIT_TRACEBACK"):
             raise

@@ -100,6 +100,9 @@ def _print_comparison(output: Output, compared: ComparisonOutput) -> None:
     """Print the letters of the results, and what differs; of families, how they fit the tests."""
     from bushfit.report.compared import FAMILY_HEADS, SideBySide
 
+    differences = compared.words if output.verbose or not compared.families else []
+    for line in (*compared.advice, *compared.notes, *differences):
+        output.print(line)
     for label, entry in zip(compared.labels, compared.entries, strict=True):
         output.print(f"{label}: {entry.name} ({entry.source})")
     if output.verbose or not compared.families:
@@ -107,9 +110,6 @@ def _print_comparison(output: Output, compared: ComparisonOutput) -> None:
     if compared.families:
         title = "families; held out: root mean square in units of noise, 1 where noise is all"
         output.print_table(title, FAMILY_HEADS, SideBySide.of(compared.document).family_cells())
-    differences = compared.words if output.verbose or not compared.families else []
-    for line in (*compared.advice, *compared.notes, *differences):
-        output.print(line)
     output.warn(line for line in compared.warnings if line not in compared.notes)
 
 

@@ -137,6 +137,12 @@ def _target(text: str) -> tuple[str, float]:
 def _print_plan(output: Output, outcome: PlanOutput) -> None:
     """The tests, what they would tell beside the standard programme, and what a user must know."""
     document = outcome.document
+    hours = number(document["hours_planned"], 3)
+    gains = (
+        f"{place} {number(100.0 * row['before'], 2)} to {number(100.0 * row['planned'], 2)} %"
+        for place, row in document["stiffness"].items()
+    )
+    output.print(f"{len(document['tests'])} runs in {hours} h: standard error of the stiffness {', '.join(gains)}")
     output.print(f"known before: {document['source']}")
     _print_tests(output, outcome)
     standard = f"standard, {number(document['hours_standard'], 3)} h"

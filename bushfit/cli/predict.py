@@ -14,6 +14,7 @@ from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction
 
 if TYPE_CHECKING:
     from bushfit.commands.predict import PredictionOutput
+    from bushfit.prediction.stiffness import Prediction
 
 #: Largest number of amplitudes of a direction that the terminal shows; the CSV has all.
 _MOST_AMPLITUDES = 8
@@ -71,6 +72,8 @@ def command(
         "arms": positive(arms, "--arms", "1"),
     }
     predicted = predict(result, loaded, wide=wide, **settings)
+    for prediction in predicted.predictions:
+        output.print(_summary(prediction))
     print_predictions(output, predicted)
     for resonance in predicted.resonances:
         frequency, largest = resonance.peak
@@ -82,6 +85,19 @@ def command(
     inputs = [model_file(model), *([bushing] if bushing else []), *(input_files(loaded) if loaded else [])]
     folder = output.folder((loaded or predicted.result).name)
     output.write(folder, predicted.files, predicted.document, inputs)
+
+
+def _summary(prediction: Prediction) -> str:
+    """Range of stiffness and loss factor of a prediction, in one line."""
+    from bushfit.units import format_range
+
+    force, loss = prediction.direction.display.stiffness, prediction.loss_factor.value
+    stiffness = force.factor * prediction.stiffness.value
+    return (
+        f"{prediction.direction}: {prediction.direction.motion.words[2]} "
+        f"{format_range(force.name, stiffness.min(), stiffness.max())}, loss factor "
+        f"{format_range('', loss.min(), loss.max()).strip()}, {format_range('Hz', *prediction.frequency[[0, -1]])}"
+    )
 
 
 def print_predictions(output: Output, predicted: PredictionOutput) -> None:

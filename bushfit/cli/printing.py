@@ -21,9 +21,14 @@ _MOST_TESTS = 8
 
 
 def print_fit(output: Output, name: str, fitted: FitOutput) -> None:
-    """Print each step of a fit, and above all the parameters that the tests leave open."""
-    if left_open := fitted.result.left_open:
+    """Print the quality of a fit, parameters that the tests leave open, and each step."""
+    result = fitted.result
+    if left_open := result.left_open:
         output.console.print(f"[bold]{escape(name)}:[/bold] [yellow]{escape(left_open)}[/]")
+    if result.quality:
+        misfit, chi_square = number(100 * result.quality.nrmse, 2), number(result.quality.reduced_chi_square, 3)
+        verdict = f"fitted with NRMSE {misfit} %, reduced chi-square {chi_square} (1 is noise alone)"
+        output.console.print(f"[bold]{escape(name)}:[/bold] {verdict}")
     for title, result in fitted.steps:
         print_step(output, f"{name}: {title}", result)
 

@@ -44,6 +44,8 @@ def view_bytes(
     """
     try:
         if not file.exists():
+            if file.is_symlink():
+                raise kind("this link leads to no file", file=file, found=f"a link to {file.readlink()}")
             siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
             hint = did_you_mean(file.name, siblings) or "check the path for a typing error"
             expected = "a relative path counts from here, or from the folder of the file that names it"

@@ -277,8 +277,8 @@ def test_json_is_utf8_in_any_code_page_and_no_text_steers_the_terminal(folder: P
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
-@pytest.mark.parametrize("after", [0.1, 0.5])
-def test_an_early_ctrl_c(after: float, folder: Path) -> None:
+@pytest.mark.parametrize(("after", "sent"), [(0.1, signal.SIGINT), (0.5, signal.SIGINT), (1.5, signal.SIGTERM)])
+def test_an_early_ctrl_c_and_a_request_to_end(after: float, sent: signal.Signals, folder: Path) -> None:
     """From the first line of bushfit on, which here says that it has begun."""
     code = (
         "import signal, sys; sys.argv = ['bushfit', 'run', 'campaign.toml']\n"
@@ -290,7 +290,7 @@ def test_an_early_ctrl_c(after: float, folder: Path) -> None:
         assert run.stdout
         run.stdout.readline()
         time.sleep(after)
-        run.send_signal(signal.SIGINT)
+        run.send_signal(sent)
         err = run.communicate()[1]
     assert_one_line(run.returncode, err.lstrip(b"\n"))
     assert err.endswith(b"bushfit: aborted\n")

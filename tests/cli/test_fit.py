@@ -69,12 +69,11 @@ def second_off(own: Path, off: float, tilted: bool = False) -> None:
 def test_repeats_that_disagree_do_not_excuse_themselves(own: Path, off: float, tilted: bool, told: list[str]) -> None:
     second_off(own, off, tilted)
     for command in ("fit", "diagnose"):
-        done = typing(own)(command, CAMPAIGN, "-o", command, "--no-plots")
+        done = typing(own)(command, CAMPAIGN, "-o", command, "--no-plots", "-v")
         warnings = [line for line in done.stderr.splitlines() if line.startswith("warning:")]
         assert [words for words in (ROWS_APART, REPEATS_OFF) if any(words in line for line in warnings)] == told
         if ROWS_APART in told:
-            assert done.stderr.startswith("warning:")  # before anything is fitted
-            assert re.search(r"sweep_axial.csv.*rows \d+ and \d+", warnings[0])
+            assert any(re.search(r"sweep_axial.csv.*rows \d+ and \d+", line) for line in warnings)
     assert ("consistent" in done.stderr) is not bool(told)
 
 
@@ -90,7 +89,7 @@ def test_rows_that_lie_far_apart_are_told_wherever_tests_are_read(
     own: Path, work: Path, words: tuple[str, ...]
 ) -> None:
     second_off(own, 0.13)
-    done = typing(own)(*(word.format(work=work) for word in words), "-o", "out", "--no-plots", "--json")
+    done = typing(own)(*(word.format(work=work) for word in words), "-o", "out", "--no-plots", "--json", "-v")
     for told in (done.stderr, done.stdout):
         assert ROWS_APART in " ".join(told.split())
         assert re.search(r"sweep_axial.csv: .*, rows \d+ and \d+", " ".join(told.split()))
@@ -261,9 +260,10 @@ def test_run_and_diagnose_write_the_model_that_fit_writes_where_nothing_is_missi
     words = (
         *("CMP 15 961: consistent", "joint fit", "mu ", "NRMSE", "correlation: ", "tested range"),
         *("axial: 0.1 to 155 Hz, 0.1 to 1 mm", "radial: 5 to 155 Hz, 0.1 to 0.5 mm, not fitted"),
-        *("axial, corners", "radial, corners", "extrapolated beyond"),
+        *("axial, corners", "radial, corners"),
         "two-step procedure (the paper's): 10 passes, agrees with the joint fit within 1 standard error",
-        *("times less certain than there (static.json, dynamic.json; -v shows it)", "wrote static.json"),
+        "times less certain than there (static.json, dynamic.json; -v shows it)",
+        *("extrapolated beyond", "wrote static.json"),
         "the model to use: ",
     )
     places = [ran.stderr.index(word) for word in words]
@@ -298,9 +298,10 @@ def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_said_first(own: Pat
     for done in (ran, told):
         assert done.stderr.startswith(f"CMP 15 961: consistent; {UNKNOWN}\n")
     assert "no sweeps: the two-step procedure is passed over" in ran.stderr
-    assert "one loop rate, 0.1 Hz: mu, m and alpha cannot be told from one another" in ran.stderr
-    assert "the further test that would help most: a loop at" in ran.stderr
-    assert document(tmp_path / "run/model.json")["warnings"][0] == UNKNOWN
+    warnings = document(tmp_path / "run/model.json")["warnings"]
+    assert any("one loop rate, 0.1 Hz: mu, m and alpha cannot be told from one another" in line for line in warnings)
+    assert any("the further test that would help most: a loop at" in line for line in warnings)
+    assert warnings[0] == UNKNOWN
     fitted = typing(own)("fit", CAMPAIGN, "-o", tmp_path / "fit", "--no-plots", "--json")
     assert fitted.stderr.startswith(f"CMP 15 961: {UNKNOWN}\n")
     assert json.loads(fitted.stdout)["warnings"][0] == UNKNOWN

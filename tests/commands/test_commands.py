@@ -42,7 +42,7 @@ def test_the_grid_of_a_comparison_is_in_the_range_of_all_results(
     frequency, amplitude = common_grid([one, two], [Direction.AXIAL] * 2)
     assert frequency.tolist() == [5.0, 15.0, 25.0, 35.0, 45.0, 55.0]
     assert amplitude.tolist() == [2e-4, 5e-4]
-    assert common_grid([one, one], [Direction.AXIAL] * 2)[0][0] == 1.0
+    assert common_grid([one, one], [Direction.AXIAL] * 2)[0][0] == 5.0
     apart = fitted(paper_model, (200.0, 300.0), (1e-4, 1e-3))
     assert (
         common_grid([one, apart], [Direction.AXIAL] * 2)[0].tolist() == default_grid(one, Direction.AXIAL)[0].tolist()
