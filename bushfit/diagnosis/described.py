@@ -22,7 +22,7 @@ from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import with_model_error
-from bushfit.fitting.robust import Estimate
+from bushfit.fitting.robust import WeightedFit
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number
@@ -47,7 +47,7 @@ class Described:
     """
 
     after: Evidence
-    fitted: Estimate
+    fitted: WeightedFit
     held: HoldOut
     fingerprint: Fingerprint | None
     words: str
@@ -106,7 +106,7 @@ def _refitted(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], b
     return Evidence(fit_from(model, data_sets, held, bounds).finished(_EVALUATIONS).solution, tuple(data_sets))
 
 
-def _held_out(before: Evidence, fitted: Estimate) -> HoldOut:
+def _held_out(before: Evidence, fitted: WeightedFit) -> HoldOut:
     """Whole runs inside the range, in turn predicted from the others, without the correction and with it."""
     solution = before.solution
     both = (

@@ -9,13 +9,13 @@ import numpy as np
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
 from bushfit.fitting.agreement import met_within, misfits, usable
-from bushfit.fitting.assess import Stage, apart_in_temperature, covariance, measured_range, quality
+from bushfit.fitting.assess import FitStage, apart_in_temperature, covariance, measured_range, quality
 from bushfit.fitting.coordinates import Bounds, Solution
 from bushfit.fitting.data_sets import DataSet, sources
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.procedures import cautions
-from bushfit.fitting.robust import Estimate
+from bushfit.fitting.robust import WeightedFit
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 
@@ -52,9 +52,9 @@ class Evidence:
         return self.solution.residual
 
     @property
-    def estimate(self) -> Estimate:
+    def estimate(self) -> WeightedFit:
         """The same as a fit that leaves nothing out."""
-        return Estimate(self.solution, self.data_sets, self.data_sets, self.data_sets, ())
+        return WeightedFit(self.solution, self.data_sets, self.data_sets, self.data_sets, ())
 
     @property
     def chi_square(self) -> float:
@@ -114,7 +114,7 @@ def result_of(
     told: Collection[str],
     *,
     lacking: bool = True,
-    corrected: Estimate | None = None,
+    corrected: WeightedFit | None = None,
     rig: RigSettings = UNSTATED,
 ) -> Result:
     """The model with its uncertainty; a parameter at rest on a bound counts as held there.
@@ -130,7 +130,7 @@ def result_of(
         model = found.solution.model
     solution = found.solution
     moving = tuple(name for name in solution.coordinates.names if name not in solution.at_bound)
-    cov = covariance(solution.model, [Stage(moving, found.weighed, found.process)])
+    cov = covariance(solution.model, [FitStage(moving, found.weighed, found.process)])
     return Result(
         model,
         moving,

@@ -8,7 +8,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Where
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import parted
-from bushfit.fitting.sweep_data import Line
+from bushfit.fitting.sweep_data import LineMisfit
 from bushfit.units import number
 
 #: Smooth misfit, in units of the noise of its root mean square, from which a region is worth a line.
@@ -73,7 +73,7 @@ def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
 
 def _read_sweep(
     part: str,
-    lines: Sequence[Line],
+    lines: Sequence[LineMisfit],
     pieces: Sequence[Array],
     touched: Sequence[int],
     spans: tuple[tuple[float, float], tuple[float, float]],

@@ -61,7 +61,7 @@ class Process:
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class FitStage:
     """One fit of a procedure: the parameters it moved, the data it saw, and how the model misses them, if it does."""
 
     names: tuple[str, ...]
@@ -69,7 +69,7 @@ class Stage:
     process: Process | None = None
 
 
-def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = None) -> Covariance:
+def covariance(model: Model, stages: Sequence[FitStage], held: Covariance | None = None) -> Covariance:
     """Covariance of all parameters that a procedure estimated, each stage holding what the others found.
 
     `held` is that of parameters which all stages held.
@@ -126,7 +126,7 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     return Covariance(names, matrix, tuple(spread))
 
 
-def _of_gains(stage: Stage, influence: Array) -> Array:
+def _of_gains(stage: FitStage, influence: Array) -> Array:
     """Covariance, (k, k), by gain errors that have no part in the weights, from the influence of residuals, (k, n)."""
     added = np.zeros((len(influence), len(influence)))
     for data_set, rows in zip(stage.data_sets, rows_of(stage.data_sets), strict=True):
@@ -136,7 +136,7 @@ def _of_gains(stage: Stage, influence: Array) -> Array:
     return added
 
 
-def _excess(model: Model, stage: Stage) -> list[float]:
+def _excess(model: Model, stage: FitStage) -> list[float]:
     """Factor of each test's variance: reduced chi-square where a test, or all together, exceed the noise; else 1."""
     together = lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0
     return [max(together, own or 1.0) for own in missed(model, stage.data_sets)]
@@ -163,7 +163,9 @@ def linear_errors(slope: Array) -> Array:
     return np.linalg.norm(_inverse(np.linalg.qr(slope.T)[1]), axis=1)
 
 
-def _unsure(stages: Sequence[Stage], influences: Sequence[Array], bases: Sequence[Array]) -> list[tuple[Array, Array]]:
+def _unsure(
+    stages: Sequence[FitStage], influences: Sequence[Array], bases: Sequence[Array]
+) -> list[tuple[Array, Array]]:
     """How far the error of each estimated variance moves the covariance, and what it adds by wrong weights, (k, k).
 
     Args:

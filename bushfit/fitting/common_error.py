@@ -20,7 +20,7 @@ _ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class ErrorSubspace:
     """Residuals that an error can move: all of some rows, and few directions of many others.
 
     Args:
@@ -68,12 +68,12 @@ class CommonError:
     """
 
     columns: Array
-    seen: Seen
+    seen: ErrorSubspace
 
     @classmethod
     def of_all(cls, columns: Array) -> CommonError:
         """An error that moves any of the residuals, (q, n)."""
-        return cls(columns, Seen([(slice(0, columns.shape[1]), None)]))
+        return cls(columns, ErrorSubspace([(slice(0, columns.shape[1]), None)]))
 
     @cached_property
     def along(self) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from scipy.special import stdtrit
 from bushfit.effects.contract import Array
 from bushfit.effects.temperature import REFERENCE
 from bushfit.effects.unnamed import Patch, Unnamed
-from bushfit.fitting.common_error import Seen
+from bushfit.fitting.common_error import ErrorSubspace
 from bushfit.fitting.coordinates import ROUNDING, Solution
 from bushfit.fitting.data_sets import DataSet, log_slopes, reached, rows_of
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood, coordinates, in_lengths, patterns
@@ -82,10 +82,10 @@ class FittedTests:
         return slopes * fitted.slopes(model.values)[self.solution.moving, None]
 
     @cached_property
-    def seen(self) -> Seen:
+    def seen(self) -> ErrorSubspace:
         """Residuals that changes of the stiffness can move: all of a sweep, two combinations of a loop."""
         pairs = zip(rows_of(self.data_sets), self._loops, strict=True)
-        return Seen([(rows, None if loop is None else loop[0]) for rows, loop in pairs])
+        return ErrorSubspace([(rows, None if loop is None else loop[0]) for rows, loop in pairs])
 
     def columns(self, shapes: Array) -> Array:
         """Whitened residuals, as `seen`, by relative changes of the stiffness, complex (c, p) -> (c, d)."""

@@ -14,7 +14,7 @@ from bushfit.effects import effect_name_of
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.data_sets import DataSet, parted
-from bushfit.fitting.information import Information, further_test, percent, relative_sizes
+from bushfit.fitting.information import FisherInformation, further_test, percent, relative_sizes
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
 from bushfit.units import format_range
@@ -95,7 +95,7 @@ def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], 
     """
     if not names:
         return []
-    known = Information.of(model, data_sets, names)
+    known = FisherInformation.of(model, data_sets, names)
     slopes = Coordinates.of(model, names).slopes(model.values) * relative_sizes(model, names)
     stderr = np.array([covariance.stderr(name) or 0.0 for name in names])
     each = dict(zip(names, stderr / np.abs(slopes), strict=True))
@@ -112,7 +112,7 @@ def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], 
         rest = [name for name in names if name not in zero and effect_name_of(name) not in idle]
         if not rest:
             return lines
-        known = Information.of(model, data_sets, rest)
+        known = FisherInformation.of(model, data_sets, rest)
         groups = _groups(known)
     if not groups:
         return []
@@ -129,7 +129,7 @@ def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], 
     return lines if missed else [*lines, *further_test(model, data_sets, known)]
 
 
-def _groups(known: Information) -> list[list[str]]:
+def _groups(known: FisherInformation) -> list[list[str]]:
     """Parameters of each open direction; directions that share one are one group."""
     errors, vectors = known.directions()
     groups: list[set[str]] = []
@@ -150,7 +150,7 @@ def _is_zero(model: Model, name: str, covariance: Covariance) -> bool:
     return "." in name and neutral is not None and abs(model.values[name] - neutral) < noise
 
 
-def _meaning(known: Information, group: Sequence[str]) -> str:
+def _meaning(known: FisherInformation, group: Sequence[str]) -> str:
     """Sentence on the combination of a group of parameters that is not known."""
     if set(group) == set(_FRICTION) and known.error(dict(zip(_FRICTION, (1.0, -1.0), strict=True))) < _KNOWN:
         return "sigma_fmax and eps_half are known only as a ratio"
@@ -184,7 +184,7 @@ def _reasons(model: Model, data_sets: Sequence[DataSet], involved: Sequence[str]
 
 
 def _combinations(
-    model: Model, data_sets: Sequence[DataSet], known: Information, involved: Sequence[str]
+    model: Model, data_sets: Sequence[DataSet], known: FisherInformation, involved: Sequence[str]
 ) -> Iterator[str]:
     """Combinations of what is open that are known well, with their errors."""
     errors = dict(zip(known.names, known.errors(), strict=True))

@@ -37,7 +37,7 @@ _HOPELESS = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class Information:
+class FisherInformation:
     """Fisher information of tests on parameters, each relative to its size.
 
     Args:
@@ -50,14 +50,14 @@ class Information:
     matrix: Array
 
     @classmethod
-    def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> "Information":
+    def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> "FisherInformation":
         """Information of data sets on the named parameters of a model at its values."""
         slope = jacobian(model, data_sets, names) * relative_sizes(model, names)[:, None]
         return cls(tuple(names), slope @ slope.T)
 
-    def with_more(self, model: Model, data_sets: Sequence[DataSet]) -> "Information":
+    def with_more(self, model: Model, data_sets: Sequence[DataSet]) -> "FisherInformation":
         """Information with that of further data sets added."""
-        return replace(self, matrix=self.matrix + Information.of(model, data_sets, self.names).matrix)
+        return replace(self, matrix=self.matrix + FisherInformation.of(model, data_sets, self.names).matrix)
 
     def directions(self) -> tuple[Array, Array]:
         """Relative standard errors, (k,), of the eigenvectors of the information, and these, (k, k) by column."""
@@ -87,7 +87,7 @@ def percent(error: float) -> str:
     return f"{float(f'{100.0 * error:.2g}'):g} %" if error < _BEYOND else "beyond 1000 %"
 
 
-def further_test(model: Model, data_sets: Sequence[DataSet], known: Information) -> list[str]:
+def further_test(model: Model, data_sets: Sequence[DataSet], known: FisherInformation) -> list[str]:
     """A sentence on the test that shrinks the worst standard error most, and to what; none where none helps."""
     before = known.errors()
     worst = int(np.argmax(before))

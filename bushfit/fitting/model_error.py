@@ -45,7 +45,7 @@ from bushfit.fitting.discrepancy import (
 )
 from bushfit.fitting.levels import level_errors_of
 from bushfit.fitting.rig_class import of_class
-from bushfit.fitting.robust import Estimate
+from bushfit.fitting.robust import WeightedFit
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood
@@ -70,8 +70,8 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 
 
 def with_model_error(
-    found: Estimate, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False
-) -> tuple[Estimate, Unnamed | None]:
+    found: WeightedFit, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False
+) -> tuple[WeightedFit, Unnamed | None]:
     """The closest fit and its discrepancy where the tests show a lack of fit; else the fit as it is, and None.
 
     Args:
@@ -99,10 +99,10 @@ def with_model_error(
     error = averaged(processes)
     if error.typical >= SIZES[-1]:
         return found, None
-    return Estimate(solution, found.data_sets, minimised, weighed, found.outliers, process), error
+    return WeightedFit(solution, found.data_sets, minimised, weighed, found.outliers, process), error
 
 
-def closest_fit(found: Estimate, bounds: Bounds) -> tuple[Solution, float]:
+def closest_fit(found: WeightedFit, bounds: Bounds) -> tuple[Solution, float]:
     """Least squares with the noise and an independent model error, and the relative size of this.
 
     Size and parameters follow each other: the size of the largest restricted likelihood, then the parameters.
@@ -149,7 +149,7 @@ def likeliest_size(model: Model, data_sets: Sequence[DataSet], names: Sequence[s
     return float(np.exp(found.x))
 
 
-def log_likelihood(found: Estimate, known: Mapping[str, float]) -> float:
+def log_likelihood(found: WeightedFit, known: Mapping[str, float]) -> float:
     """Logarithm of the restricted likelihood of a fit, the parameters that rest on no bound integrated.
 
     Where the model misses the tests, a process stands beside the noise, its sizes and lengths integrated.
@@ -186,7 +186,7 @@ def model_error_warning(error: Unnamed) -> str:
     )
 
 
-def _exceeds_noise(found: Estimate, rig: RigSettings) -> bool:
+def _exceeds_noise(found: WeightedFit, rig: RigSettings) -> bool:
     """True if chi-square of all tests, or of one, exceeds what noise and a rig of the class make."""
     data_sets, residual = found.minimised, found.solution.residual
     errors = [_errors_of_class(data_set, rig) for data_set in data_sets]
@@ -200,7 +200,7 @@ def _exceeds_noise(found: Estimate, rig: RigSettings) -> bool:
     return any(beyond_noise(square / count, count) is not None for square, count in pairs if count)
 
 
-def _is_smooth(found: Estimate, rig: RigSettings) -> bool:
+def _is_smooth(found: WeightedFit, rig: RigSettings) -> bool:
     """True if the tests are likelier with something smooth beside noise and a rig of the class, prior odds counted."""
     thinned = _thinned(found.minimised)
     solution = found.solution.at(found.solution.model, thinned)

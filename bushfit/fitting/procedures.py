@@ -11,7 +11,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.agreement import misfits, usable
 from bushfit.fitting.assess import (
-    Stage,
+    FitStage,
     apart_in_temperature,
     covariance,
     implausible,
@@ -29,7 +29,7 @@ from bushfit.fitting.levels import level_errors
 from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.profile import limit95, profile95
 from bushfit.fitting.rig_class import largest_error, words_of
-from bushfit.fitting.robust import Estimate, estimate, outlier_warnings
+from bushfit.fitting.robust import WeightedFit, estimate, outlier_warnings
 from bushfit.fitting.solve import solve, solve_with_lmfit
 from bushfit.geometry import get_place
 from bushfit.model.covariance import Covariance
@@ -208,7 +208,7 @@ def _solve(
     held: Mapping[str, float],
     model: Model | None = None,
     solver: Callable[..., Solution] = solve_with_lmfit,
-) -> Estimate:
+) -> WeightedFit:
     """Fit what the campaign leaves free of a model, from its values or else from start values taken from the data."""
     model = model or data.started(effects, data_sets, held)
     names = [name for name in data.free(tuple(model.parameters)) if name not in held]
@@ -217,14 +217,14 @@ def _solve(
 
 def _result(
     data: Data,
-    steps: Sequence[Estimate],
+    steps: Sequence[WeightedFit],
     held: Covariance | None = None,
     notes: Sequence[str] = (),
     left: Sequence[DataSet] = (),
 ) -> Result:
     """Collect the result of the steps of a procedure: the last model, with the uncertainty of all of them."""
     model, data_sets = steps[-1].solution.model, [data_set for step in steps for data_set in step.data_sets]
-    stages = [Stage(_moving(step), step.weighed, step.process) for step in steps]
+    stages = [FitStage(_moving(step), step.weighed, step.process) for step in steps]
     fitted = tuple(name for step in steps for name in step.solution.coordinates.names)
     cov = covariance(model, stages, held)
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
@@ -246,13 +246,13 @@ def _result(
     )
 
 
-def _moving(step: Estimate) -> tuple[str, ...]:
+def _moving(step: WeightedFit) -> tuple[str, ...]:
     """The parameters whose errors a fit tells; beside an error of the model, one at rest on a bound counts as held."""
     held = step.solution.at_bound if step.process else {}
     return tuple(name for name in step.solution.coordinates.names if name not in held)
 
 
-def cautions(model: Model, step: Estimate, bounds: Bounds, covariance: Covariance, advice: str = "") -> list[str]:
+def cautions(model: Model, step: WeightedFit, bounds: Bounds, covariance: Covariance, advice: str = "") -> list[str]:
     """Warnings on the loops of a fit, and on what its data do not determine: bounds met, what stays open, a misfit."""
     solution, data_sets = step.solution, step.data_sets
     names, at_bound = solution.coordinates.names, solution.at_bound

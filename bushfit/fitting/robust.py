@@ -34,7 +34,7 @@ _MOST_NAMED = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class WeightedFit:
     """A fit and the data behind it.
 
     Args:
@@ -70,7 +70,7 @@ def estimate(
     *,
     robust: bool = False,
     solver: Callable[..., Solution] = solve,
-) -> Estimate:
+) -> WeightedFit:
     """Fit the named parameters by least squares, or robustly: soft_l1, the outliers of sweeps left out.
 
     soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1) over the distances z of the points in units of noise.
@@ -79,7 +79,7 @@ def estimate(
     """
     if not robust:
         solution, same = solver(model, data_sets, names, bounds), tuple(data_sets)
-        return Estimate(solution, same, same, same, outliers_at(solution.model, same))
+        return WeightedFit(solution, same, same, same, outliers_at(solution.model, same))
     for _ in range(_MOST_ROUNDS):
         outlying = tuple(data_set.outlying(model) for data_set in data_sets)
         kept = tuple(data_set.without(points) for data_set, points in zip(data_sets, outlying, strict=True))
@@ -90,7 +90,7 @@ def estimate(
         model = solution.model
         if float(moved @ moved) < _SETTLED**2:
             weighed = tuple(data_set.weighted(np.array(_efficiency(data_set.parts))) for data_set in kept)
-            return Estimate(solution, kept, softened, weighed, outliers_at(model, kept, outlying))
+            return WeightedFit(solution, kept, softened, weighed, outliers_at(model, kept, outlying))
     raise FitError(
         "the robust fit does not settle",
         found=f"{_MOST_ROUNDS} rounds of reweighting",

@@ -33,7 +33,7 @@ _DIGITS = 9
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class LineMisfit:
     """Mean misfit of one line of a sweep over its repeats: of all that its runs stepped through while they held one.
 
     Args:
@@ -365,7 +365,7 @@ class SweepData(MeasuredTest):
         for row, off in sorted(zip((self.order[points] + 1).tolist(), distance, strict=True)):
             yield Outlier(self.name, file, row, "stiffness", off)
 
-    def lines(self, model: Model) -> list[Line]:
+    def lines(self, model: Model) -> list[LineMisfit]:
         """Mean misfit of each line over its repeats."""
         ratio, lines = self.measured / self.stiffness(model) - 1.0, []
         for held in np.unique(self.held):
@@ -377,7 +377,7 @@ class SweepData(MeasuredTest):
             of_one = np.square(self.noise.random[self.name, float(held)]) + np.square(self.noise.shared)
             frequency, amplitude = (values[chosen][first] for values in (self.frequency, self.amplitude))
             noise = np.sqrt(of_one / np.median(counts) + np.square(self.noise.level))
-            line = Line(self.name, self.direction, self.sweep.stepped, frequency, amplitude, mean / counts, noise)
+            line = LineMisfit(self.name, self.direction, self.sweep.stepped, frequency, amplitude, mean / counts, noise)
             lines.append(line)
         return lines
 

@@ -15,7 +15,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.agreement import LeaveOut
-from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
+from bushfit.fitting.assess import FitStage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import LoopData, new_loop
@@ -33,14 +33,14 @@ BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
 def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measured: Data, result: Result) -> None:
     """The noise is estimated too, which can only add to the inverse of J J^T."""
     model, data_sets = result.model, measured.chosen(None)
-    found = covariance(model, [Stage(FIVE, data_sets)])
+    found = covariance(model, [FitStage(FIVE, data_sets)])
     slope = jacobian(model, data_sets, FIVE)
     values = np.array([model.values[name] for name in FIVE])
     plain = np.sqrt(np.diag(np.linalg.inv(slope @ slope.T))) * values
     stated = np.array([found.stderr(name) for name in FIVE])
     assert np.all(stated >= plain * (1.0 - 1e-6))
     known = [replace(each, gain_error=0.0) if isinstance(each, LoopData) else each for each in data_sets]
-    certain = covariance(model, [Stage(FIVE, known)])  # of gain
+    certain = covariance(model, [FitStage(FIVE, known)])  # of gain
     np.testing.assert_allclose([certain.stderr(name) for name in FIVE], plain, rtol=0.1)
 
 
@@ -75,7 +75,7 @@ def test_a_parameter_that_no_test_sees_has_an_error_beyond_all_bounds(
     data_sets = Data.of(replace(rig(), sweeps=())).chosen(None)
     model = paper_model.with_effect("stiffness_factor.radial")
     names = (*FIVE[:1], "stiffness_factor.radial")
-    found = covariance(model, [Stage(names, data_sets)])
+    found = covariance(model, [FitStage(names, data_sets)])
     assert found.stderr("stiffness_factor.radial") > 10.0  # type: ignore[operator]
     assert found.stderr("mu") < 1e-2 * model.values["mu"]  # type: ignore[operator]
 
@@ -144,7 +144,7 @@ def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model: Mo
         tests = [replace(loop.test, name=f"{number}", noise=noise) for number, loop in enumerate(loops)]
         return [replace(each, drive=replace(each.drive, loop=test)) for each, test in zip(loops, tests, strict=True)]
 
-    plain, wide = (covariance(paper_model, [Stage(("mu",), stated(noise))]) for noise in (0.01, None))
+    plain, wide = (covariance(paper_model, [FitStage(("mu",), stated(noise))]) for noise in (0.01, None))
     told = np.array([float(np.sum(np.square(loop.jacobian(paper_model, ["mu"])))) for loop in loops])
     share, freedom = told / told.sum(), np.array([loop.counted for loop in loops])
     print("weights", share, "of rows", freedom)
@@ -163,7 +163,8 @@ def test_a_gain_that_does_not_weigh_moves_parameters_as_a_refit_says(small: Camp
     moved = solve(fitted, (*data.sweeps, off), FIVE).model
     shift = np.array([moved.values[name] - fitted.values[name] for name in FIVE])
     known, unknown = (
-        covariance(fitted, [Stage(tuple(FIVE), (*data.sweeps, each))]) for each in (replace(loop, gain_error=0.0), loop)
+        covariance(fitted, [FitStage(tuple(FIVE), (*data.sweeps, each))])
+        for each in (replace(loop, gain_error=0.0), loop)
     )
     added = np.sqrt(np.diag(unknown.matrix - known.matrix))
     np.testing.assert_allclose(added, np.abs(shift), rtol=0.1, atol=0.02 * np.sqrt(np.diag(known.matrix)).min())

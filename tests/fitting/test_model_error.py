@@ -18,7 +18,7 @@ from tries import SEEDS, some
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting
 from bushfit.errors import FitError
-from bushfit.fitting.assess import Stage, covariance
+from bushfit.fitting.assess import FitStage, covariance
 from bushfit.fitting.coordinates import Coordinates, jacobian
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import SweepData
@@ -258,5 +258,5 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(rig: Rig) -> None:
     ]
     slopes = found.solution.coordinates.slopes(model.values)
     moved = np.linalg.pinv(jacobian(model, [sweep], FIVE).T) @ np.concatenate(sources).T * slopes[:, None]
-    known = covariance(model, [Stage(FIVE, found.weighed, found.process)])
+    known = covariance(model, [FitStage(FIVE, found.weighed, found.process)])
     np.testing.assert_allclose(known.matrix, moved @ moved.T, rtol=1e-6)

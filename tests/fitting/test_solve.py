@@ -19,7 +19,7 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.procedures import cautions
-from bushfit.fitting.robust import Estimate
+from bushfit.fitting.robust import WeightedFit
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction
@@ -80,7 +80,7 @@ def test_a_fit_that_is_stopped_where_chi_square_is_flat_is_one_and_is_told(
     near = result.model.with_values({"mu": 1.0001 * result.model.values["mu"]})
     stopped = solve(near, axial, FIVE, evaluations=2)
     assert (stopped.stopped, stopped.flat) == (True, True)
-    notes = cautions(stopped.model, Estimate(stopped, axial, axial, axial, ()), {}, result.covariance)
+    notes = cautions(stopped.model, WeightedFit(stopped, axial, axial, axial, ()), {}, result.covariance)
     assert any(note.startswith("the fit was stopped after 2 evaluations") for note in notes)
 
 
