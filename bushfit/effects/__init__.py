@@ -1,4 +1,4 @@
-"""The library of effects: what is said of them in library.toml, their laws one physics a file."""
+"""Library of effects: records in library.toml, laws in one file each."""
 
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
@@ -22,23 +22,23 @@ from bushfit.geometry import Direction
 
 #: Directions along lines.
 _LINES = (Direction.AXIAL, Direction.RADIAL)
-#: Of the places tested, axial first, those that a search gives an effect of a place, by the word in library.toml.
+#: Selection of the places of a search from the tested places (axial first), by keyword in library.toml.
 _SOUGHT: dict[str, Callable[[Sequence[str]], Sequence[str]]] = {
     "others": lambda places: places[1:],
     "lines": lambda places: [place for place in places if place in _LINES],
 }
 _TABLE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("library.toml").read_text(encoding="utf-8"))
-#: What a file may have of the law of an effect: fields of its record.
+#: Fields of the record of an effect that its file may define.
 _LAW = (
     *("modulus", "stress", "modulus_sensitivities", "stress_sensitivities", "in_place_of"),  # of a branch
     *("adjust", "shift_factor", "stiffness", "force"),  # of a modifier, and of a layer
 )
-#: The kind of an effect, by a part of the law that no other kind has.
+#: Kind of an effect, by the field that only this kind has.
 _KINDS: dict[str, type[Effect]] = {"modulus": Branch, "adjust": Modifier, "stiffness": Layer}
 
 
 def _entry(name: str) -> dict[str, Any]:
-    """What library.toml says of an effect, itself or by the effect that it is like; "law" is the file of its law."""
+    """Table of an effect in library.toml, completed by the effect that it is like; "law" is the file of its law."""
     entry: dict[str, Any] = dict(_TABLE[name])
     if "like" not in entry:
         return {"law": name.partition(".")[0], **entry}
@@ -46,27 +46,27 @@ def _entry(name: str) -> dict[str, Any]:
 
 
 def _record(name: str) -> Effect | Family:
-    """The effect of a table of library.toml, or the family where each place may have one."""
+    """Effect of a table of library.toml, or family of effects of places."""
     entry = _entry(name)
     module = import_module(f"{__name__}.{entry.pop('law')}")
     law = {part: getattr(module, part) for part in _LAW if hasattr(module, part)}
     kind = next(kind for part, kind in _KINDS.items() if part in law)
     parameters = [
-        Parameter(own, **{"neutral": None, **each, "bounds": tuple(each["bounds"])})
-        for own, each in entry.pop("parameters").items()
+        Parameter(key, **{"neutral": None, **table, "bounds": tuple(table["bounds"])})
+        for key, table in entry.pop("parameters").items()
     ]
     if "level" in entry:
         entry["level"] = Level[entry["level"].upper()]
     radial, places = entry.pop("radial", {}), _SOUGHT[entry.pop("sought", "others")]
-    said: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
-    record = kind(name=name, parameters=tuple(parameters), **said, **law)
+    fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
+    record = kind(name=name, parameters=tuple(parameters), **fields, **law)
     return Family(record, places, radial) if name.endswith(".{place}") else record
 
 
 _RECORDS = [_record(name) for name in _TABLE]
-#: Every kind of effect that belongs to a place, by name.
+#: Families of effects of places, by name.
 FAMILIES = {each.name: each for each in _RECORDS if isinstance(each, Family)}
-#: Every effect by name, from the rubber outward; of a kind that belongs to a place, that of the radial direction.
+#: All effects by name, from the rubber outward; of a family, the effect of the radial direction.
 LIBRARY = {
     effect.name: effect
     for effect in (each.of_place(Direction.RADIAL) if isinstance(each, Family) else each for each in _RECORDS)
@@ -77,21 +77,24 @@ BASE = ("elastic", "springpot", "friction")
 
 
 def with_base(names: Iterable[str]) -> tuple[str, ...]:
-    """The paper's branches, less those that these effects replace, and these.
+    """Names of the paper's branches that the effects do not replace, followed by the effects.
 
     >>> with_base(["sliders", "inertia"])
     ('elastic', 'springpot', 'sliders', 'inertia')
     """
-    own = tuple(names)
-    replaced = {get_effect(name).replaces for name in own}
-    return (*(name for name in BASE if name not in replaced), *own)
+    added = tuple(names)
+    replaced = {get_effect(name).replaces for name in added}
+    return (*(name for name in BASE if name not in replaced), *added)
 
 
 def get_effect(name: str) -> Effect:
-    """The effect of that name.
+    """Effect of a name.
+
+    Returns:
+        Record of the effect.
 
     Raises:
-        ModelError: there is none; the nearest name is suggested.
+        ModelError: an unknown name; the message suggests the most similar one.
 
     >>> get_effect("inertia").phrase
     'moving mass between bushing and load cell'
@@ -107,32 +110,32 @@ def get_effect(name: str) -> Effect:
 
 
 def place_suffix(name: str) -> str | None:
-    """The place in the name of an effect that belongs to one, and of its parameter: `stiffness_factor.radial`.
+    """Place in the name of an effect of a family, or of its parameter; None for other names.
 
     >>> place_suffix("stiffness_factor.radial"), place_suffix("inertia.mass")
     ('radial', None)
     """
     family, _, place = name.partition(".")
-    own = name in LIBRARY or name not in _parameters()
-    return place or None if family in FAMILIES and own else None
+    of_place = name in LIBRARY or name not in _parameters()
+    return place or None if family in FAMILIES and of_place else None
 
 
 def twins_of(name: str) -> tuple[str, ...]:
-    """The names of an effect and of all that no test tells from it, the bushing's first; (name,) without twins.
+    """Names of an effect and its twins, the effect of the bushing first; (name,) without twins.
 
     >>> twins_of("guide_friction")
     ('interface_slip', 'guide_friction')
     """
     place = place_suffix(name)
-    known = [*LIBRARY.values(), *(family.of_place(place) for family in FAMILIES.values() if place)]
-    sets = ((effect.name, *effect.twins) for effect in known if effect.twins)
+    effects = [*LIBRARY.values(), *(family.of_place(place) for family in FAMILIES.values() if place)]
+    sets = ((effect.name, *effect.twins) for effect in effects if effect.twins)
     return next((names for names in sets if name in names), (name,))
 
 
 def qualified_name(effect: Effect, parameter: Parameter) -> str:
-    """Name of a parameter in files and reports: plain for the paper's three, `<effect>.<name>` for the rest.
+    """Name of a parameter in files and reports: `<effect>.<name>`, or `<name>` for the paper's three effects.
 
-    An effect that belongs to a place, such as `stiffness_factor.radial`, is named like its one parameter.
+    The one parameter of an effect of a place, such as `stiffness_factor.radial`, has the name of the effect.
 
     >>> names = ("elastic", "inertia", "stiffness_factor.radial")
     >>> [qualified_name(LIBRARY[name], LIBRARY[name].amount) for name in names]
@@ -144,7 +147,7 @@ def qualified_name(effect: Effect, parameter: Parameter) -> str:
 
 
 def effect_name_of(name: str) -> str:
-    """The name of the effect that a parameter belongs to, by the name of the parameter in files and reports.
+    """Name of the effect that a parameter belongs to.
 
     >>> effect_name_of("inertia.mass"), effect_name_of("alpha")
     ('inertia', 'springpot')
@@ -152,29 +155,29 @@ def effect_name_of(name: str) -> str:
     if place_suffix(name):
         return name
     effect, dot, _ = name.partition(".")
-    return effect if dot else next(base for base in BASE for own in LIBRARY[base].parameters if own.name == name)
+    return effect if dot else next(base for base in BASE for one in LIBRARY[base].parameters if one.name == name)
 
 
 @cache
 def _parameters() -> dict[str, Parameter]:
-    """Every parameter of the library by its name in files and reports."""
+    """All parameters of the library by their names in files and reports."""
     return {
         qualified_name(effect, parameter): parameter for effect in LIBRARY.values() for parameter in effect.parameters
     }
 
 
 def parameter_names() -> tuple[str, ...]:
-    """Names of all parameters of the library, in its order."""
+    """Names of all parameters in the order of the library."""
     return tuple(_parameters())
 
 
 def is_parameter(name: str) -> bool:
-    """Whether a name in files and reports is that of a parameter."""
+    """Return True if the name is that of a parameter."""
     return name in _parameters() or place_suffix(name) is not None
 
 
 def get_parameter(name: str) -> Parameter:
-    """A parameter by its name in files and reports; `is_parameter` tells whether there is one.
+    """Parameter of a name in files and reports.
 
     >>> get_parameter("inertia.mass").meaning
     'moving mass'
@@ -183,19 +186,20 @@ def get_parameter(name: str) -> Parameter:
 
 
 def effects_for_places(places: Iterable[str]) -> dict[str, Effect]:
-    """The library for tests at these places: of each kind that belongs to a place, those that are to be sought there.
-
-    Of twins that of the bushing is there alone.
+    """Effects that a search considers for tests in some directions and specimens.
 
     Args:
-        places: directions, or specimens by name; one that is axial counts as the first, which the moduli go by.
+        places: names of directions and specimens; the moduli are those of the axial direction, or else of the first.
+
+    Returns:
+        Effects by name; of twins, the effect of the bushing alone.
 
     >>> [name for name in effects_for_places(["axial", "mount"]) if name.endswith("mount")]
     ['elastic_preload.mount', 'strain_scale.mount', 'stiffness_factor.mount', 'displacement_gain.mount']
     """
-    known = list(dict.fromkeys(sorted(places, key=lambda place: place != Direction.AXIAL)))
-    found = [family.of_place(place) for family in FAMILIES.values() for place in sorted(family.places(known))]
-    of_places = {effect.name: effect for effect in found}
+    tested = list(dict.fromkeys(sorted(places, key=lambda place: place != Direction.AXIAL)))
+    in_families = [family.of_place(place) for family in FAMILIES.values() for place in sorted(family.places(tested))]
+    of_places = {effect.name: effect for effect in in_families}
     sought = {
         name: effect for name, effect in LIBRARY.items() if not place_suffix(name) or name in of_places
     } | of_places

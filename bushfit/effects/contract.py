@@ -65,7 +65,7 @@ class StiffnessBelow:
 
 
 class Level(IntEnum):
-    """Where an effect acts, from the rubber outward. Prediction leaves the instrument out; a record is no model."""
+    """Level at which an effect acts, from the rubber outward; predictions exclude instrument and record."""
 
     MATERIAL = 1
     COMPONENT = 2
@@ -81,14 +81,16 @@ class Parameter:
     """One parameter of an effect.
 
     Args:
-        name: ASCII name; base effects use it as it is, added effects as `<effect>.<name>`.
-        bounds: what a rubber, a bushing or a rig can have.
-        neutral: the value at which the effect vanishes; None where another parameter does that.
-        typical: a usual distance from the neutral value; the scale on which a fit moves a linear parameter.
-        log: whether a fit moves its logarithm (strictly positive parameters).
-        scale: what of the tests its size goes with, so that a search knows where to start: "period",
-            "frequency", "displacement", "strain" or "force"; "session" for a share of its duration; "order" where
-            it is one of derivation, of which there is but one range; none where `typical` is good for any test.
+        name: ASCII name, in files and reports `<effect>.<name>` except for the paper's effects.
+        bounds: least and largest plausible value.
+        unit: SI unit; "1" for a ratio.
+        neutral: value at which the effect vanishes; None if another parameter has this value.
+        typical: usual distance from the neutral value; scale of the parameter in a fit.
+        meaning: description for users.
+        log: True if a fit varies the logarithm of the (positive) parameter.
+        scale: quantity of the tests that determines the start of a search: "period", "frequency", "displacement",
+            "strain" or "force"; "session" for a share of its duration; "order" for the order of a derivative; None if
+            `typical` suits all tests.
     """
 
     name: str
@@ -101,7 +103,7 @@ class Parameter:
     scale: Literal["period", "frequency", "displacement", "strain", "force", "order", "session"] | None = None
 
     def sized(self, share: float) -> float:
-        """The value at a share of the typical distance from the neutral one, or from 0 where none is neutral.
+        """Value at a share of the typical distance from the neutral value, or from 0 without a neutral value.
 
         >>> Parameter("c3", "1", (0.0, 1e5), 0.0, 20.0, "cubic stress coefficient over mu").sized(0.5)
         10.0
@@ -111,7 +113,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Circumstances:
-    """Temperature and history of a test; what is not known is None, and effects that depend on it then do nothing.
+    """Temperature and history of a test; effects that depend on an unknown quantity (None) do nothing.
 
     Args:
         temperature: of the rubber [K], a number or one per operating point, (n,).
@@ -129,12 +131,12 @@ class Circumstances:
     rested: Array | float | None = None
 
     def select(self, points: Any) -> Circumstances:
-        """The circumstances of some operating points, by an index; numbers stay."""
-        known = (self.temperature, self.turn, self.strained, self.left, self.rested)
-        return Circumstances(*(each[points] if isinstance(each, np.ndarray) else each for each in known))
+        """Circumstances of the operating points of an index; numbers apply to all points."""
+        quantities = (self.temperature, self.turn, self.strained, self.left, self.rested)
+        return Circumstances(*(value[points] if isinstance(value, np.ndarray) else value for value in quantities))
 
 
-#: Circumstances of which nothing is known: those of a prediction.
+#: Unknown circumstances, as in a prediction.
 UNKNOWN = Circumstances()
 
 
@@ -178,31 +180,32 @@ class Condition:
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """What every effect states about itself.
+    """Properties that all effects have.
 
     Args:
-        name: the name in files, reports and options; the file of its law is called so.
-        sentence: what it is, for an engineer.
-        equation: its first-harmonic form, ASCII.
-        source: where the law comes from.
-        confirmed_by: the cheapest test that would prove it.
-        harmonic_error: relative error of the first-harmonic face against the time face; 0 where exact.
-        settles: whether the response changes from cycle to cycle, so that a loop is followed through all its cycles.
-        corrects: the direction, or specimen, whose stiffness formula it scales by a fitted factor; where the effect is
-            in a model, that formula's own error needs no warning. None where it scales no formula.
-        twins: names of effects, of the rig above all, with the same equation for all tests. Of such twins the one that
-            belongs to the bushing, which is this one, is proposed; how large it is, is then known, which it is, not.
-        replaces: the branch of the paper that it stands in place of; None where it is added to the others.
-        under: what of a test's circumstances it depends on, by the names of `Circumstances`.
-        assumption: what a prediction takes of these where they are not known, for its user; none of the rig's effects.
-        in_place_of: of one that replaces a branch, where a fit may begin, the likeliest first: its values by those of
-            that branch.
-        harmonic_only: whether it has no law in time: of a loop it answers the first harmonic alone, by
-            `harmonic_response`, and the rig refuses it.
-        after: the effect without which it is no other: it is looked for beside that one only.
-        never_with: effects beside which it is not looked for: the two together are a series that follows any law
-            between them, and so no name.
-        limit: the simpler effect that it is at the end of its range; None where it has none.
+        name: name in files, reports and options, and of the file of its law.
+        sentence: description for an engineer.
+        equation: first-harmonic form, ASCII.
+        level: level at which it acts.
+        parameters: its parameters.
+        source: literature.
+        confirmed_by: simplest test that would confirm the effect.
+        harmonic_error: relative error of the first-harmonic face compared with the time face; 0 if exact.
+        settles: True if the response changes from cycle to cycle, so that all cycles of a loop are computed.
+        corrects: direction or specimen whose stiffness formula it scales by a fitted factor, so that the error of the
+            formula needs no warning; None for other effects.
+        twins: effects with the same equation in all tests, mostly of the rig. The effect of the bushing, which lists
+            the twins, is proposed; the tests determine its size but cannot distinguish it from its twins.
+        replaces: branch of the paper that it replaces; None if it is added.
+        under: quantities of `Circumstances` that it depends on.
+        assumption: sentence on the value of these quantities in a prediction; empty for effects of the rig.
+        in_place_of: of an effect that replaces a branch, start values of a fit from the values of that branch, the most
+            probable first.
+        harmonic_only: True if it has no law in time: in loops it contributes to the first harmonic alone (see
+            `harmonic_response`), and the virtual rig refuses it.
+        after: effect that must be in the model before this effect is searched.
+        never_with: effects beside which this effect is not searched, because both together fit any law.
+        limit: simpler effect that it becomes at the end of its range; None without such a limit.
     """
 
     name: str
@@ -227,33 +230,32 @@ class Effect:
 
     @property
     def phrase(self) -> str:
-        """Its sentence up to the first colon or semicolon, to stand within another."""
+        """Part of the sentence before the first colon or semicolon, for use within another sentence."""
         short = re.split("[:;]", self.sentence.rstrip("."))[0]
         return short[0].lower() + short[1:]
 
     def acts_at(self, place: Place) -> bool:
-        """Whether it acts at a place: one that belongs to a place, by its name, acts there alone."""
+        """Return True if the effect acts in a direction or specimen; the name restricts it to one."""
         return self.name.partition(".")[2] in ("", str(place))
 
     @property
     def amount(self) -> Parameter:
-        """The parameter that the effect is searched by: the first that has a neutral value, where it vanishes."""
+        """First parameter with a neutral value; a search varies this parameter."""
         return next(parameter for parameter in self.parameters if parameter.neutral is not None)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Branch(Effect):
-    """A stress in parallel with the others, of the material.
+    """Stress of the material in parallel with the other branches.
 
     Args:
         modulus: (values, omega [rad/s], strain amplitude) -> complex modulus s~ / (2 e~) of the first harmonic [Pa].
         stress: (values, strain history) -> stress [Pa].
-        modulus_sensitivities: derivative of the modulus by each of its own parameters; where there is none, the model
-            differentiates numerically.
-        stress_sensitivities: the same of the stress.
-        uses: the paper's parameters that it reads besides its own.
-        size: of a linear branch that fades with memory, the parameter that its modulus is proportional to; Maxwell arms
-            can stand for it. None for all others.
+        modulus_sensitivities: derivatives of the modulus by its own parameters; None for numerical derivatives.
+        stress_sensitivities: derivatives of the stress by its own parameters; None for numerical derivatives.
+        uses: parameters of the paper that it reads.
+        size: parameter that the modulus of a linear viscoelastic branch is proportional to, so that Maxwell arms can
+            replace the branch; None for other branches.
     """
 
     level: Level = Level.MATERIAL
@@ -267,12 +269,11 @@ class Branch(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Modifier(Effect):
-    """Changes values that other effects use, by operating condition; of the material unless it says otherwise.
+    """Change of the parameter values of other effects, by operating condition.
 
     Args:
         adjust: (values, condition) -> the changed values only.
-        shift_factor: (values, circumstances) -> how many times as fast a motion is on the rubber's own time scale, a_T;
-            1 without.
+        shift_factor: (values, circumstances) -> time-temperature shift factor a_T; None without a shift.
     """
 
     level: Level = Level.MATERIAL
@@ -282,11 +283,11 @@ class Modifier(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Layer(Effect):
-    """Wraps the response below it, in both faces alike.
+    """Layer around the response of the rubber and of the layers below it.
 
     Args:
-        turns: whether it acts in torsion too; else only on motion along a line.
-        adds: the parameter whose sum stands for neighbours of the same law, such as compliances in series.
+        turns: True if it also acts in torsion.
+        adds: parameter that adds up over neighbouring layers of the same law, such as compliances in series.
         stiffness: (values, response below, omega [rad/s], amplitude [m or rad], setting) -> complex stiffness above.
         force: (values, force below, displacement history, setting) -> force above [N or N m].
     """
@@ -299,13 +300,13 @@ class Layer(Effect):
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """A kind of effect of which each place, a direction of the bushing or a specimen, may have its own.
+    """Effects of the same law, one for each direction or specimen.
 
     Args:
-        record: of any place, in whose texts the place stands for {place}. An effect of the kind, which acts at its
-            place alone, and its one parameter are called `<name>.<place>`.
-        places: of the places tested, that by which the moduli go first, those that a search gives one.
-        radial: texts that are others for the radial direction.
+        record: effect with the placeholder {place} in its texts. The effect of a place acts there alone; the effect and
+            its one parameter are named `<name>.<place>`.
+        places: selects the places of a search from the tested places.
+        radial: texts for the radial direction that differ from those of the record.
     """
 
     record: Effect
@@ -314,22 +315,30 @@ class Family:
 
     @property
     def name(self) -> str:
-        """Of the kind."""
+        """Name without the place."""
         return self.record.name.partition(".")[0]
 
     @cache  # noqa: B019  # the families live as long as the program
     def of_place(self, place: str) -> Effect:
-        """The effect of one place, kept from one call to the next."""
+        """Effect of one place; cached."""
         record = replace(self.record, **(self.radial if place == Direction.RADIAL else {}))
-        named = {each.name: getattr(record, each.name) for each in fields(record)}
-        texts: dict[str, Any] = {key: text.format(place=place) for key, text in named.items() if isinstance(text, str)}
-        parameters = tuple(replace(each, meaning=each.meaning.format(place=place)) for each in record.parameters)
+        values = {member.name: getattr(record, member.name) for member in fields(record)}
+        texts: dict[str, Any] = {key: text.format(place=place) for key, text in values.items() if isinstance(text, str)}
+        parameters = tuple(replace(one, meaning=one.meaning.format(place=place)) for one in record.parameters)
         twins = tuple(twin.format(place=place) for twin in record.twins)
         return replace(record, **texts, parameters=parameters, twins=twins)
 
 
 def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str, Value]:
-    """The named values times a factor, as far as the model has them: what most modifiers return.
+    """Multiply values by a factor, as most modifiers do.
+
+    Args:
+        p: parameter values.
+        names: of the values to multiply; names without a value are ignored.
+        factor: number, or array that broadcasts against operating points.
+
+    Returns:
+        The changed values.
 
     >>> scaled_values({"mu": 1e6}, ("mu", "m"), 0.5)
     {'mu': 500000.0}
@@ -340,7 +349,14 @@ def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str,
 def scaled_response(
     factor: Callable[[Values, Setting], Value], p: Values, below: Callable[..., Array], *motion_and_setting: Any
 ) -> Array:
-    """The response below a layer, stiffness or force alike, times a factor by values and test."""
+    """Response below a layer times a factor; the same for stiffness and force.
+
+    Args:
+        factor: (values, setting) -> factor.
+        p: parameter values of the layer.
+        below: response below the layer.
+        motion_and_setting: omega and amplitude, or history; then the setting.
+    """
     *motion, setting = motion_and_setting
     return factor(p, setting) * below(*motion)
 
@@ -348,15 +364,16 @@ def scaled_response(
 def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
     """Steady stress of a linear branch over one cycle: s_h = 2 mu^(h omega) e_h for every harmonic h.
 
-    The modulus at omega = 0 must be finite; it multiplies the mean strain.
+    Args:
+        modulus: of the branch; it must be finite at omega = 0, where it multiplies the mean strain.
+        p: parameter values.
+        history: a steady cycle of the strain.
     """
     return history.response(lambda omega: 2.0 * modulus(p, omega, history.amplitude))
 
 
 def harmonic_response(transfer: Value, history: History) -> Array:
-    """What an effect without a law in time answers: its complex ratio times the first harmonic of the motion, no more.
-
-    It is the steady answer, from the first sample on.
+    """Response of an effect without a law in time: complex ratio times the first harmonic of the motion.
 
     Args:
         transfer: stress over strain (2 mu^) or force over displacement (K), (..., 1).
@@ -368,5 +385,11 @@ def harmonic_response(transfer: Value, history: History) -> Array:
 
 
 def harmonic_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
-    """Stress of a branch without a law in time: s_1 = 2 mu^(omega, e0) e_1, no mean and no overtones."""
+    """Stress of a branch without a law in time: s_1 = 2 mu^(omega, e0) e_1, without mean and overtones.
+
+    Args:
+        modulus: of the branch.
+        p: parameter values.
+        history: strain over time.
+    """
     return harmonic_response(2.0 * modulus(p, np.atleast_1d(history.omega), history.amplitude), history)

@@ -1,4 +1,4 @@
-"""The dead zone, as a function of time and as a describing function: contact beyond a gap, motion within a play."""
+"""Dead zone in time and as a describing function, for contact beyond a gap and motion within a play."""
 
 import math
 
@@ -11,7 +11,7 @@ _SERIES = np.array([(-1.0) ** k / math.factorial(2 * k + 3) for k in range(12)])
 
 
 def dead_zone(value: Array, half_width: Value) -> Array:
-    """What of the values lies beyond +-half_width, and 0 within; all of them where half_width is 0.
+    """Excess of values over +-half_width; 0 inside this interval.
 
     >>> dead_zone(np.array([-2.0, 0.5, 3.0]), 1.0)
     array([-1.,  0.,  2.])
@@ -20,11 +20,17 @@ def dead_zone(value: Array, half_width: Value) -> Array:
 
 
 def first_harmonic(amplitude: Array, half_width: Value) -> Array:
-    """First harmonic of what a sine reaches beyond a dead zone, over the amplitude of the sine: N(r).
+    """Describing function N of a dead zone: first harmonic of the output over the amplitude of a sine.
 
-    Source: A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B.
+    Args:
+        amplitude: of the sine, any shape.
+        half_width: of the dead zone, in the same unit.
+
+    Returns:
+        N, between 0 and 1, broadcast shape of the two.
 
     Notes:
+        A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B.
         With r = half_width/amplitude, N = 1 - 2/pi (asin r + r sqrt(1 - r^2)) for r < 1, and 0 beyond. With
         cos(t/2) = r the same is (t - sin t)/pi, whose series keeps its digits where N vanishes like (1 - r)^(3/2).
 

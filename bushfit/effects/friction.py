@@ -30,9 +30,13 @@ _SERIES_SLOPE = np.array([(k + 1) * (-1.0) ** (k + 1) / (k + 4.0) for k in range
 
 
 def harmonic_shape(x: Array) -> Array:
-    """First harmonic h of the steady friction loop at the strain amplitude x = e0/eps_half, complex.
+    """Complex first harmonic h of the steady friction loop.
 
-    x is not negative, of any shape; the friction modulus is (A + iB)/(2 e0) = sigma_fmax/eps_half h(x).
+    Args:
+        x: strain amplitude over eps_half, not negative, any shape.
+
+    Returns:
+        h, same shape; the friction modulus is (A + iB)/(2 e0) = sigma_fmax/eps_half h(x).
 
     Notes:
         h(0) = 1/2, and h -> 0 for large x. Differences of nearly equal terms are rearranged, so that h keeps ten digits
@@ -63,7 +67,15 @@ def harmonic_shape(x: Array) -> Array:
 
 
 def harmonic_slope(x: Array, shape: Array) -> Array:
-    """dh/dx of `harmonic_shape`, whose value at x is `shape`."""
+    """Derivative of `harmonic_shape`.
+
+    Args:
+        x: strain amplitude over eps_half, any shape.
+        shape: `harmonic_shape(x)`.
+
+    Returns:
+        dh/dx, same shape.
+    """
     s, big, p, q, z = _roots(x)
     slope = np.empty(x.shape, dtype=complex)
     slope_p = 4.0 / (s * (x + 3.0 + s))

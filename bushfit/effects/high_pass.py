@@ -12,7 +12,7 @@ from bushfit.effects.maxwell import relax
 
 
 def _leak(p: Values, omega: Array) -> Value:
-    """-1/(1 + i omega T), 1/T = 2 pi corner: what is missing of the force; all of its mean, unless the corner is 0."""
+    """Relative loss of the force, -1/(1 + i omega T), 1/T = 2 pi corner; -1 for the mean, unless the corner is 0."""
     rate = 2.0 * np.pi * p["corner"] + 0j
     total = rate + 1j * np.asarray(omega)
     return -rate / np.where(total == 0.0, 1.0, total)

@@ -43,7 +43,13 @@ class History:
 
     @classmethod
     def steady(cls, value: Array, frequency: float, cycles: int = 1) -> History:
-        """Whole cycles of a steady state of the given frequency [Hz]."""
+        """Create the history of a steady state.
+
+        Args:
+            value: samples of whole cycles, (..., n).
+            frequency: of the excitation [Hz].
+            cycles: number of cycles in the samples.
+        """
         return cls(value, cycles / (frequency * value.shape[-1]), periodic=True, frequency=frequency)
 
     @property
@@ -81,22 +87,22 @@ class History:
     @cached_property
     def turning(self) -> Turning:
         """The pieces of each motion between its turning points, in the order in which friction follows them."""
-        count, at = self.value.shape[-1], np.arange(self.value.shape[-1])
+        count, samples = self.value.shape[-1], np.arange(self.value.shape[-1])
         if self.periodic:
-            top = _shared(np.argmax(self.value, axis=-1)[..., None])
-            path = _taken(self.value, (top + np.arange(count + 1)) % count)
-            place = (at - top) % count
+            top = _single_row(np.argmax(self.value, axis=-1)[..., None])
+            path = _take(self.value, (top + np.arange(count + 1)) % count)
+            place = (samples - top) % count
         else:
             path = np.concatenate([np.zeros_like(self.value[..., :1]), self.value], axis=-1)
-            place = np.minimum(at + 1, count - 1)
-        turned = _shared(reversals(path))
+            place = np.minimum(samples + 1, count - 1)
+        turned = _single_row(reversals(path))
         passed = np.cumsum(turned, axis=-1)
         ends = np.full((*turned.shape[:-1], int(passed[..., -1].max()) + 2), count)
         ends[..., 0] = 0
-        *rows, samples = np.nonzero(turned)
-        ends[*rows, passed[turned]] = samples
-        levels, piece = _taken(path, ends), _taken(passed, place)
-        return Turning(np.diff(levels), self.value - _taken(levels, piece), _shared(piece))
+        *rows, turns = np.nonzero(turned)
+        ends[*rows, passed[turned]] = turns
+        levels, piece = _take(path, ends), _take(passed, place)
+        return Turning(np.diff(levels), self.value - _take(levels, piece), _single_row(piece))
 
     @cached_property
     def rate(self) -> Array:
@@ -129,11 +135,11 @@ class History:
         return replace(self, value=value, solved={} if solved is None else solved)
 
     def faster(self, factor: Any) -> History:
-        """The same motion so many times as fast, a number or (..., 1)."""
+        """History of the same motion, faster by a factor: a number, or (..., 1)."""
         return replace(self, step=self.step / factor, frequency=self.frequency * factor, solved={})
 
     def driven(self) -> History:
-        """The same motion, kept as the driver of those that are made from it."""
+        """History of the same motion, which becomes the driver of histories derived from it."""
         return replace(self, driver=self.value, solved={})
 
     def scaled(self, factor: float) -> History:
@@ -165,29 +171,34 @@ class Turning:
     piece: Array
 
     def at_samples(self, of_pieces: Array) -> Array:
-        """What holds for each piece, (..., k), at the samples on it, (..., n)."""
-        return _taken(of_pieces, self.piece)
+        """Expand values of the pieces, (..., k), to the samples, (..., n)."""
+        return _take(of_pieces, self.piece)
 
 
-def _shared(rows: Array) -> Array:
-    """The one row, (n,), where all of them, (..., n), are the same; else all."""
+def _single_row(rows: Array) -> Array:
+    """Single row, (n,), if all rows, (..., n), are equal; otherwise all rows."""
     first = rows.reshape(-1, rows.shape[-1])[0]
     return first if np.all(rows == first) else rows
 
 
-def _taken(values: Array, at: Array) -> Array:
-    """Of each row of the values, (..., n), those at the places, (m,) or a row of them for each."""
-    if at.ndim == 1:
-        return values.take(at, axis=-1)
-    shape = np.broadcast_shapes(values.shape[:-1], at.shape[:-1])
-    each, places = (np.broadcast_to(of, (*shape, of.shape[-1])) for of in (values, at))
-    return np.take_along_axis(each, places, axis=-1)
+def _take(values: Array, indices: Array) -> Array:
+    """Values of each row, (..., n), at indices, (m,), or at a row of indices for each row, (..., m)."""
+    if indices.ndim == 1:
+        return values.take(indices, axis=-1)
+    shape = np.broadcast_shapes(values.shape[:-1], indices.shape[:-1])
+    rows, columns = (np.broadcast_to(array, (*shape, array.shape[-1])) for array in (values, indices))
+    return np.take_along_axis(rows, columns, axis=-1)
 
 
 def reversals(value: Array) -> Array:
-    """Whether the motion reverses at each sample but the last, (..., n) -> (..., n - 1).
+    """Reversals of a motion.
 
-    Where it rests before it turns, the last sample of the rest counts.
+    Args:
+        value: samples, (..., n).
+
+    Returns:
+        True at each sample, except the last, at which the motion reverses, (..., n - 1). If the motion rests before it
+        reverses, the last sample of the rest is the reversal.
 
     >>> reversals(np.array([0.0, 1.0, 1.0, 0.0]))
     array([False, False,  True])
@@ -196,7 +207,7 @@ def reversals(value: Array) -> Array:
     rising = steps > 0.0
     if not (moves := steps != 0.0).all():
         moving = np.maximum.accumulate(np.where(moves, np.arange(steps.shape[-1]), 0), axis=-1)
-        rising, moves = (np.take_along_axis(each, moving, axis=-1) for each in (rising, moves))
+        rising, moves = (np.take_along_axis(array, moving, axis=-1) for array in (rising, moves))
         moves[..., 1:] &= moves[..., :-1]
     turned = np.zeros_like(rising)
     turned[..., 1:] = (rising[..., 1:] != rising[..., :-1]) & moves[..., 1:]

@@ -28,7 +28,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def in_place_of(p: Values) -> list[dict[str, float]]:
-    """Where a fit may begin that had friction before: the same stiffness at rest, the same strain at half of it."""
+    """Start values from those of the friction branch: equal modulus at rest, and half of it at the same strain."""
     at_rest = p["sigma_fmax"] / (2.0 * p["eps_half"])
     return [{"delta": at_rest, "r": 0.2, "e_c": p["eps_half"], "n": 0.6}]
 

@@ -26,9 +26,18 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def relax(rate: Value, values: Array, step: Value) -> Array:
-    """The response y to dy/dt + rate y = dx/dt from rest, row by row, exact for an x that is straight between samples.
+    """Solution y of dy/dt + rate y = dx/dt from rest, exact for an x that is linear between samples.
 
-    y_n = r y_{n-1} + (1 - r)/(rate step) (x_n - x_{n-1}), r = exp(-rate step).
+    Args:
+        rate: [1/s], a number or (..., 1).
+        values: samples of x, (..., n).
+        step: time between samples [s].
+
+    Returns:
+        y, (..., n).
+
+    Notes:
+        y_n = r y_{n-1} + (1 - r)/(rate step) (x_n - x_{n-1}), r = exp(-rate step).
 
     >>> relax(1.0, np.array([1.0, 2.0, 2.0]), np.log(2.0)).round(3)
     array([0.721, 1.082, 0.541])

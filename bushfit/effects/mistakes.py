@@ -1,7 +1,7 @@
-"""Mistakes that laboratories make: what a file, or the campaign, says is not what was measured. See mistakes.toml.
+"""Mistakes in the record: a file or campaign does not state what was measured. See mistakes.toml.
 
-Each is an effect of the level `record` and has no parameter: it either is so or it is not. Nothing is mended unless the
-user says so.
+A mistake is an effect of the level `record` without parameters. A test is corrected only if the user adopts the
+mistake.
 """
 
 import tomllib
@@ -30,7 +30,7 @@ SEPARATOR = ":"
 
 @dataclass(frozen=True, kw_only=True)
 class Mistake(Effect):
-    """What the record says is not what was measured.
+    """A mistake in the record of a test or of the bushing.
 
     `sentence` is what would be so, with a slot for the files: "the amplitudes of {files} are peak-to-peak".
 
@@ -63,7 +63,11 @@ class Mistake(Effect):
     scales: bool = False
 
     def mended(self, test: _Test) -> _Test | None:
-        """The test as it was measured if this mistake was made in it; None where it cannot have been made."""
+        """Correct a test for this mistake.
+
+        Returns:
+            The corrected test, or None if the mistake is not possible in the test.
+        """
         if not self.possible(test):
             return None
         direction = self._direction(test.direction)
@@ -79,7 +83,11 @@ class Mistake(Effect):
         )
 
     def mended_cycle(self, cycle: Sweep) -> Sweep:
-        """The fundamental of a mended loop, from the fundamental of the loop as stated."""
+        """Correct the fundamental of a loop for this mistake.
+
+        Returns:
+            The fundamental as a sweep of one point.
+        """
         return replace(
             cycle,
             direction=self._direction(cycle.direction),
@@ -89,7 +97,7 @@ class Mistake(Effect):
         )
 
     def possible(self, test: Loop | Sweep) -> bool:
-        """Whether it can have been made in a test."""
+        """Return True if the mistake is possible in a test."""
         kind, place = "loop" if isinstance(test, Loop) else "sweep", test.direction
         fits = kind in self.kinds and self.motion in (None, place.motion)
         doubtful = self.doubt is None or (isinstance(test, Sweep) and self.doubt(test.stiffness))
@@ -111,25 +119,25 @@ class Mistake(Effect):
         return (other_direction(place) if self.swaps else None) or place
 
     def mended_bushing(self, bushing: Bushing) -> Bushing:
-        """The bushing as it is, if the mistake was made in its radii."""
+        """Correct the radii of a bushing for this mistake."""
         inner, outer = (self.displacement * radius for radius in (bushing.inner_radius, bushing.outer_radius))
         return replace(bushing, inner_radius=inner, outer_radius=outer)
 
     def corrected(self, test: Loop | Sweep | None) -> str:
-        """What to write into the campaign for a test, or to correct in its file; None stands for the bushing."""
+        """Line of the campaign, or correction of the file, for a test; for the bushing if the test is None."""
         if test is None:
             return self.line
-        other = other_direction(test.direction) if self.swaps else None
+        swapped = other_direction(test.direction) if self.swaps else None
         kind, line = ("loops", self.line) if isinstance(test, Loop) else ("sweeps", self.sweep_line or self.line)
-        return f"[[{kind}]] of {file_or_name(test)}: {line.replace('{direction}', str(other))}"
+        return f"[[{kind}]] of {file_or_name(test)}: {line.replace('{direction}', str(swapped))}"
 
     def in_words(self, test: Loop | Sweep) -> str:
-        """That it was made in a test, and the line for the campaign that puts it right."""
+        """Sentence on the mistake in a test, with the line of the campaign that corrects it."""
         return f"{self.sentence.format(files=file_or_name(test))} (then, in the campaign: {self.corrected(test)})"
 
 
 def file_or_name(test: Loop | Sweep) -> str:
-    """The file of a test, or its name where it came from none.
+    """Name of the file of a test, or of the test if it has no file.
 
     >>> file_or_name(Loop("slow", Direction.AXIAL, *np.ones((3, 9))))
     'slow'
@@ -138,14 +146,14 @@ def file_or_name(test: Loop | Sweep) -> str:
 
 
 def other_direction(place: Place) -> Direction | None:
-    """Radial for axial and the reverse; None for what cannot be taken for either."""
+    """Radial for axial and axial for radial; None for other directions and specimens."""
     if place is Direction.AXIAL:
         return Direction.RADIAL
     return Direction.AXIAL if place is Direction.RADIAL else None
 
 
 def _is_of_rubber(modulus: float, strain: float) -> bool:
-    """Whether a rubber can have a shear modulus [Pa], and a test of one a strain amplitude [-]."""
+    """Return True if the shear modulus [Pa] and the strain amplitude are possible in a test of rubber."""
     return _MODULI[0] < modulus < _MODULI[1] and _STRAINS[0] < strain < _STRAINS[1]
 
 
@@ -155,18 +163,18 @@ def _loss(stiffness: Complex) -> float:
 
 
 def _times_loss(factor: float, stiffness: Complex) -> Complex:
-    """The same |K|, and the loss factor times a factor."""
+    """Stiffness of equal magnitude with the loss factor multiplied by a factor."""
     loss = 1.0 + 1j * factor * stiffness.imag / stiffness.real
     return np.asarray(np.abs(stiffness) * loss / np.abs(loss))
 
 
 def _sine(stiffness: Complex) -> Complex:
-    """The same |K|, with K''/|K| where its loss factor was stated."""
+    """Stiffness of equal magnitude, with the stated loss factor as the sine of the loss angle."""
     sine = np.clip(stiffness.imag / stiffness.real, -1.0, 1.0)
     return np.asarray(np.abs(stiffness) * (np.sqrt(1.0 - sine**2) + 1j * sine))
 
 
-#: Laws that the table names: true complex stiffness by the one stated, whether it leaves room for a mistake, a motion.
+#: Laws by their names in the table: true stiffness from the stated one, condition for a mistake, or motion.
 _LAWS: dict[str, Any] = {
     # the phase is 90 deg less
     "complement": lambda k: 1j * np.conj(k),
@@ -189,36 +197,34 @@ _LAWS: dict[str, Any] = {
 
 
 def _mistake(name: str, entry: dict[str, Any]) -> Mistake:
-    """The mistake of an entry of mistakes.toml."""
+    """Mistake of an entry of mistakes.toml."""
     laws = {key: _LAWS[entry.pop(key)] for key in ("stiffness", "doubt", "motion") if key in entry}
     kinds, units = tuple(entry.pop("kinds", ["sweep"])), entry.pop("units", {}).items()
-    stated = [
-        f'units = {{ {what} = "{unit}" }}, and the same in the header if that states a unit' for what, unit in units
-    ]
-    entry |= laws | dict(zip(("line", "sweep_line"), stated, strict=False))
+    lines = [f'units = {{ {key} = "{unit}" }}, and the same in the header if that states a unit' for key, unit in units]
+    entry |= laws | dict(zip(("line", "sweep_line"), lines, strict=False))
     return Mistake(name=name, kinds=kinds, **entry)
 
 
 _TABLE = tomllib.loads(Path(__file__).with_name("mistakes.toml").read_text(encoding="utf-8"))
-#: Every mistake by name, the most frequent first; of two that explain tests alike the first leads.
+#: All mistakes by name, the most frequent first.
 MISTAKES: dict[str, Mistake] = {name: _mistake(name, entry) for name, entry in _TABLE.items()}
 
 
 def labelled(name: str, test: str | None) -> str:
-    """A mistake with its test, as options take it; None for one that is made in no test."""
+    """Name of a mistake with its test, as in options: `mistake:test`, or `mistake` without a test."""
     return name if test is None else f"{name}{SEPARATOR}{test}"
 
 
 def get_mistake(name: str) -> Mistake | None:
-    """The mistake of a name such as peak_to_peak, or peak_to_peak:sweep_axial with its test; None where none is."""
+    """Mistake of a name such as `peak_to_peak` or `peak_to_peak:sweep_axial`; None for other names."""
     return MISTAKES.get(name.partition(SEPARATOR)[0])
 
 
 def get_candidate(name: str) -> Effect:
-    """The effect of the library, or the mistake, of that name; a mistake may have its test behind a colon.
+    """Effect or mistake of a name; the name of a mistake may have a test after a colon.
 
     Raises:
-        ModelError: there is none; the nearest name is suggested.
+        ModelError: an unknown name; the message suggests the most similar one.
 
     >>> get_candidate("peak_to_peak:sweep_axial").sentence
     'the amplitudes of {files} are peak-to-peak'

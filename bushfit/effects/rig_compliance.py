@@ -132,19 +132,21 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
 
 def _differences_resolved(reached: Array, missing: Array) -> bool:
-    """Whether the forces of models on one motion are known as well as their differences from the last of them ask: to
-    a thousandth (chosen, less than a fit notices, whose derivatives these differences are), or to rounding."""
+    """Return True if forces of several models on one motion are accurate enough for their differences.
+
+    The differences, from which a fit computes derivatives, must be accurate to a thousandth or to rounding.
+    """
     if missing.ndim == 1:
         return True
     reached = np.broadcast_to(reached, missing.shape)
-    apart, unknown = (np.max(np.abs(each - each[-1]), axis=-1) for each in (reached, missing))
-    return not np.any(unknown > np.maximum(1e-3 * apart, 1e-13 * np.max(np.abs(reached), axis=-1)))
+    spread, error = (np.max(np.abs(rows - rows[-1]), axis=-1) for rows in (reached, missing))
+    return not np.any(error > np.maximum(1e-3 * spread, 1e-13 * np.max(np.abs(reached), axis=-1)))
 
 
 class _AndersonMixing:
-    """What the last rounds of an iteration teach of the next (D. G. Anderson, J. ACM 12 (1965) 547).
+    """Anderson mixing of a fixed-point iteration (D. G. Anderson, J. ACM 12 (1965) 547).
 
-    Kept are the last few differences from one round to the next, by turns in one of a few places, empty at first.
+    It stores the last few differences between rounds in a ring buffer.
     """
 
     def __init__(self, shape: tuple[int, ...]) -> None:
@@ -165,8 +167,8 @@ class _AndersonMixing:
         products = self._products
         products[..., k, :] = products[..., :, k] = (self._changed @ changed[..., None])[..., 0]
         # above rounding, so that two differences that teach the same do no harm
-        little = 1e-12 * np.einsum("...ii->...", products)[..., None, None] + np.finfo(float).tiny
-        weights = np.linalg.solve(products + little * np.eye(_REMEMBERED), self._changed @ change[..., None])
+        regular = 1e-12 * np.einsum("...ii->...", products)[..., None, None] + np.finfo(float).tiny
+        weights = np.linalg.solve(products + regular * np.eye(_REMEMBERED), self._changed @ change[..., None])
         return np.asarray(change - (weights.mT @ self._both)[..., 0, :])
 
 

@@ -115,8 +115,10 @@ def parallel_elements(history: History, yield_strain: Array, weights: Array) -> 
 
 
 def in_place_of(p: Values) -> list[dict[str, float]]:
-    """Where a fit may begin that had friction before: the same stress, and half of it at the same strain; or the same
-    strain in the middle of fewer slip strains, as a wide range that ends beyond the tests has a minimum of its own."""
+    """Start values from those of the friction branch: a wide range of slip strains, and a narrow one.
+
+    A range that ends outside the tested strains has a minimum of its own.
+    """
     return [
         {"sigma": p["sigma_fmax"], "e_s": 2.0 * p["eps_half"], "spread": 1.5},
         {"sigma": p["sigma_fmax"], "e_s": p["eps_half"], "spread": 0.75},

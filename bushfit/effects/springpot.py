@@ -62,9 +62,18 @@ def grunwald_letnikov_weights(alpha: Value, count: int) -> Array:
 
 
 def fractional_derivative(alpha: Value, values: Array, step: float) -> Array:
-    """D^alpha by Gruenwald-Letnikov with full memory, from rest before the first sample (Eq. 3).
+    """Fractional derivative by the Gruenwald-Letnikov sum with full memory, from rest before the first sample.
 
-    First order in the step: the factor (1 - exp(-i omega step))^alpha stands for (i omega step)^alpha.
+    Args:
+        alpha: order.
+        values: samples, (..., n).
+        step: time between samples [s].
+
+    Returns:
+        D^alpha of the values, (..., n).
+
+    Notes:
+        Eq. 3. First order in the step: (1 - exp(-i omega step))^alpha replaces (i omega step)^alpha.
 
     >>> fractional_derivative(1.0, np.array([0.5, 2.0, 3.0]), 0.5).round(6)
     array([1., 3., 2.])

@@ -12,14 +12,19 @@ _C1, _C2 = 17.44, 51.6
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """mu times T/T0, all other moduli and stresses times exp(-softening dT), dT = T - T0, T0 = 23 degC."""
+    """Moduli and stresses at the temperature of the test.
+
+    Returns:
+        mu times T/T0, and all other moduli and stresses times exp(-softening dT), with dT = T - T0 and T0 = 23 degC;
+        nothing if the temperature is unknown.
+    """
     temperature = condition.setting.under.temperature
     if temperature is None:
         return {}
     warmer, ratio = np.asarray(temperature) - REFERENCE, np.asarray(temperature) / REFERENCE
-    others = tuple(name for name in condition.moduli if name != "mu")
+    softened = tuple(name for name in condition.moduli if name != "mu")
     spring = scaled_values(p, ("mu",), ratio)
-    return {**spring, **scaled_values(p, others, np.exp(-p["softening"] * warmer))}
+    return {**spring, **scaled_values(p, softened, np.exp(-p["softening"] * warmer))}
 
 
 def shift_factor(p: Values, under: Circumstances) -> Value:

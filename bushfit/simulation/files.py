@@ -1,4 +1,4 @@
-"""A simulated campaign as files, as a laboratory would hand them over, with the truth beside them."""
+"""Files of a simulated campaign: test tables as of a laboratory, the campaign file, and the true model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Annotated
 
 import numpy as np
 import pandas as pd
-from typing_extensions import Doc, TypedDict
+from pydantic import Field
+from typing_extensions import TypedDict
 
 from bushfit.campaign.toml import body_lines, table_lines
 from bushfit.errors import quote_path
@@ -24,14 +25,20 @@ from bushfit.simulation.measured import Simulated
 class SimulationDocument(TypedDict):
     """A simulated campaign."""
 
-    truth: Annotated[ModelFile, Doc("the model behind it, as in truth.json.")]
-    files: Annotated[list[str], Doc("that were written, by name.")]
+    truth: Annotated[ModelFile, Field(description="True model, as in truth.json.")]
+    files: Annotated[list[str], Field(description="Names of the files.")]
 
 
 def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
-    """The campaign as files: tables, `campaign.toml` that names them, and `truth.json`, the model behind them.
+    """Convert a simulated campaign to files.
 
-    A resonance test is what `bushfit reduce` takes; `campaign.toml` says how.
+    Args:
+        simulated: the campaign.
+        form: of the tables.
+
+    Returns:
+        Content by file name: tables of the tests, `campaign.toml`, and the true model in `truth.json`. Comments in
+        `campaign.toml` state the `bushfit reduce` command of each resonance test.
     """
     tables = {
         **{loop.name: raw_loop_table(loop) for loop in simulated.loops},
@@ -50,24 +57,26 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
     lines = [f"# Simulated by bushfit simulate with seed {seed}: no rubber was tested. The model is in truth.json."]
     lines += body_lines(simulated.truth.bushing, simulated.specimens)
     plan = simulated.plan
-    if plan.level_gain_error or plan.level_phase_error:  # which no repeat shows, so that a fit has to be told
+    if plan.level_gain_error or plan.level_phase_error:  # repeats do not show these errors: the campaign states them
         errors = {"gain_error": (plan.level_gain_error, "1"), "phase_error": (plan.level_phase_error, "rad")}
         lines += ["", "[rig]", *(f'{key} = "{size:.6g} {unit}"' for key, (size, unit) in errors.items())]
     for kind, tests in (("loops", simulated.loops), ("sweeps", simulated.sweeps)):
-        for each in tests:
-            lines += table_lines(kind, f"{each.name}.{end}", each.direction, each.temperature)
-    for mass, test in simulated.resonances:
-        file, folder = (quote_path(Path(name)) for name in (f"{test.name}.{end}", test.name))
-        tested = "specimen" if isinstance(test.direction, Specimen) else "direction"
-        place = quote_path(Path(str(test.direction)))
+        for test in tests:
+            lines += table_lines(kind, f"{test.name}.{end}", test.direction, test.temperature)
+    for mass, resonance in simulated.resonances:
+        file, folder = (quote_path(Path(name)) for name in (f"{resonance.name}.{end}", resonance.name))
+        option = "specimen" if isinstance(resonance.direction, Specimen) else "direction"
+        place = quote_path(Path(str(resonance.direction)))
         lines += ["", "# A sweep comes of this resonance test with:"]
-        lines += [f'# bushfit reduce {file} --mass "{mass:.6g} kg" --{tested} {place} -o {folder}']
-        lines += [f"# {line}" for line in table_lines("sweeps", f"{test.name}/sweep.{end}", test.direction) if line]
+        lines += [f'# bushfit reduce {file} --mass "{mass:.6g} kg" --{option} {place} -o {folder}']
+        lines += [
+            f"# {line}" for line in table_lines("sweeps", f"{resonance.name}/sweep.{end}", resonance.direction) if line
+        ]
     return "\n".join(lines) + "\n"
 
 
 def raw_loop_table(loop: Loop) -> pd.DataFrame:
-    """A loop as a rig writes it: time, displacement and force in the units of engineers, or strain and stress."""
+    """Table of a loop: time, displacement and force, or strain and stress, in display units."""
     moves, resists, _ = loop.direction.motion.words
     (length, length_factor), (force, force_factor), _ = _as_stated(loop.direction)
     return pd.DataFrame(
@@ -80,9 +89,9 @@ def raw_loop_table(loop: Loop) -> pd.DataFrame:
 
 
 def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
-    """A sweep as a rig writes it: frequency, amplitude, repeat, stiffness and loss factor in the units of engineers.
+    """Table of a sweep: frequency, amplitude, repeat, stiffness and loss factor in display units.
 
-    Where the amplitude is stepped, it is written as reached, without its level.
+    A stepped amplitude is written as reached, without its nominal level.
     """
     motion = sweep.direction.motion
     amplitude, relates = "strain amplitude" if motion is STRAINING else "amplitude", motion.words[2]
@@ -103,7 +112,7 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
 
 
 def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
-    """A resonance test as a shaker's controller writes it: accelerations of base and mass, and their phase."""
+    """Table of a resonance test: frequency, accelerations of base and mass, and their phase."""
     return pd.DataFrame(
         {
             "frequency [Hz]": test.frequency,
@@ -115,7 +124,7 @@ def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
 
 
 def _as_stated(place: Place) -> Display:
-    """The units in which files of a place have displacement, force and stiffness; tensor strain is half of gamma."""
+    """Units of displacement, force and stiffness in the files of a place; a tensor strain is gamma/2."""
     (unit, factor), force, stiffness = place.display
     stated = strain_factor_of_files(place)
     return Display(Unit(unit, factor / stated), force, stiffness)

@@ -1,7 +1,4 @@
-"""What a rig with noise writes, as a campaign: noise from point to point, and errors that a run or a level shares.
-
-A run is what was recorded in one go.
-"""
+"""Simulated measurements of a rig: noise of every point, and errors that the points of a run or of a level share."""
 
 from __future__ import annotations
 
@@ -34,9 +31,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """A simulated campaign: the true model, the plan, and what the rig wrote.
+    """A simulated campaign.
 
-    `resonances` has the mass [kg] and the record of each resonance test; `specimens`, those that were tested.
+    Args:
+        truth: true model.
+        plan: settings of the simulation.
+        loops, sweeps: simulated tests.
+        resonances: mass [kg] and record of each resonance test.
+        specimens: tested specimens.
     """
 
     truth: Model
@@ -48,12 +50,12 @@ class Simulated:
 
     @property
     def result(self) -> Result:
-        """The truth as a result."""
-        said = "simulated: the values a rig simulation was given, not a fit"
-        return Result(self.truth, warnings=(said,), specimens=self.specimens)
+        """True model as a result."""
+        note = "simulated: the values a rig simulation was given, not a fit"
+        return Result(self.truth, warnings=(note,), specimens=self.specimens)
 
     def campaign(self) -> Campaign:
-        """The measurements as a campaign in memory, without the truth; resonance tests are reduced to sweeps."""
+        """Campaign with the tests; resonance tests are reduced to sweeps."""
         reduced = tuple(reduce_resonance(test, mass).sweep for mass, test in self.resonances)
         bushing, name = self.truth.bushing, self.result.name
         loops = tuple(part for loop in self.loops for part in programme(loop))
@@ -61,19 +63,28 @@ class Simulated:
 
 
 def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
-    """Put a model on the virtual rig and measure it as planned; the same seed gives the same data.
+    """Simulate the tests of a plan on the virtual rig.
 
-    The model has the effects of the rig too; a plan that names no tests has those of the paper.
+    Args:
+        truth: model, including effects of the rig.
+        plan: settings; without tests, the tests of the paper are simulated. Equal seeds give equal data.
     """
     return measure(undisturbed(truth, plan), plan)
 
 
 def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
-    """What the rig writes with the plan's noise, repeats and seed; quick, so that many seeds can be drawn.
+    """Add the noise and repeats of a plan to undisturbed tests.
+
+    Args:
+        clean: tests without noise.
+        plan: settings with noise, repeats and seed.
+
+    Returns:
+        The simulated campaign.
 
     Notes:
-        Where a sweep does not reach its amplitudes, the stiffness is that at the amplitude reached (see `near`), and
-        where it depends on the order of the tests, that at each point's turn: the plan's loops come first.
+        If a sweep does not reach its amplitudes, its stiffness is evaluated at the amplitude reached (see `near`). If
+        the model depends on the order of the tests, the loops come first.
     """
     planned = [test for kind in (clean.loops, clean.sweeps, clean.resonances) for test, _ in kind]
     under = planned_session(clean.truth.bushing, planned, plan.repeats)[len(clean.loops) :]
@@ -93,7 +104,7 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
 
 
 def _names(kind: str, tests: Sequence[SimulatedTest]) -> list[str]:
-    """A name for each test that is that of its file: by what was tested, with a number where several tests have one."""
+    """Names of the tests and their files: kind and direction or specimen, with a number if names are equal."""
     stems = [f"{kind}_{folder_name(str(test.direction))}" for test in tests]
     return [stem if stems.count(stem) == 1 else f"{stem}_{place}" for place, stem in enumerate(stems, start=1)]
 
@@ -106,7 +117,7 @@ def _loop(
     random: Generator,
     gains: dict[SimulatedLoop, float],
 ) -> Loop:
-    """One record; `gains` has those of the loops before, which their repeats share, and takes that of this loop."""
+    """Record of a loop; `gains` stores the gain error of each level, which its repeats share."""
     largest = max(amplitude for _, amplitude in test.parts)
     if test not in gains:
         gains[test] = 1.0 + plan.level_gain_error * random.standard_normal() if plan.level_gain_error else 1.0
@@ -131,19 +142,19 @@ def _sweep(
     random: Generator,
     under: Circumstances,
 ) -> Sweep:
-    """All repeats of a sweep; where the amplitude is stepped, with the levels that a reader finds in those reached."""
+    """All repeats of a sweep; for a stepped amplitude, with the levels that a reader determines."""
     plan = replace(plan, repeats=test.repeats or plan.repeats)
     shape = (len(test.held), plan.repeats, len(test.steps))
     frequency, level = (np.broadcast_to(values[:, None], shape).ravel() for values in test.points)
     repeat = np.broadcast_to(np.arange(1, plan.repeats + 1)[:, None], shape).ravel()
     stiffness, reached = np.broadcast_to(clean[:, None], shape), None
     if test.reached:
-        reached = level * reached_over_asked(test, plan, random)
+        reached = level * amplitude_ratios(test, plan, random)
     if test.reached or truth.knows_circumstances:
         planned = frequency, level, stiffness.ravel(), Circumstances(test.temperature)
         nearby = near(truth, test.direction, *planned, under)
         stiffness = nearby(level if reached is None else reached).reshape(shape)
-    stiffness = stiffness * of_levels(len(test.held), plan, random)
+    stiffness = stiffness * level_errors(len(test.held), plan, random)
     measured = np.stack([with_noise(stiffness[:, number], plan, random) for number in range(plan.repeats)], axis=1)
     if test.stepped == "amplitude" and reached is not None:
         level = runs_of(frequency, reached, repeat).amplitude
@@ -163,7 +174,7 @@ def _sweep(
 def _resonance(
     test: SimulatedResonance, clean: Array, name: str, plan: SimulateSettings, random: Generator
 ) -> ResonanceTest:
-    """One run, with the gain and phase of its two accelerometers."""
+    """Record of one run with the gain and phase errors of its two accelerometers."""
     return ResonanceTest(
         name,
         test.direction,
@@ -175,7 +186,7 @@ def _resonance(
 
 
 def filtered_noise(rows: int, plan: SimulateSettings, random: Generator) -> Array:
-    """Stationary noise of unit variance, (rows,), each row's correlated with the next as planned."""
+    """Stationary noise of unit variance with the correlation of the plan between rows, (rows,)."""
     noise = random.standard_normal(rows)
     if not plan.force_correlation:
         return noise
@@ -186,7 +197,16 @@ def filtered_noise(rows: int, plan: SimulateSettings, random: Generator) -> Arra
 
 
 def with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array:
-    """Runs with noise, (runs, steps): scatter of each point, gain and phase error of each run."""
+    """Add noise to runs.
+
+    Args:
+        clean: complex stiffness, (runs, steps).
+        plan: settings with the noise of points and the gain and phase errors of runs.
+        random: generator.
+
+    Returns:
+        Complex stiffness with noise, (runs, steps).
+    """
     runs = (clean.shape[0], 1)
     gain = plan.gain_error * random.standard_normal(runs)
     phase = plan.phase_error * random.standard_normal(runs)
@@ -194,17 +214,34 @@ def with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array
     return clean * (1.0 + gain) * np.exp(1j * phase) * (1.0 + scatter)
 
 
-def of_levels(held: int, plan: SimulateSettings, random: Generator) -> Array:
-    """What all repeats of each level of a sweep are multiplied with, (held, 1, 1): the errors that they share."""
+def level_errors(held: int, plan: SimulateSettings, random: Generator) -> Array:
+    """Factors of the gain and phase errors that all repeats of a level share.
+
+    Args:
+        held: number of levels.
+        plan: settings with the errors.
+        random: generator.
+
+    Returns:
+        Complex factors, (held, 1, 1).
+    """
     if not (plan.level_gain_error or plan.level_phase_error):
         return np.ones((held, 1, 1))
     gain, phase = random.standard_normal((2, held, 1, 1))
     return (1.0 + plan.level_gain_error * gain) * np.exp(1j * plan.level_phase_error * phase)
 
 
-def reached_over_asked(test: SimulatedSweep, plan: SimulateSettings, random: Generator) -> Array:
-    """Amplitude reached over that asked for, (held x repeats x steps,): off by as much at each frequency as at each
-    point; lognormal, so that it stays above zero."""
+def amplitude_ratios(test: SimulatedSweep, plan: SimulateSettings, random: Generator) -> Array:
+    """Ratios of the amplitude reached to the amplitude requested, lognormal.
+
+    Args:
+        test: sweep with the relative standard deviation `reached`; half of its variance is common to each frequency.
+        plan: settings with the number of repeats.
+        random: generator.
+
+    Returns:
+        (levels * repeats * steps,).
+    """
     at_frequency = random.standard_normal(len(test.frequencies))
     at_frequency = at_frequency if test.stepped == "frequency" else at_frequency[:, None, None]
     at_point = random.standard_normal((len(test.held), plan.repeats, len(test.steps)))

@@ -1,7 +1,7 @@
-"""What a rig without error writes of a known model: its loops, sweeps and resonance tests.
+"""Tests of a known model on a rig without errors: loops, sweeps and resonance tests.
 
-They come from `rig`, which steps Eqs. (3) and (5) through time. The closed form that the fits use carries its results
-from one amplitude to another near by, and no farther (see `near`).
+The virtual rig computes them in the time domain (Eqs. 3 and 5). The closed form of the fits only converts its results
+to nearby amplitudes (see `near`).
 """
 
 from __future__ import annotations
@@ -32,28 +32,27 @@ PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
 PAPER_SWEEPS = tuple(
     SimulatedSweep(direction, PAPER_AMPLITUDES, PAPER_FREQUENCIES) for direction in (Direction.AXIAL, Direction.RADIAL)
 )
-#: Rows of a simulated loop in a cycle, so that its curve is smooth, and time steps between two rows, in proportion to
-#: which the error of the time steps falls.
+#: Rows of a simulated loop per cycle, and time steps per row.
 _ROWS_PER_CYCLE, _STEPS_PER_ROW = 1000, 2
-#: Time steps of a programme at most: they take seconds, and a gigabyte.
+#: Maximum number of time steps of a programme; they take seconds and a gigabyte.
 _MOST_STEPS = 10_000_000
-#: Cycles before a loop is recorded, so that it has settled, at least and at most; none where an effect's settling is
-#: what there is to see.
+#: Least and largest number of cycles before a loop is recorded in its settled state.
 _LEAST_RUN_IN, _MOST_RUN_IN = 40, 300
-#: Cycles before these in which the motion swells and dies out, and its largest strain amplitude over eps_half, where
-#: friction would take longer than both to forget its start: chosen, of a mean force it then keeps next to nothing. Not
-#: where parameters follow the amplitude, which is that of the whole motion.
+#: Cycles of a preceding motion that swells and decays, and its largest strain amplitude over eps_half. It removes the
+#: mean force from the start where friction would keep it longer than the largest run-in. Not used if parameters follow
+#: the amplitude, which is that of the whole motion.
 _SWELL_CYCLES, _SWELL_TO = 100, 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Undisturbed:
-    """What a rig without error writes of a model.
+    """Tests of a model on a rig without errors.
 
     Args:
-        loops: each planned loop and its record.
-        sweeps: each planned sweep and its complex stiffness, (held, steps).
-        resonances: each planned resonance test and its complex transmissibility, (frequencies,).
+        truth: the model.
+        loops: planned loops with their records.
+        sweeps: planned sweeps with their complex stiffness [N/m or N m/rad], (levels, steps).
+        resonances: planned resonance tests with their complex transmissibility, (frequencies,).
     """
 
     truth: Model
@@ -63,14 +62,19 @@ class Undisturbed:
 
 
 def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = rig.STEPS_PER_CYCLE) -> Undisturbed:
-    """What the rig would write if it measured without error: the slow part of a simulation.
+    """Simulate the tests of a plan without errors; this is the slow part of a simulation.
 
     Args:
-        steps_per_cycle: time steps of the sweeps; the rig's error falls in proportion to them.
+        truth: model, including effects of the rig.
+        plan: settings with the tests; without tests, those of the paper.
+        steps_per_cycle: time steps per cycle of the sweeps; the error of the rig is inversely proportional.
+
+    Returns:
+        The tests with their results.
 
     Raises:
-        CampaignError: no tests, and no bushing for the paper's.
-        ModelError: a direction without a bushing, or one that cannot be tested.
+        CampaignError: no tests, and no bushing for the tests of the paper.
+        ModelError: a direction without a bushing, or an effect without a law in time.
     """
     loops, sweeps, resonances = plan.loops, plan.sweeps, plan.resonances
     if not (loops or sweeps or resonances):
@@ -85,8 +89,8 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
     return Undisturbed(
         truth,
         tuple(
-            (test, _clean_loop(truth, test, own.select(0)))
-            for test, own in track("loops simulated", list(zip(loops, under, strict=False)))
+            (test, _clean_loop(truth, test, circumstances.select(0)))
+            for test, circumstances in track("loops simulated", list(zip(loops, under, strict=False)))
         ),
         tuple((test, _clean_sweep(truth, test, steps_per_cycle)) for test in track("sweeps simulated", sweeps)),
         tuple((test, _clean_resonance(truth, test, steps_per_cycle)) for test in resonances),
@@ -94,7 +98,7 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
 
 
 def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.Record:
-    """The record of a loop or a programme without noise, `_ROWS_PER_CYCLE` rows a cycle of its highest frequency."""
+    """Record of a loop or programme without noise."""
     if len(test.parts) > 1:
         return _clean_programme(truth, test, under)
     ((frequency, amplitude),) = test.parts
@@ -116,10 +120,10 @@ def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.
 
 
 def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[int, float]]:
-    """Cycles until friction forgets where it began; before them those in which a small motion swells, and how far.
+    """Number of cycles before the record, and cycles and amplitude factor of a swelling motion before these.
 
-    It may keep a thousandth of the mean stress from the start, which no test sees. At a tenth of eps_half a cycle
-    keeps 95 % of it, at a hundredth 99.96 %: thousands of cycles.
+    The mean friction stress from the start must decay to a thousandth. At a strain of a tenth of eps_half a cycle keeps
+    95 % of it, at a hundredth 99.96 %.
     """
     if any(effect.settles for effect in truth.records):
         return 0, (0, 1.0)
@@ -134,7 +138,7 @@ def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[in
 
 
 def _clean_programme(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.Record:
-    """The record of a programme from rest, without noise, all of it under what it begins under."""
+    """Record of a programme from rest without noise, in the circumstances of its start."""
     fastest = max(frequency for frequency, _ in test.parts)
     step = 1.0 / (fastest * _ROWS_PER_CYCLE * _STEPS_PER_ROW)
     duration = sum(test.cycles / frequency + test.pause for frequency, _ in test.parts)
@@ -156,25 +160,25 @@ def _clean_programme(truth: Model, test: SimulatedLoop, under: Circumstances) ->
 
 
 def _thinned(record: rig.Record) -> rig.Record:
-    """One row of a record for so many time steps."""
-    every = _STEPS_PER_ROW
-    return rig.Record(record.time[::every], record.displacement[::every], record.force[::every])
+    """Record with one row per `_STEPS_PER_ROW` time steps."""
+    rows = slice(None, None, _STEPS_PER_ROW)
+    return rig.Record(record.time[rows], record.displacement[rows], record.force[rows])
 
 
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:
-    """Complex stiffness, (held, steps)."""
+    """Complex stiffness of a sweep, (levels, steps)."""
     points = (values.ravel() for values in test.points)
     under = Circumstances(test.temperature)
-    found = rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle, under=under)
-    return found.reshape(len(test.held), -1)
+    stiffness = rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle, under=under)
+    return stiffness.reshape(len(test.held), -1)
 
 
 def _clean_resonance(truth: Model, test: SimulatedResonance, steps_per_cycle: int) -> Array:
-    """Complex transmissibility, (frequencies,), at the amplitudes that the mount reaches.
+    """Complex transmissibility of a resonance test, (frequencies,).
 
     Notes:
-        The closed form tells where these amplitudes are about; the rig is asked there, and they are found again with
-        its stiffness. Errors of the instrument are those of a test machine, which a shaker does not have.
+        The closed form gives approximate amplitudes, for which the rig computes the stiffness. Effects of the
+        instrument are left out: they belong to a test machine, not to a shaker.
     """
     mount, frequency = truth.without(Level.INSTRUMENT), np.array(test.frequencies)
     base = test.base_acceleration / (2.0 * np.pi * frequency) ** 2
@@ -182,9 +186,9 @@ def _clean_resonance(truth: Model, test: SimulatedResonance, steps_per_cycle: in
     def closed(amplitude: Array) -> Array:
         return mount.stiffness(test.direction, frequency, amplitude)
 
-    about, _ = response(closed, test.mass, frequency, base)
-    stiffness = rig.dynamic_stiffness(mount, test.direction, frequency, about, steps_per_cycle=steps_per_cycle)
-    return response(near(mount, test.direction, frequency, about, stiffness), test.mass, frequency, base)[1]
+    approximate, _ = response(closed, test.mass, frequency, base)
+    stiffness = rig.dynamic_stiffness(mount, test.direction, frequency, approximate, steps_per_cycle=steps_per_cycle)
+    return response(near(mount, test.direction, frequency, approximate, stiffness), test.mass, frequency, base)[1]
 
 
 def near(
@@ -193,15 +197,26 @@ def near(
     frequency: Array,
     amplitude: Array,
     stiffness: Array,
-    known: Circumstances = UNKNOWN,
-    wanted: Circumstances = UNKNOWN,
+    under: Circumstances = UNKNOWN,
+    target: Circumstances = UNKNOWN,
 ) -> Callable[[Array], Array]:
-    """The rig's stiffness at amplitudes near those at which it is known, and under what is wanted: it changes as that
-    of the closed form does.
+    """Extrapolate the stiffness of the rig to nearby amplitudes and other circumstances.
+
+    Args:
+        truth: the model.
+        place: direction or specimen.
+        frequency: [Hz], (n,).
+        amplitude: at which the stiffness is known [m or rad], (n,).
+        stiffness: complex stiffness of the rig [N/m or N m/rad], (n,).
+        under: circumstances of the known stiffness.
+        target: circumstances of the result.
+
+    Returns:
+        Function of the amplitude, (n,), that returns the complex stiffness, (n,).
 
     Notes:
-        The rig is within 0.1 % of the closed form, and this ratio hardly changes with the amplitude: 2 % away the error
-        is below 1e-5, and 10 % away below 4e-5, a tenth of the rig's own.
+        The ratio of rig to closed form, within 0.1 % of 1, is kept. The error is below 1e-5 at an amplitude 2 % away,
+        and below 4e-5 at 10 %.
     """
-    ratio = stiffness / truth.stiffness(place, frequency, amplitude, under=known)
-    return lambda reached: ratio * truth.stiffness(place, frequency, reached, under=wanted)
+    ratio = stiffness / truth.stiffness(place, frequency, amplitude, under=under)
+    return lambda reached: ratio * truth.stiffness(place, frequency, reached, under=target)
