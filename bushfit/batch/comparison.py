@@ -33,10 +33,10 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
     """
     deviations, outliers = dict[str, Array](), dict[str, Array]()
     for name, (values, errors) in quantities.items():
-        known = np.isfinite(values)
+        finite = np.isfinite(values)
         removed = list[int]()
-        count, usual = 0, known.copy()
-        for step in range(int(known.sum()) // FEWEST):
+        count, usual = 0, finite.copy()
+        for step in range(int(finite.sum()) // FEWEST):
             z = _studentised(values, errors, usual)
             if not np.isfinite(z[usual]).any():  # the others agree to the digit
                 break
@@ -47,25 +47,25 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
             count = step + 1 if chance < _LEVEL else count
         differs = np.zeros(values.size, dtype=bool)
         differs[removed[:count]] = True
-        deviations[name] = _studentised(values, errors, known & ~differs)
+        deviations[name] = _studentised(values, errors, finite & ~differs)
         outliers[name] = differs
     return deviations, outliers
 
 
 def _studentised(values: Array, errors: Array, usual: Array) -> Array:
     """Deviation of each value from the mean of the usual ones without it, in their standard deviations, (n,)."""
-    count, others = usual.sum(), usual.sum() - usual  # (n,): how many others each value is held against
+    count, other_count = usual.sum(), usual.sum() - usual  # (n,): how many others each value is held against
     if count < FEWEST - 1:
         return np.full(values.size, np.nan)
     center = values[usual].mean()  # taken off first, for the digits of the sums
-    shifted, own = values - center, np.where(usual, values - center, 0.0)
-    mean = (shifted[usual].sum() - own) / others
-    variance = ((shifted[usual] ** 2).sum() - own**2 - others * mean**2) / (others - 1)
+    shifted, deviation = values - center, np.where(usual, values - center, 0.0)
+    mean = (shifted[usual].sum() - deviation) / other_count
+    variance = ((shifted[usual] ** 2).sum() - deviation**2 - other_count * mean**2) / (other_count - 1)
     square = errors**2
     if np.isfinite(square[usual]).any():
         typical = float(np.nanmean(square[usual]))
         variance = variance + np.maximum(np.where(np.isfinite(square), square, typical) - typical, 0.0)
-    spread = np.sqrt(np.maximum(variance, 0.0) * (1.0 + 1.0 / others))
+    spread = np.sqrt(np.maximum(variance, 0.0) * (1.0 + 1.0 / other_count))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(spread > 1e-9 * (np.abs(center) + np.abs(shifted)), (shifted - mean) / spread, np.nan)
 
@@ -80,11 +80,14 @@ def smallest_deviation(parts: int, quantities: int) -> float | None:
 def capability(
     values: Array, low: float, high: float
 ) -> tuple[tuple[float, float, float] | None, tuple[float, float, float] | None]:
-    """Cp and Cpk, each with its 95 % interval; None where limits or scatter are missing.
+    """Compute Cp and Cpk with their 95 % intervals.
 
     Args:
         values: of the parts, (n,), without NaN.
         low, high: limits; either may be infinite.
+
+    Returns:
+        Cp and Cpk, each as value, low and high; None where limits or scatter are missing.
 
     Notes:
         ISO 22514-2 for normal scatter, from the standard deviation of all parts, so that a process that drifts shows
@@ -99,5 +102,5 @@ def capability(
     width = (high - low) / (6.0 * sigma)
     if not math.isfinite(width):
         return None, cpk
-    least, most = (width * math.sqrt(float(chdtri(count - 1, p)) / (count - 1)) for p in (0.975, 0.025))
-    return (width, least, most), cpk
+    lower, upper = (width * math.sqrt(float(chdtri(count - 1, p)) / (count - 1)) for p in (0.975, 0.025))
+    return (width, lower, upper), cpk

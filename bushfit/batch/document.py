@@ -25,7 +25,7 @@ class Estimate:
     unit: Annotated[str, Field(description="SI unit of all four numbers.")] = "1"
 
     @classmethod
-    def of(cls, value: float, low: float | None, high: float | None, stderr: float | None, unit: str) -> "Estimate":
+    def finite(cls, value: float, low: float | None, high: float | None, stderr: float | None, unit: str) -> "Estimate":
         """An estimate in which numbers that are not finite are None."""
         low, high, stderr = (x if x is not None and math.isfinite(x) else None for x in (low, high, stderr))
         return cls(value, low, high, stderr, unit)

@@ -57,7 +57,11 @@ class Workers:
 
 
 def local_workers(processes: int) -> Workers:
-    """Processes of this machine; a server that forks them starts at once."""
+    """Processes of this machine; a server that forks them starts at once.
+
+    Returns:
+        Workers whose executor is a process pool.
+    """
     os.environ.update(_ENVIRONMENT, PYTHONPATH=os.pathsep.join(sys.path))
     forks = "forkserver" in multiprocessing.get_all_start_methods()  # this process has threads, so it must not fork
     context = multiprocessing.get_context("forkserver" if forks else "spawn")
@@ -87,6 +91,9 @@ def dask_workers(address: str) -> Workers:
 
     Args:
         address: of the scheduler, such as tcp://10.0.0.5:8786.
+
+    Returns:
+        Workers whose executor sends tasks to the cluster.
 
     Raises:
         BatchError: Dask is not installed, or no scheduler answers at the address.
@@ -133,7 +140,7 @@ def run_rows(
     workers: Workers,
     warn: Callable[[str], object] = lambda _: None,
 ) -> Iterator[tuple[int, Outcome]]:
-    """Do work(row) for all rows in any order; yield the number and the result of each as it is finished.
+    """Do work(row) for all rows in any order.
 
     Args:
         rows: arguments of `work`.
@@ -141,6 +148,9 @@ def run_rows(
         give_up: result of a row that the workers do not survive, from a sentence on that.
         workers: of this machine or of a cluster.
         warn: called with a sentence when no worker is left.
+
+    Returns:
+        Iterator over the number and result of each row as it is finished.
 
     Raises:
         BatchError: no worker starts, or the cluster is lost.

@@ -73,8 +73,8 @@ class Bounds:
     at_least: Annotated[int, Field(ge=3)] = 10
 
     def __post_init__(self) -> None:
-        given = [value is not None for value in (self.min, self.max, self.nominal, self.sigma)]
-        if not any(given) or (self.nominal is None) != (self.tolerance is None):
+        is_stated = [value is not None for value in (self.min, self.max, self.nominal, self.sigma)]
+        if not any(is_stated) or (self.nominal is None) != (self.tolerance is None):
             expected = "min, max, nominal with tolerance, or sigma"
             raise ValueError(CampaignError("these keys make no limit", expected=expected))
         if self.min is not None and self.max is not None and self.min >= self.max:
@@ -163,7 +163,7 @@ class Limits:
         stiffness, loss_factor: at operating points.
         nrmse, reduced_chi_square: largest allowed.
         verdicts: of `diagnose` that are allowed; empty for all.
-        guard: whether a conditional pass counts as a miss.
+        guard: if true, a conditional pass is a miss.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
@@ -216,6 +216,11 @@ def read_limits(path: Path) -> Limits:
 def check_limits(limits: Limits, path: Path, rows: Iterable[Row]) -> None:
     """Check that these rows can be judged by the limits.
 
+    Args:
+        limits: the limits file.
+        path: of the file, for the error.
+        rows: of the batch.
+
     Raises:
         CampaignError: `verdicts`, and a row without diagnose or run.
     """
@@ -264,6 +269,9 @@ def judge_part(
         limits: the limits file.
         allowed: lowest and highest allowed value by the name of the quantity, as the whole batch resolves them.
         quantities: how each is written.
+
+    Returns:
+        The worst result, and sentences on the limits that are missed or doubtful.
     """
     poor, results = describe_poor_fit(record, limits), list[LimitResult]()
     misses, doubtful = dict[str, str](), dict[str, str]()
@@ -297,23 +305,31 @@ def judge_part(
 
 
 def judge_value(estimate: Estimate, low: float, high: float) -> LimitResult:
-    """Compare a value and its 95 % interval, if known, with the lowest and highest allowed value."""
-    least, most = (estimate.value if end is None else end for end in (estimate.low, estimate.high))
+    """Compare a value and its 95 % interval, if known, with limits.
+
+    Args:
+        estimate: value and interval.
+        low, high: lowest and highest allowed value in the unit of the estimate; either may be infinite.
+
+    Returns:
+        One of the four results; "not judged" is none of them.
+    """
+    lower, upper = (estimate.value if end is None else end for end in (estimate.low, estimate.high))
     if low <= estimate.value <= high:
-        return "pass" if low <= least and most <= high else "conditional pass"
-    return "fail" if most < low or least > high else "conditional fail"
+        return "pass" if low <= lower and upper <= high else "conditional pass"
+    return "fail" if upper < low or lower > high else "conditional fail"
 
 
 def _limit_sentence(
     quantity: Quantity, estimate: Estimate, allowed: tuple[float, float], result: LimitResult, bound: str | None
 ) -> str:
     """Value, interval and the nearer limit in words: "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail"."""
-    shown = quantity.displayed(estimate.value)
+    displayed = quantity.displayed(estimate.value)
 
     def written(x: float) -> str:
-        return number(x * shown.factor, 4)
+        return number(x * displayed.factor, 4)
 
-    unit = "" if shown.unit == "-" else f" {shown.unit}"
+    unit = "" if displayed.unit == "-" else f" {displayed.unit}"
     interval = (
         ""
         if estimate.low is None or estimate.high is None
@@ -328,16 +344,19 @@ def _limit_sentence(
 
 
 def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[str, tuple[float, float]], list[str]]:
-    """Lowest and highest allowed value of each quantity, and notes on limits that the batch cannot be judged by.
+    """Resolve limits that are relative to the batch.
 
     Args:
         limits: the limits file.
         values: of each quantity over the batch, (n,), NaN where a part has none.
+
+    Returns:
+        Lowest and highest allowed value of each quantity, and notes on limits that the batch cannot be judged by.
     """
     allowed, notes = dict[str, tuple[float, float]](), list[str]()
     for name, bounds in limits.bounds.items():
-        known = values.get(name, np.empty(0))
-        low, high, idle = bounds.resolve(known[np.isfinite(known)])
+        finite_values = values.get(name, np.empty(0))
+        low, high, idle = bounds.resolve(finite_values[np.isfinite(finite_values)])
         allowed[name] = low, high
         notes += [f"{name}: {idle}"] if idle else []
     return allowed, notes

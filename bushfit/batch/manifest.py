@@ -89,12 +89,12 @@ class Settings:
 
     @property
     def predicts(self) -> bool:
-        """Whether the row is predicted; the tables of a prediction are always written."""
+        """True if the row is predicted; the tables of a prediction are always written."""
         return not {"run", "predict"}.isdisjoint(self.commands or ())
 
     @property
     def diagnoses(self) -> bool:
-        """Whether the row ends in a verdict of diagnose."""
+        """True if the row ends in a verdict of diagnose."""
         return not {"run", "diagnose"}.isdisjoint(self.commands or ())
 
 
@@ -166,6 +166,9 @@ def read_manifest(source: str, settings: Settings, *more: str) -> Manifest:
         settings: of the command line; they replace those at the top of the manifest.
         more: further campaign files, where a shell has expanded a pattern.
 
+    Returns:
+        Rows with complete settings, in order.
+
     Raises:
         CampaignError: no such file, no match, rows that would be lost, or keys and values that are not understood.
     """
@@ -213,10 +216,10 @@ def _read_csv_manifest(path: Path) -> Iterator[Entry]:
     delimiter = max(",;\t", key=text.lstrip().partition("\n")[0].count)
     lines = _csv_lines(path, text, delimiter)
     header = next((cells for _, cells in lines), [])
-    known = [key.name for key in fields(Entry)]
+    keys = [key.name for key in fields(Entry)]
     for column in header:
-        if column not in known:
-            error = unknown_key(column, known)
+        if column not in keys:
+            error = unknown_key(column, keys)
             error.file, error.place, error.hint = path, "header", error.hint or _INIT_HINT
             raise error
         if header.count(column) > 1:
@@ -275,8 +278,10 @@ def _make_rows(entries: Sequence[Entry], base: Path, settings: Settings, source:
         raise CampaignError("the manifest has no rows", file=source, expected="a campaign on each line")
     _check_used(settings, {entry.commands or settings.commands or _DEFAULT_COMMANDS for entry in entries}, source)
     stems = Counter(Path(entry.campaign).stem for entry in entries)
-    taken: set[str] = set()
-    complete = cache(lambda own: _complete(own, settings, base, source))  # rows share one object, for memory
+    used_folders: set[str] = set()
+    complete = cache(
+        lambda row_settings: _complete(row_settings, settings, base, source)
+    )  # rows share one object, for memory
     rows = []
     for entry in entries:
         path = Path(entry.campaign)
@@ -284,8 +289,8 @@ def _make_rows(entries: Sequence[Entry], base: Path, settings: Settings, source:
         name = entry.name or (path.parent.name if shared else path.stem)
         plain = folder_name(name)
         numbered = (f"{plain} {number}" for number in count(2))
-        folder = next(folder for folder in chain([plain], numbered) if folder.casefold() not in taken)
-        taken.add(folder.casefold())
+        folder = next(folder for folder in chain([plain], numbered) if folder.casefold() not in used_folders)
+        used_folders.add(folder.casefold())
         try:
             merged = complete(entry.settings)
         except CampaignError as error:
@@ -316,9 +321,9 @@ def _uses(commands: tuple[Command, ...], name: str) -> bool:
     return not set(commands).isdisjoint(_COMMANDS_USING[name])
 
 
-def _complete(own: Settings, defaults: Settings, base: Path, source: str) -> Settings:
+def _complete(row_settings: Settings, defaults: Settings, base: Path, source: str) -> Settings:
     """Settings of a row with every default filled in, checked against each other."""
-    settings = own.with_defaults(defaults)
+    settings = row_settings.with_defaults(defaults)
     commands = settings.commands or _DEFAULT_COMMANDS
     if "run" in commands and set(commands) != {"run"}:
         raise CampaignError(
@@ -327,9 +332,9 @@ def _complete(own: Settings, defaults: Settings, base: Path, source: str) -> Set
             place="commands",
             found=", ".join(commands),
             expected='commands = ["run"], or any of fit, diagnose, predict without it',
-            hint="--command run alone" if own.commands is None else None,
+            hint="--command run alone" if row_settings.commands is None else None,
         )
-    _check_used(own, [commands], source)
+    _check_used(row_settings, [commands], source)
     if commands == ("predict",) and not settings.model:
         raise CampaignError(
             "predict has no model to predict from",

@@ -56,6 +56,9 @@ class Point:
 def parse_point(text: str) -> Point:
     """Read a text such as "axial 25 Hz 0.1 mm"; a place that resembles no direction is the name of a specimen.
 
+    Returns:
+        The point in SI units.
+
     Raises:
         UnitError: no direction, no numbers, or units that do not fit.
     """
@@ -114,22 +117,25 @@ def point_quantity(point: Point, name: str) -> Quantity:
     return Quantity(f"{name} {point}", unit, factor)
 
 
-def list_quantities(known: Collection[str], points: Iterable[Point]) -> dict[str, Quantity]:
+def list_quantities(names: Collection[str], points: Iterable[Point]) -> dict[str, Quantity]:
     """Quantities by name: parameters among the known ones in the order of the library, quality of the fit, points."""
-    in_order = dict.fromkeys([*parameter_names(), *sorted(filter(is_parameter, known))])
-    units = {name: get_parameter(name).unit for name in in_order if name in known}
+    in_order = dict.fromkeys([*parameter_names(), *sorted(filter(is_parameter, names))])
+    units = {name: get_parameter(name).unit for name in in_order if name in names}
     parameters = [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
     at_points = [point_quantity(point, name) for point in points for name in (STIFFNESS, LOSS_FACTOR)]
     return {quantity.name: quantity for quantity in (*parameters, *FIT_QUALITY.values(), *at_points)}
 
 
 def measured_at(sweeps: Iterable[Sweep], point: Point, noise: float) -> dict[str, Estimate]:
-    """Stiffness and loss factor as measured at a point, by quantity; empty if no sweep has the point.
+    """Find the measured stiffness and loss factor at a point.
 
     Args:
         sweeps: of one part.
         point: operating point.
         noise: standard deviation of the real and imaginary part of one measured point, relative to |K|.
+
+    Returns:
+        Mean of the repeats by the name of the quantity; empty if no sweep has the point.
     """
     for sweep in sweeps:
         frequency, amplitude = sweep.frequency / point.frequency - 1.0, sweep.amplitude / point.amplitude - 1.0
@@ -149,10 +155,13 @@ def measured_at(sweeps: Iterable[Sweep], point: Point, noise: float) -> dict[str
 
 
 def measured_curve(sweeps: Iterable[Sweep]) -> dict[str, float]:
-    """|K| [SI] by operating point, at most twelve, of the first sweep that holds a level, at its middle level.
+    """Take the stiffness curve of the first sweep that holds a level, at its middle level.
 
     Levels and steps are rounded to three digits, so that parts have common points although a rig reaches its set points
     with some error.
+
+    Returns:
+        |K| [SI] by operating point, at most twelve points.
     """
     for sweep in sweeps:
         held, step = (np.array([float(f"{x:.3g}") for x in values]) for values in (sweep.held, sweep.step))

@@ -107,6 +107,11 @@ def _limit_threads() -> Any:
 def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFile, dict[str, bytes]]:
     """Run the commands of a row.
 
+    Args:
+        row: part, campaign and commands.
+        points: operating points of stiffness and loss factor.
+        formats: files to make.
+
     Returns:
         The record of their results, and the files by name.
 
@@ -142,7 +147,7 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
 def _run_commands(
     campaign: Campaign, settings: Settings, formats: Formats
 ) -> tuple[Result, Diagnosis | None, dict[str, bytes]]:
-    """Run fit, diagnose and predict as far as they are asked for, each from the result before; or the whole chain."""
+    """Run those of fit, diagnose and predict that the row states, each from the result before; or the whole chain."""
     commands, with_tables = settings.commands or (), replace(formats, tables=True)
     if "run" in commands:
         ran = run(campaign)
@@ -160,8 +165,8 @@ def _run_commands(
             files["joint.json"] = files.pop("model.json")
     if "diagnose" in commands and data:
         options = {name: getattr(settings, name) for name in ("max_effects", "tolerance", "adopt", "without")}
-        given = {name: value for name, value in options.items() if value is not None}
-        diagnosed = diagnose(data, model=start, joint=joint, **given)
+        options_given = {name: value for name, value in options.items() if value is not None}
+        diagnosed = diagnose(data, model=start, joint=joint, **options_given)
         result, diagnosis = diagnosed.result, diagnosed.diagnosis
         files |= encode_all(diagnosed.files, formats)
     assert result is not None  # the manifest refuses rows without fit, diagnose or model
@@ -200,7 +205,7 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
     for name, parameter in result.model.parameters.items():
         low, high = result.interval(name) or (None, None)
         stderr = result.covariance.stderr(name)
-        estimates[name] = Estimate.of(result.model.values[name], low, high, stderr, parameter.unit)
+        estimates[name] = Estimate.finite(result.model.values[name], low, high, stderr, parameter.unit)
     if result.quality:
         estimates |= {quantity.name: Estimate(getattr(result.quality, key)) for key, quantity in FIT_QUALITY.items()}
     for point in points:
@@ -215,6 +220,6 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
         )
         for name, band, unit in bands:
             value, low, high = (float(values[0]) for values in (band.value, band.low, band.high))
-            estimates[f"{name} {point}"] = Estimate.of(value, low, high, None, unit)
+            estimates[f"{name} {point}"] = Estimate.finite(value, low, high, None, unit)
         warnings.append(prediction.warnings)
     return estimates, warnings

@@ -88,6 +88,9 @@ def run_batch(
             the whole batch is written.
         warn: called with a sentence when a cluster has no workers.
 
+    Returns:
+        Results of all rows.
+
     Raises:
         BatchError: the workers are lost; finished rows are kept.
         OutputError: the results cannot be written, or another batch is at work in the folder.

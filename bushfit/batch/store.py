@@ -36,7 +36,16 @@ STAGE = ".aside"
 
 
 def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
-    """Hash of the settings of a row, of the files it writes, and of the version of bushfit."""
+    """Hash of all that the results of a row depend on, apart from its inputs.
+
+    Args:
+        row: with its settings.
+        points: operating points of stiffness and loss factor.
+        formats: files that the row writes.
+
+    Returns:
+        SHA-256 of settings, points, formats and the version of bushfit.
+    """
     settings = {
         "settings": asdict(row.settings),
         "points": [str(point) for point in points],
@@ -49,7 +58,16 @@ def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
 
 
 def load_row(output: Path, row: Row, key: str) -> RowFile | None:
-    """The record of a row that was done with the same settings and inputs and whose files are whole; else None."""
+    """Load the record of a row that was done before.
+
+    Args:
+        output: folder of the batch.
+        row: part and campaign.
+        key: hash of its settings.
+
+    Returns:
+        The record; None if settings or inputs have changed, or a file is damaged or missing.
+    """
     folder, campaign_folder = output / ROWS_FOLDER / row.folder, Path(row.campaign).parent
     with contextlib.suppress(OSError, ValueError, BushfitError):
         record = row_adapter().validate_json((folder / ROW_FILE).read_bytes())
@@ -63,6 +81,12 @@ def load_row(output: Path, row: Row, key: str) -> RowFile | None:
 
 def save_row(output: Path, row: Row, files: Mapping[str, bytes], record: RowFile) -> None:
     """Write the files and the record of a row, and remove those of an earlier run.
+
+    Args:
+        output: folder of the batch.
+        row: part and campaign.
+        files: contents by name.
+        record: of the results.
 
     Raises:
         OSError: the disk is full or cannot be written.
@@ -108,6 +132,9 @@ def list_earlier(output: Path, rows: Collection[Row]) -> list[Path]:
 @contextlib.contextmanager
 def batch_folder(output: Path) -> Iterator[None]:
     """Keep other batches out of the folder; files that a killed batch left half written are removed.
+
+    Returns:
+        A context in which the folder is reserved.
 
     Raises:
         OutputError: another batch is at work there.

@@ -45,7 +45,7 @@ _NAMES_LISTED = 10
 
 @dataclass(frozen=True)
 class BatchPlan:
-    """What a batch is to do.
+    """Settings of a batch.
 
     Args:
         title: of the batch.
@@ -291,6 +291,9 @@ class BatchResult:
         """A row for each part, in the order of the manifest, with a unit in every header.
 
         A parameter has the unit of its typical value, so that the headers of two batches agree.
+
+        Returns:
+            Table with columns of texts, quantities, remarks, deviations and the measured curve.
         """
         import pandas as pd
 
@@ -333,7 +336,11 @@ class BatchResult:
         )
 
     def panels(self) -> list[Panel]:
-        """Panels of the picture: quantities with limits, and those that at least three parts have."""
+        """Panels of the picture.
+
+        Returns:
+            One for each quantity with limits or known of at least three parts.
+        """
         from bushfit.report.plots.batch import Panel
 
         panels = []
@@ -351,7 +358,11 @@ class BatchResult:
         return panels
 
     def junit(self) -> bytes:
-        """JUnit report for continuous integration: an error for a row that failed, a failure for a missed limit."""
+        """Make the JUnit report for continuous integration.
+
+        Returns:
+            XML with an error for a row that failed, and a failure for a limit that is missed or not judged.
+        """
         from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
         suite = TestSuite(self.plan.title)

@@ -134,7 +134,7 @@ def within_limits(model: Model, rig: RigSettings, place: Place, frequency: Array
 
 
 def entropy_left(odds: Sequence[float] | Array, distances: Array) -> Array:
-    """Entropy of which of several explanations is right that tests leave, at most [nats], (...).
+    """Largest entropy over several explanations that tests leave [nats], (...).
 
     Args:
         odds: probability of each explanation before the tests, in any unit, (r,).

@@ -37,7 +37,7 @@ _TONES = {"pass": "good", "conditional pass": "fair", "not judged": "fair", "con
 
 
 def is_batch(folder: Path) -> bool:
-    """Whether a folder holds the results of a batch."""
+    """True if a folder holds the results of a batch."""
     return (folder / "batch.json").exists()
 
 
