@@ -94,7 +94,7 @@ def to_document(result: Result) -> dict[str, Any]:
         unnamed=model.unnamed,
         model_error=result.model_error,
         alternatives=tuple(
-            AlternativeTable(alternative.model.effects, alternative.model.values, alternative.probability)
+            AlternativeTable(alternative.model.effects, dict(alternative.model.values), alternative.probability)
             for alternative in result.alternatives
         ),
         warnings=result.warnings,
