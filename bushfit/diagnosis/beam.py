@@ -17,12 +17,12 @@ import numpy as np
 from bushfit.diagnosis.claims import Screen, claims
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.explanations import Explanation, FaultyPlace, Meeting
-from bushfit.diagnosis.hypotheses import COMPOUND, Asked, Hypothesis, State, Tests, Weighed
+from bushfit.diagnosis.hypotheses import COMPOUND, DiagnosisRequest, Hypothesis, State, Tests, Weighed
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, FAR, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_what_it_uses
 from bushfit.diagnosis.refit import beside, refitted, within_reach
-from bushfit.diagnosis.words import judged
+from bushfit.diagnosis.verdict import judged
 from bushfit.errors import FitError, ModelError
 from bushfit.progress import track
 
@@ -41,7 +41,7 @@ _BENT = 1.5
 class Search:
     """A beam over sets of explanations."""
 
-    def __init__(self, asked: Asked) -> None:
+    def __init__(self, asked: DiagnosisRequest) -> None:
         self.asked = asked
         self.found: dict[frozenset[Hashable], Hypothesis] = {}
         self._seen: set[frozenset[Hashable]] = set()
@@ -76,7 +76,7 @@ class Search:
         return sorted(self.found.values(), key=lambda each: -each.log_posterior)
 
     def _is_sure(self) -> bool:
-        """Whether one answer is all but sure already, with whatever may be beside it weighed, and it fits."""
+        """True if one explanation has nearly all of the probability, was refitted and fits the tests."""
         finding = judged(self.ordered, self.asked.tolerance)
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.first.chance() >= DOES_NOT_FIT
@@ -115,7 +115,7 @@ class Search:
     def _note_with_each(self, weighed: Weighed, depth: int) -> None:
         """Note a state, and it with every explanation beside it, counted linearly."""
         self._note_state(weighed)
-        for each, worth in weighed.worths:
+        for each, worth in weighed.group_evidence:
             if len(weighed.state.effects) < self.asked.most or each.kind != "effect":
                 for one in weighed.with_(each, worth, self._prior(each.kind, each.name) - log(depth + 1)):
                     self._note(one)
@@ -131,7 +131,7 @@ class Search:
         return log(ODDS["place"] / len(families)) - self.root.state.log_prior
 
     def _met(self, hypothesis: Hypothesis, place: Meeting) -> Hypothesis:
-        """The same, and that points which have no weight meet at a frequency, beside all other tests."""
+        """The hypothesis and, beside it, a disturbance at the frequency where points without weight meet."""
         posterior = hypothesis.log_posterior + self._met_odds + place.log_odds
         size = max(hypothesis.size, place.size)
         if hypothesis.size <= self.asked.tolerance:  # nothing that anyone would miss
@@ -162,7 +162,7 @@ class Search:
         prior = state.log_prior + state.density - weighed.log_posterior
         evidence = {
             each.name: prior + self._prior("effect", each.name) + worth.whole
-            for each, worth in weighed.worths
+            for each, worth in weighed.group_evidence
             if each.kind == "effect"
         }
         first = [name for name in sorted(evidence, key=lambda name: -evidence[name]) if name in new]
@@ -204,11 +204,11 @@ class Search:
 
     def _with_places(self, weighed: Weighed, depth: int) -> list[Weighed]:
         state, grown = weighed.state, []
-        own = [(each, worth) for each, worth in weighed.worths if isinstance(each, FaultyPlace)]
+        own = [(each, worth) for each, worth in weighed.group_evidence if isinstance(each, FaultyPlace)]
         own.sort(key=lambda pair: -(self._prior("place", pair[0].name) + pair[1].whole))
         for place, shifted in own[:_PLACES]:
             free = place.freely
-            (scattered,) = weighed.worths_of([free])
+            (scattered,) = weighed.group_evidence_of([free])
             each, worth = (free, scattered) if scattered.whole > shifted.whole else (place, shifted)
             odds = self._prior("place", each.name) - log(depth + 1)
             better = state.log_prior + state.density + odds + worth.whole > weighed.log_posterior

@@ -47,7 +47,7 @@ class Claim:
 
     @property
     def each(self) -> list[Claim]:
-        """The same of each test alone."""
+        """One claim for each test alone."""
         return [Claim(self.mistake, (place,)) for place in self.tests] or [self]
 
     def test(self, data: Data) -> str | None:
@@ -59,13 +59,13 @@ class Claim:
         return tuple(labelled(self.mistake.name, one.test(data)) for one in self.each)
 
     def words(self, data: Data) -> str:
-        """What would be so, in words."""
+        """Sentence that states the mistake."""
         every = [*data.loops, *data.sweeps]
         files = [file_or_name(every[place].test) for place in self.tests]
         return self.mistake.sentence.format(files=" and ".join(filter(None, (", ".join(files[:-1]), *files[-1:]))))
 
     def corrections(self, data: Data) -> tuple[str, ...]:
-        """What to write into the campaign, a line each."""
+        """Lines to write into the campaign, one for each test."""
         every = [*data.loops, *data.sweeps]
         return tuple(self.mistake.corrected(every[place].test) for place in self.tests) or (
             self.mistake.corrected(None),
@@ -105,7 +105,7 @@ def adopted(data: Data, names: Collection[str]) -> tuple[Data, list[str]]:
 
 
 def _claimed(data: Data, name: str) -> Claim:
-    """What one --adopt claims."""
+    """Claim that one --adopt option makes."""
     mistake, test = get_mistake(name), name.partition(SEPARATOR)[2]
     every: list[DataSet] = [*data.loops, *data.sweeps]
     possible = [place for place, one in enumerate(every) if mistake and _is_possible(mistake, one, data)]
@@ -121,7 +121,7 @@ def _claimed(data: Data, name: str) -> Claim:
 
 
 def _is_possible(mistake: Mistake, data_set: DataSet, data: Data) -> bool:
-    """Whether a mistake can have been made in a test, by its columns and by the modulus that it implies."""
+    """True if a mistake is possible in a test, judged by its columns and by the modulus that it implies."""
     bushing, place = data.campaign.bushing, data_set.direction
     modulus = float(np.median(np.abs(data_set.measured))) / stiffness_per_modulus(bushing, place)
     strain = float(np.max(data_set.amplitude)) * unit_strain(bushing, place)

@@ -25,7 +25,7 @@ _MOST_ROWS = 50_000
 
 
 class _Means(NamedTuple):
-    """What of a sweep is diagnosed.
+    """Part of a sweep that is diagnosed.
 
     Args:
         under: what its points were measured under, the rows that are left out among those before.
@@ -110,7 +110,7 @@ def _noise(before: SweepNoise, made: Sequence[_Means], rig: RigSettings) -> Swee
 
 
 def _told(data_set: SweepData) -> _Means | None:
-    """What of a sweep is diagnosed; None where it is the sweep as it is."""
+    """Part of a sweep that is diagnosed; None if that is the whole sweep."""
     sweep, rows, words = data_set.sweep, data_set.order[data_set.weights > 0.0], ""
     lines = np.unique(sweep.held[rows])
     if lines.size > _MOST_LINES:
@@ -157,7 +157,7 @@ class _Groups:
 
     @classmethod
     def of(cls, rows: Array, keys: Array) -> "_Groups":
-        """Those with the same key, (keys, n)."""
+        """Means of the values that have the same key."""
         _, first, place, counts = np.unique(keys, axis=1, return_index=True, return_inverse=True, return_counts=True)
         turn = np.argsort(np.bincount(place, rows) / counts, kind="stable")
         return cls(rows, np.argsort(turn)[place], rows[first[turn]], counts[turn])

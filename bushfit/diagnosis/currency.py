@@ -1,4 +1,4 @@
-"""What every explanation of a gap is worth: the logarithm of the marginal likelihood of the tests under it.
+"""Marginal likelihood of the tests under each explanation of a gap.
 
 Notes:
     Around a fitted model the whitened residuals are r = noise + W e + J p + U a: errors e of the rig, independent and
@@ -62,8 +62,8 @@ class Group:
 
 
 @dataclass(frozen=True, eq=False)
-class Worth:
-    """What a group is worth.
+class GroupEvidence:
+    """Evidence of the tests for a group of columns.
 
     Args:
         log_evidence: of the tests with it, of all sizes and nodes together.
@@ -77,7 +77,7 @@ class Worth:
     size: float
     likeliest: float
     by_node: Array
-    beside: "Worth | None" = None
+    beside: "GroupEvidence | None" = None
 
     @property
     def whole(self) -> float:
@@ -88,7 +88,7 @@ class Worth:
 
 
 @dataclass(frozen=True, eq=False)
-class Ledger:
+class LinearModel:
     """Everything linear about one fitted model and its tests.
 
     Args:
@@ -125,12 +125,12 @@ class Ledger:
 
     @cached_property
     def _plain(self) -> Array:
-        """Which nodes have neither errors beyond the class of the rig nor a deviation of the compound."""
+        """Mask of the nodes without level errors beyond the rig's class and without a deviation of the compound."""
         return self.rig.within[self._at] & ~self._bent
 
     @cached_property
     def _bent(self) -> Array:
-        """Which nodes have a deviation of the compound."""
+        """Mask of the nodes with a deviation of the compound."""
         return np.asarray(self.rig.compound[self._at] > 0.0)
 
     @cached_property
@@ -142,7 +142,7 @@ class Ledger:
 
     @cached_property
     def _scatters(self) -> Array:
-        """Which rows scatter as sweeps' points do, (n,) bool."""
+        """Mask of the rows that scatter as points of sweeps do, (n,)."""
         scatters = np.zeros(self.residual.size, dtype=bool)
         for block in self.rig.blocks:
             scatters[block.rows] |= block.scatters
@@ -245,25 +245,29 @@ class Ledger:
             moved = np.square(np.abs(back[:, flat:] * size @ self.compound.unit)).max(axis=-1)
         return _Solved(base, rest[:, 0], np.maximum(square[:, first:], 0.0), rest[:, first:], grams, moved)
 
-    def worths_of(self, groups: Sequence[Group]) -> list[Worth]:
-        """What other groups are worth, some at a time, as memory has it."""
+    def group_evidence_of(self, groups: Sequence[Group]) -> list[GroupEvidence]:
+        """Evidence for other groups, computed in parts to limit the memory."""
         whole = np.cumsum([len(group.columns) for group in groups]) * self.residual.size // _AT_ONCE
         ends = [0, *(np.flatnonzero(np.diff(whole)) + 1).tolist(), len(groups)]
-        return [worth for own in pairwise(ends) for worth in replace(self, groups=groups[slice(*own)]).worths]
+        return [
+            evidence
+            for own in pairwise(ends)
+            for evidence in replace(self, groups=groups[slice(*own)]).group_evidence
+        ]
 
     @property
     def log_evidence(self) -> float:
-        """Of the tests with nothing missing, errors of the rig within what its class allows."""
+        """Log evidence of the tests if nothing is missing and the rig's errors are within its class."""
         return float(logsumexp(self._solved.base[self._plain]))
 
     @property
     def log_evidence_bent(self) -> float:
-        """The same with a deviation of the compound."""
+        """Log evidence of the tests with a deviation of the compound."""
         return float(logsumexp(self._solved.base[self._bent])) if self._bent.any() else -np.inf
 
     @property
     def deviation(self) -> tuple[float, float]:
-        """What a deviation of the compound changes as the tests leave it, and its likeliest size, relative to |K|."""
+        """Relative change by a deviation of the compound, estimated from the tests, and its most probable size."""
         base = self._solved.base[self._bent]
         share = np.exp(base - logsumexp(base))
         sizes = self.rig.compound[self._at][self._bent]
@@ -272,7 +276,7 @@ class Ledger:
 
     @property
     def log_evidence_wide(self) -> float:
-        """The same with errors of levels beyond the class."""
+        """Log evidence of the tests with level errors beyond the rig's class."""
         beyond = ~(self._plain | self._bent)
         return float(logsumexp(self._solved.base[beyond])) if beyond.any() else -np.inf
 
@@ -297,9 +301,9 @@ class Ledger:
         return float(np.exp(base - logsumexp(base)) @ chdtrc(freedom, self._solved.misfit))
 
     @cached_property
-    def worths(self) -> list[Worth]:
-        """What each group is worth, errors of the rig within what its class allows."""
-        found: dict[int, Worth] = {}
+    def group_evidence(self) -> list[GroupEvidence]:
+        """Evidence for each group, with the rig's errors within its class."""
+        found: dict[int, GroupEvidence] = {}
         first = self._first
         for (numbers, own), gram in zip(self._alike, self._solved.grams, strict=True):
             units = [self.groups[number].unit for number in numbers]
@@ -328,21 +332,21 @@ class Ledger:
         spread = np.einsum("nij,nj,nkj->ik", vectors, np.einsum("ns,nsj->nj", share, v2 / grown), vectors)
         return mean, spread + np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
 
-    def _worth(self, gains: Array, moved: Array) -> Worth:
-        """From gains in ln evidence and squares of the change, (nodes, columns, sizes)."""
+    def _worth(self, gains: Array, moved: Array) -> GroupEvidence:
+        """Evidence for a group from the gains in log evidence and the squared changes, (nodes, columns, sizes)."""
         whole = self._solved.base[:, None, None] + gains
         by_node = whole.max(axis=(1, 2))
 
-        def of(chosen: Array, beside: Worth | None = None) -> Worth:
+        def of(chosen: Array, beside: GroupEvidence | None = None) -> GroupEvidence:
             own = whole[chosen]
             if not own.size:
-                return Worth(-np.inf, 0.0, float(SIZES[0]), by_node, beside)
+                return GroupEvidence(-np.inf, 0.0, float(SIZES[0]), by_node, beside)
             share = np.exp(own - own.max())
             total = share.sum()
             size = float(np.sqrt(np.sum(share * moved[chosen]) / total))
             likeliest = float(SIZES[int(np.argmax(share.sum(axis=(0, 1))))])
             log_evidence = float(own.max() + np.log(total) - np.log(whole.shape[1] * SIZES.size))
-            return Worth(log_evidence, size, likeliest, by_node, beside)
+            return GroupEvidence(log_evidence, size, likeliest, by_node, beside)
 
         return of(self._plain, of(self._bent) if self._bent.any() else None)
 
@@ -419,7 +423,7 @@ class _WithErrors:
     log_size: Array
 
     def at(self, numbers: Array) -> "_WithErrors":
-        """The same of some of the combinations."""
+        """Inner products at some of the combinations."""
         grams = [gram[numbers] for gram in self.grams]
         return _WithErrors(self.gram[numbers], self.square[numbers], grams, self.log_size[numbers])
 

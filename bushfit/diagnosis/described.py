@@ -1,4 +1,4 @@
-"""What has no name, described: a smooth correction where it stands, and the power law that it is like."""
+"""Smooth correction of a model for what no effect explains, and the power law that is nearest to it."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.currency import Ledger
+from bushfit.diagnosis.currency import LinearModel
 from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import unnamed
@@ -93,12 +93,12 @@ def describe(
     return Described(after, fitted, _held_out(evidence, fitted), like, *told)
 
 
-def weighed(fitted: Evidence, rig: RigSettings) -> tuple[Evidence, Ledger]:
+def weighed(fitted: Evidence, rig: RigSettings) -> tuple[Evidence, LinearModel]:
     """The fit with residuals in units of what scatters from point to point, and what anything smooth beside it is worth
     at the sizes of the rig's errors that matter."""
     bare = scattering_alone(fitted)
     rows, curves = bare.solution.jacobian, [each.group for each in unnamed(bare) if each.group]
-    plain = Ledger(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), curves)
+    plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), curves)
     return bare, replace(plain, at=plain.likely(_NEAR))
 
 
@@ -158,7 +158,7 @@ def _words(correction: Unnamed, like: Fingerprint | None) -> str:
 
 
 def _trusted(correction: Unnamed, whole: Evidence) -> str:
-    """Where it may be trusted, and by how much the form of the worst loop stays off, all harmonics counted."""
+    """Sentence on the range in which the correction is valid, and on the misfit that stays in the worst loop."""
     patches = [
         f"{', '.join(patch.directions)} {_span(patch.frequency_Hz)} Hz, {_span(patch.strain, 100.0)} % strain"
         for patch in correction.patches

@@ -30,7 +30,7 @@ _CORRECTED = (
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Where the fit of a model to all tests of a campaign ended, and the tests.
+    """Fit of a model to all tests of a campaign, with the tests.
 
     Args:
         solution: the fit, its residuals in units of noise.
@@ -53,7 +53,7 @@ class Evidence:
 
     @property
     def estimate(self) -> WeightedFit:
-        """The same as a fit that leaves nothing out."""
+        """Estimate of a fit that leaves nothing out."""
         return WeightedFit(self.solution, self.data_sets, self.data_sets, self.data_sets, ())
 
     @property
@@ -87,12 +87,12 @@ class Evidence:
         return basis[:, size > 1e-10 * size[0]]
 
     def beside(self, columns: Array) -> Array:
-        """What is left of columns, (c, n), when the model's own parameters have absorbed what they can."""
+        """Columns, (c, n), less what the model's own parameters can absorb."""
         return columns - (columns @ self.span) @ self.span.T
 
     @cached_property
     def place(self) -> Mapping[DataSet, slice]:
-        """Where each data set's residuals stand."""
+        """Slice of the residuals of each data set."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets]).tolist()
         return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
 

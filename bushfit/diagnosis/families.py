@@ -63,7 +63,7 @@ class FittedFamily:
 
     @property
     def words(self) -> str:
-        """Whether it is nearer to what was held out than the first family is, beyond chance."""
+        """True if the family predicts the held-out data better than the first family, beyond chance."""
         if self.gain is None or self.p is None or self.held.before is None or self.held.after is None:
             return "nothing can be held out of both"
         figures = f"held out {number(self.held.after, 3)} x noise, the first {number(self.held.before, 3)}"
@@ -86,12 +86,12 @@ def known_families(model: Model, data_sets: Sequence[DataSet]) -> tuple[str, ...
 
 
 def _clash(names: Sequence[str]) -> bool:
-    """Whether one of some effects is none beside another."""
+    """True if one of some effects vanishes beside another."""
     return any({*get_effect(name).never_with} & {*names} for name in names)
 
 
 def _fits(model: Model, name: str) -> bool:
-    """Whether a model has not an effect yet, and what it stands in place of."""
+    """True if a model lacks an effect and has the branch that it replaces."""
     return name not in model.effects and get_effect(name).replaces in (None, *model.effects)
 
 
@@ -168,7 +168,7 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
 def _gain(
     told: Mapping[str, Predicted], data_sets: Sequence[DataSet]
 ) -> tuple[tuple[float, float, float] | None, float | None]:
-    """By how much the mean square of predicted residuals falls, with its 95 % interval, and the probability of chance.
+    """Fall of the mean squared held-out residual, with its 95 % interval and its probability.
 
     Notes: by the delta method the variance of the gain is the sum, over the rows of all tests, of the squares of its
     slope by the noise of each, times what the better model leaves of a mean square, at least 1. A row counts where it

@@ -18,7 +18,7 @@ from math import log
 import numpy as np
 from scipy.special import logsumexp
 
-from bushfit.diagnosis.currency import Group, Ledger
+from bushfit.diagnosis.currency import Group, LinearModel
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import TELLS
 from bushfit.diagnosis.terms import Measure, Terms
@@ -88,7 +88,7 @@ class Fingerprint:
 
     @property
     def told(self) -> list[bool]:
-        """Whether these tests tell its phase, and each of its powers."""
+        """True for each of phase, frequency power and amplitude power that the tests determine."""
         found = zip(
             (self.phase_deg, self.frequency_power, self.amplitude_power), (_PHASE_TOLD, _TOLD, _TOLD), strict=True
         )
@@ -121,7 +121,7 @@ class Fingerprint:
 
 
 def fingerprint(
-    fitted: Evidence, bare: Evidence, plain: Ledger, start: Mapping[str, float], bounds: Bounds
+    fitted: Evidence, bare: Evidence, plain: LinearModel, start: Mapping[str, float], bounds: Bounds
 ) -> Fingerprint | None:
     """The power law that closes most of the gap that a fitted model leaves; None where the tests show none.
 
@@ -146,7 +146,7 @@ def fingerprint(
     drawn[0] = np.degrees(middle + np.angle(turn * np.exp(-1j * middle)))
     phase, p, q = (tuple(each) for each in np.quantile(drawn, (0.5, 0.025, 0.975), axis=-1).T.tolist())
     law = logsumexp(apart) + grids[0].log_evidence - log(len(grids))
-    curves = replace(grids[0].ledger, groups=plain.groups).worths  # around the same parameters and term
+    curves = replace(grids[0].ledger, groups=plain.groups).group_evidence  # around the same parameters and term
     smooth = logsumexp([worth.log_evidence for worth in curves]) - log(len(curves))
     return Fingerprint(grids[0].terms.measure, alike, phase, p, q, bool(law > smooth))
 
@@ -162,12 +162,14 @@ class _Grid:
     """
 
     terms: Terms
-    ledger: Ledger
+    ledger: LinearModel
     powers: Array
     step: Array
 
     @classmethod
-    def of_the_likeliest(cls, fitted: Terms, bare: Terms, plain: Ledger, model: Model, bounds: Bounds) -> _Grid | None:
+    def of_the_likeliest(
+        cls, fitted: Terms, bare: Terms, plain: LinearModel, model: Model, bounds: Bounds
+    ) -> _Grid | None:
         """The grid that the likeliest pairs fill, around the parameters and the term that go best with one
         another; None where these do not come to rest from those of a model."""
         about = bare.points - bare.points.mean(axis=0)
@@ -193,7 +195,7 @@ class _Grid:
     @cached_property
     def _logs(self) -> Array:
         """Logarithm of the evidence with each pair."""
-        return np.array([worth.log_evidence for worth in self.ledger.worths])
+        return np.array([worth.log_evidence for worth in self.ledger.group_evidence])
 
     @cached_property
     def share(self) -> Array:
@@ -202,7 +204,7 @@ class _Grid:
 
     @property
     def log_evidence(self) -> float:
-        """Of the tests with any of all pairs, each as likely beforehand."""
+        """Log evidence of the tests averaged over all pairs, each equally probable."""
         filled = np.log(np.where(self.step > 0.0, self.step / (2.0 * _MOST), 1.0)).sum()
         return float(logsumexp(self._logs) + filled)
 

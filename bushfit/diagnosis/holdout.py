@@ -38,13 +38,13 @@ _NAMES: dict[Stepped | None, tuple[str, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What is held out together: of each test which points, (n,) bool; of a loop all or none."""
+    """Points that are held out together: of each test a mask, (n,); of a loop all or none."""
 
     name: str
     points: Sequence[Array]
 
     def rows(self, data_sets: Sequence[DataSet]) -> Array:
-        """Its residuals among those of all tests, (n,) bool."""
+        """Mask of the part's residuals among those of all tests, (n,)."""
         return np.concatenate([np.tile(of, data.parts) for data, of in zip(data_sets, self.points, strict=True)])
 
     def rest(self, data_sets: Sequence[DataSet]) -> list[DataSet]:
@@ -121,8 +121,7 @@ def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
 
 
 def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[dict[str, Predicted], list[Skipped]]:
-    """What two models predict of each part from the rest, by its name, and the parts that one of them cannot; the
-    arguments are as of `hold_out`."""
+    """Predictions by two models of each part from the rest, by name, and the parts that one model cannot predict."""
     models = [_Fitted.of(evidence) for evidence in dict.fromkeys((before, after))]
     told, skipped = dict[str, Predicted](), list[Skipped]()
     for part in track("parts held out", list(parts(after.data_sets))):
@@ -143,7 +142,7 @@ def _figures(pair: Array) -> tuple[float, float, tuple[float, float]]:
 
 
 class Predicted(NamedTuple):
-    """What two models predict of a part that is held out.
+    """Predictions by two models of a part that is held out.
 
     Args:
         residuals: of each model, plain and whitened by its prediction's error, (2, 2, n).

@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
-from bushfit.diagnosis.currency import Group, Ledger, Worth
+from bushfit.diagnosis.currency import Group, GroupEvidence, LinearModel
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import (
     Explanation,
@@ -37,8 +37,8 @@ _NEAR = 8.0
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
-    """What a search works with.
+class DiagnosisRequest:
+    """Request for a search.
 
     Args:
         data: the tests.
@@ -100,7 +100,7 @@ class Hypothesis:
 
     @property
     def refitted(self) -> bool:
-        """Whether all of its effects were refitted, and not only counted linearly."""
+        """True if all of its effects were refitted, and none was counted linearly only."""
         return self.effects == self.weighed.state.effects
 
     @property
@@ -143,7 +143,7 @@ class Tests:
 
     @cached_property
     def deviation(self) -> Group | None:
-        """The same in residuals as they are fitted."""
+        """The compound's own deviation in residuals as they are fitted."""
         return compound(self.base)
 
     @cached_property
@@ -189,7 +189,7 @@ class Weighed:
     """
 
     state: State
-    asked: Asked
+    asked: DiagnosisRequest
 
     @cached_property
     def bare(self) -> Evidence:
@@ -197,7 +197,7 @@ class Weighed:
         return self.state.tests.bare if same else scattering_alone(self.state.evidence)
 
     @cached_property
-    def first(self) -> Ledger:
+    def first(self) -> LinearModel:
         state, tests = self.state, self.state.tests
         known = [state.precision.get(name, 0.0) for name in self.bare.solution.coordinates.names]
         moves = np.isfinite(known)
@@ -207,7 +207,7 @@ class Weighed:
             free.append(place.columns)
             precision += [amount**-2] * len(place.columns)
         rows = np.concatenate(free)
-        return Ledger(self.bare.residual, rows, np.array(precision), tests.errors, compound=tests.compound)
+        return LinearModel(self.bare.residual, rows, np.array(precision), tests.errors, compound=tests.compound)
 
     @cached_property
     def log_posterior(self) -> float:
@@ -231,16 +231,18 @@ class Weighed:
         return effects(self.bare, (*self.asked.without, *self.state.effects), self.asked.held)
 
     @cached_property
-    def worths(self) -> list[tuple[Explanation, Worth]]:
+    def group_evidence(self) -> list[tuple[Explanation, GroupEvidence]]:
         """Every explanation that can be counted linearly, at the sizes of the rig's errors that matter."""
         every = [each for each in (*self.effects, *self.state.tests.fixed) if each.group is not None]
-        return list(zip(every, self.worths_of(every), strict=True))
+        return list(zip(every, self.group_evidence_of(every), strict=True))
 
-    def worths_of(self, every: Sequence[Explanation]) -> Sequence[Worth]:
-        """Of explanations that have columns."""
-        return replace(self.first, at=self.first.likely(_NEAR)).worths_of([each.group for each in every if each.group])
+    def group_evidence_of(self, every: Sequence[Explanation]) -> Sequence[GroupEvidence]:
+        """Evidence for explanations that have columns."""
+        return replace(self.first, at=self.first.likely(_NEAR)).group_evidence_of(
+            [each.group for each in every if each.group]
+        )
 
-    def with_(self, each: Explanation, worth: Worth, log_odds: float) -> list[Hypothesis]:
+    def with_(self, each: Explanation, worth: GroupEvidence, log_odds: float) -> list[Hypothesis]:
         """This state with an explanation more, counted linearly; and beside a deviation of the compound."""
         state, tests = self.state, self.state.tests
         names = (*state.effects, each.name) if each.kind == "effect" else state.effects

@@ -1,4 +1,4 @@
-"""Where model and measurement disagree: smooth misfit per line and part, ranked, and put into words."""
+"""Regions in which model and measurement disagree: smooth misfit per line and part, ranked, and put into words."""
 
 from collections.abc import Iterator, Sequence
 
@@ -107,7 +107,7 @@ def _read_sweep(
 
 
 def _crosses(piece: Array, largest: float) -> bool:
-    """Whether a line has much misfit of the other sign than the largest."""
+    """True if a line has much misfit of the opposite sign to the largest."""
     return bool(np.max(-np.sign(largest) * piece) > _STRONG * abs(largest))
 
 
@@ -132,7 +132,7 @@ def _over_lines(pieces: Sequence[Array], held: str) -> str:
 
 
 def _way(first: float, last: float) -> str:
-    """Whether a misfit grows or fades from its first to its last value, or changes sides."""
+    """Word for a misfit that grows, fades or changes sides from its first to its last value."""
     if first * last < 0.0 and min(abs(first), abs(last)) > _FLAT * max(abs(first), abs(last)):
         return f"going from {'above to below' if first > 0.0 else 'below to above'}"
     return "growing" if abs(last) > abs(first) else "fading"

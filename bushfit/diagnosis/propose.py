@@ -30,7 +30,7 @@ _STEP = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """What one effect promises before any refit.
+    """Expected gain by one effect before any refit.
 
     Args:
         model: the model with the effect in its best shape and at no amount; an amount that is fitted in its logarithm
@@ -96,7 +96,7 @@ def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
 
 
 def has_what_it_uses(effect: Effect, model: Model) -> bool:
-    """Whether a model has the parameters of others that an effect reads."""
+    """True if a model has the parameters of other effects that an effect reads."""
     return not (isinstance(effect, Branch) and {*effect.uses} - {*model.values})
 
 

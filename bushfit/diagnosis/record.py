@@ -1,4 +1,4 @@
-"""What a diagnosis found, frozen, and as the document that diagnosis.json holds."""
+"""Results of a diagnosis, and their document, diagnosis.json."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -98,7 +98,7 @@ class Named:
 
 @dataclass(frozen=True)
 class Odds:
-    """What may explain a gap, and how probable each is.
+    """Explanations of a gap with their probabilities.
 
     Args:
         nothing: probability that nothing is missing beyond noise and tolerance.
@@ -132,7 +132,7 @@ class Odds:
 
 
 @dataclass(frozen=True)
-class Judged:
+class CandidateResult:
     """One candidate and why it won or lost; its probability is that it is part of what is missing."""
 
     name: str
@@ -165,7 +165,7 @@ class Diagnosis:
     remainder: tuple[Where, ...]
     holdout: HoldOut
     next_test: str
-    candidates: tuple[Judged, ...]
+    candidates: tuple[CandidateResult, ...]
     before: Evidence
     after: Evidence
     result: Result
@@ -181,12 +181,12 @@ class Diagnosis:
 
     @property
     def changed(self) -> bool:
-        """Whether something was found that the model, or a warning with it, has to tell."""
+        """True if something was found that the model, or a warning with it, reports."""
         return self.after is not self.before
 
     @property
     def added(self) -> bool:
-        """Whether the model to use holds more than the one that came."""
+        """True if the model to use has more effects than the model at the start."""
         return self.result.model.effects != self.before.model.effects
 
     @property

@@ -76,12 +76,12 @@ class RigErrors:
 
     @cached_property
     def distinct_scatter(self) -> Array:
-        """Of each combination, (combinations,)."""
+        """Scatter of each combination, (combinations,)."""
         return np.array([of[0] for of in self._combinations])
 
     @cached_property
     def within(self) -> Array:
-        """Which nodes are within the class of the rig, (nodes,) bool."""
+        """Mask of the nodes within the class of the rig, (nodes,)."""
         return np.array([not node.wide for node in self.nodes])
 
     @cached_property
@@ -130,7 +130,7 @@ def scattering_alone(evidence: Evidence) -> Evidence:
 
 
 def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:
-    """Of the tests that a model was fitted to, whatever the model."""
+    """Errors of the rig in the tests that a model was fitted to."""
     return RigErrors(blocks(evidence, rig), nodes(evidence))
 
 
@@ -152,7 +152,7 @@ def nodes(evidence: Evidence) -> list[Node]:
 
 
 def blocks(evidence: Evidence, rig: RigSettings) -> list[Block]:
-    """What shares errors: of each level of a sweep its gains, and its phases; loops that repeat one another."""
+    """Blocks of rows that share errors: gains and phases of each level of a sweep, and repeated loops."""
     loops, sweeps = parted(evidence.data_sets)
     gain = of_class(rig, ASSUMED)
     found = [block for sweep in sweeps for block in _of_sweep(evidence, sweep, gain)]
@@ -182,7 +182,7 @@ def _of_sweep(evidence: Evidence, sweep: SweepData, classes: Sequence[float]) ->
 
 
 def _shared(size: int, runs: Sequence[Array]) -> tuple[Array, Array]:
-    """What errors of the class make of a line's points, (w, n), by the places of each run in it; and their kinds."""
+    """Columns of the rig's errors in the points of a line, (w, n), and the kind of each."""
     columns, kinds = [np.ones(size)], [_LEVEL]
     for run in runs:
         among = np.zeros(size)

@@ -35,19 +35,19 @@ class Terms:
 
     @property
     def sensible(self) -> bool:
-        """Whether such a term means one thing: one stiffness cannot be added to displacement and to rotation."""
+        """True if the term has one meaning: one stiffness cannot be added to displacement and to rotation."""
         motions = {data_set.direction.motion for data_set in self.data_sets}
         return len(motions) == 1 if self.measure == "stiffness" else bool(motions)
 
     @cached_property
     def place(self) -> list[slice]:
-        """Where the points of each test stand."""
+        """Slice of the points of each test."""
         ends = np.cumsum([data_set.frequency.size for data_set in self.data_sets]).tolist()
         return [slice(end - each.frequency.size, end) for end, each in zip(ends, self.data_sets, strict=True)]
 
     @cached_property
     def directions(self) -> Array:
-        """Of each point, by name, (p,)."""
+        """Name of the direction of each point, (p,)."""
         return np.concatenate([[str(each.direction)] * each.frequency.size for each in self.data_sets])
 
     @cached_property
@@ -59,13 +59,13 @@ class Terms:
         return np.log(np.concatenate(axes, axis=-1).T)
 
     def stiffness(self, model: Model) -> Array:
-        """Of a model at each point, complex, (p,) [N/m or N m/rad]."""
+        """Complex stiffness of a model at each point, (p,) [N/m or N m/rad]."""
         return np.concatenate(
             [model.stiffness(each.direction, each.frequency, each.amplitude, kind=each.kind) for each in self.data_sets]
         )
 
     def unit(self, model: Model) -> Array:
-        """What one unit of the term adds at each point, (p,) [N/m or N m/rad]."""
+        """Stiffness that one unit of the term adds at each point, (p,) [N/m or N m/rad]."""
         match self.measure:
             case "gain":
                 return self.stiffness(model)

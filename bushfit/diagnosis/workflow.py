@@ -12,10 +12,10 @@ from bushfit.diagnosis.claims import adopted
 from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
 from bushfit.diagnosis.explanations import meetings
-from bushfit.diagnosis.hypotheses import Asked
+from bushfit.diagnosis.hypotheses import DiagnosisRequest
 from bushfit.diagnosis.record import Diagnosis, Settings
-from bushfit.diagnosis.verdict import Told
-from bushfit.diagnosis.words import judged
+from bushfit.diagnosis.report_text import DiagnosisWriter
+from bushfit.diagnosis.verdict import judged
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
 from bushfit.fitting.data import Data
@@ -51,7 +51,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     whole, (data, fewer) = data, condensed(data)
     if fewer:
         begun = _begin(data, model, settings)
-    asked = Asked(
+    asked = DiagnosisRequest(
         data,
         begun.evidence,
         lambda mended: _begin(mended, model, settings).evidence,
@@ -65,7 +65,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     )
     search = Search(asked)
     hypotheses = search.run()
-    found = Told(search, judged(hypotheses, settings.tolerance), hypotheses, settings.unresolved).diagnosis()
+    found = DiagnosisWriter(search, judged(hypotheses, settings.tolerance), hypotheses, settings.unresolved).diagnosis()
     fewer += _left_out_of_fewer(whole, data, begun.outliers)
     of_loops = outliers_at(found.result.model, data.loops)
     outliers = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(left, robust=True))
@@ -83,7 +83,7 @@ def _left_out_of_fewer(whole: Data, fewer: Data, outliers: Sequence[Outlier]) ->
     return tuple(f"{name}: {count} of these points left out, farther off than noise" for name, count in counts.items())
 
 
-def _without_wild(data: Data, model: Model | None, settings: Settings) -> tuple[Data, _Begun, tuple[Outlier, ...]]:
+def _without_wild(data: Data, model: Model | None, settings: Settings) -> tuple[Data, InitialFit, tuple[Outlier, ...]]:
     """The campaign with no weight on single points of sweeps that repeats and neighbours speak against, its fit, and
     these points: a row that went wrong is neither physics nor a fault of the rig."""
     left: tuple[Outlier, ...] = ()
@@ -98,7 +98,7 @@ def _without_wild(data: Data, model: Model | None, settings: Settings) -> tuple[
     return data, begun, left
 
 
-class _Begun(NamedTuple):
+class InitialFit(NamedTuple):
     """A model fitted to all tests of a campaign before the search adds anything, and the start of the paper's own."""
 
     evidence: Evidence
@@ -107,7 +107,7 @@ class _Begun(NamedTuple):
     outliers: tuple[Outlier, ...]
 
 
-def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
+def _begin(data: Data, model: Model | None, settings: Settings) -> InitialFit:
     """Fit the model as it came, with the effects that the user adopts; the rig's errors are part of every explanation,
     so a loop's gain weighs, whether its class is stated or assumed."""
     hint = "add measured tests to the campaign"
@@ -129,4 +129,4 @@ def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
         outliers, data_sets = robust.outliers, robust.data_sets
     data_sets = [data_set.with_weight() for data_set in with_gains(data_sets, weigh=True)]
     descent = fit_from(model, data_sets, held, data.bounds).finished(EVALUATIONS)
-    return _Begun(Evidence(descent.solution, tuple(data_sets)), start, held, outliers)
+    return InitialFit(Evidence(descent.solution, tuple(data_sets)), start, held, outliers)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import kstest, multivariate_normal, norm
 
-from bushfit.diagnosis.currency import Group, Ledger
+from bushfit.diagnosis.currency import Group, LinearModel
 from bushfit.diagnosis.priors import SIZES
 from bushfit.diagnosis.rig_errors import Block, Node, RigErrors
 from bushfit.effects.contract import Array
@@ -26,7 +26,7 @@ NODES = (
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: bool = True) -> Ledger:
+def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: bool = True) -> LinearModel:
     """Random numbers of everything: two blocks of which one scatters, rows in none, and a group of each sort."""
     random = np.random.default_rng(seed)
     blocks = (
@@ -44,10 +44,12 @@ def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: 
     )
     precision = np.repeat([0.0, 0.5], [flat, known])
     jacobian = random.normal(size=(flat + known, rows))
-    return Ledger(3.0 * random.normal(size=rows), jacobian, precision, RigErrors(blocks, NODES), made if groups else ())
+    return LinearModel(
+        3.0 * random.normal(size=rows), jacobian, precision, RigErrors(blocks, NODES), made if groups else ()
+    )
 
 
-def covariance(of: Ledger, node: Node) -> Array:
+def covariance(of: LinearModel, node: Node) -> Array:
     """Of the residuals by noise, errors of the rig and parameters that are known, in full, (n, n)."""
     variance = np.ones(of.residual.size)
     whole = np.zeros((variance.size, variance.size))
@@ -59,7 +61,7 @@ def covariance(of: Ledger, node: Node) -> Array:
     return np.diag(variance) + whole + (of.jacobian[known].T / of.precision[known]) @ of.jacobian[known]
 
 
-def restricted(of: Ledger, whole: Array) -> float:
+def restricted(of: LinearModel, whole: Array) -> float:
     """Logarithm of the restricted likelihood of the residuals with this covariance, but for its power of 2 pi."""
     own = of.jacobian[of.precision == 0.0]
     inverse = np.linalg.inv(whole)
@@ -69,7 +71,7 @@ def restricted(of: Ledger, whole: Array) -> float:
     return float(-0.5 * (of.residual @ p @ of.residual + sizes))
 
 
-def over_nodes(of: Ledger, values: Sequence[float], *, wide: bool = False) -> float:
+def over_nodes(of: LinearModel, values: Sequence[float], *, wide: bool = False) -> float:
     own = [node.log_weight + value for node, value in zip(of.rig.nodes, values, strict=True) if node.wide is wide]
     return float(logsumexp(own))
 
@@ -82,7 +84,7 @@ def test_worth_is_that_of_the_covariance_in_full(seed: int) -> None:
     plain = [restricted(of, covariance(of, node)) for node in of.rig.nodes]
     assert of.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
     assert of.log_evidence_wide == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
-    for group, worth in zip(of.groups, of.worths, strict=True):
+    for group, worth in zip(of.groups, of.group_evidence, strict=True):
         if group.sense:
             continue
         parts = (
@@ -113,7 +115,7 @@ def test_an_amount_is_integrated_over_its_sense(sense: int) -> None:
         density = noise.pdf(shifted) @ (15.0 * weight) * norm.pdf(amounts, scale=spread) * (2.0 if sense else 1.0)
         whole += 3.5 * spread * (high - low) * weight @ density / spreads.size
     power = 0.5 * (of.residual.size - 1) * np.log(2.0 * np.pi)
-    assert of.worths[0].log_evidence == pytest.approx(np.log(whole) + power + NODES[0].log_weight, abs=1e-4)
+    assert of.group_evidence[0].log_evidence == pytest.approx(np.log(whole) + power + NODES[0].log_weight, abs=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -135,7 +137,7 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed: int) -> Non
     assert of.log_evidence == pytest.approx(evidence(False, nothing), abs=1e-6)
     assert of.log_evidence_bent == pytest.approx(evidence(True, nothing), abs=1e-6)
     added = size**2 * (group.T @ group)
-    worth = of.worths[0]
+    worth = of.group_evidence[0]
     for bent, found in ((False, worth.log_evidence), (True, worth.beside.log_evidence if worth.beside else 0.0)):
         over_sizes = logsumexp([evidence(bent, each) for each in added]) - np.log(SIZES.size)
         assert found == pytest.approx(over_sizes, abs=1e-6)
@@ -149,7 +151,7 @@ def test_what_does_nothing_leaves_the_evidence_as_it_is(seed: int) -> None:
     groups = [Group(each, np.eye(2), together=True) for each in (nothing, spanned)]
     groups += [Group(each, np.ones(2), together=False) for each in (nothing, spanned)]
     groups += [replace(of.groups[3], unit=np.zeros(2)), Group(nothing, np.ones(2), together=False, sense=1)]
-    for each in replace(of, groups=groups).worths:
+    for each in replace(of, groups=groups).group_evidence:
         assert each.log_evidence == pytest.approx(of.log_evidence, abs=1e-5)
 
 
@@ -161,10 +163,10 @@ def test_the_size_is_that_of_what_was_put_there() -> None:
         residual=-0.03 / group.unit[0] * group.columns[0] * 10.0,
         groups=(replace(group, columns=10.0 * group.columns),),
     )
-    (found,) = there.worths
+    (found,) = there.group_evidence
     assert found.size == pytest.approx(0.03, rel=0.1)
     assert found.likeliest == min(SIZES, key=lambda size: abs(size - 0.03))
-    (wrong,) = replace(there, residual=-there.residual).worths
+    (wrong,) = replace(there, residual=-there.residual).group_evidence
     assert wrong.log_evidence < there.log_evidence < found.log_evidence - 5.0
 
 
@@ -218,9 +220,9 @@ def test_columns_that_move_together_change_what_their_sum_does_where_it_is_large
     columns = plain.groups[0].columns
     sizes = []
     for unit in ([[1.0], [0.0]], [[0.0], [1.0]], [[1.0], [1.0j]], [[1.0, 3.0], [1.0j, 3.0j]], [[1.0, 0.0], [0.0, 1.0]]):
-        (worth,) = replace(plain, groups=[Group(columns, np.array(unit), together=True)]).worths
+        (worth,) = replace(plain, groups=[Group(columns, np.array(unit), together=True)]).group_evidence
         sizes.append(worth.size)
-        assert worth.log_evidence == pytest.approx(plain.worths[0].log_evidence)
+        assert worth.log_evidence == pytest.approx(plain.group_evidence[0].log_evidence)
     first, second, both, thrice, larger = sizes
     assert both == pytest.approx(np.hypot(first, second))
     assert thrice == pytest.approx(3.0 * both)

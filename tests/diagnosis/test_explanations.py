@@ -14,7 +14,7 @@ import pytest
 from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_strong, no_loops, no_repeats, no_sweeps, off
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.currency import Ledger
+from bushfit.diagnosis.currency import LinearModel
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
 from bushfit.diagnosis.propose import proposals, scores, sensitivity
@@ -34,7 +34,7 @@ def best(evidence: Evidence, every: Sequence[Explanation]) -> Explanation:
     rig = rig_errors(evidence, SHARED_RIG)
     solution = evidence.solution
     precision = np.zeros(len(solution.jacobian))
-    worths = Ledger(solution.residual, solution.jacobian, precision, rig, groups).worths
+    worths = LinearModel(solution.residual, solution.jacobian, precision, rig, groups).group_evidence
     return max(zip(known, worths, strict=True), key=lambda pair: pair[1].log_evidence)[0]
 
 

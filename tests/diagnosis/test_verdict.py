@@ -1,186 +1,104 @@
-"""The verdict: look-alikes are a set, twins leave the level open, what cannot be shown is said; and the next test.
-
-That is an entry of the menu that parts the models in question, and none where there is nothing to part.
-"""
+"""From probabilities to a verdict, on hypotheses written by hand."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import log
+from types import SimpleNamespace
+from typing import Any
 
-import numpy as np
 import pytest
-from rigged import SHARED, Measured, asked, no_loops, no_repeats, no_sweeps, one_direction, said
 
-from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, entropy_left
-from bushfit.effects import BASE
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet
-from bushfit.geometry import Direction
-from bushfit.model.file import to_document
-from bushfit.model.model import Model
+from bushfit.diagnosis.hypotheses import Hypothesis
+from bushfit.diagnosis.verdict import Finding, judged
+from bushfit.effects.mistakes import MISTAKES
+
+TOLERANCE = 0.01
 
 
-def test_what_the_tests_cannot_show_is_said_and_goes_with_the_model(measured: Measured) -> None:
-    campaign = measured({}, SHARED)
-    for part, unseen in (
-        (no_loops, {"asymmetry", "force_offset", "force_gain"}),
-        (no_sweeps, {"viscous", "maxwell", "force_gain"}),
-    ):
-        diagnosis = asked(part(campaign))
-        assert said(diagnosis) == "consistent "
-        (note,) = diagnosis.notes
-        assert note.startswith("not identifiable from these tests: ")
-        assert unseen <= set(note.partition(": ")[2].split(", "))
-    assert any("cannot be told from one another" in line for line in to_document(diagnosis.result)["warnings"])
-    whole = asked(campaign)
-    assert whole.notes == whole.result.warnings == ()
-
-
-def test_the_class_of_a_rig_that_is_assumed_is_said(measured: Measured) -> None:
-    campaign = no_repeats(measured({}, SHARED))
-    for rig, words in (
-        (RigSettings(), "0.5 % gain and 0.25 deg phase, gain and phase assumed"),
-        (RigSettings(gain_error=4e-3), "0.4 % gain and 0.25 deg phase, phase assumed"),
-        (RigSettings(gain_error=4e-3, phase_error=3.5e-3), ""),
-    ):
-        assumed = Data.of(replace(campaign, rig=rig)).assumed
-        assert [note.partition(" class, ")[2] for note in assumed] == [words] * bool(words)
-
-
-#: 3 % of give in the axial direction, 17 % in the radial, measured at a few frequencies.
-SOFT_RIG = {"rig_compliance": {"compliance": 4e-8}}
-FEW = tuple(replace(sweep, frequencies=(5.0, 25.0, 55.0, 85.0, 115.0, 155.0)) for sweep in SHARED.sweeps)
-#: With torsion, in which nothing gives way along a line: it tells the rubber by itself.
-TURNED = replace(SHARED, sweeps=(*FEW, replace(FEW[0], direction=Direction.TORSION, amplitudes=(0.01, 0.03))))
-
-
-@pytest.mark.slow
-def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured: Measured) -> None:
-    """A softer rig and a softer rubber look alike in one direction; two leave open which gives way, torsion tells."""
-    campaign = measured(SOFT_RIG, TURNED)
-    whole = asked(campaign)
-    assert said(whole) == "named sleeve_compliance"
-    assert said(asked(replace(campaign, sweeps=campaign.sweeps[:2]))) == (
-        "ambiguous sleeve_compliance|sleeve_compliance.radial"
+def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, chance: float = 0.5) -> Hypothesis:
+    """Of parts joined by +: effects, "unnamed", "levels", places as "kind:name", a mistake by its name; "" of none."""
+    names = parts.split("+") if parts else []
+    spots = [name.split(":") for name in names if ":" in name]
+    places: Any = tuple(SimpleNamespace(family=family, name=name, extreme=False) for family, name in spots)
+    claims: list[Any] = [SimpleNamespace(mistake=MISTAKES[name], tests=(0,)) for name in names if name in MISTAKES]
+    others = {"unnamed", "levels", *MISTAKES}
+    effects = tuple(name for name in names if ":" not in name and name not in others)
+    weighed: Any = SimpleNamespace(
+        state=SimpleNamespace(effects=effects), first=SimpleNamespace(chance=lambda **_: chance)
     )
-    assert whole.result.unresolved == ("sleeve_compliance",)
-    (entry,) = whole.to_document()["effects"]
-    assert (entry["level"], entry["twins"]) == ("unresolved", ["rig_compliance"])
-    low, high = whole.result.interval("sleeve_compliance.compliance") or (0.0, 0.0)
-    assert low <= 4e-8 <= high
-    for alone in (
-        replace(campaign, sweeps=campaign.sweeps[:1]),
-        replace(campaign, sweeps=campaign.sweeps[1:2], loops=()),
-    ):
-        assert asked(alone).verdict in ("consistent", "ambiguous")
-    again = asked(campaign, whole.result.model, unresolved=whole.result.unresolved)
-    assert (again.verdict, again.result.unresolved) == ("consistent", ("sleeve_compliance",))
-    settled = asked(campaign, whole.result.model, unresolved=whole.result.unresolved, adopt=("rig_compliance",))
-    assert (settled.verdict, settled.result.unresolved) == ("consistent", ())
-    assert settled.result.model.effects == (*BASE, "rig_compliance")
-    assert settled.result.model.values["rig_compliance.compliance"] == pytest.approx(
-        whole.result.model.values["sleeve_compliance.compliance"], rel=1e-3
-    )
-    proposed = {judged.name for judged in settled.candidates}
-    assert not proposed & {"sleeve_compliance", "rig_compliance"}
+    claim, curve = claims[0] if claims else None, "smooth all" if "unnamed" in names else ""
+    size = size if names else 0.0
+    return Hypothesis(effects, claim, places, curve, "levels" in names, log(odds), size, last, weighed)
 
 
-SENTENCES = [test.sentence for test in BUSHING_TESTS]
-SENTENCES += [test.sentence.format(place=place) for test in FIXTURE_TESTS for place in ("axial", "radial")]
-EVEN = (0.5, 0.5)
+def of(**odds: float) -> Finding:
+    found = [one(parts.replace("__", "."), share) for parts, share in odds.items()]
+    return judged(sorted(found, key=lambda each: -each.log_posterior), TOLERANCE)
 
 
-@pytest.fixture
-def data_sets(measured: Measured) -> list[DataSet]:
-    data = Data.of(measured())
-    return [*data.loops, *data.sweeps]
-
-
-def test_one_model_needs_none(paper_model: Model, data_sets: list[DataSet]) -> None:
-    assert deciding_test([paper_model], EVEN[:1], data_sets) == ""
-    assert deciding_test([], (), data_sets) == ""
-    assert deciding_test([paper_model, paper_model], EVEN, data_sets) == ""
-
-
-def with_each(model: Model, *effects: dict[str, float]) -> list[Model]:
-    """The model with one effect more, each in turn, by the values of its parameters."""
-    return [model.with_effect(next(iter(values)).partition(".")[0], values) for values in effects]
-
-
-SLIP = {"interface_slip.force": 2.0}
-SECOND = {"second_friction.sigma_fmax": 2e3, "second_friction.eps_half": 5e-4}
-STOP = {"bump_stop.gap": 4e-4, "bump_stop.stiffness": 1e5}
+def told(finding: Finding) -> dict[str, float]:
+    """Parts and rounded probabilities of what is told."""
+    return {"+".join(sorted(each.parts)): round(each.probability, 2) for each in finding.told}
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "words"),
+    ("odds", "verdict", "expected"),
     [
-        ({"rig_compliance.compliance": 1e-7}, STOP, ("fixture", "dummy")),
-        ({"inertia.mass": 0.03}, {"viscous.eta": 60.0}, ("fixture", "highest frequency")),
-        ({"viscous.eta": 60.0}, {"maxwell.mu1": 1e5, "maxwell.tau": 6e-4}, ("highest frequency",)),
-        ({"strain_stiffening.c3": 0.5}, {"bump_stop.gap": 4.5e-4, "bump_stop.stiffness": 2e3}, ("largest amplitude",)),
-        (SLIP, SECOND, ("smallest",)),
-        ({"interface_slip.force": 0.4}, {"viscous.eta": 8.0}, ("smallest",)),  # where slip by far outweighs the rest
+        ({"": 0.2, "inertia": 0.8}, "consistent", {}),
+        ({"": 0.01, "inertia": 0.99}, "named", {"inertia": 1.0}),
+        ({"inertia": 0.6, "inertia+delay": 0.39, "": 0.01}, "named", {"inertia": 1.0}),
+        ({"inertia": 0.35, "inertia+delay": 0.65}, "named", {"inertia": 0.35, "delay+inertia": 0.65}),
+        ({"inertia+delay": 0.99, "inertia": 0.01}, "named", {"delay+inertia": 0.99}),
+        ({"inertia": 0.69, "fixture_resonance": 0.31}, "named", {"inertia": 1.0}),
+        ({"inertia": 0.31, "fixture_resonance": 0.69}, "ambiguous", {"fixture_resonance": 0.69, "inertia": 0.31}),
+        ({"inertia": 0.6, "delay": 0.38, "viscous": 0.02}, "ambiguous", {"inertia": 0.6, "delay": 0.38}),
+        ({"frequency:50 Hz": 0.7, "inertia": 0.3}, "ambiguous", {"place: frequency": 0.7, "inertia": 0.3}),
+        ({"unnamed": 0.6, "inertia": 0.4}, "described", {"unnamed": 0.6, "inertia": 0.4}),
+        ({"unnamed": 0.4, "inertia": 0.6}, "ambiguous", {"unnamed": 0.4, "inertia": 0.6}),
+        ({"unnamed": 0.99, "inertia": 0.01}, "described", {"unnamed": 0.99}),
+        ({"frequency:50 Hz": 0.5, "frequency:45 to 55 Hz": 0.49, "": 0.01}, "unexplained", {"place: frequency": 1.0}),
+        ({"levels": 0.99, "": 0.01}, "unexplained", {"levels": 1.0}),
+        ({"delay+level:1 mm": 0.99, "delay": 0.01}, "unexplained", {"delay+place: level": 0.99}),
+        ({"peak_to_peak": 0.99, "": 0.01}, "named", {"peak_to_peak": 1.0}),
     ],
-    ids=lambda value: next(iter(value)).partition(".")[0] if isinstance(value, dict) else "",
+    ids=str,
 )
-def test_pairs(
-    paper_model: Model, data_sets: list[DataSet], one: dict[str, float], other: dict[str, float], words: tuple[str, ...]
-) -> None:
-    models = with_each(paper_model, one, other)
-    found = deciding_test(models, EVEN, data_sets)
-    assert found in SENTENCES
-    assert any(word in found for word in words)
-    assert deciding_test(models[::-1], EVEN, data_sets) == found
+def test_verdicts(odds: dict[str, float], verdict: str, expected: dict[str, float]) -> None:
+    finding = of(**odds)
+    assert (finding.verdict, told(finding)) == (verdict, expected)
+    assert finding.nothing == pytest.approx(odds.get("", 0.0))
 
 
-def test_a_direction_that_is_swept_is_no_next_test(paper_model: Model, measured: Measured) -> None:
-    """Compliance and a softer rubber differ most in the stiff direction: to be swept where it has not been."""
-    models = with_each(paper_model, {"viscous.eta": 100.0}, {"interface_slip.force": 1.0})
-    campaign = measured()
-    alone, both = Data.of(one_direction(campaign)).sweeps, Data.of(campaign).sweeps
-    assert "axial" not in deciding_test(models, EVEN, alone)
-    assert not any(direction in deciding_test(models, EVEN, both) for direction in ("axial", "radial"))
+def test_what_changes_less_than_the_tolerance_is_nothing() -> None:
+    small, large = one("inertia", 0.2, size=0.009), one("inertia+delay", 0.8)
+    assert judged([large, small], TOLERANCE).verdict == "consistent"
+    finding = judged([large, small], 0.001)
+    assert (finding.verdict, finding.nothing) == ("named", 0.0)
 
 
-def test_a_factor_of_one_direction_is_settled_by_a_reference_spring_in_its_fixture(
-    paper_model: Model, data_sets: list[DataSet]
-) -> None:
-    """An empty fixture and a steel dummy read the same whatever the gain of a transducer is."""
-    models = [
-        paper_model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 0.93}),
-        paper_model.with_effect("displacement_gain.radial", {"displacement_gain.radial": 1.06}),
-    ]
-    found = deciding_test(models, (0.9, 0.1), data_sets)
-    assert found == "put a reference spring of known stiffness in the radial fixture"
+def test_of_more_than_can_be_told_it_is_described_by_what_nearly_all_have_in_common() -> None:
+    others = ("inertia", "viscous", "maxwell", "high_pass", "clearance", "asymmetry")
+    finding = of(**{f"delay+{name}": 1.0 for name in others})
+    assert (finding.verdict, finding.leads, len(finding.told)) == ("described", ("delay",), 4)
+    assert of(**dict.fromkeys(others, 1.0)).leads == ()
 
 
-def test_the_next_test_is_within_the_limits_of_the_rig(paper_model: Model, data_sets: list[DataSet]) -> None:
-    models = with_each(paper_model, {"viscous.eta": 60.0}, {"maxwell.mu1": 1e5, "maxwell.tau": 6e-4})
-    top = max(float(data_set.frequency.max()) for data_set in data_sets)
-    assert "highest frequency" in deciding_test(models, EVEN, data_sets)
-    assert "highest frequency" not in deciding_test(models, EVEN, data_sets, RigSettings(max_frequency=top))
+@pytest.mark.parametrize(("last", "verdict"), [(0.002, "partly"), (0.02, "described")])
+def test_names_stand_beside_what_has_none_where_they_change_most(last: float, verdict: str) -> None:
+    finding = judged([one("inertia+unnamed", 0.99, size=0.05, last=last), one("inertia", 0.01)], TOLERANCE)
+    assert finding.verdict == verdict
+    assert finding.leads == (("inertia",) if verdict == "described" else ())
+    assert told(finding) == {"inertia+unnamed": 1.0}
 
 
-def test_a_test_without_the_rig_parts_nothing_inside_the_rubber(paper_model: Model, data_sets: list[DataSet]) -> None:
-    models = with_each(paper_model, {"viscous.eta": 100.0}, {"strain_stiffening.c3": 20.0})
-    found = deciding_test(models, EVEN, data_sets)
-    assert found in SENTENCES
-    assert not any(words in found for words in ("fixture", "dummy"))
+@pytest.mark.parametrize("more", [(), ("inertia+delay",)])
+def test_a_leader_that_does_not_fit_is_a_lead(more: tuple[str, ...]) -> None:
+    finding = judged([*(one(parts, 2.0) for parts in more), one("inertia", 1.0, chance=1e-4)], TOLERANCE)
+    assert (finding.verdict, finding.leads) == ("described", ("inertia",))
 
 
-@pytest.mark.parametrize("odds", [(1.0, 1.0), (0.8, 0.2)])
-def test_what_stays_open_is_bounded_from_above(odds: tuple[float, float]) -> None:
-    """Against the entropy that is left of two normal distributions a distance apart, by integration."""
-    p, x = np.array(odds) / sum(odds), np.linspace(-12.0, 20.0, 20_001)
-    for distance in (0.0, 0.5, 3.0, 8.0):
-        weighed = p[:, None] * np.exp(-0.5 * np.square(x - np.array([[0.0], [distance]]))) / np.sqrt(2.0 * np.pi)
-        share = weighed / weighed.sum(axis=0)
-        left = -float(np.trapezoid((weighed * np.log(np.maximum(share, 1e-300))).sum(axis=0), x))
-        bound = float(entropy_left(odds, distance**2 * (1.0 - np.eye(2))))
-        print(f"{distance:g} apart: {left:.4f} nats stay open, at most {bound:.4f}")
-        assert left - 1e-6 <= bound <= left + 0.2
-    assert entropy_left(odds, np.zeros((2, 2))) == pytest.approx(-float(p @ np.log(p)))
-    far = [float(entropy_left((*odds, 0.0), d * (1.0 - np.eye(3)))) for d in (300.0, 1000.0, 3000.0)]
-    assert far[0] > far[1] > far[2] > 0.0, "no rounding stands in for what is left"
+def test_only_ratios_count() -> None:
+    every = [one("inertia", 0.5), one("delay", 0.3), one("unnamed", 0.19), one("", 0.01)]
+    far = [replace(each, log_posterior=each.log_posterior - 5000.0) for each in every]
+    assert told(judged(far, TOLERANCE)) == told(judged(every, TOLERANCE))

@@ -1,4 +1,4 @@
-"""What may explain a gap: each kind proposes itself, as columns with a prior, and says what it is in words."""
+"""Explanations of a gap: each kind proposes its own members, as columns with a prior."""
 
 from bushfit.diagnosis.explanations.compound import compound
 from bushfit.diagnosis.explanations.contract import Explanation, FaultyPlace, MissingEffect, is_pattern

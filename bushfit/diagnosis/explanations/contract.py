@@ -1,4 +1,4 @@
-"""What every explanation of a gap has: a name, a share of the odds, and columns with a prior."""
+"""Explanation of a gap: a name, a prior probability, and columns with a prior."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -59,7 +59,7 @@ class FaultyPlace(Explanation):
 
     @property
     def freely(self) -> "FaultyPlace":
-        """The same with every point of a sweep off by itself: what went wrong need be no shift and no slope."""
+        """The place with an independent error of every point, for faults that are no shift and no slope."""
         if self.family == "loop":
             return self
         size = np.abs(self.columns).max(axis=0)

@@ -41,7 +41,7 @@ class Meeting(FaultyPlace):
 
 
 def meetings(left: Sequence[Outlier], sweeps: Sequence[SweepData], model: Model) -> list[Meeting]:
-    """What points that were left out have in common, by frequency; a point by itself has nothing."""
+    """Frequencies that several of the points that were left out have in common."""
     apart = {(outlier.test, outlier.row): outlier.distance for outlier in left}
     found: dict[float, list[_Left]] = defaultdict(list)
     for sweep in sweeps:

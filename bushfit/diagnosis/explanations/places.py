@@ -39,7 +39,7 @@ def _loop(evidence: Evidence, loop: LoopData) -> FaultyPlace:
 
 
 def _rows(evidence: Evidence, data_sets: Sequence[DataSet]) -> slice:
-    """From the first row of some data sets to their last."""
+    """Slice from the first row of some data sets to their last."""
     places = [evidence.place[each] for each in data_sets]
     return slice(min(place.start for place in places), max(place.stop for place in places))
 

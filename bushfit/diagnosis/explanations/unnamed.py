@@ -37,7 +37,7 @@ def unnamed(evidence: Evidence) -> list[Explanation]:
 
 
 def harmonics(evidence: Evidence, loops: Sequence[LoopData]) -> Array:
-    """What the harmonics of loops that repeat one another share, (c, n)."""
+    """Columns of the harmonics that repeated loops share, (c, n)."""
     columns = np.zeros((len(loops[0].contrasts()), evidence.residual.size))
     for loop in loops:
         columns[:, evidence.place[loop]] = loop.contrasts()

@@ -1,0 +1,391 @@
+"""Texts and figures of a diagnosis: what is missing, how large it is, where it shows, and what to test next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bushfit.diagnosis.beam import Search
+from bushfit.diagnosis.claims import Claim
+from bushfit.diagnosis.described import Described, describe
+from bushfit.diagnosis.document import Verdict
+from bushfit.diagnosis.evidence import Evidence, fit, result_of
+from bushfit.diagnosis.explanations import FaultyPlace
+from bushfit.diagnosis.holdout import hold_out
+from bushfit.diagnosis.hypotheses import Hypothesis
+from bushfit.diagnosis.locate import locate
+from bushfit.diagnosis.next_test import deciding_test
+from bushfit.diagnosis.priors import MOST_LEFT
+from bushfit.diagnosis.record import CandidateResult, Diagnosis, Named, Odds, Where, format_probability
+from bushfit.diagnosis.verdict import Composition, Finding
+from bushfit.effects import get_effect, qualified_name
+from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import parted, with_gains
+from bushfit.model.result import Result
+from bushfit.units import display_unit, format_aligned, number
+
+#: What is said of what was weighed and is not told, and where there is no gap.
+_LESS_LIKELY = "another explanation is likelier"
+_NOTHING = "nothing is missing beyond noise and tolerance"
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosisWriter:
+    """A finding put into words.
+
+    Args:
+        hypotheses: all that were weighed, the most probable first.
+        unresolved: effects of the model as it came that these tests could not tell from a twin of the rig.
+    """
+
+    search: Search
+    finding: Finding
+    hypotheses: Sequence[Hypothesis]
+    unresolved: Sequence[str]
+
+    @property
+    def data(self) -> Data:
+        return self.search.asked.data
+
+    @property
+    def base(self) -> Evidence:
+        return self.search.asked.base
+
+    @property
+    def first(self) -> Composition | None:
+        return self.finding.told[0] if self.finding.told else None
+
+    def diagnosis(self) -> Diagnosis:
+        """The whole finding."""
+        match self.finding.verdict:
+            case "consistent":
+                return self._finished("consistent", _NOTHING, self.base)
+            case "named" | "partly":
+                return self._named()
+            case "ambiguous":
+                return self._ambiguous()
+        return self._without_name()
+
+    def _named(self) -> Diagnosis:
+        assert self.first
+        first, names = self.first, self.finding.names
+        if first.best.claim:
+            return self._of_record(first.best.claim)
+        after = self._with_names(names)
+        entries = [Named(name, self._evidence()) for name in names]
+        if self.finding.verdict == "named" and (doubt := self._doubt(after, names)):
+            return self._partly(after, entries, doubt)
+        if self.finding.verdict == "partly":
+            return self._partly(after, entries, "")
+        words = f"{_all(names)} {'closes' if len(names) == 1 else 'close'} the gap"
+        return self._finished("named", words, after, entries, places=first.best)
+
+    def _with_names(self, names: Sequence[str]) -> Evidence:
+        """The model as it came with these effects, fitted to noise alone."""
+        of_names = [each for each in self.hypotheses if set(each.effects) == set(names) and each.refitted]
+        others = [each for each in self.hypotheses if set(each.effects) >= set(names) and each.refitted]
+        fitted = (of_names or others)[0].weighed.state
+        model = fitted.evidence.model
+        for name in fitted.effects:
+            if name not in names:
+                model = model.without(name)
+        asked = self.search.asked
+        return fit(model, fitted.evidence.data_sets, asked.held, asked.bounds)
+
+    def _doubt(self, after: Evidence, names: Sequence[str]) -> str:
+        """Why names that are all but sure do not explain the whole gap; "" if they do."""
+        held = hold_out(self._fitted(self.base), self._fitted(after), self.search.asked.bounds)
+        if held.after is not None and held.after > MOST_LEFT:
+            return f"held out, {number(held.after, 3)} times the noise is left"
+        result = result_of(self._fitted(after), self.search.asked.bounds, after.model.effects, lacking=False)
+        for name in names:
+            effect = get_effect(name)
+            amount = qualified_name(effect, effect.amount) if effect.replaces is None else ""
+            low, high = (result.interval(amount) if amount in result.model.values else None) or (1.0, 1.0)
+            if effect.amount.neutral is not None and low <= effect.amount.neutral <= high:
+                return f"{name} may be nothing: the 95 % interval of its amount includes none"
+        return ""
+
+    def _partly(self, after: Evidence, entries: Sequence[Named], doubt: str) -> Diagnosis:
+        """Names that explain part of the gap, with the rest described where a correction stands."""
+        assert self.first
+        best, names = self.first.best, [entry.name for entry in entries]
+        base, plain = self._fitted(self.base), self._fitted(after)
+        excess = [max(each.chi_square / sum(d.counted for d in each.data_sets) - 1.0, 0.0) for each in (base, plain)]
+        share = 1.0 - excess[1] / excess[0] if excess[0] else 1.0
+        words = f"{_all(names)} {'explains' if len(names) == 1 else 'explain'} {number(100 * share, 2)} % of the gap"
+        beside = [place.name for place in self.first.places]
+        beside += ["errors of levels beyond the rig's class"] if best.levels else []
+        gap = self._described(after) if not beside else None
+        if gap:
+            entries = [*entries, Named(UNNAMED, gap.evidence)]
+            beside.append(f"something without a name, {gap.words}")
+        elif self.first.unnamed:
+            beside.append("something without a name")
+        words += f"; the rest: {', '.join([*beside, *filter(None, [doubt])])}" if beside or doubt else ""
+        return self._finished("partly", words, gap.after if gap else after, entries, places=best, gap=gap)
+
+    def _described(self, evidence: Evidence) -> Described | None:
+        asked, rig = self.search.asked, self.data.campaign.rig
+        return describe(self._fitted(evidence), rig, asked.start, asked.held, asked.bounds) if asked.most else None
+
+    def _of_record(self, claim: Claim) -> Diagnosis:
+        """A mistake in the record: the gap shrinks if it was made; the model stays as it was."""
+        assert self.first
+        evidence, best = self._of_claim(self.first), self.first.best
+        names = _entries(self.data, claim, evidence)
+        command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(self.data))])
+        advice = f"if the records of the tests bear it out, {'; '.join(claim.corrections(self.data))} (or {command})"
+        beside = [*best.effects, *(place.name for place in best.places)]
+        words = f"these tests agree if {claim.words(self.data)}" + f", with {_all(beside)} beside it" * bool(beside)
+        found = self._finished(self.finding.verdict, words, self.base, names, places=best, next_test=advice)
+        warning = f"fitted to the tests as they are, which only agree if {claim.words(self.data)}: {advice}"
+        after = self._fitted(best.weighed.state.evidence)
+        return replace(
+            found,
+            after=after,
+            remainder=locate(after),
+            holdout=hold_out(found.before, after, self.search.asked.bounds),
+            result=replace(found.result, warnings=(*found.result.warnings, warning)),
+        )
+
+    def _of_claim(self, each: Composition) -> str:
+        gain = self.base.chi_square - each.best.weighed.state.evidence.chi_square
+        return f"lowers chi-square by {gain:.0f} without a parameter; {self._probability(each)}"
+
+    def _ambiguous(self) -> Diagnosis:
+        told = self.finding.told
+        labels = {id(each): self.label(each) for each in told}
+        led = next((each for each in told if each.names or each.best.claim), None)
+        others = tuple(labels[id(each)] for each in told if each is not led)
+        names: list[Named] = []
+        if led and led.best.claim:
+            names = [
+                replace(each, alternatives=others) for each in _entries(self.data, led.best.claim, self._of_claim(led))
+            ]
+        elif led:
+            names = [Named(name, self._probability(led), others) for name in led.names]
+        words = f"these tests cannot distinguish {' from '.join(labels.values())}"
+        fitted = [each for each in told if each.best.effects and each.best.refitted]
+        models = [each.best.weighed.state.evidence.model for each in fitted]
+        advice = deciding_test(
+            models, [each.probability for each in fitted], self.base.data_sets, self.data.campaign.rig
+        )
+        if led and led.best.claim:
+            advice = f"look into the records of the tests; {'; '.join(led.best.claim.corrections(self.data))}"
+        spot = next((each.best for each in told if each.places), None)
+        return self._finished("ambiguous", words, self.base, names, places=spot, next_test=advice)
+
+    def _without_name(self) -> Diagnosis:
+        """A gap that is described where a correction stands, else unexplained, with the place at fault if one is."""
+        finding = self.finding
+        lead = f"; leads: {_all(finding.leads)}" if finding.leads else ""
+        spot = self.first.best if self.first and finding.verdict == "unexplained" else None
+        if not spot and (found := self._described(self.base)):
+            largest = [place.name for place in self.first.best.places] if self.first else []
+            words = f"no known effect closes the gap: {found.words}{lead}"
+            words += f"; it is largest at {_all(largest)}" if largest else ""
+            names = [Named(UNNAMED, found.evidence)]
+            return self._finished("described", words, found.after, names, gap=found)
+        words = "no known effect closes the gap" + lead
+        advice = ""
+        spot = spot or (self.first.best if self.first and self.first.best.places else None)
+        if spot and spot.places:
+            words = f"{_all([place.name for place in spot.places])}: this stands out from all other tests; "
+            words += "measure it again before looking for physics"
+        elif spot:
+            words = "the levels disagree by more than the rig's class allows, and by nothing else"
+            advice = "measure the levels again in another session; or state the rig's class, gain_error under [rig]"
+        return self._finished("unexplained", words, self.base, places=spot, next_test=advice)
+
+    def label(self, each: Composition) -> str:
+        """A composition by the names of its effects, or what else it is."""
+        best = each.best
+        names = [*(best.claim.labels(self.data) if best.claim else ()), *each.names]
+        return " + ".join((*names, *(f"fault: {place.name}" for place in each.places), *_nameless(each)))
+
+    @cached_property
+    def odds(self) -> Odds:
+        """Explanations that are reported, the most probable first."""
+        told = sorted(self.finding.told, key=lambda each: -each.probability)
+        models = (each.best.weighed.state.evidence.model if each.best.refitted else None for each in told)
+        pairs = ((self._in_words(each), each.probability) for each in told)
+        labels, apart = tuple(map(self.label, told)), self.finding.verdict == "ambiguous"
+        return Odds(self.finding.nothing, tuple(pairs), tuple(models), labels, apart)
+
+    def _in_words(self, each: Composition) -> str:
+        """A composition as it is told to people: what each of its parts is, with its name."""
+        best = each.best
+        parts = [best.claim.words(self.data)] if best.claim else []
+        parts += [f"{get_effect(name).phrase} ({name})" for name in each.names]
+        parts += [f"the tests are off: {place.name}" for place in each.places]
+        *most, last = (*parts, *_nameless(each))
+        return ", and ".join(filter(None, (", ".join(most), last)))
+
+    def _evidence(self) -> str:
+        """Why effects were named."""
+        assert self.first
+        after = self._fitted(self._with_names(self.finding.names))
+        gain = self._fitted(self.base).chi_square - after.chi_square
+        beside = " with what was named beside it" if len(self.finding.names) > 1 else ""
+        return f"lowers chi-square by {gain:.0f}{beside}; {self._probability(self.first)}"
+
+    def _probability(self, each: Composition) -> str:
+        others = [other for other in self.finding.told if other is not each]
+        words = f"probability {format_probability(each.probability)}"
+        if not others:
+            return words
+        return f"{words}, next {self.label(others[0])} {format_probability(others[0].probability)}"
+
+    def _finished(
+        self,
+        verdict: Verdict,
+        summary: str,
+        after: Evidence,
+        names: Sequence[Named] = (),
+        *,
+        places: Hypothesis | None = None,
+        next_test: str = "",
+        gap: Described | None = None,
+    ) -> Diagnosis:
+        base, after, bounds = self._fitted(self.base), self._fitted(after), self.search.asked.bounds
+        spots = list(places.places) if places else []
+        if not next_test and names:
+            next_test = get_effect(names[0].name).confirmed_by
+        if spots:
+            next_test = f"measure again: {spots[0].name}"
+        lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
+        known, corrected = {*base.model.effects} - {*self.unresolved}, gap.fitted if gap else None
+        where = (*(_place_where(base, each, places) for each in spots if places), *locate(base))
+        result = self.odds.averaged(result_of(after, bounds, known, lacking=lacking, corrected=corrected))
+        return Diagnosis(
+            verdict,
+            "; ".join([summary, *filter(None, (_format_amount(entry.name, result) for entry in names))]),
+            tuple(names),
+            where,
+            where if after is base else locate(after),
+            gap.held if gap else hold_out(base, after, bounds),
+            next_test,
+            tuple(self.candidates),
+            base,
+            after,
+            result,
+            self._notes(),
+            gap.description if gap else None,
+            self.odds,
+        )
+
+    def _fitted(self, evidence: Evidence) -> Evidence:
+        """The same model as a fit has it, in which a loop's gain weighs only where its class is stated."""
+        loops = parted(evidence.data_sets)[0]
+        if self.data.campaign.rig.stated[0] is not None or not any(loop.gain_weighs for loop in loops):
+            return evidence
+        if evidence not in self._refitted:
+            asked, data_sets = self.search.asked, with_gains(evidence.data_sets, weigh=False)
+            self._refitted[evidence] = fit(evidence.model, data_sets, asked.held, asked.bounds)
+        return self._refitted[evidence]
+
+    @cached_property
+    def _refitted(self) -> dict[Evidence, Evidence]:
+        return {}
+
+    @cached_property
+    def candidates(self) -> list[CandidateResult]:
+        """Every effect of the library beside the model as it came, and every mistake in the record weighed: its
+        score, its refit and its probability; by score."""
+        chance = self.hypotheses[0].log_posterior
+        weight = {id(each): float(np.exp(each.log_posterior - chance)) for each in self.hypotheses}
+        whole = sum(weight.values())
+        alone = {
+            each.effects[0]: each
+            for each in self.hypotheses
+            if each.refitted and len(each.effects) == 1 and len(each.key) == 1
+        }
+        found = list[CandidateResult]()
+        for hypothesis in self.hypotheses:
+            if (claim := hypothesis.claim) and len(hypothesis.key) == 1:
+                share = weight[id(hypothesis)] / whole
+                gain = self.base.chi_square - hypothesis.weighed.state.evidence.chi_square
+                why = "closes the gap" if self.first and self.first.best is hypothesis else _LESS_LIKELY
+                found.append(CandidateResult(" + ".join(claim.labels(self.data)), gain, gain, share, {}, why))
+        for each in self.search.root.effects:
+            share = sum(weight[id(other)] for other in self.hypotheses if each.name in other.effects) / whole
+            found.append(
+                self._judged(each.name, each.proposal.score, each.proposal.visible, alone.get(each.name), share)
+            )
+        return sorted(found, key=lambda judged: -judged.score)
+
+    def _judged(
+        self, name: str, score: float, visible: bool, alone: Hypothesis | None, share: float
+    ) -> CandidateResult:
+        if alone is None:
+            why = "score too small to refit" if visible else "not visible in these tests"
+            return CandidateResult(name, score, None, share, {}, why)
+        after = alone.weighed.state.evidence
+        own = {key: value for key, value in after.model.values.items() if key not in self.base.model.values}
+        told = self.first and name in self.first.names
+        why = "part of the likeliest explanation" if told else _LESS_LIKELY
+        return CandidateResult(name, score, self.base.chi_square - after.chi_square, share, own, why)
+
+    def _notes(self) -> tuple[str, ...]:
+        """Sentence on the effects that these tests cannot show."""
+        unseen = [each.name for each in self.search.root.effects if not each.proposal.visible]
+        blind = [name for name in unseen if not get_effect(name).under]  # what no test states is not asked for
+        return (f"not identifiable from these tests: {', '.join(blind)}",) if blind else ()
+
+
+def _format_amount(name: str, result: Result) -> str:
+    """Amount of an effect in a model, with its 95 % interval; "" if the model has no such amount."""
+    if name == UNNAMED or name not in result.model.effects or (effect := get_effect(name)).replaces is not None:
+        return ""
+    amount = effect.amount
+    value, interval = (
+        result.model.values[qualified_name(effect, amount)],
+        result.interval(qualified_name(effect, amount)),
+    )
+    unit, factor = display_unit(amount.unit, 1.0, value)
+    shown, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
+    told = f"{amount.meaning or amount.name}: {f'{shown} {unit}'.removesuffix(' -').removesuffix(' 1')}"
+    return f"{told} (95 % interval {ends[0]} to {ends[1]})" if ends else told
+
+
+def _nameless(each: Composition) -> list[str]:
+    """Parts of a composition beside effects, places and mistakes."""
+    levels = ["errors of levels beyond the rig's class"] if each.best.levels else []
+    return [*levels, *(["something without a name"] if each.unnamed else [])]
+
+
+def _all(names: Sequence[str]) -> str:
+    return " and ".join(names)
+
+
+def _entries(data: Data, claim: Claim, evidence: str) -> list[Named]:
+    """An entry for each test of a claim."""
+    return [
+        Named(
+            one.mistake.name,
+            evidence,
+            test=one.test(data),
+            sentence=one.words(data),
+            correction=one.corrections(data)[0],
+        )
+        for one in claim.each
+    ]
+
+
+def _place_where(base: Evidence, place: FaultyPlace, best: Hypothesis) -> Where:
+    kind, component = ("loop", "force") if place.family == "loop" else ("sweep", "storage")
+    reading = f"{place.name} departs by {number(100 * best.size, 2)} % from what all other tests say"
+    return Where(
+        place.direction,
+        kind,
+        place.frequency,
+        place.amplitude,
+        component,
+        place.distance(base.residual),
+        reading,
+    )
