@@ -250,9 +250,7 @@ class LinearModel:
         whole = np.cumsum([len(group.columns) for group in groups]) * self.residual.size // _AT_ONCE
         ends = [0, *(np.flatnonzero(np.diff(whole)) + 1).tolist(), len(groups)]
         return [
-            evidence
-            for own in pairwise(ends)
-            for evidence in replace(self, groups=groups[slice(*own)]).group_evidence
+            evidence for own in pairwise(ends) for evidence in replace(self, groups=groups[slice(*own)]).group_evidence
         ]
 
     @property

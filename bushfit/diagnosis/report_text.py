@@ -120,7 +120,7 @@ class DiagnosisWriter:
         words = f"{_all(names)} {'explains' if len(names) == 1 else 'explain'} {number(100 * share, 2)} % of the gap"
         beside = [place.name for place in self.first.places]
         beside += ["errors of levels beyond the rig's class"] if best.levels else []
-        gap = self._described(after) if not beside else None
+        gap = self._described(after) if not best.levels else None
         if gap:
             entries = [*entries, Named(UNNAMED, gap.evidence)]
             beside.append(f"something without a name, {gap.words}")

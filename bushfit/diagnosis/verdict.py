@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bushfit.diagnosis.document import Verdict
-from bushfit.diagnosis.explanations import FaultyPlace, is_pattern
+from bushfit.diagnosis.explanations import FaultyPlace, Meeting, is_pattern
 from bushfit.diagnosis.hypotheses import COMPOUND, Hypothesis
 from bushfit.diagnosis.priors import DOES_NOT_FIT, MOST_TOLD, MOSTLY, NAMED, NOTHING
 from bushfit.effects import get_effect
@@ -112,14 +112,21 @@ def _of_one(first: Composition, nothing: float, leads: Sequence[str]) -> Finding
     """The verdict where one composition is all but sure."""
     best, names = first.best, first.names
     leads = tuple(dict.fromkeys((*names, *leads)))
-    if first.places or not (names or best.claim or first.unnamed):  # a place that is off has to go first
+    if _bend_names(first) or not (names or best.claim or first.unnamed):  # a place that is off has to go first
         return Finding("unexplained", nothing, (first,), leads)
     curve = best.unnamed not in ("", COMPOUND) and best.last >= (1.0 - MOSTLY) * best.size
     if not best.claim and (not names or curve or best.chance < DOES_NOT_FIT):
         return Finding("described", nothing, (first,), leads)
-    if first.unnamed or best.levels:
+    if first.unnamed or best.levels or first.places:
         return Finding("partly", nothing, (first,), names=names)
     return Finding("named", nothing, (first,), names=names)
+
+
+def _bend_names(composition: Composition) -> bool:
+    """True if the places at fault may bend the names beside them: a fault of a level, a repeat or a frequency does. A
+    loop is a test of its own, and points that were left out have no weight."""
+    faults = [place for place in composition.places if not isinstance(place, Meeting)]
+    return bool(composition.places) and (not composition.names or any(place.family != "loop" for place in faults))
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
