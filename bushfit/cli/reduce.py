@@ -88,7 +88,7 @@ def command(
 
 @dataclass(frozen=True)
 class _Reduced:
-    """What files were reduced to: the points as a table, how to show and draw them, and what --json has besides.
+    """Result of a reduction: the points as a table, how to show and draw them, and what --json has besides.
 
     What was tested is told by `body` and `name`, as in a campaign: direction = "axial", or specimen = "mount".
     """

@@ -44,7 +44,7 @@ class TestSource:
         return f"{self.file}, {word_for_part(self.file)} {self.sheet}" if self.sheet else str(self.file)
 
     def without(self, *keys: str) -> "TestSource":
-        """The same of which some keys are not stated."""
+        """Copy of the source without some options."""
         return replace(self, test_options={key: value for key, value in self.test_options.items() if key not in keys})
 
     def inspect(self) -> Inspection:
@@ -53,10 +53,14 @@ class TestSource:
 
 
 def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list[TestSource], tuple[str, ...]]:
-    """The tests among files, the sheets of workbooks, and the files of folders and of the folders in them.
+    """Find the tests among files, the sheets of workbooks, and the files of folders and of the folders in them.
 
-    A file that the user names and that is no workbook with several sheets is not opened. `stated` are the keys of
-    [[loops]] and [[sweeps]] that the user states. A sentence is told for each file and sheet that holds no test.
+    Args:
+        paths: files and folders. A named file that is no workbook with several sheets is not opened.
+        test_options: keys of [[loops]] and [[sweeps]] that hold for all tests, as TOML has them.
+
+    Returns:
+        The tests in order, and a sentence for each file and sheet without a test.
 
     Raises:
         NoTestError: a folder without a test.
@@ -92,8 +96,14 @@ def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list
 
 
 def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
-    """Files that were inspected, each with a sentence more where another one of the same part, in the same direction,
-    contradicts it."""
+    """Compare inspected files of the same part in the same direction.
+
+    Args:
+        files: inspections, in order.
+
+    Returns:
+        The inspections, with one more oddity where another file contradicts the file.
+    """
     contradictions: dict[int, str] = {}
     placed = [inspection for inspection in files if inspection.direction is not None and inspection.kind != "history"]
     for part in dict.fromkeys(inspection.part for inspection in placed):
@@ -111,9 +121,12 @@ def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
 
 
 def _tests_by_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
-    """The tests of a file that its columns tell apart, by direction, part and run, and which rows are left out.
+    """Split a file into the tests that its columns mark: directions, parts and runs.
 
-    The runs of a sweep are repeats; so are tests those of a loop alone, where time does not go on from one to the next.
+    The runs of a sweep are repeats. The runs of a loop are tests where time starts again in each.
+
+    Returns:
+        The tests, and a sentence on the rows that are left out.
     """
     test_options = source.test_options
     whole_file_options = {
@@ -143,11 +156,17 @@ def _tests_by_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
 
 
 def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str, Any]) -> list[TestSource]:
-    """Sources with what the user states of each.
+    """Give each test the options that apply to it.
 
-    A column that is stated for all, and that only some of them have, is left out for the others; so is a unit for those
-    whose headers say it, and a temperature that is to choose rows, one of several in a file, for files that have no
-    column for it.
+    A column that only some tests have is left out for the others. The same holds for a unit where the header has
+    one, and for a temperature that selects rows where a file has no column for it.
+
+    Args:
+        sources: tests.
+        test_options: options that hold for all of them.
+
+    Returns:
+        The tests with their options.
     """
     tables: Mapping[str, Mapping[str, str]] = {key: test_options.get(key, {}) for key in ("columns", "units")}
     by_source = [{**test_options, **tables, **({"sheet": source.sheet} if source.sheet else {})} for source in sources]
@@ -166,7 +185,7 @@ def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str,
 
 
 def _needs_option(file: Path, key: str, role: str, test_options: Mapping[str, Any]) -> bool | None:
-    """Whether a file has the column that is stated for a role, or lacks its unit; None where it cannot be told."""
+    """Return True if a file has the column of a role, or lacks its unit; None if it cannot be read."""
     names = LOOP_COLUMNS if role in LOOP_COLUMNS else SWEEP_COLUMNS
     mine = {"columns": {role: test_options["columns"][role]}} if key == "columns" else {"units": {}}
     try:
@@ -204,7 +223,7 @@ def _list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
 
 
 def _sheets_of(source: TestSource, test_options: Mapping[str, Any]) -> list[TestSource]:
-    """The sheets of a workbook with several of which the user states none; else the file itself."""
+    """The sheets of a workbook with several, if no option names one; else the file itself."""
     if test_options.get("sheet"):
         return [source]
     try:
@@ -215,7 +234,7 @@ def _sheets_of(source: TestSource, test_options: Mapping[str, Any]) -> list[Test
 
 
 def _keep_tests(parts: Sequence[TestSource]) -> tuple[list[TestSource], list[str]]:
-    """Those of some sheets, or of one file, that hold a test or might, and why the others do not."""
+    """Keep the sheets, or the file, that hold a test or may hold one; with a sentence on each of the others."""
     tests: list[TestSource] = []
     left_out: list[str] = []
     without: set[str | None] = set()

@@ -1,4 +1,4 @@
-"""What is said of a test outside its columns, by names and the lines above its table: keys of a campaign, and slips."""
+"""Labels of a test outside its columns, in names and in the lines above its table: keys of a campaign, and slips."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ _AGREEMENT = 0.03
 
 
 def temperatures_of(table: Table) -> int:
-    """How many temperatures the rows of a table were tested at: 0 without a column for it, 1, or 2 for several."""
+    """Count the temperatures of a table's rows: 0 without a column for it, 1, or 2 for several."""
     if (column := table.roles.get("temperature")) is None:
         return 0
     found = table.read({"temperature": column}, fewest_rows=1)["temperature"]
@@ -31,7 +31,16 @@ def temperatures_of(table: Table) -> int:
 
 
 def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> Labels:
-    """What the name of a sheet and of its file say of a test; they count amplitudes as is stated, if it is."""
+    """Labels in the names of a sheet and of its file.
+
+    Args:
+        file: test file.
+        sheet: name of its sheet, or "".
+        test_options: options of the test; `amplitude` states how amplitudes in the names are counted.
+
+    Returns:
+        The labels; the sheet's name takes precedence.
+    """
     labels = labels_in_names(sheet, file.stem)
     counting = test_options.get("amplitude")
     if counting is None:
@@ -47,15 +56,24 @@ def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> L
 def keys_from_labels(
     table: Table, place: Place, test_options: Mapping[str, Any], by_name: Labels, of_book: Labels, *, is_sweep: bool
 ) -> tuple[dict[str, Any], dict[str, str], bool]:
-    """What is said of a test outside its columns: keys of its table in a campaign, where what was found, by label, and
-    whether it is known how an amplitude counts that no column has.
+    """Keys of a test's table in a campaign that only its labels state.
 
-    What is stated goes first, then the table, its names (`by_name`), the lines above it, and what the other sheets say
-    of all tests of their workbook (`of_book`). Of a sweep, frequency and amplitude have to be known; the
-    place settles its unit.
+    An option takes precedence, then a column, the names, the lines above the table, and the other sheets.
+
+    Args:
+        table: of the test.
+        place: direction or specimen; it determines the unit of an amplitude.
+        test_options: options of the test.
+        by_name: labels in the names of file and sheet.
+        of_book: labels in the other sheets of the workbook.
+        is_sweep: whether it is a sweep, whose frequency and amplitude have to be known.
+
+    Returns:
+        The keys with their values, the labels as facts by their origin, and whether it is known how an amplitude is
+        counted that no column has.
 
     Raises:
-        MeasurementError: a sweep of which nothing says the amplitude, or the frequency.
+        MeasurementError: a sweep without an amplitude or a frequency.
     """
     above = labels_above(line for line in table.source.head() if line.number < table.layout.header_line)
     written = "from the lines above the table" if table.layout.header_line else "from the properties in the file"
@@ -86,7 +104,7 @@ def keys_from_labels(
 
 
 def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -> tuple[str, Quantity]:
-    """Where the amplitude or frequency is said that a sweep held, and what."""
+    """Origin and value of the amplitude or frequency that a sweep was tested at."""
     role = _HELD_ROLES[key]
     expected = place.motion.displacement_unit if role == "amplitude" else "Hz"
     label, found = next(
@@ -107,7 +125,17 @@ def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, L
 def wrong_labels(
     labels: Labels, direction: Place, amplitudes: Sequence[float], frequencies: Sequence[float]
 ) -> Iterator[str]:
-    """A sentence where the name of a file states an amplitude or a frequency that the file does not contain."""
+    """Warn where the name of a file states an amplitude or a frequency that the file does not contain.
+
+    Args:
+        labels: in the names of file and sheet.
+        direction: direction or specimen.
+        amplitudes: of the file, zero-to-peak [m, rad or strain].
+        frequencies: of the file [Hz].
+
+    Returns:
+        One sentence for each wrong label.
+    """
     unit, factor = direction.display.displacement
     expected = direction.motion.displacement_unit
     amplitudes_in_name = [

@@ -1,4 +1,4 @@
-"""What a hysteresis loop or a raw stepped-sine history holds: cycles or steps, noise, and faults of its channels."""
+"""Contents of a hysteresis loop or a raw stepped-sine history: cycles or steps, noise, and faults of its channels."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -65,7 +65,7 @@ def describe_sampling(history: Loop) -> str:
 
 
 class RecordedChannel(NamedTuple):
-    """A recorded channel: its values in SI, (n,), and the unit in which they are told with the factor to it."""
+    """A recorded channel: its values in SI, (n,), its unit for people, and the factor from SI to that unit."""
 
     name: str
     unit: str
@@ -73,12 +73,19 @@ class RecordedChannel(NamedTuple):
     values: Floats
 
     def format_row(self, row: int) -> str:
-        """The value of a row in words, without its unit."""
+        """The value of a row, without its unit."""
         return number(self.factor * self.values[row], 4)
 
 
 def odd_channels(history: Loop) -> Iterator[str]:
-    """A sentence for each fault in the channels of a loop or a raw history."""
+    """Warn of faults in the channels of a record: gaps, a stuck recorder, cut-off tops, outliers.
+
+    Args:
+        history: a loop or a raw history.
+
+    Returns:
+        One sentence for each fault.
+    """
     names, units = history.direction.motion.words, history.direction.display
     motion = RecordedChannel(names[0], *units.displacement, history.displacement)
     force = RecordedChannel(names[1], *units.force, history.force)
@@ -90,7 +97,7 @@ def odd_channels(history: Loop) -> Iterator[str]:
 
 
 def _gaps(motion: RecordedChannel, time: Floats, *, timed: bool) -> Iterator[str]:
-    """A sentence on gaps in a recorded time; in a file without it, only the motion tells of them."""
+    """Warn of gaps in the recorded time, or in the motion where no time was recorded."""
     steps = np.diff(time) if timed else np.abs(np.diff(motion.values))
     widest = np.quantile(steps, 0.99)  # gaps left out
     wide = steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * widest)
@@ -111,8 +118,8 @@ def _gaps(motion: RecordedChannel, time: Floats, *, timed: bool) -> Iterator[str
 
 def _stuck(motion: RecordedChannel, force: RecordedChannel) -> Iterator[str]:
     """A sentence on rows in which the recorder stood still though the motion went on."""
-    standing = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], standing.astype(np.int8), [0]))))
+    is_still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], is_still.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2]
     after = np.minimum(ends + 1, motion.values.size - 1)  # a record may end stuck: then nothing went on
     travel = np.abs(motion.values[after] - motion.values[starts])
@@ -158,7 +165,14 @@ def _outliers(channel: RecordedChannel, time: Floats) -> Iterator[str]:
 
 
 def describe_loop(loop: Loop, labels: Labels) -> Findings:
-    """Facts and oddities of a loop; `labels` are what the names of its file and sheet say.
+    """Facts and oddities of a loop.
+
+    Args:
+        loop: in SI.
+        labels: in the names of its file and sheet.
+
+    Returns:
+        Facts by name, and a sentence on each oddity.
 
     Raises:
         FitError: no whole cycle, or a loop that runs the wrong way round.
@@ -208,7 +222,14 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
 
 
 def describe_history(history: Loop, labels: Labels) -> Findings:
-    """Facts and oddities of a history; `labels` are what the names of its file and sheet say.
+    """Facts and oddities of a raw stepped-sine history.
+
+    Args:
+        history: in SI.
+        labels: in the names of its file and sheet.
+
+    Returns:
+        Facts by name, and a sentence on each oddity.
 
     Raises:
         MeasurementError: no steady sine in it.
@@ -236,10 +257,18 @@ def describe_history(history: Loop, labels: Labels) -> Findings:
 
 
 def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Findings:
-    """Facts and oddities of a record that holds several loops, in order.
+    """Facts and oddities of a record that holds several loops.
+
+    Args:
+        record: the whole record.
+        loops: its loops, in order.
+        labels: in the names of its file and sheet.
+
+    Returns:
+        Facts by name, and a sentence on each oddity.
 
     Raises:
-        FitError: a part that has no whole cycle, or runs the wrong way round.
+        FitError: a part without a whole cycle, or one that runs the wrong way round.
     """
     drives = [drive_of(loop) for loop in loops]
     unit, factor = record.direction.display.displacement

@@ -43,13 +43,18 @@ _QUASI_STATIC = 1.0
 
 
 def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table, bool]:
-    """The table of a file, and whether it is a sweep's and not a loop's.
+    """Open a test file as a loop or a sweep, by its columns.
 
-    The user states keys of [[loops]] and [[sweeps]], as TOML has them; each is used where it fits.
+    Args:
+        file: test file.
+        test_options: keys of [[loops]] and [[sweeps]], as TOML has them; the fitting ones are used.
+
+    Returns:
+        The table, and whether it is a sweep's.
 
     Raises:
         NoTestError: a file that cannot be opened as a table, or whose columns make no test.
-        MeasurementError, UnitError: one whose columns might, if they were clear.
+        MeasurementError, UnitError: columns that may make one, if they were clear.
     """
     opened: list[tuple[Table, bool]] = []
     failed: list[tuple[Mapping[str, Sequence[str]], BushfitError]] = []
@@ -108,12 +113,20 @@ def _refuse_resonance(file: Path, test_options: Mapping[str, Any]) -> None:
 
 
 def test_place(file: Path, table: Table, test_options: Mapping[str, Any]) -> Place | None:
-    """What a test was made on: a specimen, or the bushing in a direction, as stated or as the file says; else None.
+    """Body and direction of a test: a specimen, or a direction of the bushing.
 
-    A modulus is that of a specimen, a stiffness that of the bushing unless sizes of a block in shear are stated.
+    A modulus is that of a specimen, a stiffness that of the bushing unless the sizes of a block in shear are given.
+
+    Args:
+        file: test file.
+        table: of the file.
+        test_options: options of the test.
+
+    Returns:
+        Direction or specimen; None if neither options nor file state it.
 
     Raises:
-        MeasurementError: units of torsion where the user states another direction.
+        MeasurementError: units of torsion where an option states another direction.
         CampaignError, UnitError, ModelError: sizes that make no specimen.
     """
     keys: dict[str, Any] = {"kind": "shear"} | {key: test_options[key] for key in BLOCK_KEYS if key in test_options}
@@ -127,10 +140,18 @@ def test_place(file: Path, table: Table, test_options: Mapping[str, Any]) -> Pla
 
 
 def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) -> Direction | None:
-    """The direction of a test of the bushing as the user states it, or else as its file does; None where neither does.
+    """Direction of a test of the bushing, by an option, or else by its file.
+
+    Args:
+        file: test file.
+        table: of the file.
+        test_options: options of the test.
+
+    Returns:
+        The direction; None if neither states it.
 
     Raises:
-        MeasurementError: a file that says another direction than the user.
+        MeasurementError: a file that states another direction than the option.
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     headers = table.layout.written or table.headers
@@ -191,14 +212,20 @@ def open_table(
 
 
 def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = NO_LABELS) -> Inspection:
-    """Recognise a test file, and say what it holds and what is odd about it.
+    """Recognize a test file, and describe its contents and what is odd about them.
 
-    The user states keys of [[loops]] and [[sweeps]], as TOML has them, and sizes of a specimen in shear; each is used
-    where it fits. `of_book` is what other sheets of its workbook say of all its tests.
+    Args:
+        file: test file.
+        test_options: keys of [[loops]] and [[sweeps]], as TOML has them, and sizes of a specimen in shear; the
+            fitting ones are used.
+        of_book: labels in the other sheets of its workbook.
+
+    Returns:
+        The inspection, with the content in SI.
 
     Raises:
-        NoTestError: a file that holds no test.
-        MeasurementError, UnitError, CampaignError, FitError: a file or a statement that cannot be used.
+        NoTestError: a file without a test.
+        MeasurementError, UnitError, CampaignError, FitError: a file or an option that cannot be used.
     """
     table, is_sweep = recognize_table(file, test_options)
     direction = test_place(file, table, test_options)
@@ -232,10 +259,17 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
 
 
 def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Direction | None]:
-    """A raw history, and its direction where the file or `stated` say it.
+    """Read a raw history.
+
+    Args:
+        file: test file.
+        test_options: keys of [[loops]], as TOML has them.
+
+    Returns:
+        The history in SI, and its direction; None where neither file nor options state it.
 
     Raises:
-        MeasurementError, UnitError, CampaignError: a file or a statement that cannot be used.
+        MeasurementError, UnitError, CampaignError: a file or an option that cannot be used.
     """
     table, is_sweep = recognize_table(file, test_options)
     if is_sweep:
@@ -270,7 +304,7 @@ def _entry(
 def _keywords(
     file: Path, direction: Place, entry: Mapping[str, Any], schema: type[LoopFile] | type[SweepFile]
 ) -> dict[str, Any]:
-    """What a reader is called with for a file that a campaign lists with these keys."""
+    """Keyword arguments of the reader for a file with these keys in a campaign."""
     specimens = [direction] if isinstance(direction, Specimen) else []
     tested = {} if specimens else {"direction": str(direction)}
     test = validate_tables({**entry, "file": str(file), **tested}, file, schema)

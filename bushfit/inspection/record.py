@@ -1,4 +1,4 @@
-"""What an inspection of a test file finds, and the text of a campaign for files that were inspected."""
+"""Result of the inspection of a test file, and the text of a campaign for inspected files."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -70,7 +70,7 @@ class InspectedFile(TypedDict):
 
 
 class InspectionDocument(TypedDict):
-    """What test files hold."""
+    """Contents of test files."""
 
     files: Annotated[list[InspectedFile], Doc("that can be used.")]
     left_out: Annotated[list[str], Doc("a sentence for each file or sheet that holds no test.")]
@@ -102,7 +102,7 @@ class Inspection:
 
     @property
     def label(self) -> str:
-        """The name of the file, with the sheet where it has several, and with what columns tell of the test."""
+        """Name of the file, with its sheet, direction and part where it holds several."""
         in_columns = {column.role for column in self.columns}
         direction = self.direction if "direction" in in_columns else None
         part = self.part if "specimen number" in in_columns else None
@@ -118,12 +118,12 @@ class Inspection:
 
     @property
     def is_counting_open(self) -> bool:
-        """Whether nothing says how the amplitudes of a sweep are counted."""
+        """True for a sweep whose amplitudes may be zero-to-peak or peak-to-peak."""
         return self.kind == "sweep" and not self.counted and "amplitude" not in self.entry
 
     @property
     def assumed(self) -> str | None:
-        """What was assumed, with the option or key that says otherwise; None where nothing was."""
+        """Assumptions, each with the option or key that changes it; None where there are none."""
         assumptions = []
         if isinstance(self.direction, Specimen) and self.direction.kind == "modulus":
             meaning, alternative = "the engineering shear strain", "tension"
@@ -155,10 +155,13 @@ class Inspection:
 
 
 def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspection], folder: Path) -> str:
-    """The text of a whole campaign file.
+    """Text of a whole campaign file.
 
-    The name is that of the bushing, too, of which `bushing` has the other keys, quantities as texts; None where
-    specimens alone were tested. Loops and sweeps are named from the folder where the campaign will lie.
+    Args:
+        name: of the campaign and of its bushing.
+        bushing: other keys of [bushing], quantities as texts; None where specimens alone were tested.
+        files: inspections of its tests.
+        folder: folder of the campaign; files are named relative to it.
     """
     head = _key_lines({"name": name, **(bushing or {})})
     order = [inspection for kind in _TABLES for inspection in files if inspection.kind == kind]
@@ -170,10 +173,20 @@ def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[
 def campaigns_of_parts(
     name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspection], folder: Path, listed_in: str
 ) -> dict[str, str]:
-    """The text of a campaign of each part whose number a column tells, and of the manifest of them, by their files.
+    """Texts of one campaign for each part, and of the batch manifest that lists them.
+
+    Args:
+        name: of the bushing.
+        bushing: other keys of [bushing], quantities as texts; None where specimens alone were tested.
+        files: inspections, each with the number of its specimen.
+        folder: folder of the campaigns.
+        listed_in: name of the manifest.
+
+    Returns:
+        The texts by file name, the manifest first.
 
     Raises:
-        CampaignError: a file of which nothing tells the part.
+        CampaignError: a file without the number of its specimen.
     """
     of_parts: list[Any] = [inspection.entry.get("specimen_number") for inspection in files]
     if None in of_parts:
@@ -198,7 +211,14 @@ def campaigns_of_parts(
 
 
 def with_specimens_named(files: Sequence[Inspection]) -> list[Inspection]:
-    """Files that were inspected, with specimens that differ under names that differ: coupon, coupon_2 and so on."""
+    """Give different specimens different names: coupon, coupon_2 and so on.
+
+    Args:
+        files: inspections.
+
+    Returns:
+        The same inspections, renamed where two specimens had one name.
+    """
     named: dict[Specimen, Specimen] = {}
     for body in (inspection.direction for inspection in files):
         if isinstance(body, Specimen) and body not in named:
@@ -233,9 +253,14 @@ def pasted_text(files: Sequence[Inspection]) -> str:
 
 
 def file_text(inspection: Inspection, folder: Path | None = None) -> str:
-    """The table of one file in a campaign that lies in a folder; for a raw history, a comment on what to do first.
+    """Table of one file in a campaign; for a raw history, a comment on what to do first.
 
-    Without a folder the file is named by its full path.
+    Args:
+        inspection: of the file.
+        folder: folder of the campaign; without it, the full path is written.
+
+    Returns:
+        Text in TOML.
     """
     name = inspection.file.resolve().as_posix()
     with suppress(ValueError):  # another drive, where no path leads

@@ -1,4 +1,4 @@
-"""What a sweep holds: its frequencies, amplitudes, repeats and noise, and what is odd about it."""
+"""Contents of a sweep: its frequencies, amplitudes, repeats and noise, and what is odd about it."""
 
 from collections.abc import Iterator
 
@@ -49,7 +49,10 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
 
     Args:
         sweep: in SI.
-        labels: what the names of its file and sheet state.
+        labels: in the names of its file and sheet.
+
+    Returns:
+        Facts by name, and a sentence on each oddity.
     """
     unit, factor = sweep.direction.display.displacement
     frequencies, levels = np.unique(sweep.frequency), np.unique(sweep.amplitude)

@@ -103,21 +103,38 @@ def stretches(changes: NDArray[np.bool_]) -> list[slice]:
 
 
 def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
-    """Whether a sine that begins again after a gap [cycles] of three at most does so whole `step`s of a cycle later."""
+    """Return True if a sine begins again after a gap [cycles] of up to three, whole `step`s of a cycle later."""
     return gap < _LONGEST_INTERRUPTION and abs(gap - step * round(gap / step)) < _SAME_PHASE
 
 
 def change_after(time: Floats, motion: Floats, shift: float, rows: slice) -> Floats:
-    """How far a motion, at some of its rows, is from where it is a time [s] later, or earlier, [m or rad]."""
+    """Difference between a motion and the same motion a time later, or earlier.
+
+    Args:
+        time: of each row [s], (n,).
+        motion: [m or rad], (n,).
+        shift: time between the two [s].
+        rows: rows that are compared.
+
+    Returns:
+        Magnitude of the difference [m or rad], (rows,).
+    """
     return np.abs(np.interp(time[rows] + shift, time, motion) - motion[rows])
 
 
 def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
-    """Which rows of a channel, (n,), lie alone far off their neighbours, as faults of a record do, (n,).
+    """Find rows of a channel that lie alone far off their neighbours, as faults of a record do.
+
+    Args:
+        time: of each row [s], (n,).
+        values: of the channel, (n,).
+
+    Returns:
+        Mask of these rows, (n,).
 
     Notes:
-        Such a row is farther off the cubic through the two rows before and the two after it than these spread, and
-        than noise goes; a cubic through rows at uneven times magnifies noise, which is allowed for. No sine does that,
+        Such a row is farther off the cubic through the two rows before and the two after it than these spread, and than
+        noise goes; a cubic through rows at uneven times magnifies noise, which is allowed for. No sine does that,
         however few rows it has, nor the kink of dry friction.
     """
     outliers = np.zeros(values.size, dtype=bool)
@@ -169,10 +186,14 @@ def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
 
 
 def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
-    """Whether the frequency of a run of crossings [s], (m + 1,), sweeps all the time and does not step between parts.
+    """Return True if the frequency of a run sweeps all the time and does not step between its parts.
 
-    Notes:
-        In a sweep the period changes within the pieces as it does between them; in steps it is constant within.
+    Args:
+        edges: time of the crossings [s], (m + 1,).
+        parts: parts of the run, as `pieces` gives them.
+
+    Returns:
+        Whether the period changes within the parts as it does between them; in steps it is constant within.
     """
     parts = [part for part in parts if part.stop - part.start > _FEWEST_CYCLES]
     if len(parts) < 4:  # which may be steps

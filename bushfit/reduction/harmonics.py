@@ -50,9 +50,15 @@ def basis(phase: Floats, order: int, *drift: Floats) -> Floats:
 
 
 def least_squares(columns: Floats, values: Floats, weight: NDArray[Any] | None = None) -> Floats:
-    """Real coefficients that fit `values`, (n,) or (n, channels), by normal equations, each row with its weight, (n,).
+    """Real coefficients that fit values, by normal equations.
 
-    The columns are of `basis`, (n, k): nearly orthogonal over whole cycles, so that normal equations lose no digits.
+    Args:
+        columns: of `basis`, (n, k): nearly orthogonal over whole cycles, so that normal equations lose no digits.
+        values: (n,) or (n, channels).
+        weight: of each row, (n,); None for one.
+
+    Returns:
+        Coefficients, (k,) or (k, channels).
     """
     weighed = columns.T if weight is None or np.all(weight == 1.0) else columns.T * weight
     gram, moments = weighed @ columns, weighed @ values
@@ -73,7 +79,7 @@ def series(coefficients: Complex, phase: Floats) -> Floats:
 
 
 def resolved_order(rows_per_cycle: float, max_order: int) -> int:
-    """As many harmonics as the rows of one cycle carry, from 1 to `most`."""
+    """Number of harmonics that the rows of one cycle determine, from 1 to `max_order`."""
     return int(np.clip(rows_per_cycle / _ROWS_PER_HARMONIC, 1, max_order))
 
 

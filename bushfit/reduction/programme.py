@@ -65,7 +65,7 @@ class _SteadySpan:
         return (self.end - self.begin) / self.period
 
     def is_like(self, span: "_SteadySpan") -> bool:
-        """Whether two parts have one amplitude and one rate."""
+        """Return True if two parts have one amplitude and one rate."""
         ranges, periods = np.log(self.range / span.range), np.log(self.period / span.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
@@ -180,7 +180,7 @@ def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
 
 
 def _long_stretches(changes: NDArray[np.bool_]) -> list[slice]:
-    """Those stretches between changes, (n - 1,), that have two entries or more."""
+    """Stretches between changes, (n - 1,), with two entries or more."""
     return [run for run in stretches(changes) if run.stop - run.start > 1]
 
 
@@ -234,8 +234,7 @@ def left_out(gaps: Iterable[str], cycles: float) -> str:
 
 
 def _softening(loop: Loop, span: _SteadySpan, *, from_rest: bool) -> float | None:
-    """By how much the first cycle of a part is stiffer than its last; None where that is chance or what rubber keeps
-    in memory of what came before, which any model has."""
+    """Relative excess of the first cycle's stiffness over the last; None within chance and the memory of rubber."""
     if span.cycles < 1.95:  # first and last are one
         return None
     first, first_error = _stiffness(loop, span.begin, span.period)

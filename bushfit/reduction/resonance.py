@@ -29,7 +29,7 @@ _MEDIAN_TO_SIGMA = 1.1774100225154747
 
 @dataclass(frozen=True, eq=False)
 class Resonance:
-    """What a resonance test was reduced to: points with the amplitude that each reached and its standard error.
+    """Points of a reduced resonance test, each with the amplitude that it reached and its standard error.
 
     Args:
         mass: that moves on the mount [kg].
@@ -94,7 +94,16 @@ class Resonance:
 
 
 def transmissibility(stiffness: Complex, mass: float, frequency: Floats) -> Complex:
-    """Complex transmissibility T = K/(K - M omega^2) [-], (n,), of a mass [kg] on a mount, with K [N/m], (n,)."""
+    """Complex transmissibility of a mass on a mount, T = K/(K - M omega^2).
+
+    Args:
+        stiffness: complex K of the mount [N/m], (n,).
+        mass: M [kg].
+        frequency: [Hz], (n,).
+
+    Returns:
+        Motion of the mass over that of the base [-], (n,).
+    """
     return stiffness / (stiffness - mass * (2.0 * np.pi * frequency) ** 2)
 
 
@@ -191,10 +200,10 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
 
 
 def _is_turned(test: ResonanceTest) -> bool:
-    """Whether the phases count the other way: with them, the loss is below zero.
+    """Return True if the phases count the other way: with them, the loss is below zero.
 
-    Rows count by (ln |T|)^2: most at the resonance and far above it, where they tell K well, and the same should base
-    and mass be swapped, which then shows as a stiffness below zero.
+    Rows have the weight (ln |T|)^2: most at the resonance and far above it, where they determine K well, and the same
+    if base and mass are swapped, which then shows as a stiffness below zero.
     """
     ratio = test.transmissibility
     flexibility = (1.0 - 1.0 / ratio) / test.frequency**2

@@ -1,4 +1,4 @@
-"""What raw histories are reduced to: operating points, stretches that make none, and what is to be said of both."""
+"""Result of a reduction of raw histories: operating points, stretches that make none, and warnings about both."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -92,7 +92,7 @@ class SkippedStretch:
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """What histories of one direction were reduced to.
+    """Operating points of histories of one direction.
 
     Args:
         steps: in the order of the histories and of time.
@@ -171,8 +171,8 @@ def _amplitude_slope(steps: Sequence[Step]) -> float:
     """Steepest d ln|K| / d ln X between neighbouring levels at one frequency; 0 where there is only one level."""
     ordered = sorted(steps, key=lambda step: (step.nominal_frequency, step.amplitude))
     slopes = [
-        float(np.log(abs(other.stiffness / one.stiffness)) / np.log(other.amplitude / one.amplitude))
-        for one, other in pairwise(ordered)
-        if other.nominal_frequency == one.nominal_frequency and other.level != one.level
+        float(np.log(abs(upper.stiffness / lower.stiffness)) / np.log(upper.amplitude / lower.amplitude))
+        for lower, upper in pairwise(ordered)
+        if upper.nominal_frequency == lower.nominal_frequency and upper.level != lower.level
     ]
     return max(slopes, key=abs, default=0.0)

@@ -67,7 +67,14 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
 
 
 def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
-    """Frequency [Hz], rough amplitude [m or rad] and number of cycles of each steady stretch of a history."""
+    """Steady stretches of a history.
+
+    Args:
+        history: time, displacement and force.
+
+    Returns:
+        Frequency [Hz], rough amplitude [m or rad] and number of cycles of each.
+    """
     cycles = Cycles.of(history.time, history.displacement)
     found = []
     for run in cycles.runs():
@@ -180,7 +187,7 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
 
 
 def _creeps(values: Floats, smallest: float) -> bool:
-    """Whether values, (n,), change steadily from first to last, by more than `least` and beyond their scatter."""
+    """Return True if values, (n,), change steadily from first to last, by more than `smallest` and their scatter."""
     if values.size < 3:
         return False
     number = np.arange(values.size) - (values.size - 1) / 2.0

@@ -37,7 +37,7 @@ def turning_points(values: Floats, prominence: float) -> Integers:
 
 
 def _reversals(values: Floats, rows: Integers) -> Integers:
-    """Those of some rows at which the values turn from one of them to the next, ends included."""
+    """Rows, of those given, at which the values turn from one of them to the next, ends included."""
     direction = np.sign(np.diff(values[rows]))
     inner = 1 + np.flatnonzero(direction[1:] != direction[:-1])
     return np.concatenate((rows[:1], rows[inner], rows[1:][-1:]))
@@ -151,7 +151,17 @@ def stroke_middles(height: Floats) -> Floats:
 
 
 def middle_crossings(time: Floats, motion: Floats, turns: Integers, middle: Floats) -> Floats:
-    """Time at which each stroke from one turning point to the next crosses its middle [s], (strokes,)."""
+    """Time at which each stroke, from one turning point to the next, crosses its middle.
+
+    Args:
+        time: of each row [s], (n,).
+        motion: [m or rad], (n,).
+        turns: rows of the turning points, (strokes + 1,).
+        middle: of each stroke [m or rad], (strokes,).
+
+    Returns:
+        Times [s], (strokes,).
+    """
     sense, length = np.sign(np.diff(motion[turns])), np.diff(turns)
     strokes = motion[turns[0] : turns[-1]]
     before = (strokes - np.repeat(middle, length)) * np.repeat(sense, length) < 0.0
