@@ -1,4 +1,4 @@
-"""What a test is made on: a bushing in a direction, or a specimen of its compound; equivalent strain and stiffness."""
+"""Bodies under test: a bushing in a direction, or a specimen of its compound; equivalent strain and stiffness."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -11,28 +11,28 @@ from bushfit.errors import ModelError, did_you_mean
 from bushfit.geometry import tube
 from bushfit.geometry.shape import NO_CORRECTION, Correction, radial_correction
 
-#: Which radial formulas a bushing goes by: the paper's as they are, or corrected by finite elements.
+#: Radial formulas of a bushing: those of the paper, or corrected by finite elements.
 Shape = Literal["paper", "calibrated"]
-#: What the tests of a specimen give: strain and modulus, or displacement and force of blocks in shear.
+#: Tests of a specimen: strain and modulus, or displacement and force of blocks in shear.
 SpecimenKind = Literal["modulus", "shear"]
-#: What strain the files of a modulus test state.
+#: Kind of strain in the files of a modulus test.
 StatedStrain = Literal["engineering", "tensor", "tension"]
 
 
-#: Shortest and longest side of a body of rubber [m]; chosen: far from all that is tested.
+#: Shortest and longest plausible side of a body of rubber [m].
 _SHORTEST = 1e-6
 _LONGEST = 100.0
 
 
 class Unit(NamedTuple):
-    """A unit in which people read a quantity, and the factor from SI to it."""
+    """A display unit with its factor from SI."""
 
     name: str
     factor: float
 
 
 class Display(NamedTuple):
-    """The units in which engineers read displacement, force and stiffness."""
+    """Display units of displacement, force and stiffness."""
 
     displacement: Unit
     force: Unit
@@ -41,7 +41,13 @@ class Display(NamedTuple):
 
 @dataclass(frozen=True)
 class Motion:
-    """A kind of motion: in words what moves, what resists it and what relates the two; SI units, and engineers'."""
+    """A kind of motion.
+
+    Args:
+        words: names of displacement, force and stiffness.
+        displacement_unit, force_unit, stiffness_unit: SI units.
+        display: display units.
+    """
 
     words: tuple[str, str, str]
     displacement_unit: str
@@ -75,26 +81,26 @@ STRAINING = Motion(
 
 
 class _Tested:
-    """What a direction and a specimen answer alike."""
+    """Common properties of directions and specimens."""
 
     @property
     def motion(self) -> Motion:
-        """The kind of motion that it is tested in."""
+        """Kind of motion of its tests."""
         raise NotImplementedError
 
     @property
     def is_rotation(self) -> bool:
-        """Whether it counts rotation [rad] and moment [N m], and not displacement [m] and force [N]."""
+        """True for rotation [rad] and moment [N m] instead of displacement [m] and force [N]."""
         return self.motion is ROTATION
 
     @property
     def display(self) -> Display:
-        """The units in which engineers read its displacement, force and stiffness, or strain, stress and modulus."""
+        """Display units of displacement, force and stiffness, or of strain, stress and modulus."""
         return self.motion.display
 
 
 class Direction(_Tested, StrEnum):
-    """Direction in which a bushing is tested: its name in files, and its kind of motion."""
+    """Direction in which a bushing is tested."""
 
     AXIAL = "axial"
     RADIAL = "radial"
@@ -165,7 +171,7 @@ class Bushing:
 
     @cached_property
     def correction(self) -> Correction | None:
-        """What finite elements make of the radial formulas, applied or not; None where none were computed."""
+        """Correction of the radial formulas by finite elements; None outside the computed shapes."""
         return radial_correction(*self.proportions)
 
     def unit_strain(self, direction: Direction) -> float:
@@ -179,7 +185,7 @@ class Bushing:
         return _DEFINITIONS[direction].stiffness_per_modulus(*sizes) * self._corrected(direction).stiffness
 
     def _corrected(self, direction: Direction) -> Correction:
-        """The correction that this bushing's formulas for a direction go by."""
+        """Correction that is applied to the formulas of a direction."""
         calibrated = direction is Direction.RADIAL and self.shape == "calibrated"
         return self.correction if calibrated and self.correction else NO_CORRECTION
 
@@ -232,15 +238,15 @@ class Specimen(_Tested):
         return TRANSLATION if self.kind == "shear" else STRAINING
 
 
-#: Where a response is measured or predicted: a direction of the bushing, or a specimen of its compound.
+#: A direction of the bushing, or a specimen of its compound.
 Place = Direction | Specimen
 
 
 def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
-    """The specimen of this name, or else the direction.
+    """Specimen or direction of a name.
 
     Raises:
-        ModelError: it is neither.
+        ModelError: an unknown name.
 
     >>> get_place("mount", [Specimen("mount", "shear", area=1e-3, thickness=0.01)]).motion.words
     ('displacement', 'force', 'stiffness')
@@ -253,10 +259,10 @@ def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
 
 
 def unit_strain(bushing: Bushing | None, place: Place) -> float:
-    """Equivalent strain per unit displacement [1/m], rotation [1/rad] or strain [1] at a place.
+    """Equivalent strain per unit displacement [1/m], rotation [1/rad] or strain [1] of a direction or specimen.
 
     Raises:
-        ModelError: a direction where there is no bushing.
+        ModelError: a direction without a bushing.
 
     >>> unit_strain(None, Specimen("coupon", "modulus"))
     0.5
@@ -269,10 +275,10 @@ def unit_strain(bushing: Bushing | None, place: Place) -> float:
 
 
 def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
-    """Stiffness per unit equivalent shear modulus at a place: [m], [m^3/rad] of a rotation, [1] of a modulus.
+    """Stiffness per unit equivalent shear modulus: [m], [m^3/rad] of a rotation, [1] of a modulus.
 
     Raises:
-        ModelError: a direction where there is no bushing.
+        ModelError: a direction without a bushing.
 
     >>> stiffness_per_modulus(None, Specimen("mount", "shear", area=1e-3, thickness=0.01, elements=2))
     0.2
@@ -285,7 +291,7 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
 
 
 def strain_factor_of_files(place: Place) -> float:
-    """What one unit of displacement or strain in a test's file is as it is counted: 2 of the tensor's shear, else 1.
+    """Displacement or strain per unit in a test file: 2 for shear strain of the tensor, 1 otherwise.
 
     >>> strain_factor_of_files(Specimen("coupon", "modulus", "tensor")), strain_factor_of_files(Direction.AXIAL)
     (2.0, 1.0)
@@ -305,7 +311,7 @@ def _present(bushing: Bushing | None, place: Direction) -> Bushing:
 
 
 class _Definition(NamedTuple):
-    """A direction's kind of motion, and the formulas of a tube for it, by its radii and length."""
+    """Kind of motion and formulas of a tube for a direction, as functions of its radii and length."""
 
     motion: Motion
     unit_strain: Callable[[float, float], float]

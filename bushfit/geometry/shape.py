@@ -1,4 +1,4 @@
-"""The paper's radial formulas against finite elements: how far they lie off, as smooth functions of a tube's shape.
+"""Correction of the paper's radial formulas by finite elements, as smooth functions of the shape of a tube.
 
 The tube is bonded to rigid sleeves, its ends are free. `tests/reference/finite_tube.py` solves it and prints the
 coefficients in shape.toml: of polynomials of Chebyshev's in the two `coordinates` of a shape.
@@ -31,7 +31,7 @@ _COEFFICIENTS = {
 
 
 class Correction(NamedTuple):
-    """What finite elements make of the radial formulas for one shape.
+    """Correction of the radial formulas for one shape by finite elements.
 
     Args:
         stiffness: radial stiffness over that of Eqs. 11 and 12.
@@ -45,10 +45,11 @@ class Correction(NamedTuple):
     softening: float
 
     def lowering(self, mu: float) -> float:
-        """Share by which a bulk modulus of 2 GPa lowers the radial stiffness of rubber with shear modulus `mu` [Pa].
+        """Relative decrease of the radial stiffness by a bulk modulus of 2 GPa, for a shear modulus `mu` [Pa].
 
-        Notes: rubber that gives way in volume adds its compliance to that of incompressible rubber. That is within
-        0.01 of finite elements for mu up to 3.3 MPa, and 0.02 up to 10 MPa.
+        Notes:
+            The compliance of the volume is added to that of incompressible rubber. This is within 0.01 of finite
+            elements for mu up to 3.3 MPa, and within 0.02 up to 10 MPa.
         """
         return 1.0 - 1.0 / (1.0 + self.softening * (mu / BULK_MODULUS - INCOMPRESSIBLE))
 
@@ -58,7 +59,7 @@ NO_CORRECTION = Correction(1.0, 1.0, 0.0)
 
 
 def coordinates(radius_ratio: float, slenderness: float) -> tuple[float, float]:
-    """A shape's ln((b - a)/a) and ln(L/b), each scaled so that its range becomes -1 to 1.
+    """Coordinates ln((b - a)/a) and ln(L/b) of a shape, scaled to -1 to 1 over the computed range.
 
     Args:
         radius_ratio: a/b, inner over outer radius.
@@ -71,13 +72,17 @@ def coordinates(radius_ratio: float, slenderness: float) -> tuple[float, float]:
 
 
 def radial_correction(radius_ratio: float, slenderness: float) -> Correction | None:
-    """The correction of the radial formulas for a shape; None for one that lies outside the two ranges.
+    """Correction of the radial formulas for a shape.
 
     Args:
         radius_ratio: a/b, inner over outer radius.
         slenderness: L/b, length over outer radius.
 
-    Notes: within 1 % of finite elements in stiffness, and 3 % in strain.
+    Returns:
+        The correction, or None outside the computed shapes.
+
+    Notes:
+        Within 1 % of finite elements in stiffness, and 3 % in strain.
 
     >>> [round(factor, 3) for factor in radial_correction(10 / 18, 34 / 18)]
     [0.953, 0.736, 11.571]

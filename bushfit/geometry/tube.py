@@ -15,7 +15,7 @@ from bushfit.errors import ModelError
 RADIUS_RATIO_RANGE = (0.1, 0.97)
 #: Length over outer radius for which the radial formula was checked against 60-digit arithmetic.
 SLENDERNESS_RANGE = (0.05, 100.0)
-#: Relative width by which the two ranges are widened: 1.8 mm over 18 mm is not quite 0.1 in binary.
+#: Relative tolerance of the two ranges, for rounding: 1.8 mm / 18 mm is not exactly 0.1.
 _ROUNDING = 1e-9
 #: q = (b^2 - a^2)/(b^2 + a^2) up to which ln(b/a) - q is summed as a series; above it, the two no longer cancel.
 _LARGEST_Q_OF_SERIES = 0.5
@@ -69,7 +69,7 @@ def radial_stiffness(a: float, b: float, length: float) -> float:
     >>> round(radial_stiffness(0.010, 0.018, 0.034), 4)
     2.8431
     """
-    if not (_within(a / b, RADIUS_RATIO_RANGE) and _within(length / b, SLENDERNESS_RANGE)):
+    if not (_is_inside(a / b, RADIUS_RATIO_RANGE) and _is_inside(length / b, SLENDERNESS_RANGE)):
         raise ModelError(
             "the radial formula (Eqs. 11, 12) was not checked for this shape",
             place="inner_radius, outer_radius, length",
@@ -124,5 +124,5 @@ def _q(a: float, b: float) -> float:
     return _area(a, b) / (a * a + b * b)
 
 
-def _within(value: float, limits: tuple[float, float]) -> bool:
+def _is_inside(value: float, limits: tuple[float, float]) -> bool:
     return limits[0] * (1.0 - _ROUNDING) <= value <= limits[1] * (1.0 + _ROUNDING)

@@ -23,7 +23,7 @@ STEPS_PER_CYCLE = 2048
 
 @dataclass(frozen=True)
 class Record:
-    """What a rig writes: time [s], displacement [m or rad] and force [N or N m], each (n,)."""
+    """Record of a rig: time [s], displacement [m or rad] and force [N or N m], (n,) each."""
 
     time: Array
     displacement: Array
@@ -58,14 +58,22 @@ def record(
     """Impose `run_in + cycles` cycles from rest and keep the last `cycles`.
 
     Args:
-        frequency, amplitude: [Hz], and zero-to-peak [m or rad].
-        swell: so many cycles before these swell to so many times the amplitude and die out again (a Hann window):
-            friction then forgets where it began, and the springpot sees no step. Not for models whose parameters
-            follow the amplitude, which is that of the whole motion.
-        steps_per_cycle: the springpot's error falls in proportion: its Gruenwald-Letnikov sum is of first order.
-        waveform: sine or triangle.
-        kind: whether a loop or a sweep is recorded; only effects of the instrument tell them apart.
-        under: what the test is made under, numbers.
+        model: under test, with the effects of the rig.
+        direction: direction or specimen.
+        frequency: of the motion [Hz].
+        amplitude: zero-to-peak [m or rad].
+        cycles: number of recorded cycles.
+        run_in: number of cycles before the record.
+        swell: number and amplitude factor of preceding cycles that swell and decay (Hann window), so that friction
+            forgets its start and the springpot sees no step. Not for models whose parameters follow the amplitude,
+            which is that of the whole motion.
+        steps_per_cycle: time steps; the error of the Gruenwald-Letnikov sum is inversely proportional.
+        waveform: "sine" or "triangle".
+        kind: "loop" or "sweep"; only effects of the instrument depend on it.
+        under: circumstances of the test, numbers.
+
+    Returns:
+        The record of the last `cycles`.
     """
     before = swell[0] + run_in
     phase = np.arange((before + cycles) * steps_per_cycle + 1) / steps_per_cycle
@@ -87,9 +95,19 @@ def imposed(
     kind: Kind = "loop",
     under: Circumstances = UNKNOWN,
 ) -> Record:
-    """Impose any motion, in even steps of time [s] from rest: displacement [m or rad], (n,).
+    """Impose a motion from rest.
 
-    The frequency of its cycles [Hz] is for effects that count them.
+    Args:
+        model: under test, with the effects of the rig.
+        direction: direction or specimen.
+        motion: displacement [m or rad], (n,).
+        step: time between samples [s].
+        frequency: of its cycles [Hz], for effects that count cycles.
+        kind: "loop" or "sweep"; only effects of the instrument depend on it.
+        under: circumstances of the test, numbers.
+
+    Returns:
+        The record.
 
     Raises:
         ModelError: an effect has no law in time.
@@ -109,7 +127,7 @@ def imposed(
 
 
 def lock_in(measured: Record, frequency: float) -> complex:
-    """Complex dynamic stiffness of a record at its frequency [Hz], overtones dropped: [N/m or N m/rad] (Eq. 9)."""
+    """Complex dynamic stiffness [N/m or N m/rad] of a record from its first harmonic at the frequency [Hz] (Eq. 9)."""
     channels = np.column_stack((measured.displacement, measured.force))
     _, (displacement, force), _ = cycle_harmonics(measured.time * frequency, channels, 1)
     return complex(force / displacement)
@@ -127,7 +145,14 @@ def dynamic_stiffness(
 ) -> Array:
     """Complex dynamic stiffness by stepped sine, one settled cycle per operating point: (n,) [N/m or N m/rad].
 
-    Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each; circumstances are numbers or likewise.
+    Args:
+        model: under test, with the effects of the rig.
+        direction: direction or specimen.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad], (n,).
+        run_in: number of cycles before the measured one.
+        steps_per_cycle: time steps.
+        under: circumstances of the tests, numbers or (n,).
 
     >>> measured = dynamic_stiffness(paper, "axial", 20.0, 1e-3)
     >>> bool(abs(measured / paper.stiffness("axial", 20.0, 1e-3) - 1.0).max() < 1e-3)
