@@ -91,7 +91,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     raise best.header_error(
         "the columns do not make a test",
         kind=NoTestError,
-        found=", ".join(best.headers) + (f" (understood: {understood})" if understood else ""),
+        found=", ".join(best.headers) + f" (understood: {understood})" if understood else None,
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
         hint=f"correct the header, or name the column: {best.columns_key(lacking, unit)}",
     )

@@ -68,7 +68,7 @@ def _side_by_side(
     width = len([header for header in layout.headers[sides[0]] if header])
     lines = list(rows(source, layout))
     labels = [labels_in_names(title) for title in titles]
-    added = _label_columns(labels, titles, set(vocabulary.roles(layout.headers)))
+    added = _label_columns(labels, titles, set(vocabulary.roles(layout.headers)), are_parts=True)
     numbers: list[int] = []
     content: list[Sequence[str | float]] = []
     for index, side in enumerate(sides):
@@ -117,7 +117,7 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         return source, layout
     titles = [_title(lines) for lines in groups]
     labels = [labels_above(lines) | labels_in_names(title) for lines, title in zip(groups, titles, strict=True)]
-    added = _label_columns(labels, titles, set(vocabulary.roles(layout.headers)))
+    added = _label_columns(labels, titles, set(vocabulary.roles(layout.headers)), are_parts=False)
     contents += [(part.number, cells_of(part, layout), len(groups) - 1) for part in between]
     content: list[Sequence[str | float]] = []
     for _, row, block in contents:
@@ -133,7 +133,9 @@ def _title(lines: Sequence[Line]) -> str:
     return "".join(takewhile(lambda text: not re.search(r"[\t;:=]", text), texts)).strip()
 
 
-def _label_columns(labels: Sequence[Labels], titles: Sequence[str], roles: set[str]) -> dict[str, list[str]]:
+def _label_columns(
+    labels: Sequence[Labels], titles: Sequence[str], roles: set[str], *, are_parts: bool
+) -> dict[str, list[str]]:
     """Texts of the added columns by header: quantities that all blocks state, direction, part, and block number."""
     columns: dict[str, list[str]] = {}
     for role, expected in (("amplitude", "m"), ("amplitude", "rad"), ("amplitude", "1"), ("frequency", "Hz")):
@@ -151,7 +153,7 @@ def _label_columns(labels: Sequence[Labels], titles: Sequence[str], roles: set[s
     if all(directions):
         columns["direction"] = [str(direction) for direction in directions]
     numbers = [label.specimen_number for label in labels]
-    parts_named = numbers if all(numbers) else titles if not columns and len(set(titles)) == len(titles) else []
+    parts_named = numbers if all(numbers) else titles if are_parts and not columns else []
     if parts_named and all(parts_named) and len(set(parts_named)) > 1:
         columns["part"] = [str(text) for text in parts_named]
     columns["block"] = [str(number) for number in range(1, len(labels) + 1)]

@@ -364,14 +364,16 @@ class Cells:
             found: default the cells of the header, if the file is understood as a table of numbers.
             details: further arguments of `error`.
         """
-        if found is None and (
-            len(self.roles) > 1
-            or self.layout.written
-            or any(is_row([str(cell) for cell in cells]) for _, cells in islice(self.rows(), _MOST_LISTED))
-        ):
+        if found is None and self.is_table:
             found = ", ".join(self.headers)
         found = found or f"{len(self.headers)} cell{'s' * (len(self.headers) != 1)}, which name no columns of a test"
         return self.error(problem, line=self.layout.header_line, found=found, **details)
+
+    @property
+    def is_table(self) -> bool:
+        """True if the file is understood as a table of numbers; the text of any other file is not shown in errors."""
+        rows = ([str(cell) for cell in cells] for _, cells in islice(self.rows(), _MOST_LISTED))
+        return len(self.roles) > 1 or bool(self.layout.written) or any(map(is_row, rows))
 
     def place(self, line: int | None, column: Column | None) -> str | None:
         """Location in the file in words: sheet, line and column as far as they are given."""

@@ -148,7 +148,8 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
         if 1 <= number <= len(cells.headers):
             indices[number - 1] = role
         elif role not in known:
-            near = next(iter(get_close_matches(text, cells.headers, n=1, cutoff=_ALIKE)), "")
+            headers = cells.headers if cells.is_table else ()
+            near = next(iter(get_close_matches(text, headers, n=1, cutoff=_ALIKE)), "")
             raise cells.header_error(
                 f'there is no column "{text}"',
                 kind=NoColumnError,

@@ -230,6 +230,8 @@ class Vocabulary:
         # or with the words of its convention
         without, convention = split_convention(text)
         for name, unit, certain in (split for form in dict.fromkeys((without, text)) for split in _splits(form)):
+            if unit is None and name.endswith(("%", "‰")):
+                continue  # the unit without a bracket
             bare = plain(name)
             implied: AmplitudeConvention | None = "peak-to-peak" if bare in _PEAK_TO_PEAK_NAMES else convention
             amplitudes = [bare + "amplitude"] * bool(implied) + ["amplitude"] * (bare in _PEAK_TO_PEAK_NAMES)

@@ -85,7 +85,11 @@ def _from_hdf5(node: Any) -> Any:
 
     None where it is an object of a class, such as a table.
     """
+    if getattr(node, "external", None) or getattr(node, "is_virtual", False):
+        raise ValueError("its data are in other files")
     if hasattr(node, "items"):
+        if any(type(node.get(name, getlink=True)).__name__ == "ExternalLink" for name in node):
+            raise ValueError("its data are in other files")
         fields = {name: _from_hdf5(child) for name, child in node.items() if not name.startswith("#")}
         if fields and all(isinstance(values, list) for values in fields.values()):  # an array of structs
             return [dict(zip(fields, one, strict=True)) for one in zip(*fields.values(), strict=True)]
@@ -343,7 +347,7 @@ def format_of(data: bytes, file: Path) -> Format | None:
         raise MeasurementError(
             f"this is no {said.name} file",
             file=file,
-            found=f"first bytes {data[:16]!r}",
+            found="the first bytes of another file",
             expected=f"a {said.name} file, as its ending {file.suffix} says",
             hint="export it again, or give it the ending of what it is, such as .csv",
         )

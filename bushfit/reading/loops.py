@@ -148,7 +148,7 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
     if "block" in table.headers:
         hint = 'this file has several blocks: rows = { block = "1" } in the campaign takes the first; bushfit init all'
     elif stuck.any() and np.all(np.diff(time) >= 0.0):
-        hint = 'take the time out, with columns = { time = "..." } for another column, or state rate or frequency'
+        hint = "export the file again with more digits of the time"
     if stuck.any():
         table.refuse(np.append(False, stuck), column, "time does not increase", "a later time on every row", hint)
     if time[-1] - time[0] < LEAST_VALUE:

@@ -101,7 +101,7 @@ def read_sweep(
     for role, value in held.items():
         values[role] = check_stated(table, wanted.get(role), values, value)
     if pair[0] == "force_amplitude":
-        force_convention = wanted["force_amplitude"].convention or convention
+        force_convention = force_amplitude_convention(table, wanted["force_amplitude"], convention)
         values["force_amplitude"] = values["force_amplitude"] * ZERO_TO_PEAK[force_convention] / to_peak
     values, more = with_positive_loss(values, wanted, test)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -233,6 +233,29 @@ def amplitude_convention(
             hint="correct one of them; what the header says needs no key in the campaign",
         )
     return column.convention or stated or "zero-to-peak"
+
+
+def force_amplitude_convention(table: Table, column: Column, of_motion: AmplitudeConvention) -> AmplitudeConvention:
+    """Convention of the amplitudes of the force: that of their header, or zero-to-peak if the motion has the same.
+
+    Args:
+        table: of the sweep.
+        column: of the amplitudes of the force.
+        of_motion: convention of the amplitudes of the displacement.
+
+    Raises:
+        MeasurementError: only the header of the displacement states peak-to-peak or rms.
+    """
+    if column.convention is None and of_motion != "zero-to-peak":
+        forms = {"peak-to-peak": "p-p", "rms": "rms"}
+        keys = (f'units = {{ force_amplitude = "{column.unit} {form}" }}' for form in (forms[of_motion], "0-p"))
+        raise table.header_error(
+            "nothing says how the amplitudes of the force are counted",
+            found=f'"{column.header}" beside a displacement that is {of_motion}',
+            expected="p-p, rms or 0-p in the header",
+            hint=f"{' or '.join(keys)} in the campaign",
+        )
+    return column.convention or "zero-to-peak"
 
 
 def with_positive_loss(

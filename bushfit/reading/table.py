@@ -223,7 +223,8 @@ class Table(Cells):
         """
         usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
         free = [header for header in self.headers if header and usual.heading(header) is None]
-        fitting = [header for header in free if units.is_compatible(units.split_header(header)[1] or "", unit)]
+        of_unit = (header for header in free if units.is_compatible(units.split_header(header)[1] or "", unit))
+        fitting = [] if unit == "1" else list(of_unit)  # a ratio can be anything
         return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
 
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
