@@ -15,9 +15,9 @@ from bushfit.geometry import Direction
 from bushfit.inspection.labels import temperatures_of
 from bushfit.inspection.opening import inspect_file, open_table, recognize_table
 from bushfit.inspection.record import Inspection
-from bushfit.reading.cells import same_text
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
+from bushfit.reading.labelled import same_text
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above
 from bushfit.reading.parts import parts_of

@@ -18,8 +18,8 @@ from bushfit.inspection.labels import keys_from_labels, labels_of_file, temperat
 from bushfit.inspection.loops import describe_history, describe_loop, describe_programme
 from bushfit.inspection.record import ColumnSeen, Findings, Inspection, Kind
 from bushfit.inspection.sweeps import describe_sweep
-from bushfit.reading.cells import Rows
 from bushfit.reading.headers import LOOP_COLUMNS, PAIRS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary, of_motion
+from bushfit.reading.labelled import Rows
 from bushfit.reading.layout import DELIMITERS, FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
@@ -28,7 +28,8 @@ from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.source import Channels, Sheet
 from bushfit.reading.stated import LoopFile, SweepFile
-from bushfit.reading.sweeps import read_sweep, refuse_ambiguous_damping
+from bushfit.reading.stiffness import refuse_ambiguous_damping
+from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
 from bushfit.reduction.programme import programme
 from bushfit.reduction.steps import steady_sines

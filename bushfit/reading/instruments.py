@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import replace
 from functools import lru_cache
-from itertools import pairwise, product, takewhile
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 
 from bushfit import units
 from bushfit.errors import MeasurementError
-from bushfit.reading.files import to_utf8
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
+from bushfit.reading.labview import labview
 from bushfit.reading.layout import Layout, Line
-from bushfit.reading.source import Channels
+from bushfit.reading.source import Channel, Channels, Group
 
 #: Values of a file that are read at most; chosen: ten million rows of twenty channels and more, 2 GiB.
 _MOST_VALUES = 1 << 28
@@ -42,28 +42,12 @@ _UFF_MARK = b"    -1"
 _UFF_CODES = re.compile(r"(\s*-?\d+){4}\s*")
 #: The direction of UFF from which on a displacement is a rotation, and a force a moment.
 _UFF_ROTATIONS = 4
-#: Lines of the header of a LabVIEW measurement file; chosen: it has some twenty.
-_LVM_HEAD = 40
-_LVM_END = "***End_of_Header***"
 #: The names that a base of recording goes by.
 _BASES = Vocabulary({"time": LOOP_COLUMNS["time"], "frequency": SWEEP_COLUMNS["frequency"]}, {})
 #: What may be done about files without channels.
 _HINT = "export it again, with its channels"
 _MATLAB_HINT = 'save vectors, or structs of them, with -v7; a table by way of table2struct(T, "ToScalar", true)'
 _UFF_HINT = "export records or frequency responses as dataset 58; of data at nodes (55) only the latter are read"
-
-
-class Channel(NamedTuple):
-    """A recorded channel: values, (n,), with their unit, and the channel that they were recorded over, if any."""
-
-    name: str
-    values: NDArray[Any]
-    unit: str = ""
-    over: "Channel | None" = None
-
-
-#: Channels that a file holds together: a name, they, and what the file says of all, names and values or lines of text.
-Group = tuple[str, list[Channel], Sequence[tuple[Any, ...]]]
 
 
 def matlab(data: bytes, _: Path) -> Iterator[Group]:
@@ -198,38 +182,6 @@ def arrow(data: bytes, _: Path) -> Iterator[Group]:
         plain = column.dt.tz_localize(None) if getattr(column.dtype, "tz", None) else column
         channels.append(Channel(field.name, plain.to_numpy(), unit))
     yield "", channels, ()
-
-
-def labview(data: bytes, file: Path) -> Iterator[Group]:
-    """Channels of each segment of a LabVIEW measurement file (.lvm), over their time."""
-    lines = to_utf8(data, file)[0].decode().splitlines()
-    head = dict(line.split(None, 1) for line in lines[:_LVM_HEAD] if len(line.split(None, 1)) == 2)
-    mark = "," if head.get("Separator", "Tab").strip() == "Comma" else "\t"
-    point = head.get("Decimal_Separator", ".").strip()
-    ends = [number for number, line in enumerate(lines) if line.startswith(_LVM_END)]
-    for segment, (start, end) in enumerate(pairwise([*ends, len(lines) + _LVM_HEAD]), start=1):
-        names, *rows = [line.split(mark) for line in lines[start + 1 : end] if line.strip()] or [[""]]
-        if "X_Value" not in names:
-            continue  # the header of the file, not of a segment
-        above = {cells[0]: cells[1:] for line in lines[:start] if (cells := line.split(mark))}
-        rows = list(takewhile(lambda cells: cells[0] != "Channels", rows))
-        numbers = [[float(cell.replace(point, ".") or "nan") for cell in row[: len(names)]] for row in rows if row]
-        width = min(len(row) for row in numbers)
-        columns, channels, over = np.array([row[:width] for row in numbers]).T, [], None
-        step, first = (float(above[key][0].replace(point, ".")) for key in ("Delta_X", "X0"))
-        counted = first + step * np.arange(len(numbers))
-        units_of, dimension = iter(above.get("Y_Unit_Label", ())), above.get("X_Dimension", ["Time"])[0]
-        for name, values in zip(names, columns, strict=False):
-            if name == "X_Value":
-                is_time = dimension.strip() in ("Time", "")
-                over = Channel(
-                    "time" if is_time else dimension,
-                    counted if np.isnan(values).all() else values,
-                    "s" if is_time else "",
-                )
-            elif name != "Comment":
-                channels.append(Channel(name, values, next(units_of, "").strip(), over))
-        yield f"segment {segment}" if len(ends) > 2 else "", channels, ()
 
 
 def uff(data: bytes, file: Path) -> Iterator[Group]:

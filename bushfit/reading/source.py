@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -271,6 +271,19 @@ class Channels(Sheet):
             return None
         scaled = {index: self.arrays[index] * scale for index, scale in scales.items()}
         return scaled if all(np.all(np.abs(values) <= LARGEST_VALUE) for values in scaled.values()) else None
+
+
+class Channel(NamedTuple):
+    """Recorded channel: values, (n,), their unit, and the channel over which they were recorded, if there is one."""
+
+    name: str
+    values: NDArray[Any]
+    unit: str = ""
+    over: Channel | None = None
+
+
+#: Channels that a file stores together: name, channels, and properties of all as names and values or lines of text.
+Group = tuple[str, list[Channel], Sequence[tuple[Any, ...]]]
 
 
 #: Source of rows.

@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, Field, ValidationInfo
 
 from bushfit.errors import CampaignError, error_location
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
-from bushfit.reading.cells import Rows
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
+from bushfit.reading.labelled import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Source, Stepped, Waveform, rebuild_time
 from bushfit.units import CELSIUS, parse_quantity

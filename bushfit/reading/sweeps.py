@@ -13,17 +13,22 @@ from bushfit import units as si
 from bushfit.geometry import STRAINING, Place, strain_factor_of_files
 from bushfit.reading.headers import (
     AGREEING_PAIRS,
-    OF_MOTION,
-    PAIRS,
     SWEEP_COLUMNS,
     ZERO_TO_PEAK,
     AmplitudeConvention,
     Column,
-    Vocabulary,
 )
-from bushfit.reading.measurement import SAME_TEMPERATURE, Complex, Floats, Sweep
+from bushfit.reading.measurement import SAME_TEMPERATURE, Floats, Sweep
 from bushfit.reading.runs import runs_of
 from bushfit.reading.stated import SweepFile
+from bushfit.reading.stiffness import (
+    check_agreement,
+    check_loss,
+    complex_stiffness,
+    force_amplitude_convention,
+    stiffness_pair,
+    with_positive_loss,
+)
 from bushfit.reading.table import Table
 
 #: Columns whose values must be positive.
@@ -35,25 +40,14 @@ _POSITIVE = (
 _FEWEST_SWEEP_ROWS = 3
 #: Above every repeat number; chosen: a larger number is another quantity.
 _MOST_REPEATS = 1_000_000
-#: Loss factors of a bushing [-]; chosen: noise may push one below zero, and the softest rubber is far below 5.
-_LOSS_FACTORS = (-0.5, 5.0)
-#: Loss factor that every rubber exceeds somewhere [-]; chosen: a tenth of the least damping rubber.
-LEAST_LOSS_FACTOR = 0.005
-#: Share of the points below zero from which the sign of the loss is reversed; chosen: noise may lift some, and a late
-#: channel leaves the loss at low frequencies positive.
-_THROUGHOUT = 0.95
 #: Share within which a stated amplitude or frequency agrees with its column; chosen: rigs miss by less.
 _STATED_AGREEMENT = 0.1
 #: Range of temperatures in one test [K]; chosen: rubber warms up by as much during a test.
 ONE_TEST = 5.0
-#: Share of |K| within which redundant columns agree; chosen: some are rounded to few digits.
-_AGREEMENT = 0.02
 _HINTS = {
     "amplitude": 'or state at_amplitude = "0.1 mm" if all rows have it',
     "frequency": 'or state at_frequency = "10 Hz" if all rows have it',
 }
-#: Damping that can be a loss factor or a damping ratio.
-_DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissement", "amortiguamiento", "阻尼"]}, {})
 
 
 def read_sweep(
@@ -136,44 +130,6 @@ def read_sweep(
     )
 
 
-def stiffness_pair(table: Table) -> tuple[str, str]:
-    """First of PAIRS for which a table has columns.
-
-    Raises:
-        MeasurementError: there is none, or the damping can be read in two ways.
-    """
-    for pair in PAIRS:
-        if set(pair) <= set(table.roles):
-            return pair
-    for role in {role: None for pair in PAIRS for role in pair if role in OF_MOTION}:
-        table.refuse_other_motion(role)
-    refuse_ambiguous_damping(table)
-    usual = ", or ".join(" and ".join(pair) for pair in AGREEING_PAIRS).replace("_", " ")
-    raise table.header_error(
-        "no pair of columns gives a complex stiffness",
-        expected=f"{usual}, or a force amplitude and its phase",
-        hint='correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
-    )
-
-
-def refuse_ambiguous_damping(table: Table) -> None:
-    """Refuse a damping that can be a loss factor or a damping ratio.
-
-    Raises:
-        MeasurementError: there is such a column beside a stiffness or an amplitude of the force.
-    """
-    damping = next((header for header in table.headers if header and _DAMPING.heading(header)), None)
-    if damping and {"stiffness", "storage_stiffness", "force_amplitude"} & set(table.roles):
-        keys = (f'columns = {{ {role} = "{damping}" }}' for role in ("loss_factor", "damping_ratio"))
-        coefficient = f'columns = {{ damping_coefficient = "{damping}" }}'
-        raise table.header_error(
-            "this damping can be a loss factor or a damping ratio, which is half as large",
-            found=f'"{damping}"',
-            expected="one of them, or a damping coefficient in N s/mm",
-            hint=f"{' or '.join(keys)} or {coefficient} in the campaign",
-        )
-
-
 def sweep_columns(
     table: Table, direction: Place, pair: tuple[str, str], held: Mapping[str, float]
 ) -> dict[str, Column]:
@@ -233,177 +189,6 @@ def amplitude_convention(
             hint="correct one of them; what the header says needs no key in the campaign",
         )
     return column.convention or stated or "zero-to-peak"
-
-
-def force_amplitude_convention(table: Table, column: Column, of_motion: AmplitudeConvention) -> AmplitudeConvention:
-    """Convention of the amplitudes of the force: that of their header, or zero-to-peak if the motion has the same.
-
-    Args:
-        table: of the sweep.
-        column: of the amplitudes of the force.
-        of_motion: convention of the amplitudes of the displacement.
-
-    Raises:
-        MeasurementError: only the header of the displacement states peak-to-peak or rms.
-    """
-    if column.convention is None and of_motion != "zero-to-peak":
-        forms = {"peak-to-peak": "p-p", "rms": "rms"}
-        keys = (f'units = {{ force_amplitude = "{column.unit} {form}" }}' for form in (forms[of_motion], "0-p"))
-        raise table.header_error(
-            "nothing says how the amplitudes of the force are counted",
-            found=f'"{column.header}" beside a displacement that is {of_motion}',
-            expected="p-p, rms or 0-p in the header",
-            hint=f"{' or '.join(keys)} in the campaign",
-        )
-    return column.convention or "zero-to-peak"
-
-
-def with_positive_loss(
-    values: Mapping[str, Floats], columns: Mapping[str, Column], test: SweepFile
-) -> tuple[dict[str, Floats], tuple[str, ...]]:
-    """Correct the sign of a loss that is negative throughout, and the range of a phase.
-
-    Args:
-        values: in SI by role, (n,) each.
-        columns: by role.
-        test: force_sign and phase_sign as the user states them; None for an automatic choice.
-
-    Returns:
-        Corrected values, and a sentence on each correction.
-
-    Notes:
-        A phase is wrapped to -180 to 180 deg. Beyond 90 deg the force has the other sign, which turns it by 180 deg. A
-        phase that is negative throughout is that of the displacement relative to the force.
-    """
-    corrected, notes = dict(values), []
-    if (phase := values.get("phase")) is not None:
-        header = columns["phase"].header
-        wrapped = np.angle(np.exp(1j * phase))
-        if np.abs(phase).max() > np.pi * (1.0 + 1e-9):
-            notes.append(f'"{header}" goes beyond 180 deg and is wrapped')
-        else:
-            wrapped = phase
-        automatic = test.force_sign is None and np.median(np.abs(wrapped)) > np.pi / 2.0
-        if test.force_sign == -1 or automatic:
-            wrapped = np.angle(-np.exp(1j * wrapped))
-        if automatic:
-            notes.append(
-                f'"{header}" lies beyond 90 deg: the force counts the other way, and the phase is turned by 180 deg; '
-                "force_sign = 1 in the campaign keeps it"
-            )
-        corrected["phase"] = wrapped
-    for role in ("phase", "loss_factor", "loss_stiffness", "damping_coefficient", "damping_ratio"):
-        if role not in corrected or role not in columns:
-            continue
-        size = (
-            corrected[role] / np.median(values.get("storage_stiffness", values.get("stiffness", 1.0)))
-            if role == "loss_stiffness"
-            else corrected[role]
-        )
-        automatic = test.phase_sign is None and np.mean(size < -LEAST_LOSS_FACTOR) > _THROUGHOUT
-        if test.phase_sign == -1 or automatic:
-            corrected[role] = -corrected[role]
-        if automatic:
-            notes.append(
-                f'"{columns[role].header}" is negative throughout and is taken with the other sign; '
-                "phase_sign = 1 in the campaign keeps it"
-            )
-    return corrected, tuple(notes)
-
-
-def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tuple[Complex, Floats]:
-    """Complex stiffness and loss factor.
-
-    Args:
-        pair: one of PAIRS.
-        values: in SI by role, (n,) each.
-
-    Returns:
-        Complex stiffness [N/m or N m/rad, or Pa], (n,), and loss factor [-], (n,), NaN from a phase of 90 deg on.
-
-    Notes:
-        K* = K' + i K'' with K'' = 2 pi f c of a damping coefficient c, and tan delta = 2 zeta of a damping ratio zeta.
-        A force amplitude F at a displacement amplitude x gives |K*| = F / x.
-    """
-    size, loss = values[pair[0]], values[pair[1]]
-    if pair[0] == "force_amplitude":
-        size = size / values["amplitude"]
-    if pair[1] in ("loss_stiffness", "damping_coefficient"):
-        loss = loss * (2.0 * np.pi * values["frequency"] if pair[1] == "damping_coefficient" else 1.0)
-        storage = size if pair[0] == "storage_stiffness" else np.sqrt(size**2 - loss**2)
-        return storage + 1j * loss, loss / storage
-    factor = 2.0 * loss if pair[1] == "damping_ratio" else loss
-    if pair[1] == "phase":
-        factor = np.where(np.abs(loss) < np.pi / 2, np.tan(loss), np.nan)
-        if pair[0] != "storage_stiffness":
-            return size * np.exp(1j * loss), factor
-    storage = size if pair[0] == "storage_stiffness" else size / np.hypot(1.0, factor)
-    return storage * (1.0 + 1j * factor), factor
-
-
-def check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
-    """Refuse ratios that are stated in %, and a loss that no bushing has.
-
-    Args:
-        table: of the sweep.
-        column: of the loss.
-        loss_factor: [-], (n,).
-
-    Raises:
-        MeasurementError: such a loss.
-    """
-    if np.mean(loss_factor < -LEAST_LOSS_FACTOR) > _THROUGHOUT:
-        raise table.error(
-            "the loss counts the other way",
-            column=column,
-            found=f"{np.count_nonzero(loss_factor < 0.0)} of {loss_factor.size} rows below zero",
-            expected="a force that leads the displacement: phase, loss factor and loss stiffness above zero",
-            hint="take phase_sign out of the campaign, or state phase_sign = -1",
-        )
-    largest = float(np.nan_to_num(np.abs(loss_factor), nan=np.inf).max())
-    if column.role == "loss_factor" and column.scale != 1.0 and 0.0 < largest < LEAST_LOSS_FACTOR:
-        raise table.error(
-            "no rubber loses so little",
-            column=column,
-            found=f"{largest / column.scale:.3g} {column.unit} at most",
-            expected=f"a loss factor above {LEAST_LOSS_FACTOR / column.scale:g} {column.unit} somewhere",
-            hint=f'if these are ratios, write "[-]" for "[{column.unit}]" in the header',
-        )
-    low, high = _LOSS_FACTORS
-    table.refuse(
-        ~((loss_factor >= low) & (loss_factor <= high)),
-        column,
-        "no bushing has this loss",
-        f"a loss factor (loss over storage stiffness) from {low:g} to {high:g}",
-        "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]; or is it 90 deg less the loss?",
-    )
-
-
-def check_agreement(table: Table, pair: tuple[str, str], values: Mapping[str, Floats], stiffness: Complex) -> None:
-    """Refuse rows in which other columns give another stiffness; their loss may have the other sign.
-
-    Args:
-        table: of the sweep.
-        pair: of PAIRS that gave the stiffness.
-        values: in SI by role, (n,) each.
-        stiffness: complex [N/m or N m/rad, or Pa], (n,).
-
-    Raises:
-        MeasurementError: there is such a row.
-    """
-    for other in AGREEING_PAIRS:
-        if other == pair or not set(other) <= set(values):
-            continue
-        redundant, _ = complex_stiffness(other, values)
-        distance = np.hypot(redundant.real - stiffness.real, np.abs(redundant.imag) - np.abs(stiffness.imag))
-        used, others = (" and ".join(f'"{table.roles[role].header}"' for role in both) for both in (pair, other))
-        table.refuse(
-            ~(distance <= _AGREEMENT * np.abs(stiffness)),
-            table.roles[other[1] if other[0] == pair[0] else other[0]],
-            "the columns contradict each other",
-            f"the complex stiffness of {used}, within {100 * _AGREEMENT:g} %, in {others}",
-            "correct the columns that are wrong, or take them out",
-        )
 
 
 def check_stated(table: Table, column: Column | None, values: Mapping[str, Floats], stated: float) -> Floats:

@@ -16,7 +16,6 @@ from bushfit import units
 from bushfit.errors import MeasurementError, UnitError, error_location
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.blocks import combined
-from bushfit.reading.cells import Cells, Rows
 from bushfit.reading.classification import classify
 from bushfit.reading.headers import (
     LOOP_COLUMNS,
@@ -28,6 +27,7 @@ from bushfit.reading.headers import (
     is_angular,
     of_motion,
 )
+from bushfit.reading.labelled import LabelledCells, Rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, find_layout
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import Numerals, weigh
@@ -44,7 +44,7 @@ _FIRST = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Table(Cells):
+class Table(LabelledCells):
     """Table of a test, with its columns by role.
 
     Args:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bushfit.errors import MeasurementError
 from bushfit.reading.measurement import Complex, Floats, Sweep
 from bushfit.reading.resonance import ResonanceTest
-from bushfit.reading.sweeps import LEAST_LOSS_FACTOR
+from bushfit.reading.stiffness import LEAST_LOSS_FACTOR
 
 #: Points that a test is thinned to; chosen: some twenty lie within the resonance, and a fit has no use for more.
 MOST_POINTS = 100

@@ -278,4 +278,29 @@ EXPORTS: dict[str, Export] = {
     "one header for two roles": Export(
         loop(), None, ["two roles"], {"columns": {"force": "displacement [mm]", "displacement": "displacement [mm]"}}
     ),
+    # more exports
+    "force amplitude beside a displacement p-p": Export(
+        sweep("Frequency [Hz]|Displacement p-p [mm]|Force amplitude [N]|Phase [deg]", F, 2 * A, K * A, PHASE), None, ['"N 0-p"'],
+    ),
+    "force amplitude, as the hint says": Export(
+        sweep("Frequency [Hz]|Displacement p-p [mm]|Force amplitude [N]|Phase [deg]", F, 2 * A, K * A, PHASE),
+        stated={"units": {"force_amplitude": "N 0-p"}},
+    ),
+    "units row with conventions": Export("Freq\tAmp\tStiffness\tPhase\nHz\tmm pk-pk\tN mm-1\t°\n" + "\n".join(table([], F, 2 * A, K, PHASE)[1:])),
+    "Servotest": Export(
+        "Servotest Pulsar,Test 3\nDate,26/11/2026\n\n"
+        + sweep("Frequency (Hz)|Amplitude (+/-mm)|Dynamic Stiffness (N/mm)|Loss Angle (deg)|Damping (Ns/mm)|Static Load (N)", F, A, K, PHASE, DAMPING, 0 * F + 500, mark=",")
+    ),
+    "past midnight": Export(
+        loop("Time|Displacement [mm]|Force [N]", [f"23:59:{45 + t:06.3f}" if t < 15 else f"00:00:{t - 15:06.3f}" for t in TIME], DISPLACEMENT, FORCE), "loop"
+    ),
+    "Kraftamplitude": Export(
+        sweep("Frequenz [Hz]|Wegamplitude SS [mm]|Kraftamplitude SS [N]|Phasenwinkel [°]", F, 2 * A, 2 * K * A, PHASE, mark=";").replace(".", ",")
+    ),
+    "tan(delta)/%": Export(sweep("f/Hz|A/mm|K*/(N/mm)|tan(delta)/%", F, A, K, 100 * ETA)),
+    "a quality factor": Export(sweep(USUAL + "Q [-]", F, A, K, 1 / ETA), None, ["the columns do not make a test"]),
+    "logarithms of a DMA": Export(
+        sweep("log10(f/Hz)|Strain [%]|log10 G' [Pa]|log10 G'' [Pa]", np.log10(F), 10 * A, np.log10(1e6 * G.real), np.log10(1e6 * G.imag)), reference=MODULUS
+    ),
+    "times too coarse": Export(loop("Time [s]|Displacement [mm]|Force [N]", ["0"] * 300 + ["1"] * 300, DISPLACEMENT, FORCE), None, ["more digits"]),
 }  # fmt: skip

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import openpyxl
 import pytest
+from commandline import call
 from exports import AMPLITUDE, DISPLACEMENT, EXPORTS, FORCE, FREQUENCY, STIFFNESS, TIME
 
 from bushfit.errors import BushfitError
@@ -41,3 +45,42 @@ def test_an_export_is_read_right_or_raises_a_question(name: str, tmp_path: Path)
                 np.testing.assert_allclose(found - found[0], values, atol=0.06 if "spread" in notes else 2e-3)
             else:
                 np.testing.assert_allclose(found, values, rtol=2e-6, atol=2e-5 * np.abs(values).max())
+
+
+def test_parts_side_by_side_and_date_cells_of_a_workbook(tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    book.active.append(["P01", None, None, "P02"])
+    book.active.merge_cells("A1:C1")
+    book.active.append(["Time", "Displacement [mm]", "Force [N]"] * 2)
+    for seconds, x, force in zip(TIME.tolist(), DISPLACEMENT.tolist(), FORCE.tolist(), strict=True):
+        stamp = datetime(2026, 11, 26, 20) + timedelta(seconds=seconds)
+        book.active.append([stamp, x, force, stamp, x, 1.1 * force])
+    book.save(tmp_path / "parts.xlsx")
+    seen = [source.inspect() for source in gather([tmp_path / "parts.xlsx"], {"direction": "axial"})[0]]
+    assert [one.part for one in seen] == ["P01", "P02"]
+    for one, factor in zip(seen, (1.0, 1.1), strict=True):
+        assert isinstance(one.measured, Loop)
+        np.testing.assert_allclose(one.measured.force, factor * FORCE, atol=1e-6)
+        np.testing.assert_allclose(one.measured.time, TIME, atol=1e-3)
+
+
+FITTED = ["phases near 174", "Amplitude RMS [mm]", "damping coefficient alone", "blocks with amplitudes", "F and x"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FITTED)
+def test_a_fit_of_an_export_equals_that_of_a_plain_file(name: str, tmp_path: Path) -> None:
+    values = []
+    for folder, export in (("plain", EXPORTS["damping is a loss factor"]), ("export", EXPORTS[name])):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "sweep.txt").write_text(str(export.content))
+        rubber = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm", "--direction", "axial")
+        damping = ("--column", "loss_factor=Damping [-]") if folder == "plain" else ()
+        inspected = call(tmp_path / folder, "inspect", "sweep.txt", "--direction", "axial", *damping, "--json")
+        assert json.loads(inspected.stdout)["files"][0]["kind"] == "sweep"
+        assert call(tmp_path / folder, "init", "sweep.txt", *rubber, *damping, "-o", "x").returncode == 0
+        done = call(tmp_path / folder, "fit", "x/campaign.toml", "-o", "y", "--no-plots")
+        assert done.returncode == 0, done.stderr
+        values.append(json.loads((tmp_path / folder / "y/model.json").read_text())["parameters"])
+    for parameter, value in values[0].items():
+        assert values[1][parameter]["value"] == pytest.approx(value["value"], rel=1e-4)
