@@ -9,6 +9,7 @@ import numpy as np
 
 from bushfit.geometry import Bushing
 from bushfit.model.file import read_document
+from bushfit.prediction.caveats import by_importance, use_of
 from bushfit.report import plots
 from bushfit.report.compare_document import ComparedEntry
 from bushfit.report.compared import FAMILY_HEADS, ContrastHeaders, SideBySide, chance, parameter_cells, signed
@@ -64,6 +65,7 @@ def comparison_context(comparison: SideBySide) -> dict[str, Any]:
         "chance": chance,
         "pictures": [picture(plots.batch.comparison_figure(comparison), "compare")] if drawn else [],
         "tabled": [*_tabled(comparison, places)][: 2 * _ROWS],
+        "warnings": [(line, use_of(line)) for line in by_importance(document["warnings"])],
         "files": _files(document["compared"]),
     }
 

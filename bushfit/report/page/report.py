@@ -16,7 +16,7 @@ from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.model.document import TestTable
 from bushfit.model.result import Misfit, Result
-from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.caveats import agrees_within_noise, by_importance, use_of, warnings_of
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.report import plots
 from bushfit.report.page.record import ReportRecord
@@ -58,9 +58,6 @@ _BESIDE_TEST = {
 }
 #: Highest frequency of a static stiffness [Hz].
 _STATIC = 1.0
-#: Reduced chi-square of a sweep that was not fitted, up to which it agrees within its noise; chosen: 95 % of the values
-#: of 20 points are below.
-_AGREES = 1.4
 #: Frequencies and amplitudes of a place in the table of values, and rows of all places together.
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 #: Tests, regions and places that a page lists or draws at most: the files have all.
@@ -100,6 +97,7 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
     head = {key.replace("_", " ").capitalize(): value for key, value in (campaign.report if campaign else {}).items()}
     predictions = record.predictions[:_MOST_PLACES]
     place_warnings = [prediction.warnings for prediction in record.predictions]
+    warnings = warnings_of(result, place_warnings, diagnosis["warnings"] if diagnosis else ())
     figures, more_figures = _figures(record, predictions)
     pictures = _drawn(figures, _LARGEST_FIGURES)
     appendix = _drawn(more_figures, _LARGEST_FIGURES - sum(len(drawn.svg) for drawn in pictures))
@@ -129,7 +127,7 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
         "more_tests": max(0, len(tests) - MOST),
         "tabled": [*_tabled(predictions)],
         "gaps": [*_gaps(diagnosis)] if diagnosis else [],
-        "warnings": warnings_of(result, place_warnings, diagnosis["warnings"] if diagnosis else ()),
+        "warnings": [(line, use_of(line)) for line in by_importance(warnings)],
         "campaign": campaign,
         "files": _files(record),
         "versions": record.versions,
@@ -209,7 +207,7 @@ def _basis(record: ReportRecord, place: str) -> str:
     if not tests:
         return f"{source}; not tested"
     worst = max(tests, key=lambda test: test.reduced_chi_square)
-    if worst.reduced_chi_square <= _AGREES:
+    if agrees_within_noise(record.result, record.result.place(place)):
         return f"{source}; the measured sweep agrees within its noise ({number(100 * worst.nrmse, 2)} %)"
     return f"{source}; the measured sweep differs by {number(100 * worst.nrmse, 2)} %"
 
