@@ -20,7 +20,7 @@ from bushfit.errors import BushfitError, did_you_mean
 
 @dataclass(frozen=True)
 class Described:
-    """What a schema describes.
+    """Files that a schema describes.
 
     Args:
         files: by their names, and commands whose `--json` prints the same.
@@ -122,14 +122,14 @@ def _explained(made: dict[str, Any], kind: type) -> dict[str, Any]:
 
 
 def _arguments(docstring: str) -> dict[str, str]:
-    """What the docstring says of each argument, in the words of JSON."""
+    """Description of each argument in a docstring, in the words of JSON."""
     found = _ARGS.search(re.sub(r"\bNone\b", "null", docstring))
     entries = _ARG.findall(found[1]) if found else []
     return {name: " ".join(words.split()) for names, words in entries for name in names.split(", ")}
 
 
 def _beside_keys(kind: type) -> dict[str, str]:
-    """What a TypedDict says of each key beside it."""
+    """Description of each key of a TypedDict."""
     hints = get_type_hints(kind, include_extras=True)
     parts = ((key, part) for key, hint in hints.items() for part in (hint, *get_args(hint)))  # as in NotRequired[...]
     beside = ((key, each) for key, part in parts for each in getattr(part, "__metadata__", ()))

@@ -167,7 +167,7 @@ class ReportSettings:
 
     @property
     def lines(self) -> dict[str, str]:
-        """What is stated in words, in the order in which it is read."""
+        """Lines of [report] that are stated, in the order in which they are read."""
         return {key: value for key, value in vars(self).items() if value is not None and key != "logo"}
 
 

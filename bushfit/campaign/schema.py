@@ -217,7 +217,7 @@ class PredictSettings:
 
 @dataclass(frozen=True)
 class SimulatedTest:
-    """What [[simulate.loops]], [[simulate.sweeps]] and [[simulate.resonances]] say alike.
+    """Keys that [[simulate.loops]], [[simulate.sweeps]] and [[simulate.resonances]] have in common.
 
     Args:
         direction: of the bushing that is tested; a specimen has none, which may be written "shear".
@@ -288,12 +288,12 @@ class SimulatedSweep(SimulatedTest):
 
     @property
     def held(self) -> tuple[float, ...]:
-        """What the points of a run have in common: amplitudes [m or rad, or strain] or frequencies [Hz]."""
+        """Values that are constant in a run: amplitudes [m or rad, or strain] or frequencies [Hz]."""
         return self.amplitudes if self.stepped == "frequency" else self.frequencies
 
     @property
     def steps(self) -> tuple[float, ...]:
-        """What changes from point to point of a run: frequencies [Hz] or amplitudes [m or rad, or strain]."""
+        """Values that change from point to point of a run: frequencies [Hz] or amplitudes [m or rad, or strain]."""
         return self.frequencies if self.stepped == "frequency" else self.amplitudes
 
     @property

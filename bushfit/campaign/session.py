@@ -32,7 +32,7 @@ class Visit(NamedTuple):
 
 
 def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> list[Circumstances]:
-    """What the rows of each measured test were made under; a loop has one turn. Its `order` is a stated condition."""
+    """Circumstances of the rows of each measured test; a loop has one turn. Its `order` is a stated condition."""
 
     def visit(test: Loop | Sweep) -> Visit:
         order = test.source.conditions.get("order") if test.source else None
@@ -43,7 +43,7 @@ def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> 
 
 
 def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], repeats: int) -> list[Circumstances]:
-    """What the points of each planned test are measured under, in the order of a sweep's rows; one per part of a loop.
+    """Circumstances of the points of each planned test, in the order of a sweep's rows; one per part of a loop.
 
     The strains of a resonance test are not known beforehand and count as none.
     """
@@ -60,7 +60,7 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
 
 
 def session(bushing: Bushing | None, visits: Sequence[Visit]) -> list[Circumstances]:
-    """What the points of each test were made under, (n,) each: every body has a session of its own.
+    """Circumstances of the points of each test, (n,) each; every body has a session of its own.
 
     Every point of a sweep and every loop takes one turn; turns go from 0 to 1.
     """

@@ -115,7 +115,7 @@ def _tests_alone(context: click.Context, _: click.Parameter, files: tuple[Path, 
 
 @contextmanager
 def options_named() -> Iterator[None]:
-    """Where an error says what to write in the campaign, it says which option does the same here."""
+    """Add to an error that names keys of a campaign the options that do the same on the command line."""
     try:
         yield
     except BushfitError as error:

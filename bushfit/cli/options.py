@@ -32,7 +32,7 @@ Written = Literal["tables", "pictures", "pages"]
 
 
 def _named(ctx: click.Context, tables: str, key: str) -> Iterator[str]:
-    """What the campaigns and models that are typed already have under a key of such tables, as far as they do.
+    """Values of a key of such tables in the campaigns and models that are typed already.
 
     While somebody types, no file is an error.
     """

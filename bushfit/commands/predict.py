@@ -210,7 +210,7 @@ def _predictable_sweeps(result: Result, campaign: Campaign) -> list[SweepData]:
 
 
 def _is_at(result: Result, sweep: SweepData, temperature: float | None) -> bool:
-    """Whether a sweep was made at the temperature of the prediction [K], as far as it is known."""
+    """Return True if a sweep was made at the temperature of the prediction [K], or if that is not known."""
     tested = sweep.circumstances.temperature
     if tested is None or not result.model.knows_temperature:
         return True

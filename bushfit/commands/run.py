@@ -73,7 +73,7 @@ class RunOutput:
 
     @property
     def added(self) -> bool:
-        """Whether the diagnosis added an effect to the model to use."""
+        """True if the diagnosis added an effect to the model to use."""
         return bool(self.diagnosed and self.diagnosed.diagnosis.added)
 
 

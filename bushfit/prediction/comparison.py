@@ -262,7 +262,7 @@ def _exponent(name: str, parameter: Parameter) -> str | None:
 
 
 def _equally_held(name: str, *results: Result) -> bool:
-    """Whether a parameter was held at one value in all results."""
+    """Return True if a parameter was held at one value in all results."""
     free = any(result.covariance.stderr(name) for result in results)
     return not free and len({result.model.values[name] for result in results}) == 1
 

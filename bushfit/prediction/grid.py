@@ -42,7 +42,7 @@ def asked_or(usual: tuple[Array, Array], asked: PredictSettings, place: Place) -
 
 
 def grid_settings(asked: PredictSettings, campaign: Campaign | None) -> PredictSettings:
-    """What is asked for, and where that says nothing the [predict] of a campaign."""
+    """Settings asked for, completed by the [predict] of a campaign."""
     given = {key: value for key, value in vars(asked).items() if value is not None}
     return replace(campaign.predict if campaign else PredictSettings(), **given)
 
@@ -135,7 +135,7 @@ def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitu
 
 
 def _even(least: float, most: float, count: int) -> Array:
-    """So many values of three digits, in equal ratios from the least to the most."""
+    """Values of three digits in equal ratios between two ends."""
     return _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(least, most, count)]))
 
 

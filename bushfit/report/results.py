@@ -279,7 +279,7 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
 
 
 def _is_same(file: Path, other: Path) -> bool:
-    """Whether two paths lead to one file, if both exist."""
+    """Return True if two paths lead to one existing file."""
     with suppress(OSError):
         return file.samefile(other)
     return False
@@ -294,7 +294,7 @@ def _recorded(folder: Path) -> set[tuple[str, str]]:
 
 
 def _is_recorded(file: Path, known: set[tuple[str, str]]) -> bool:
-    """Whether a file is, byte for byte, one that bushfit wrote."""
+    """Return True if a file is, byte for byte, one that bushfit wrote."""
     return (
         file.is_file() and not file.is_symlink() and (hashlib.sha256(file.read_bytes()).hexdigest(), file.name) in known
     )
