@@ -80,9 +80,9 @@ def command(
         campaign = "batch_7/*/campaign.toml"   # from the list's folder
 
     The command names parts that miss a limit, with value and limit, and parts that differ from the others by more than
-    chance, with the parameter that differs. --force also removes results of parts that are no longer listed. The exit
-    status is 1 if a row failed, a limit is missed or a part was not judged. The command writes batch.csv, batch.png,
-    batch.json, index.html, and bushings/<name>/model.json.
+    chance. --force also removes results of parts that are no longer listed. The exit status is 1 if a row failed, a
+    limit is missed or a part was not judged. Writes batch.csv, batch.png, batch.json, index.html, and
+    bushings/<name>/model.json.
     """
     from bushfit.batch.executor import dask_workers, local_workers
 
