@@ -80,7 +80,7 @@ def from_document(document: object, file: Path | None = None) -> Result:
 def to_document(result: Result) -> dict[str, Any]:
     """Convert a result to the JSON data of a model file."""
     model, covariance = result.model, result.covariance
-    inputs = (InputTable(str(source.file), source.sha256, source.conditions) for source in result.inputs)
+    inputs = (InputTable(str(source.file), source.sha256, dict(source.conditions)) for source in result.inputs)
     matrices = [tuple(map(tuple, matrix.tolist())) for matrix in (covariance.matrix, *covariance.spread)]
     tables = ModelFile(
         schema=SCHEMA,

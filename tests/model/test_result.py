@@ -15,7 +15,7 @@ from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.document import SCHEMA
 from bushfit.model.file import from_document, load_result, model_document, to_document
 from bushfit.model.model import FIVE, Model
-from bushfit.model.result import Result
+from bushfit.model.result import Alternative, Result
 
 
 def test_covariance_root(result: Result) -> None:
@@ -91,3 +91,9 @@ def test_a_model_alone_is_a_result(paper_model: Model, tmp_path: Path) -> None:
     assert result.model == paper_model
     assert result.quality is None
     assert result.interval("mu") is None
+
+
+def test_alternatives_come_back(result: Result) -> None:
+    other = result.model.with_effect("viscous", {"viscous.eta": 50.0})
+    document = json.loads(json.dumps(to_document(replace(result, alternatives=(Alternative(other, 0.3),)))))
+    assert from_document(document).alternatives == (Alternative(other, 0.3),)
