@@ -31,6 +31,10 @@ from bushfit.units import display_unit, format_aligned, number
 #: What is said of what was weighed and is not told, and where there is no gap.
 _LESS_LIKELY = "another explanation is likelier"
 _NOTHING = "nothing is missing beyond noise and tolerance"
+_ONE_DIRECTION = (
+    "one direction was tested: a deviation of the compound and a smooth fault of the rig cannot be distinguished; test "
+    "another direction or specimen"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,7 +339,10 @@ class DiagnosisWriter:
         """Sentence on the effects that these tests cannot show."""
         unseen = [each.name for each in self.search.root.effects if not each.proposal.visible]
         blind = [name for name in unseen if not get_effect(name).under]  # what no test states is not asked for
-        return (f"not identifiable from these tests: {', '.join(blind)}",) if blind else ()
+        notes = [f"not identifiable from these tests: {', '.join(blind)}"] if blind else []
+        if self.first and self.first.unnamed and len({str(test.direction) for test in self.base.data_sets}) == 1:
+            notes.append(_ONE_DIRECTION)
+        return tuple(notes)
 
 
 def _format_amount(name: str, result: Result) -> str:
