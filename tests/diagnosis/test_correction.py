@@ -141,16 +141,6 @@ def test_spoiled_data_is_one_clear_error(spoil: object, place: str, result: Resu
     assert place in str(error.value)
 
 
-def test_a_file_of_an_earlier_version_is_read_as_far_as_it_says_the_same(result: Result) -> None:
-    document = json.loads(json.dumps(to_document(result)))
-    document["unnamed"] |= {"tilt": 0.0, "peak": None}
-    for patch in document["unnamed"]["patches"]:
-        patch |= {"peak_in_phase": [], "peak_in_quadrature": []}
-    assert from_document(document).model.unnamed == result.model.unnamed
-    with pytest.raises(ModelError, match="a tilt or a peak"):
-        from_document(document | {"unnamed": document["unnamed"] | {"tilt": 0.5}})
-
-
 def test_an_effect_without_its_data_is_refused(result: Result) -> None:
     document = to_document(result)
     del document["unnamed"]
@@ -174,8 +164,8 @@ def test_predictions_use_it_inside_the_range_and_open_outside(result: Result) ->
     half_far = (far.stiffness.high - far.stiffness.low) / 2.0 / far.stiffness.value
     print("outside: half band", half_far, "gap", unnamed.largest, "size between nodes", unnamed.size)
     assert half_far == pytest.approx([unnamed.largest], rel=0.05)
-    assert any("the band opens" in line for line in caveats(result))
-    assert any("cannot tell it from the rig's" in line for line in caveats(result))
+    assert any("the band widens" in line for line in caveats(result))
+    assert any("cannot distinguish it from one of the rig" in line for line in caveats(result))
     assert any("extrapolated" in line for line in far.warnings)
 
 

@@ -225,6 +225,7 @@ def _shape(plain: Model, plan: SimulateSettings, scale: str | None, typical: flo
         "force": (0.4 * largest, 0.9 * largest),
         "strain": tuple(x * plain.values["eps_half"] for x in (0.02, 0.1)),
         "order": (0.45, 0.85),
+        "session": (0.02, 1.0),
         None: (0.7 * typical, 1.4 * typical),
     }
     return float(np.exp(random.uniform(*np.log(ranges[scale]))))
