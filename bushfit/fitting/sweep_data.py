@@ -293,9 +293,8 @@ class SweepData(MeasuredTest):
         return replace(self, model_error=size)
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
-        slopes = self._slopes(model, names)
-        rows = np.concatenate((self.deviation(model)[None], self._relative(slopes, self.stiffness(model))))
-        return self._whitening.error_products(rows)
+        slopes = self._relative(self._slopes(model, names), self.stiffness(model))
+        return self._whitening.error_products(np.concatenate((self.deviation(model)[None], slopes)))
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the stiffness at the points by fit coordinate, (len(names), n); the stiffness is kept."""
@@ -398,5 +397,4 @@ class SweepData(MeasuredTest):
 
     def columns(self) -> dict[str, Any]:
         unit, factor = self.direction.display.displacement
-        amplitude = self.amplitude * factor
-        return {"frequency [Hz]": self.frequency, f"amplitude [{unit}]": amplitude, "repeat": self.repeat}
+        return {"frequency [Hz]": self.frequency, f"amplitude [{unit}]": self.amplitude * factor, "repeat": self.repeat}
