@@ -114,11 +114,14 @@ def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, L
         return label, found[0]
     usual = {"m": "0.1 mm", "Hz": "10 Hz", "1": "0.1 %"}
     example = found[0].text if found else usual.get(expected, "1 deg")
+    state = f'state {key} = "{example}" in the campaign'
+    if "block" in table.headers:
+        state = f'give each block a [[sweeps]] table with rows = {{ block = "1" }} and {key} = "{example}"'
     raise table.header_error(
         f"nothing says at which {role} this was tested",
         found=f"{label}: {' and '.join(quantity.text for quantity in found)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
-        hint=f'state {key} = "{example}" in the campaign, or name the column: {table.columns_key(role, expected)}',
+        hint=f"{state}, or name the column: {table.columns_key(role, expected)}",
     )
 
 

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import takewhile
 
 from bushfit.reading.headers import AmplitudeConvention, Vocabulary, plain
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_units_row, split
@@ -116,7 +115,7 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     if len(groups) < 2:
         return source, layout
     titles = [_title(lines) for lines in groups]
-    labels = [labels_above(lines) | labels_in_names(title) for lines, title in zip(groups, titles, strict=True)]
+    labels = [labels_above(lines) | labels_in_names(_last_text(lines)) for lines in groups]
     added = _label_columns(labels, titles, set(vocabulary.roles(layout.headers)), are_parts=False)
     contents += [(part.number, cells_of(part, layout), len(groups) - 1) for part in between]
     content: list[Sequence[str | float]] = []
@@ -129,8 +128,14 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
 
 def _title(lines: Sequence[Line]) -> str:
     """Text of the last line above a block if it is a single cell."""
-    texts = [line.content if isinstance(line.content, str) else " ".join(map(str, line.content)) for line in lines[-1:]]
-    return "".join(takewhile(lambda text: not re.search(r"[\t;:=]", text), texts)).strip()
+    text = _last_text(lines)
+    return "" if re.search(r"[\t;:=]", text) else text
+
+
+def _last_text(lines: Sequence[Line]) -> str:
+    """Text of the last line."""
+    content = lines[-1].content if lines else ""
+    return (content if isinstance(content, str) else " ".join(map(str, content))).strip()
 
 
 def _label_columns(

@@ -38,6 +38,8 @@ _AGREEMENT = 0.02
 _REPLACEABLE = ("force_amplitude", "damping_coefficient", "damping_ratio", "relative_error", "temperature")
 #: SI units by which a column without a known name has a role.
 _UNITS_OF_LOOP = {"time": ("s",), "displacement": ("m", "rad"), "force": ("N", "N*m")}
+#: Roles that state the loss of a sweep.
+_LOSSES = ("phase", "loss_factor", "loss_stiffness", "damping_coefficient", "damping_ratio")
 _NOT_MEASURED = frozenset(map(plain, WORDS["channels"]["not_measured"]))
 
 
@@ -105,6 +107,8 @@ def classify(
         notes += _by_unit(cells, roles)
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
         notes += _motion_as_amplitude(cells, roles, motion, stated_units)
+    if "amplitude" in roles:
+        notes += _angle_as_phase(cells, roles)
     first = next(cells.rows(), (0, ()))[1]
     clocks = {
         column.index
@@ -262,6 +266,17 @@ def _by_unit(cells: Cells, roles: dict[str, Column]) -> list[str]:
         if len(stamps) == 1 and len(first) == len(cells.headers):
             roles["time"] = replace(stamps[0], role="time")
     return notes
+
+
+def _angle_as_phase(cells: Cells, roles: dict[str, Column]) -> list[str]:
+    """Add the phase of a sweep if one column is an angle and no other column states the loss."""
+    if not {"stiffness", "storage_stiffness", "force_amplitude"} & set(roles) or set(roles) & set(_LOSSES):
+        return []
+    angles = [column for column in _unnamed(cells) if column.unit and units.is_compatible(column.unit, "rad")]
+    if len(angles) != 1:
+        return []
+    roles["phase"] = replace(angles[0], role="phase")
+    return [f'"{angles[0].header}" is taken as the phase by its unit']
 
 
 def _motion_as_amplitude(

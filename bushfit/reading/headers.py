@@ -74,10 +74,10 @@ _UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
 _UNITS_OF = {
     ("a", "amplitude"): ("m", "rad"),
     ("da", "amplitude"): ("m", "rad", "1"),
-    ("k", "stiffness"): ("N/m", "N*m/rad"),
+    **dict.fromkeys((("k", "stiffness"), ("cdyn", "stiffness")), ("N/m", "N*m/rad")),
     **{
         (name, "damping_coefficient"): ("N*s/m", "N*m*s/rad", "Pa*s")
-        for name in ("c", "damping", "dampfung", "amortissement", "damp")
+        for name in ("c", "cdyn", "damping", "dampfung", "amortissement", "damp")
     },
     **{(name, "force_amplitude"): ("N", "N*m", "Pa") for name in ("force", "load", "kraft", "torque", "moment")},
 }
@@ -99,7 +99,7 @@ _CONVENTIONS: tuple[tuple[re.Pattern[str], AmplitudeConvention], ...] = (
     (
         re.compile(
             rf"{_START}(?:{_PEAK}[\s_/-]*(?:(?:to|zu|a|2)[\s_-]*)?{_PEAK}|p[\s_./-]?(?:t[\s_./-]?|2[\s_./-]?)?p"
-            rf"|c[\s-]a[\s-]c|s[.-]?s|max\.?[\s_./-]*(?:min|to[\s_-]*min)|\(?2\s?[ax](?:_?0)?\)?)\.?{_END}"
+            rf"|v[\s_-]?pp|c[\s-]a[\s-]c|s[.-]?s|max\.?[\s_./-]*(?:min|to[\s_-]*min)|\(?2\s?[ax](?:_?0)?\)?)\.?{_END}"
             rf"|{_AFTER_UNIT}(?:pk?-?pk?|s-?s){_END}|\((?:total|double|full)\)|(?<=amplitude)[\s,_-]+total{_END}"
         ),
         "peak-to-peak",
@@ -115,6 +115,8 @@ _CAMEL = re.compile(r"(?<=[a-z]{2})(?=[A-Z])")
 #: Characters of the longest header that is compared; chosen: longer texts are no names.
 _LONGEST_HEADER = 200
 _EMPTY_BRACKETS = re.compile(r"[\[(]\s*[\])]")
+#: Comma that is left where a convention was taken out: "(mm, )".
+_DANGLING = re.compile(r"\s*[,;]\s*(?=[\])]|$)|(?<=[\[(])\s*[,;]\s*")
 #: Full-width brackets and typographic primes as plain signs; quotation marks are dropped.
 _SPELLINGS: dict[int, int | str] = {
     **str.maketrans("\uff08\uff09\uff3b\uff3d\u2032\u2019\u00b4", "()[]'''"),
@@ -230,7 +232,7 @@ class Vocabulary:
         # or with the words of its convention
         without, convention = split_convention(text)
         for name, unit, certain in (split for form in dict.fromkeys((without, text)) for split in _splits(form)):
-            if unit is None and name.endswith(("%", "‰")):
+            if unit is None and name.endswith(("%", "‰", "°")):
                 continue  # the unit without a bracket
             bare = plain(name)
             implied: AmplitudeConvention | None = "peak-to-peak" if bare in _PEAK_TO_PEAK_NAMES else convention
@@ -280,7 +282,7 @@ def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
         for pattern, convention in _CONVENTIONS:
             if match := pattern.search(_folded(form)):
                 rest = form[: match.start()] + " " + form[match.end() :]
-                return _EMPTY_BRACKETS.sub("", rest).strip(), convention
+                return _EMPTY_BRACKETS.sub("", _DANGLING.sub("", rest)).strip(), convention
     return text.strip(), None
 
 

@@ -44,6 +44,10 @@ _UFF_CODES = re.compile(r"(\s*-?\d+){4}\s*")
 _UFF_ROTATIONS = 4
 #: The names that a base of recording goes by.
 _BASES = Vocabulary({"time": LOOP_COLUMNS["time"], "frequency": SWEEP_COLUMNS["frequency"]}, {})
+#: Channels that have no complex values.
+_REAL = Vocabulary(
+    {"time": LOOP_COLUMNS["time"], **{role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}}, {}
+)
 #: What may be done about files without channels.
 _HINT = "export it again, with its channels"
 _MATLAB_HINT = 'save vectors, or structs of them, with -v7; a table by way of table2struct(T, "ToScalar", true)'
@@ -317,6 +321,9 @@ def read_groups(data: bytes, file: Path, own: Format) -> tuple[Channels, ...] | 
         try:
             found = [part for group in own.read(data, file) for part in _of_one_length(*group, own)]
             problem, said = "holds no channels", {"expected": "numbers", "hint": own.hint}
+        except MeasurementError as error:
+            error.file = file
+            return error
         except ImportError as error:
             found, problem = [], "takes a package that is not installed"
             said = {"found": f"no package {error.name}", "hint": 'pip install "bushfit[instruments]"'}
@@ -366,7 +373,8 @@ def _of_one_length(
     labels = [tuple(map(str, label)) for label in said]
     for table in tables:
         over = table[0].over
-        several = sum(np.iscomplexobj(one.values) for one in table) > 1
+        _refuse_complex(table)
+        several = sum(np.iscomplexobj(one.values) and bool(np.any(one.values.imag)) for one in table) > 1
         if over and over.name not in _BASES.roles([one.name for one in table]):
             table.insert(0, over)
         plain = [part for one in table for part in _plain(one, several)]
@@ -380,9 +388,30 @@ def _of_one_length(
             yield Channels(title, (), layout=layout, numeric=numeric, arrays=arrays, above=above, format=own.name)
 
 
+def _refuse_complex(channels: Sequence[Channel]) -> None:
+    """Refuse complex values that have no meaning: a time, a frequency, an amplitude, or anything recorded over time.
+
+    Raises:
+        MeasurementError: there is such a channel.
+    """
+    roles = {channel.name: heading.role for channel in channels if (heading := _REAL.heading(channel.name))}
+    for channel in channels:
+        is_real = channel.name in roles or "time" in roles.values()
+        if is_real and np.iscomplexobj(channel.values) and np.any(channel.values.imag):
+            raise MeasurementError(
+                f'the channel "{channel.name}" holds complex numbers',
+                found=f"{channel.values[np.argmax(channel.values.imag != 0.0)]:.6g} among them",
+                expected="real numbers",
+                hint="export its real part, or leave the channel out",
+            )
+
+
 def _plain(channel: Channel, several: bool) -> Iterator[Channel]:
     """A channel as floats or texts: a complex one as magnitude and phase, named if `several` are, times in seconds."""
     values = channel.values
+    if values.dtype.kind == "c" and not np.any(values.imag):
+        values = values.real
+        channel = channel._replace(values=values)
     if values.dtype.kind == "c":
         yield channel._replace(values=np.abs(values))
         yield Channel(f"{channel.name} phase" if several else "phase", np.angle(values), "rad")

@@ -259,6 +259,9 @@ def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence
     below = [(line.number, split(line.content, delimiter)) for line in _below(lines, index, delimiter)]
     if below:
         cells = [cell.strip("[]() ") for cell in below[0][1]]
+        if delimiter == " " and isinstance(text := next(_below(lines, index, delimiter)).content, str):
+            wide = _COLUMN_GAP.split(text.strip())  # a unit may contain a single blank
+            cells = wide if len(wide) == len(headers) else cells
         if len(cells) <= len(headers) and is_units_row(cells):
             units_line, row = below[0][0], [*cells, *row][: len(headers)]
     widths = {len(cells) for _, cells in below if is_row(cells)}

@@ -13,6 +13,8 @@ from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
 from bushfit.reading.times import DAY, are_day_numbers, spread, without_midnight
 
+#: Latest time of a record [s]; chosen: the year 5138 in seconds since 1970, or March 1973 in milliseconds.
+_LATEST_SECOND = 1e11
 #: Rows of the shortest loop; chosen: fewer do not show a shape.
 _FEWEST_LOOP_ROWS = 10
 
@@ -139,6 +141,14 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
             found=f"{time[0]:.9g} {column.unit} to {time[-1]:.9g} {column.unit}",
             expected="times in seconds, or days",
             hint='units = { time = "d" } in the campaign; or subtract the first time from all',
+        )
+    if time.size and time[0] > _LATEST_SECOND:
+        raise table.error(
+            "these times look like milliseconds since 1970, not seconds",
+            column=column,
+            found=f"{time[0] / column.scale:.15g} {column.unit or 's'} in the first row",
+            expected="times in seconds",
+            hint='units = { time = "ms" } in the campaign; or subtract the first time from all',
         )
     stuck = time[1:] <= time[:-1]
     if stuck.any() and (even := spread(time)) is not None:

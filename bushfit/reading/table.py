@@ -26,6 +26,7 @@ from bushfit.reading.headers import (
     Vocabulary,
     is_angular,
     of_motion,
+    split_convention,
 )
 from bushfit.reading.labelled import LabelledCells, Rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, find_layout
@@ -173,7 +174,8 @@ class Table(LabelledCells):
         if column.unit is None and (expected != "1" or role in OF_MOTION):
             example = units.example_unit(expected)
             angular = expected == "Hz" and is_angular(column.header, "1/s")
-            other = f', or units = {{ {role} = "rad/s" }}' if angular else ""
+            second = "rad/s" if angular else "rad" if expected == "rad" and role == "phase" else ""
+            other = f', or units = {{ {role} = "{second}" }}' if second else ""
             raise UnitError(
                 f"the {label} has no unit",
                 file=self.file,
@@ -223,7 +225,12 @@ class Table(LabelledCells):
         """
         usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
         free = [header for header in self.headers if header and usual.heading(header) is None]
-        of_unit = (header for header in free if units.is_compatible(units.split_header(header)[1] or "", unit))
+        in_row = dict(zip(self.headers, self.layout.units, strict=True))
+        of_unit = (
+            header
+            for header in free
+            if units.is_compatible(split_convention(units.split_header(header)[1] or in_row[header])[0], unit)
+        )
         fitting = [] if unit == "1" else list(of_unit)  # a ratio can be anything
         return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
 

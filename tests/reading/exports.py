@@ -302,5 +302,23 @@ EXPORTS: dict[str, Export] = {
     "logarithms of a DMA": Export(
         sweep("log10(f/Hz)|Strain [%]|log10 G' [Pa]|log10 G'' [Pa]", np.log10(F), 10 * A, np.log10(1e6 * G.real), np.log10(1e6 * G.imag)), reference=MODULUS
     ),
+    "a comma before the convention": Export(sweep("Freq. (Hz)|Dyn. Disp. (mm, 0-pk)|Static Disp (mm)|Kd (N/mm)|Loss Angle (deg)", F, A, 0 * F + 2, K, PHASE)),
+    "Vpp": Export(sweep("f [Hz]|Disp Vpp (mm)|K* [N/mm]|tan delta", F, 2 * A, K, ETA)),
+    "Cdyn is a damping": Export(sweep("Frequency,Hz|Amp,mm|Kdyn,N/mm|Cdyn,N·s/mm", F, A, K, DAMPING)),
+    "kNs/m": Export(sweep("f [Hz]|A [mm]|K [kN/m]|c [kNs/m]", F, A, K, DAMPING)),
+    "blocks with an amplitude after a colon": Export(blocks("Level 1: ±{} mm".format, "f [Hz]|K* [N/mm]|tan delta")),
+    "blocks without a unit": Export(blocks("Amplitude {}".format, "f [Hz]|K* [N/mm]|tan delta"), None, ['rows = { block = "1" }']),
+    "an angle is the phase": Export(sweep(USUAL + "Angle force/disp [deg]", F, A, K, PHASE), words=["by its unit"]),
+    "phase without unit": Export(sweep(USUAL + "Phase", F, A, K, PHASE), None, ['phase = "deg"', 'phase = "rad"']),
+    "symbols over units": Export(sweep("f / Hz|x0 / um|F0 / N|delta / °", F, 1e3 * A, K * A, PHASE)),
+    "milliseconds since 1970": Export(loop("timestamp|x (mm)|F (N)", [f"{1.79e12 + 1e3 * t:.0f}" for t in TIME], DISPLACEMENT, FORCE), "loop", (), {"units": {"time": "ms"}}),
+    "milliseconds taken for seconds": Export(
+        loop("timestamp|x (mm)|F (N)", [f"{1.79e12 + 1e3 * t:.0f}" for t in TIME], DISPLACEMENT, FORCE), None, ['time = "ms"'], {"units": {"time": "s"}}
+    ),
+    "columns of one width with a units row": Export("\n".join([
+        "Frequency   Dyn Ampl   Dyn Stiff   Loss Angle", "     Hz       mm p-p     N/mm        deg",
+        *(f"{f:10.3f} {2 * a:10.4f} {k:14.7f} {p:12.7f}" for f, a, k, p in zip(F, A, K, PHASE, strict=True)),
+    ])),
+    "Japanese": Export(sweep("周波数[Hz]|変位振幅[mm]|動的ばね定数[N/mm]|損失係数", F, A, K, ETA).encode("cp932"), stated={"encoding": "cp932"}),
     "times too coarse": Export(loop("Time [s]|Displacement [mm]|Force [N]", ["0"] * 300 + ["1"] * 300, DISPLACEMENT, FORCE), None, ["more digits"]),
 }  # fmt: skip

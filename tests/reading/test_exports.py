@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import openpyxl
 import pytest
+import scipy.io
 from commandline import call
 from exports import AMPLITUDE, DISPLACEMENT, EXPORTS, FORCE, FREQUENCY, STIFFNESS, TIME
 
@@ -45,6 +46,14 @@ def test_an_export_is_read_right_or_raises_a_question(name: str, tmp_path: Path)
                 np.testing.assert_allclose(found - found[0], values, atol=0.06 if "spread" in notes else 2e-3)
             else:
                 np.testing.assert_allclose(found, values, rtol=2e-6, atol=2e-5 * np.abs(values).max())
+
+
+@pytest.mark.parametrize("channel", ["time", "force"])
+def test_complex_numbers_recorded_over_time_are_refused(channel: str, tmp_path: Path) -> None:
+    channels = {"time": TIME, "displacement": DISPLACEMENT, "force": FORCE}
+    scipy.io.savemat(tmp_path / "loop.mat", {**channels, channel: channels[channel] * (1.0 + 0.1j)})
+    with pytest.raises(BushfitError, match=f'loop.mat: the channel "{channel}" holds complex numbers'):
+        gather([tmp_path / "loop.mat"], {"direction": "axial"})[0][0].inspect()
 
 
 def test_parts_side_by_side_and_date_cells_of_a_workbook(tmp_path: Path) -> None:
