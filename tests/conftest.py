@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, settings
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.effects import BASE
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing
 from bushfit.model.model import Model
@@ -80,7 +80,7 @@ def campaign() -> Campaign:
 @pytest.fixture(scope="session")
 def result(campaign: Campaign) -> Result:
     """The joint fit to its axial tests."""
-    return fit_joint(Data.of(campaign))
+    return fit_joint(PreparedCampaign.of(campaign))
 
 
 @pytest.fixture(scope="session")

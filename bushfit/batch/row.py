@@ -26,7 +26,7 @@ from bushfit.commands.run import run
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import get_effect
 from bushfit.errors import BatchError, BushfitError, ModelError
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.file import load_result
 from bushfit.model.result import End, Result
 from bushfit.prediction.caveats import warnings_of
@@ -156,7 +156,7 @@ def _run_commands(
         return ran.result, ran.diagnosed.diagnosis if ran.diagnosed else None, files
     start = result = load_result(Path(settings.model)) if settings.model else None
     diagnosis, joint, files = None, None, {}
-    data = Data.of(campaign) if set(commands) - {"predict"} else None
+    data = PreparedCampaign.of(campaign) if set(commands) - {"predict"} else None
     if "fit" in commands and data:
         fitted = fit(data, directions=settings.directions or (), effects=settings.effects or ())
         result, files = fitted.result, encode_all(fitted.files, formats)

@@ -13,7 +13,7 @@ from bushfit.diagnosis import workflow
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.errors import FitError, quote_path
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import NEXT
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -36,7 +36,7 @@ class DiagnosisOutput:
     """
 
     name: str
-    data: Data
+    data: PreparedCampaign
     diagnosis: Diagnosis
     document: DiagnosisFile
     files: Sequence[ResultFile]
@@ -56,7 +56,7 @@ class DiagnosisOutput:
 
 
 def diagnose(
-    campaign: Campaign | Data,
+    campaign: Campaign | PreparedCampaign,
     *,
     model: Result | HasResult | None = None,
     adopt: Sequence[str] = (),
@@ -105,7 +105,7 @@ def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -
     return [gap, figure, table_file("candidates", partial(tables.candidates_table, diagnosis))]
 
 
-def _require_free_parameter(data: Data, model: Model | None, settings: Settings) -> None:
+def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: Settings) -> None:
     """Raise a FitError if no parameter is free and no effect is to be added."""
     model = model or Model.with_defaults(data.campaign.bushing, data.effects, {})
     if not (settings.adopt or data.free(tuple(model.parameters))):

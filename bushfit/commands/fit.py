@@ -12,8 +12,8 @@ from bushfit.commands.provenance import campaign_document, option_words, result_
 from bushfit.effects import with_base
 from bushfit.errors import FitError
 from bushfit.fitting import procedures
-from bushfit.fitting.data import Data
 from bushfit.fitting.master_curve import can_shift, master_curve
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.result import Result
 from bushfit.report import plots, tables
 from bushfit.report.results import ResultFile, figure_file, json_file, table_file
@@ -30,7 +30,7 @@ class FitOutput:
         files: model file, tables and figures.
     """
 
-    data: Data
+    data: PreparedCampaign
     steps: tuple[tuple[str, Result], ...]
     document: Mapping[str, Any]
     files: Sequence[ResultFile]
@@ -45,7 +45,7 @@ class FitOutput:
 
 
 def fit(
-    campaign: Campaign | Data,
+    campaign: Campaign | PreparedCampaign,
     *,
     directions: Sequence[str] = (),
     effects: Sequence[str] = (),
@@ -74,7 +74,7 @@ def fit(
 
 
 def fit_static(
-    campaign: Campaign | Data, *, dynamic: Result | HasResult | None = None, loss: Loss | None = None
+    campaign: Campaign | PreparedCampaign, *, dynamic: Result | HasResult | None = None, loss: Loss | None = None
 ) -> FitOutput:
     """Fit mu, sigma_fmax and eps_half to the loops of a campaign.
 
@@ -92,7 +92,7 @@ def fit_static(
 
 
 def fit_dynamic(
-    campaign: Campaign | Data, *, static: Result | HasResult | None = None, loss: Loss | None = None
+    campaign: Campaign | PreparedCampaign, *, static: Result | HasResult | None = None, loss: Loss | None = None
 ) -> FitOutput:
     """Fit m and alpha to the sweep of smallest amplitude of a campaign.
 
@@ -124,19 +124,21 @@ def fit_dynamic(
     return FitOutput(data, (*steps, ("dynamic fit of the smallest sweep", result)), document, files)
 
 
-def prepare_tests(campaign: Campaign | Data, loss: Loss | None = None) -> Data:
+def prepare_tests(campaign: Campaign | PreparedCampaign, loss: Loss | None = None) -> PreparedCampaign:
     """Campaign prepared for a fit: a data set with its noise for each test.
 
     Args:
         campaign: the campaign; one that is prepared already is returned as it is.
         loss: "soft_l1" or "linear" in place of the campaign's.
     """
-    if isinstance(campaign, Data):
+    if isinstance(campaign, PreparedCampaign):
         return campaign
-    return Data.of(replace(campaign, fit=replace(campaign.fit, loss=loss)) if loss else campaign)
+    return PreparedCampaign.of(replace(campaign, fit=replace(campaign.fit, loss=loss)) if loss else campaign)
 
 
-def campaign_files(data: Data, result: Result, kinds: Collection[str] = ("loop", "sweep")) -> list[ResultFile]:
+def campaign_files(
+    data: PreparedCampaign, result: Result, kinds: Collection[str] = ("loop", "sweep")
+) -> list[ResultFile]:
     """Tables and figures of the tests beside the model; outliers that the fit left out have no weight.
 
     Sweeps at several temperatures add a master curve, if the model has the effect of temperature.
@@ -155,7 +157,7 @@ def campaign_files(data: Data, result: Result, kinds: Collection[str] = ("loop",
     return files
 
 
-def temperature_files(data: Data, result: Result, title: str) -> list[ResultFile]:
+def temperature_files(data: PreparedCampaign, result: Result, title: str) -> list[ResultFile]:
     """Master curve and shift factors of sweeps at several temperatures, each a table and a figure."""
     sweeps, model = data.without(result.outliers).sweeps, result.model
     shifted = cache(partial(master_curve, result, sweeps))

@@ -19,7 +19,7 @@ from bushfit.effects.contract import Array, Circumstances
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
-from bushfit.fitting.data_sets import SweepData, sweep_data
+from bushfit.fitting.preparation import MeasuredSweep, prepare_sweeps
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
 from bushfit.model.arms import Arms, model_arms
 from bushfit.model.result import Misfit, Result, Usable, carried
@@ -59,7 +59,7 @@ class PredictionOutput:
 
     result: Result
     predictions: Sequence[Prediction]
-    measured: Sequence[SweepData] = ()
+    measured: Sequence[MeasuredSweep] = ()
     notes: Sequence[str] = ()
     resonances: Sequence[PredictedResonance] = ()
     arms: Sequence[Arms] = ()
@@ -198,18 +198,18 @@ def _places(result: Result, campaign: Campaign | None, settings: PredictSettings
     return [*(_DIRECTIONS if result.model.bushing or not specimens else ()), *specimens.values()]
 
 
-def _predictable_sweeps(result: Result, campaign: Campaign) -> list[SweepData]:
+def _predictable_sweeps(result: Result, campaign: Campaign) -> list[MeasuredSweep]:
     """Sweeps of a campaign in directions that the model knows, each with what it was measured under."""
     tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
     circumstances = measured_session(result.model.bushing, tests)[len(campaign.loops) :]
     return [
         replace(sweep, under=under)
-        for sweep, under in zip(sweep_data(campaign.sweeps), circumstances, strict=True)
+        for sweep, under in zip(prepare_sweeps(campaign.sweeps), circumstances, strict=True)
         if result.model.bushing or isinstance(sweep.direction, Specimen)
     ]
 
 
-def _is_at(result: Result, sweep: SweepData, temperature: float | None) -> bool:
+def _is_at(result: Result, sweep: MeasuredSweep, temperature: float | None) -> bool:
     """Return True if a sweep was made at the temperature of the prediction [K], or if that is not known."""
     tested = sweep.circumstances.temperature
     if tested is None or not result.model.knows_temperature:
@@ -217,7 +217,7 @@ def _is_at(result: Result, sweep: SweepData, temperature: float | None) -> bool:
     return bool(abs(np.mean(tested) - (temperature or REFERENCE)) <= SAME_TEMPERATURE)
 
 
-def split_by_fit(result: Result, sweeps: Sequence[SweepData]) -> tuple[list[SweepData], list[SweepData]]:
+def split_by_fit(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[list[MeasuredSweep], list[MeasuredSweep]]:
     """Sweeps whose files the model was fitted to, and the other ones."""
     digests = {source.sha256 for source in result.inputs}
     fitted = [sweep for sweep in sweeps if sweep.source and sweep.source.sha256 in digests]
@@ -240,7 +240,7 @@ def _maxwell_arms(
     return arms
 
 
-def _files(output: PredictionOutput, at_temperature: Sequence[SweepData], *, wide: bool) -> list[ResultFile]:
+def _files(output: PredictionOutput, at_temperature: Sequence[MeasuredSweep], *, wide: bool) -> list[ResultFile]:
     """Tables and figures of a prediction; `at_temperature` are the sweeps that figures show."""
     predictions = output.predictions
     places = [prediction.direction for prediction in predictions]
@@ -257,7 +257,7 @@ def _files(output: PredictionOutput, at_temperature: Sequence[SweepData], *, wid
 
 
 def prediction_figure(
-    result: Result, prediction: Prediction, sweeps: Sequence[SweepData], notes: Sequence[str]
+    result: Result, prediction: Prediction, sweeps: Sequence[MeasuredSweep], notes: Sequence[str]
 ) -> Figure:
     """Figure of a prediction with the measured sweeps."""
     place = prediction.direction
@@ -291,7 +291,7 @@ def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) ->
     ]
 
 
-def measured_files(result: Result, sweeps: Sequence[SweepData]) -> list[ResultFile]:
+def measured_files(result: Result, sweeps: Sequence[MeasuredSweep]) -> list[ResultFile]:
     """Table of the measured sweeps beside the model; nothing without sweeps."""
 
     def table() -> pd.DataFrame:

@@ -6,8 +6,8 @@ from typing import Any
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.errors import quote_path
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, SweepData
+from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.file import to_document
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
@@ -20,7 +20,7 @@ def result_document(result: Result, campaign: Mapping[str, Any]) -> dict[str, An
     return {**to_document(result), "warnings": warnings_of(result), "campaign": campaign}
 
 
-def campaign_document(data: Data, command: str, options: Iterable[str] = ()) -> dict[str, Any]:
+def campaign_document(data: PreparedCampaign, command: str, options: Iterable[str] = ()) -> dict[str, Any]:
     """Campaign as result files state it, with its tests and the command that gives the same numbers.
 
     Args:
@@ -70,9 +70,9 @@ def input_files(campaign: Campaign) -> list[Path]:
     return [campaign.path, *(folder / file for file in files), *([folder / logo] if logo else [])]
 
 
-def _test_document(data_set: DataSet) -> dict[str, Any]:
+def _test_document(data_set: MeasuredTest) -> dict[str, Any]:
     """Test as result files state it: direction or specimen, range [SI], file, and stated conditions."""
-    source, sweep = data_set.test.source, data_set.sweep if isinstance(data_set, SweepData) else None
+    source, sweep = data_set.test.source, data_set.sweep if isinstance(data_set, MeasuredSweep) else None
     return {
         "test": data_set.name,
         "kind": data_set.kind,

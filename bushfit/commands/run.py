@@ -15,7 +15,7 @@ from bushfit.commands.predict import PredictionOutput, predict
 from bushfit.commands.provenance import campaign_document, result_document
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import FitError
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import TwoStep, fit_two_step
 from bushfit.model.document import ModelFile
 from bushfit.model.model import FIVE
@@ -53,7 +53,7 @@ class RunOutput:
         files: documents, tables, figures and page.
     """
 
-    data: Data
+    data: PreparedCampaign
     static: FitOutput | None
     two_step: TwoStep | None
     reason_left_out: str
@@ -77,7 +77,7 @@ class RunOutput:
         return bool(self.diagnosed and self.diagnosed.diagnosis.added)
 
 
-def run(campaign: Campaign | Data, *, loss: Loss | None = None) -> RunOutput:
+def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> RunOutput:
     """Fit a campaign in every way, diagnose it, and predict from the model to use.
 
     Args:
@@ -115,7 +115,7 @@ def run(campaign: Campaign | Data, *, loss: Loss | None = None) -> RunOutput:
     return RunOutput(data, static, two_step, reason, joint, diagnosed, predicted, document, files)
 
 
-def _two_step(data: Data) -> tuple[TwoStep | None, str]:
+def _two_step(data: PreparedCampaign) -> tuple[TwoStep | None, str]:
     """The paper's procedure, or the reason why it is left out."""
     if not (data.loops and data.sweeps):
         return None, f"no {'sweeps' if data.loops else 'loops'}"

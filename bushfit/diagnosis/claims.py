@@ -15,8 +15,8 @@ from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import MISTAKES, SEPARATOR, Mistake, file_or_name, get_mistake, labelled
 from bushfit.errors import ModelError
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, SweepData, loop_data, with_gain_errors
+from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, prepare_loops, with_gain_errors
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Place, stiffness_per_modulus, unit_strain
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
@@ -50,28 +50,28 @@ class Claim:
         """One claim for each test alone."""
         return [Claim(self.mistake, (place,)) for place in self.tests] or [self]
 
-    def test(self, data: Data) -> str | None:
+    def test(self, data: PreparedCampaign) -> str | None:
         """The name of its one test; None of [bushing]."""
         return [*data.loops, *data.sweeps][self.tests[0]].name if self.tests else None
 
-    def labels(self, data: Data) -> tuple[str, ...]:
+    def labels(self, data: PreparedCampaign) -> tuple[str, ...]:
         """The mistake with each of its tests, as --adopt takes it."""
         return tuple(labelled(self.mistake.name, one.test(data)) for one in self.each)
 
-    def words(self, data: Data) -> str:
+    def words(self, data: PreparedCampaign) -> str:
         """Sentence that states the mistake."""
         every = [*data.loops, *data.sweeps]
         files = [file_or_name(every[place].test) for place in self.tests]
         return self.mistake.sentence.format(files=" and ".join(filter(None, (", ".join(files[:-1]), *files[-1:]))))
 
-    def corrections(self, data: Data) -> tuple[str, ...]:
+    def corrections(self, data: PreparedCampaign) -> tuple[str, ...]:
         """Lines to write into the campaign, one for each test."""
         every = [*data.loops, *data.sweeps]
         return tuple(self.mistake.corrected(every[place].test) for place in self.tests) or (
             self.mistake.corrected(None),
         )
 
-    def mended(self, data: Data) -> Data:
+    def mended(self, data: PreparedCampaign) -> PreparedCampaign:
         """The campaign as it was measured if the mistake was made."""
         campaign = data.campaign
         if not self.tests:
@@ -81,7 +81,7 @@ class Claim:
         for place in self.tests:
             test = self.mistake.mended([*data.loops, *data.sweeps][place].test)
             if isinstance(test, Loop):
-                loops[place] = loop_data([test], data.campaign.rig, without_outliers=data.robust)[0]
+                loops[place] = prepare_loops([test], data.campaign.rig, without_outliers=data.robust)[0]
             elif isinstance(test, Sweep):
                 sweeps[place - count] = test
         data = replace(data, loops=tuple(with_gain_errors(loops, data.campaign.rig)))
@@ -90,7 +90,7 @@ class Claim:
         return data.in_session()
 
 
-def adopted(data: Data, names: Collection[str]) -> tuple[Data, list[str]]:
+def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCampaign, list[str]]:
     """The campaign with mistakes mended that the user adopts, and a sentence on each.
 
     Raises:
@@ -104,10 +104,10 @@ def adopted(data: Data, names: Collection[str]) -> tuple[Data, list[str]]:
     return data, said
 
 
-def _claimed(data: Data, name: str) -> Claim:
+def _claimed(data: PreparedCampaign, name: str) -> Claim:
     """Claim that one --adopt option makes."""
     mistake, test = get_mistake(name), name.partition(SEPARATOR)[2]
-    every: list[DataSet] = [*data.loops, *data.sweeps]
+    every: list[MeasuredTest] = [*data.loops, *data.sweeps]
     possible = [place for place, one in enumerate(every) if mistake and _is_possible(mistake, one, data)]
     tests = tuple(place for place in possible if every[place].name == test)
     if mistake is None or bool(tests) != bool(mistake.kinds) or (test and not tests):
@@ -120,7 +120,7 @@ def _claimed(data: Data, name: str) -> Claim:
     return Claim(mistake, tests)
 
 
-def _is_possible(mistake: Mistake, data_set: DataSet, data: Data) -> bool:
+def _is_possible(mistake: Mistake, data_set: MeasuredTest, data: PreparedCampaign) -> bool:
     """True if a mistake is possible in a test, judged by its columns and by the modulus that it implies."""
     bushing, place = data.campaign.bushing, data_set.direction
     modulus = float(np.median(np.abs(data_set.measured))) / stiffness_per_modulus(bushing, place)
@@ -128,9 +128,9 @@ def _is_possible(mistake: Mistake, data_set: DataSet, data: Data) -> bool:
     return mistake.possible(data_set.test) and mistake.explains(data_set.test, modulus, strain)
 
 
-def claims(data: Data, without: Collection[str]) -> list[Claim]:
+def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
     """Every mistake that may have been made: in one test, in all of a kind or of a direction, or in all."""
-    every: list[DataSet] = [*data.loops, *data.sweeps]
+    every: list[MeasuredTest] = [*data.loops, *data.sweeps]
     found = []
     for mistake in MISTAKES.values():
         if mistake.name in without:
@@ -159,7 +159,7 @@ class Screen:
     normal equations depends on that test alone, so that claims about many tests are sums.
     """
 
-    data: Data
+    data: PreparedCampaign
     _known: dict[tuple[int, str, Bushing | None], Array] = field(default_factory=dict)
     _responses: dict[tuple[Bushing | None, Place, bytes, bytes], Array] = field(default_factory=dict)
 
@@ -175,7 +175,7 @@ class Screen:
         bushing = self.data.campaign.bushing
         if claim and not claim.tests and bushing:
             bushing = claim.mistake.mended_bushing(bushing)
-        every: list[DataSet] = [*self.data.loops, *self.data.sweeps]
+        every: list[MeasuredTest] = [*self.data.loops, *self.data.sweeps]
         mistakes = [claim.mistake if claim and place in claim.tests else None for place in range(len(every))]
         try:
             parts = [self._part(place, test, mistakes[place], bushing) for place, test in enumerate(every)]
@@ -188,7 +188,7 @@ class Screen:
         explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
         return max(_least((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
 
-    def _part(self, place: int, data_set: DataSet, mistake: Mistake | None, bushing: Bushing | None) -> Array:
+    def _part(self, place: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None) -> Array:
         """Products of a test's three columns, and of what they are to meet, at each point of the grid, (g, 4, 4)."""
         key = (place, mistake.name if mistake else "", bushing)
         if key not in self._known:
@@ -240,9 +240,9 @@ def _columns(bushing: Bushing | None, direction: Place, frequency: Array, amplit
     return np.stack(each, axis=1)
 
 
-def _points(data_set: DataSet, mistake: Mistake | None) -> tuple[Place, Array, Array, Array, Array]:
+def _points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[Place, Array, Array, Array, Array]:
     """Direction, frequency, amplitude, stiffness and relative error of a test's points, (n,) each, as mended."""
-    if isinstance(data_set, SweepData):
+    if isinstance(data_set, MeasuredSweep):
         sweep, noise = data_set.sweep, np.hypot(data_set.relative_noise, max(data_set.noise.shared))
         mended = (mistake and mistake.mended(sweep)) or sweep
     else:

@@ -9,9 +9,9 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.effects.contract import Array, Circumstances
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import LoopData, SweepData, repeats_of, with_gain_errors
 from bushfit.fitting.noise import LineKey, SweepNoise, sweep_noise
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, repeats_of, with_gain_errors
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.reading.measurement import Sweep
 
 #: Points of a run from which it counts as long; chosen for time: stepped sines have tens, a swept sine thousands.
@@ -39,7 +39,7 @@ class _Means(NamedTuple):
     words: str
 
 
-def condensed(data: Data) -> tuple[Data, tuple[str, ...]]:
+def condensed(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]]:
     """The same tests with long runs of sweeps in means over narrow bands, and of very many lines of a sweep, or rows of
     loops, only some lines or loops; and a sentence on each sweep that this changes, and one on the loops.
 
@@ -69,7 +69,7 @@ def condensed(data: Data) -> tuple[Data, tuple[str, ...]]:
     return replace(data, sweeps=tuple(sweeps)), said
 
 
-def _some(loops: Sequence[LoopData]) -> Sequence[LoopData]:
+def _some(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
     """Of loops with too many rows those that can be looked at, one of each direction at the least.
 
     Each comes once before any is repeated; of too many that differ some, evenly spread over direction, amplitude and
@@ -109,7 +109,7 @@ def _noise(before: SweepNoise, made: Sequence[_Means], rig: RigSettings) -> Swee
     return replace(before, random=random, slopes={**slopes, **anew.slopes}, scatter_freedom=freedom)
 
 
-def _told(data_set: SweepData) -> _Means | None:
+def _told(data_set: MeasuredSweep) -> _Means | None:
     """Part of a sweep that is diagnosed; None if that is the whole sweep."""
     sweep, rows, words = data_set.sweep, data_set.order[data_set.weights > 0.0], ""
     lines = np.unique(sweep.held[rows])

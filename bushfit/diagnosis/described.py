@@ -19,9 +19,9 @@ from bushfit.effects.unnamed import NAME, Unnamed
 from bushfit.errors import FitError
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds
-from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import with_model_error
+from bushfit.fitting.preparation import MeasuredTest, parted
 from bushfit.fitting.robust import WeightedFit
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
@@ -102,7 +102,7 @@ def weighed(fitted: Evidence, rig: RigSettings) -> tuple[Evidence, LinearModel]:
     return bare, replace(plain, at=plain.likely(_NEAR))
 
 
-def _refitted(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Evidence:
+def _refitted(model: Model, data_sets: Sequence[MeasuredTest], held: Sequence[str], bounds: Bounds) -> Evidence:
     return Evidence(fit_from(model, data_sets, held, bounds).finished(_EVALUATIONS).solution, tuple(data_sets))
 
 
@@ -124,9 +124,9 @@ def _held_out(before: Evidence, fitted: WeightedFit) -> HoldOut:
     return HoldOut.of(told)
 
 
-def _inside(data_sets: Sequence[DataSet]) -> Iterator[Part]:
+def _inside(data_sets: Sequence[MeasuredTest]) -> Iterator[Part]:
     """Whole runs inside the range: every third frequency of each, the middle level, a repeat."""
-    chosen: dict[str, dict[DataSet, Array]] = {}
+    chosen: dict[str, dict[MeasuredTest, Array]] = {}
     for sweep in parted(data_sets)[1]:
         rank = np.unique(sweep.step, return_inverse=True)[1]
         levels, level = np.unique(sweep.held, return_inverse=True)

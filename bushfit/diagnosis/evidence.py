@@ -11,9 +11,9 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.agreement import met_within, misfits, usable
 from bushfit.fitting.assess import FitStage, apart_in_temperature, covariance, measured_range, quality
 from bushfit.fitting.coordinates import Bounds, Solution
-from bushfit.fitting.data_sets import DataSet, sources
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import model_error_warning, with_model_error
+from bushfit.fitting.preparation import MeasuredTest, sources
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.robust import WeightedFit
 from bushfit.model.model import Model
@@ -39,7 +39,7 @@ class Evidence:
     """
 
     solution: Solution
-    data_sets: tuple[DataSet, ...]
+    data_sets: tuple[MeasuredTest, ...]
     joint: Solution | None = None
 
     @property
@@ -91,13 +91,13 @@ class Evidence:
         return columns - (columns @ self.span) @ self.span.T
 
     @cached_property
-    def place(self) -> Mapping[DataSet, slice]:
+    def place(self) -> Mapping[MeasuredTest, slice]:
         """Slice of the residuals of each data set."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets]).tolist()
         return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
 
 
-def fit(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Evidence:
+def fit(model: Model, data_sets: Sequence[MeasuredTest], held: Sequence[str], bounds: Bounds) -> Evidence:
     """Fit every parameter of a model but the held ones, from its own values.
 
     Raises:

@@ -15,9 +15,9 @@ from bushfit.effects import BASE, get_effect
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import apart_in_temperature
 from bushfit.fitting.coordinates import Bounds
-from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.design import with_effect
 from bushfit.fitting.model_error import log_likelihood, with_model_error
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.prediction.comparison import CHANCE
@@ -76,7 +76,7 @@ class FittedFamily:
         return f"{figures}: {'better' if self.gain[0] > 0.0 else 'worse'} by more than chance"
 
 
-def known_families(model: Model, data_sets: Sequence[DataSet]) -> tuple[str, ...]:
+def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str, ...]:
     """Each law of rate with each law of amplitude, as far as a model can take them; with the effect of temperature
     where the tests are apart in it and the model has none. The paper's laws with each other are the model itself."""
     warm = ["temperature"] if apart_in_temperature(model, data_sets) else []
@@ -97,7 +97,7 @@ def _fits(model: Model, name: str) -> bool:
 
 def fit_families(
     model: Model,
-    data_sets: Sequence[DataSet],
+    data_sets: Sequence[MeasuredTest],
     names: Sequence[str],
     held: Sequence[str],
     bounds: Bounds,
@@ -166,7 +166,7 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
 
 
 def _gain(
-    told: Mapping[str, Predicted], data_sets: Sequence[DataSet]
+    told: Mapping[str, Predicted], data_sets: Sequence[MeasuredTest]
 ) -> tuple[tuple[float, float, float] | None, float | None]:
     """Fall of the mean squared held-out residual, with its 95 % interval and its probability.
 
@@ -187,7 +187,7 @@ def _gain(
     return (gain, float(gain - Z95 * error), float(gain + Z95 * error)), p
 
 
-def _apart(data_sets: Sequence[DataSet], among: Collection[str]) -> Iterator[str]:
+def _apart(data_sets: Sequence[MeasuredTest], among: Collection[str]) -> Iterator[str]:
     """Those of the parts of these names that share no point with one that came before."""
     taken = np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
     for part in parts(data_sets):

@@ -22,7 +22,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds, jacobian, residual
-from bushfit.fitting.data_sets import DataSet, SweepData, parted
+from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, parted
 from bushfit.progress import track
 from bushfit.reading.measurement import Stepped
 
@@ -43,11 +43,11 @@ class Part:
     name: str
     points: Sequence[Array]
 
-    def rows(self, data_sets: Sequence[DataSet]) -> Array:
+    def rows(self, data_sets: Sequence[MeasuredTest]) -> Array:
         """Mask of the part's residuals among those of all tests, (n,)."""
         return np.concatenate([np.tile(of, data.parts) for data, of in zip(data_sets, self.points, strict=True)])
 
-    def rest(self, data_sets: Sequence[DataSet]) -> list[DataSet]:
+    def rest(self, data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:
         """The tests without it, with the same noise."""
         left = [(data, of) for data, of in zip(data_sets, self.points, strict=True) if not of.all()]
         return [data.without(np.flatnonzero(of)).with_weight() if of.any() else data for data, of in left]
@@ -207,22 +207,22 @@ def _refitted(evidence: Evidence, part: Part, bounds: Bounds) -> _Fitted | None:
     return None if rest.stopped else _Fitted.of(Evidence(told, data_sets))
 
 
-def _clusters(data_sets: Sequence[DataSet]) -> Array:
+def _clusters(data_sets: Sequence[MeasuredTest]) -> Array:
     """Number of the line of a sweep, or of the loop, that each residual belongs to, (n,)."""
     numbers, first = list[Array](), 0
     for data_set in data_sets:
         line = np.zeros(data_set.size // data_set.parts, dtype=int)
-        if isinstance(data_set, SweepData):
+        if isinstance(data_set, MeasuredSweep):
             line = np.unique(data_set.held, return_inverse=True)[1]
         numbers.append(np.tile(first + line, data_set.parts))
         first += int(line.max()) + 1
     return np.concatenate(numbers)
 
 
-def parts(data_sets: Sequence[DataSet]) -> Iterator[Part]:
+def parts(data_sets: Sequence[MeasuredTest]) -> Iterator[Part]:
     """Each part: lines, the top third of what they step through, directions, loops."""
 
-    def part(name: str, chosen: Mapping[DataSet, Array]) -> Part:
+    def part(name: str, chosen: Mapping[MeasuredTest, Array]) -> Part:
         return Part(name, [chosen.get(data, np.zeros(data.size // data.parts, dtype=bool)) for data in data_sets])
 
     loops, sweeps = parted(data_sets)

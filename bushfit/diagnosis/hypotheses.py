@@ -26,7 +26,7 @@ from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.rig_errors import RigErrors, rig_errors, scattering_alone
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
 #: Name of the compound's own deviation among what has no name.
@@ -52,9 +52,9 @@ class DiagnosisRequest:
         held, bounds: parameters that do not move, and limits of the others inside their own.
     """
 
-    data: Data
+    data: PreparedCampaign
     base: Evidence
-    fitted: Callable[[Data], Evidence]
+    fitted: Callable[[PreparedCampaign], Evidence]
     without: Sequence[str]
     most: int
     tolerance: float

@@ -7,8 +7,8 @@ import numpy as np
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Where
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import parted
-from bushfit.fitting.sweep_data import LineMisfit
+from bushfit.fitting.measured_sweep import LineMisfit
+from bushfit.fitting.preparation import parted
 from bushfit.units import number
 
 #: Smooth misfit, in units of the noise of its root mean square, from which a region is worth a line.

@@ -13,7 +13,7 @@ import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array, Level
-from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.fitting.preparation import MeasuredTest, parted
 from bushfit.geometry import TRANSLATION, Direction, Place
 from bushfit.model.model import Model
 
@@ -72,7 +72,7 @@ FIXTURE_TESTS = (
 def deciding_test(
     models: Sequence[Model],
     odds: Sequence[float],
-    data_sets: Sequence[DataSet],
+    data_sets: Sequence[MeasuredTest],
     rig: RigSettings = UNSTATED,
 ) -> str:
     """The test that is expected to separate the explanations best per hour, as an instruction.
@@ -103,7 +103,7 @@ def deciding_test(
     return best
 
 
-def _candidates(data_sets: Sequence[DataSet]) -> Iterator[NextTest]:
+def _candidates(data_sets: Sequence[MeasuredTest]) -> Iterator[NextTest]:
     """Tests of the fixtures of all places tested, and tests of the bushing in directions that were not swept."""
     places = dict.fromkeys(data_set.direction for data_set in data_sets)
     for place, test in product(places, FIXTURE_TESTS):
@@ -179,7 +179,7 @@ def _fixture(model: Model, place: Place, stiffness: float) -> Model:
     return Model.with_defaults(model.bushing, ("elastic", *rig), values)
 
 
-def _points(test: NextTest, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Place]:
+def _points(test: NextTest, data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, Place]:
     """Frequencies [Hz], amplitudes [m or rad, or strain] and place of a test."""
     place = test.place or data_sets[-1].direction
     same = [data_set for data_set in data_sets if data_set.direction == place] or list(data_sets)

@@ -16,9 +16,9 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects import Branch, Effect, effects_for_places, qualified_name, twins_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import fit_from, probes
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.model.model import Model
 
 #: Share of a unit sensitivity that the model's own parameters must leave for it to count as visible.
@@ -142,7 +142,9 @@ def _promised(fit: Descent) -> float:
     return fit.chi_square - fit.expected_fall
 
 
-def sensitivity(model: Model, data_sets: Sequence[DataSet], effect: Effect) -> tuple[list[dict[str, float]], Array]:
+def sensitivity(
+    model: Model, data_sets: Sequence[MeasuredTest], effect: Effect
+) -> tuple[list[dict[str, float]], Array]:
     """Shapes of an effect on a grid that the tests suggest, and its whitened sensitivity in each, (shapes, n).
 
     It is that at next to no amount, per typical amount, against none in the same call, so that what is solved by rounds

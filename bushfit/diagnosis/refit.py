@@ -13,9 +13,9 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.common_error import CommonError, Joined
 from bushfit.fitting.coordinates import Bounds
-from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import fit_from, probes
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 from bushfit.progress import track
@@ -46,7 +46,7 @@ def refitted(
             their noise, (c, n); None where they have noise alone.
     """
     fits: dict[str, Descent] = {}
-    tests: Sequence[DataSet] = evidence.data_sets
+    tests: Sequence[MeasuredTest] = evidence.data_sets
     if columns is not None:
         tests = Joined(evidence.data_sets, CommonError.of_all(columns))
     for proposal in proposed:
@@ -86,7 +86,7 @@ def _goes_on(fit: Descent, best: float) -> bool:
     return fit.evaluations < _FIRST or fit.chi_square - _MOST_FALL * fit.expected_fall < best + _FAR
 
 
-def within_reach(model: Model, data_sets: Sequence[DataSet]) -> Bounds:
+def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
     """Limits of the shapes of a model's effects to what the tests can show: a stop that is always met is no stop, and a
     resonance far above all frequencies is a mass."""
     shapes = [

@@ -23,8 +23,8 @@ from bushfit.diagnosis.record import CandidateResult, Diagnosis, Named, Odds, Wh
 from bushfit.diagnosis.verdict import Composition, Finding
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import parted, with_gains
+from bushfit.fitting.preparation import parted, with_gains
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned, number
 
@@ -52,7 +52,7 @@ class DiagnosisWriter:
     unresolved: Sequence[str]
 
     @property
-    def data(self) -> Data:
+    def data(self) -> PreparedCampaign:
         return self.search.asked.data
 
     @property
@@ -370,7 +370,7 @@ def _all(names: Sequence[str]) -> str:
     return " and ".join(names)
 
 
-def _entries(data: Data, claim: Claim, evidence: str) -> list[Named]:
+def _entries(data: PreparedCampaign, claim: Claim, evidence: str) -> list[Named]:
     """An entry for each test of a claim."""
     return [
         Named(

@@ -13,7 +13,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import COMPOUND, KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted, with_gains
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, alike, parted, with_gains
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
 #: Kinds of errors, by their place in `Node.errors`.
@@ -122,7 +122,7 @@ def scattering_alone(evidence: Evidence) -> Evidence:
     """
     data_sets = tuple(
         replace(each, noise=replace(each.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), residuals="complex")
-        if isinstance(each, SweepData)
+        if isinstance(each, MeasuredSweep)
         else each
         for each in with_gains(evidence.data_sets, weigh=False)
     )
@@ -163,12 +163,12 @@ def blocks(evidence: Evidence, rig: RigSettings) -> list[Block]:
     return found
 
 
-def _ends(evidence: Evidence, data_set: SweepData | LoopData) -> tuple[int, int]:
+def _ends(evidence: Evidence, data_set: MeasuredSweep | MeasuredLoop) -> tuple[int, int]:
     place = evidence.place[data_set]
     return place.start, place.stop
 
 
-def _of_sweep(evidence: Evidence, sweep: SweepData, classes: Sequence[float]) -> Iterator[Block]:
+def _of_sweep(evidence: Evidence, sweep: MeasuredSweep, classes: Sequence[float]) -> Iterator[Block]:
     first, _ = _ends(evidence, sweep)
     size, runs = sweep.frequency.size, np.split(np.arange(sweep.frequency.size), sweep.block_starts[1:])
     units = sweep.whiten(np.full(size, 1.0 + 1.0j)).reshape(2, size)

@@ -9,7 +9,7 @@ import numpy as np
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.geometry import STRAINING
 from bushfit.model.model import Model
 
@@ -29,7 +29,7 @@ class Terms:
     measure: Measure
 
     @cached_property
-    def data_sets(self) -> list[DataSet]:
+    def data_sets(self) -> list[MeasuredTest]:
         """The tests that it acts on."""
         return [data_set for data_set in self.evidence.data_sets if data_set.direction.motion is not STRAINING]
 

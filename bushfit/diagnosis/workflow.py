@@ -18,9 +18,9 @@ from bushfit.diagnosis.report_text import DiagnosisWriter
 from bushfit.diagnosis.verdict import judged
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import parted, with_gains
 from bushfit.fitting.design import fit_from
+from bushfit.fitting.preparation import parted, with_gains
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.robust import estimate, outlier_warnings, outliers_at
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -29,7 +29,7 @@ from bushfit.model.result import Outlier
 _MOST_ROUNDS = 4
 
 
-def diagnose(data: Data, model: Model | None = None, settings: Settings | None = None) -> Diagnosis:
+def diagnose(data: PreparedCampaign, model: Model | None = None, settings: Settings | None = None) -> Diagnosis:
     """Find where model and measurement disagree, name what is missing, add it, and show the gap shrink.
 
     Args:
@@ -75,7 +75,9 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     return replace(found, notes=notes, result=result)
 
 
-def _left_out_of_fewer(whole: Data, fewer: Data, outliers: Sequence[Outlier]) -> tuple[str, ...]:
+def _left_out_of_fewer(
+    whole: PreparedCampaign, fewer: PreparedCampaign, outliers: Sequence[Outlier]
+) -> tuple[str, ...]:
     """A sentence on each sweep that was condensed and of whose points a robust fit then left some out."""
     pairs = zip(whole.sweeps, fewer.sweeps, strict=True)
     changed = {after.name for before, after in pairs if after.size < before.size}
@@ -83,7 +85,9 @@ def _left_out_of_fewer(whole: Data, fewer: Data, outliers: Sequence[Outlier]) ->
     return tuple(f"{name}: {count} of these points left out, farther off than noise" for name, count in counts.items())
 
 
-def _without_wild(data: Data, model: Model | None, settings: Settings) -> tuple[Data, InitialFit, tuple[Outlier, ...]]:
+def _without_wild(
+    data: PreparedCampaign, model: Model | None, settings: Settings
+) -> tuple[PreparedCampaign, InitialFit, tuple[Outlier, ...]]:
     """The campaign with no weight on single points of sweeps that repeats and neighbours speak against, its fit, and
     these points: a row that went wrong is neither physics nor a fault of the rig."""
     left: tuple[Outlier, ...] = ()
@@ -107,7 +111,7 @@ class InitialFit(NamedTuple):
     outliers: tuple[Outlier, ...]
 
 
-def _begin(data: Data, model: Model | None, settings: Settings) -> InitialFit:
+def _begin(data: PreparedCampaign, model: Model | None, settings: Settings) -> InitialFit:
     """Fit the model as it came, with the effects that the user adopts; the rig's errors are part of every explanation,
     so a loop's gain weighs, whether its class is stated or assumed."""
     hint = "add measured tests to the campaign"

@@ -11,7 +11,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Solution
-from bushfit.fitting.data_sets import DataSet, SweepData, log_slopes, rows_of
+from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, log_slopes, rows_of
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Usable
 from bushfit.reading.measurement import loss_factor
@@ -130,13 +130,13 @@ class LeaveOut:
         return -np.linalg.solve(self._rest(rows), self.along - self.basis[rows].T @ self.residual[rows])
 
 
-def misfits(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Misfit, ...]:
+def misfits(model: Model, fitted: Sequence[MeasuredTest], left: Sequence[MeasuredTest] = ()) -> tuple[Misfit, ...]:
     """How well a model meets each test, and each run of those that have several; `left` are tests not fitted."""
     pairs = [(data_set, True) for data_set in fitted] + [(data_set, False) for data_set in left]
     return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.with_weight(), was_fitted=was))
 
 
-def _misfits(model: Model, data_set: DataSet, *, was_fitted: bool) -> Iterator[Misfit]:
+def _misfits(model: Model, data_set: MeasuredTest, *, was_fitted: bool) -> Iterator[Misfit]:
     """The figures of a test without points of no weight, and of its runs where there are several."""
     relative, gain = data_set.relative(model), np.abs(data_set.noise_free(model).measured / data_set.measured) - 1.0
     squares = np.square(data_set.residual(model)).reshape(data_set.parts, -1).sum(axis=0)
@@ -154,7 +154,9 @@ def _misfits(model: Model, data_set: DataSet, *, was_fitted: bool) -> Iterator[M
         yield figures(run, *(values[run.points] for values in (relative, squares, gain)))
 
 
-def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Usable, ...]:
+def usable(
+    solution: Solution, data_sets: Sequence[MeasuredTest], left: Sequence[MeasuredTest] = ()
+) -> tuple[Usable, ...]:
     """Within what a fitted model meets the measured stiffness and loss factor, 95 % of the points, place by place.
 
     Each run is predicted from the fit without it where the rest tells all parameters and moves none far; a test that
@@ -173,18 +175,18 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
             points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
             step = whole.step(rows.start + np.flatnonzero(points), len(free))
             moved = modelled if step is None else modelled * np.exp(step @ slopes)
-            counted = run.points & (data_set.weights > 0.0 if isinstance(data_set, SweepData) else True)
+            counted = run.points & (data_set.weights > 0.0 if isinstance(data_set, MeasuredSweep) else True)
             off = _off(moved[counted], data_set.measured[counted])
             parts.append((str(data_set.direction), off, step is not None))
     return _by_place([*parts, *_as_modelled(solution.model, left, predicted=True)])
 
 
-def met_within(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet]) -> tuple[Usable, ...]:
+def met_within(model: Model, fitted: Sequence[MeasuredTest], left: Sequence[MeasuredTest]) -> tuple[Usable, ...]:
     """Usable range of a model whose fit is not at hand: residuals of the fitted tests stand for held-out ones."""
     return _by_place([*_as_modelled(model, fitted, predicted=False), *_as_modelled(model, left, predicted=True)])
 
 
-def _as_modelled(model: Model, data_sets: Sequence[DataSet], *, predicted: bool) -> Iterator[_Part]:
+def _as_modelled(model: Model, data_sets: Sequence[MeasuredTest], *, predicted: bool) -> Iterator[_Part]:
     for data_set in data_sets:
         yield str(data_set.direction), _off(data_set.noise_free(model).measured, data_set.measured), predicted
 
@@ -208,9 +210,9 @@ def _off(modelled: Array, measured: Array) -> Array:
     return np.abs([np.abs(modelled / measured) - 1.0, loss_factor(modelled) - loss_factor(measured)])
 
 
-def _runs(data_set: DataSet) -> Iterator[_Run]:
+def _runs(data_set: MeasuredTest) -> Iterator[_Run]:
     """Runs of a test, one for each value held; a loop, and a sweep that holds nothing, is one run."""
-    if not isinstance(data_set, SweepData) or data_set.sweep.stepped is None:
+    if not isinstance(data_set, MeasuredSweep) or data_set.sweep.stepped is None:
         yield _Run(None, None, None, np.ones(data_set.frequency.size, dtype=bool))
         return
     what: Literal["amplitude", "frequency"] = "amplitude" if data_set.sweep.stepped == "frequency" else "frequency"

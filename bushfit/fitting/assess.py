@@ -14,7 +14,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual
-from bushfit.fitting.data_sets import DataSet, LoopData, parted, reached, repeats_of, rows_of
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, parted, reached, repeats_of, rows_of
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -50,7 +50,7 @@ class Process:
     shapes: Array
     freedom: float
 
-    def moves(self, model: Model, data_sets: Sequence[DataSet], influence: Array) -> Array:
+    def moves(self, model: Model, data_sets: Sequence[MeasuredTest], influence: Array) -> Array:
         """Covariance of parameters that it makes, (k, k), by the influence of whitened residuals on them, (k, n)."""
         first, moved = 0, np.zeros((len(influence), len(self.shapes)))
         for data_set, rows in zip(data_sets, rows_of(data_sets), strict=True):
@@ -65,7 +65,7 @@ class FitStage:
     """One fit of a procedure: the parameters it moved, the data it saw, and how the model misses them, if it does."""
 
     names: tuple[str, ...]
-    data_sets: Sequence[DataSet]
+    data_sets: Sequence[MeasuredTest]
     process: Process | None = None
 
 
@@ -130,7 +130,7 @@ def _of_gains(stage: FitStage, influence: Array) -> Array:
     """Covariance, (k, k), by gain errors that have no part in the weights, from the influence of residuals, (k, n)."""
     added = np.zeros((len(influence), len(influence)))
     for data_set, rows in zip(stage.data_sets, rows_of(stage.data_sets), strict=True):
-        if isinstance(data_set, LoopData) and not data_set.gain_weighs:
+        if isinstance(data_set, MeasuredLoop) and not data_set.gain_weighs:
             moved = data_set.gain_error * (influence[:, rows] @ data_set.gain_and_offset()[0])
             added += np.outer(moved, moved)
     return added
@@ -187,18 +187,18 @@ def _unsure(
     return list(parts.values())
 
 
-def reduced(model: Model, data_sets: Sequence[DataSet], parameters: int) -> tuple[float, int]:
+def reduced(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> tuple[float, int]:
     """Reduced chi-square and its degrees of freedom."""
     return _over_freedom(residual(model, data_sets), data_sets, parameters)
 
 
-def _over_freedom(residuals: Array, data_sets: Sequence[DataSet], parameters: int) -> tuple[float, int]:
+def _over_freedom(residuals: Array, data_sets: Sequence[MeasuredTest], parameters: int) -> tuple[float, int]:
     """Sum of squares of residuals, (n,), over their degrees of freedom, and these."""
     freedom = max(sum(data_set.counted for data_set in data_sets) - parameters, 1)
     return float(residuals @ residuals) / freedom, freedom
 
 
-def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Quality:
+def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> Quality:
     """How well a model meets data sets: NRMSE, reduced chi-square, number of residuals, relative noise."""
     relative = np.concatenate([data_set.relative(model) for data_set in data_sets])
     noise = np.repeat([data_set.relative_noise for data_set in data_sets], [data_set.counted for data_set in data_sets])
@@ -213,7 +213,7 @@ def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Qual
     )
 
 
-def measured_range(model: Model, data_sets: Sequence[DataSet]) -> Range:
+def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
     """Frequencies [Hz], equivalent strains, directions and temperatures [K] that the data sets reach."""
     found = [str(data_set.direction) for data_set in data_sets]
     directions = tuple(dict.fromkeys([*(str(direction) for direction in Direction if direction in found), *found]))
@@ -223,12 +223,12 @@ def measured_range(model: Model, data_sets: Sequence[DataSet]) -> Range:
     return Range(ends[0], ends[1], directions, *ends[2:])
 
 
-def lack_of_fit(model: Model, data_sets: Sequence[DataSet], parameters: int) -> float | None:
+def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> float | None:
     """Reduced chi-square where the model misses the data by more than their noise, else None."""
     return beyond_noise(*reduced(model, data_sets, parameters))
 
 
-def missed(model: Model, data_sets: Sequence[DataSet]) -> list[float | None]:
+def missed(model: Model, data_sets: Sequence[MeasuredTest]) -> list[float | None]:
     """Reduced chi-square of each test that the model misses by more than its noise; else None."""
     residuals, parts = residual(model, data_sets), zip(rows_of(data_sets), data_sets, strict=True)
     return [beyond_noise(*_over_freedom(residuals[rows], [data_set], 0)) for rows, data_set in parts]
@@ -239,7 +239,7 @@ def beyond_noise(chi_square: float, freedom: int) -> float | None:
     return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
 
-def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: str = "") -> list[str]:
+def misfit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, advice: str = "") -> list[str]:
     """A sentence, with advice, where the model misses all data, or one test, by more than the noise; else none."""
     together = lack_of_fit(model, data_sets, parameters)
     named = zip(data_sets, missed(model, data_sets), strict=True)
@@ -254,7 +254,7 @@ def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: 
     ]
 
 
-def implausible(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> list[str]:
+def implausible(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[str]:
     """Sentences on moduli that no rubber has, and on tests too far apart to be of one bushing: most often a unit."""
     moduli = {
         data_set.name: float(np.median(np.abs(data_set.measured))) / stiffness_per_modulus(bushing, data_set.direction)
@@ -268,7 +268,7 @@ def implausible(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> list[s
     return [] if _SOFTEST < moduli[hardest] < _HARDEST else [said]
 
 
-def refuse_strain(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> None:
+def refuse_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> None:
     """Raise a FitError where a test strains its rubber by more than any bears: a unit, or a size, is wrong."""
     for each in data_sets:
         largest = float(np.max(each.amplitude))
@@ -283,7 +283,7 @@ def refuse_strain(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> None
             )
 
 
-def apart_in_temperature(model: Model, data_sets: Sequence[DataSet]) -> list[str]:
+def apart_in_temperature(model: Model, data_sets: Sequence[MeasuredTest]) -> list[str]:
     """A sentence on tests whose temperatures, where they are known, lie too far apart for one model."""
     degrees = [(data_set.name, data_set.test.temperature) for data_set in data_sets]
     known = sorted((float(np.mean(kelvin)) - CELSIUS, name) for name, kelvin in degrees if kelvin is not None)
@@ -297,7 +297,7 @@ def apart_in_temperature(model: Model, data_sets: Sequence[DataSet]) -> list[str
     ]
 
 
-def mixed_conditions(data_sets: Sequence[DataSet]) -> list[str]:
+def mixed_conditions(data_sets: Sequence[MeasuredTest]) -> list[str]:
     """Warn of tests of the bushing that were made on several specimens, or under several preloads, and fitted as one.
 
     Args:
@@ -322,7 +322,7 @@ def mixed_conditions(data_sets: Sequence[DataSet]) -> list[str]:
     return sentences
 
 
-def unfitted(model: Model, data_sets: Sequence[DataSet], advice: str) -> list[str]:
+def unfitted(model: Model, data_sets: Sequence[MeasuredTest], advice: str) -> list[str]:
     """A sentence on the tests of each place that a model was not fitted to and misses by more than their noise."""
     off: dict[str, list[tuple[float, float, str]]] = {}
     for data_set in data_sets:

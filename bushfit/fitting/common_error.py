@@ -13,7 +13,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 
 if TYPE_CHECKING:
-    from bushfit.fitting.data_sets import DataSet
+    from bushfit.fitting.preparation import MeasuredTest
 
 #: Variance along a direction, relative to the largest, below which it is rounding.
 _ROUNDING = 1e-14
@@ -114,17 +114,17 @@ class ErrorProducts(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Joined(Sequence["DataSet"]):
+class Joined(Sequence["MeasuredTest"]):
     """Tests with an error in common beside the noise of each: their residuals are whitened together."""
 
-    data_sets: tuple[DataSet, ...]
+    data_sets: tuple[MeasuredTest, ...]
     error: CommonError
 
     @overload
-    def __getitem__(self, index: int) -> DataSet: ...
+    def __getitem__(self, index: int) -> MeasuredTest: ...
     @overload
-    def __getitem__(self, index: slice) -> Sequence[DataSet]: ...
-    def __getitem__(self, index: int | slice) -> DataSet | Sequence[DataSet]:
+    def __getitem__(self, index: slice) -> Sequence[MeasuredTest]: ...
+    def __getitem__(self, index: int | slice) -> MeasuredTest | Sequence[MeasuredTest]:
         return self.data_sets[index]
 
     def __len__(self) -> int:

@@ -15,7 +15,7 @@ from bushfit.effects import Parameter
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.common_error import Joined
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import End
@@ -98,7 +98,7 @@ class Solution:
         seen = values > ROUNDING * values.max(initial=0.0)
         return float(np.sum(np.square(left[:, seen].T @ self.residual)))
 
-    def at(self, model: Model, data_sets: Sequence[DataSet]) -> Solution:
+    def at(self, model: Model, data_sets: Sequence[MeasuredTest]) -> Solution:
         """Move the parameters of the fit to the values of a model, with the residuals of these tests."""
         rows = jacobian(model, data_sets, self.coordinates.names)
         return replace(self, model=model, residual=residual(model, data_sets), jacobian=rows)
@@ -114,19 +114,19 @@ class Solution:
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
 
-def residual(model: Model, data_sets: Sequence[DataSet]) -> Array:
+def residual(model: Model, data_sets: Sequence[MeasuredTest]) -> Array:
     """Whitened residuals of all data sets, (n,)."""
     return together(data_sets, np.concatenate([data_set.residual(model) for data_set in data_sets]))
 
 
-def jacobian(model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> Array:
+def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> Array:
     """Derivatives of `residual` by parameter coordinate, (len(names), n)."""
     slopes = Coordinates.of(model, names).slopes(model.values)
     by_value = np.concatenate([data_set.jacobian(model, names) for data_set in data_sets], axis=-1)
     return together(data_sets, by_value * slopes[:, None])
 
 
-def together(data_sets: Sequence[DataSet], rows: Array) -> Array:
+def together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:
     """Residuals of all data sets, each whitened by itself, (..., n), whitened by an error that they share as well.
 
     Also what an estimator takes of residuals, (..., n), by what it takes of whitened ones.
@@ -135,7 +135,7 @@ def together(data_sets: Sequence[DataSet], rows: Array) -> Array:
 
 
 def starting_point(
-    model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds
+    model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], bounds: Bounds
 ) -> tuple[Coordinates, Array, Array, Array]:
     """Coordinates of a fit, the model's own values in them, and the lower and upper bounds, (k,) each."""
     points = sum(data_set.size for data_set in data_sets)

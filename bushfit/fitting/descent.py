@@ -30,7 +30,7 @@ from bushfit.fitting.coordinates import (
     residual,
     starting_point,
 )
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.model.model import Model
 
 #: Damping of the first step, relative to the curvature: next to none, the starts are good (usual for such methods).
@@ -76,7 +76,7 @@ class Descent:
     """
 
     model: Model
-    data_sets: Sequence[DataSet]
+    data_sets: Sequence[MeasuredTest]
     coordinates: Coordinates
     low: Array
     high: Array
@@ -94,7 +94,7 @@ class Descent:
     def start(
         cls,
         model: Model,
-        data_sets: Sequence[DataSet],
+        data_sets: Sequence[MeasuredTest],
         names: Sequence[str],
         bounds: Bounds,
         tolerance: float | None = None,

@@ -9,8 +9,8 @@ from bushfit.effects import Effect, Parameter, get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import Bounds, Solution
-from bushfit.fitting.data_sets import DataSet, parted, reached
 from bushfit.fitting.descent import Descent
+from bushfit.fitting.preparation import MeasuredTest, parted, reached
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 
@@ -33,7 +33,9 @@ _LOWER = 0.1
 _MOST = 200
 
 
-def designed(model: Model, plain: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Model:
+def designed(
+    model: Model, plain: Model, data_sets: Sequence[MeasuredTest], held: Sequence[str], bounds: Bounds
+) -> Model:
     """A model to start a fit from, effects added in turn to the best fit of those before.
 
     Args:
@@ -54,7 +56,7 @@ def designed(model: Model, plain: Model, data_sets: Sequence[DataSet], held: Seq
 
 
 def with_effect(
-    solution: Solution, data_sets: Sequence[DataSet], effect: Effect, held: Sequence[str], bounds: Bounds
+    solution: Solution, data_sets: Sequence[MeasuredTest], effect: Effect, held: Sequence[str], bounds: Bounds
 ) -> Solution:
     """A fitted model with one effect more, or one in place of a branch: the best fit of several starts.
 
@@ -71,7 +73,7 @@ def with_effect(
     return min((each.finished(_MOST) for each in best), key=lambda each: each.chi_square).solution
 
 
-def fit_from(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
+def fit_from(model: Model, data_sets: Sequence[MeasuredTest], held: Sequence[str], bounds: Bounds) -> Descent:
     """A fit of every parameter of a model but the held ones, from its own values, before its first step."""
     return Descent.start(model, data_sets, _free(model, held), bounds)
 
@@ -80,7 +82,7 @@ def _free(model: Model, held: Sequence[str]) -> list[str]:
     return [name for name in model.parameters if name not in held]
 
 
-def _starts(fitted: Model, data_sets: Sequence[DataSet], effect: Effect) -> Iterator[Model]:
+def _starts(fitted: Model, data_sets: Sequence[MeasuredTest], effect: Effect) -> Iterator[Model]:
     """Models to start from: each that the fitted one suggests, and the first with each shape parameter elsewhere.
 
     What has a neutral amount starts at a tenth of its typical one: at its neutral value a fit may not see its shape.
@@ -98,7 +100,7 @@ def _starts(fitted: Model, data_sets: Sequence[DataSet], effect: Effect) -> Iter
                 yield model.with_values({name: value})
 
 
-def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:
+def probes(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter) -> Array:
     """Values of a shape parameter that these tests could show, by what it is measured against."""
     frequencies, strains = reached(model.bushing, data_sets)
     match parameter.scale:
@@ -126,7 +128,7 @@ def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> 
     return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)
 
 
-def stroke(data_sets: Sequence[DataSet]) -> tuple[float, float]:
+def stroke(data_sets: Sequence[MeasuredTest]) -> tuple[float, float]:
     """Displacements that some test reaches and some test just misses [m]."""
     amplitudes = np.concatenate([data_set.amplitude for data_set in data_sets])
     return 0.8 * float(amplitudes.min()), 0.95 * float(amplitudes.max())

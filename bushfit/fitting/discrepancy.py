@@ -19,7 +19,7 @@ from bushfit.effects.temperature import REFERENCE
 from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.fitting.common_error import ErrorSubspace
 from bushfit.fitting.coordinates import ROUNDING, Solution
-from bushfit.fitting.data_sets import DataSet, log_slopes, reached, rows_of
+from bushfit.fitting.preparation import MeasuredTest, log_slopes, reached, rows_of
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood, coordinates, in_lengths, patterns
 from bushfit.model.covariance import Z95
 
@@ -46,7 +46,7 @@ class FittedTests:
     """
 
     solution: Solution
-    data_sets: Sequence[DataSet]
+    data_sets: Sequence[MeasuredTest]
     rig_errors: Sequence[Array]
 
     @cached_property

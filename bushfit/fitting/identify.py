@@ -13,8 +13,8 @@ import numpy as np
 from bushfit.effects import effect_name_of
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.coordinates import Coordinates
-from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.information import FisherInformation, further_test, percent, relative_sizes
+from bushfit.fitting.preparation import MeasuredTest, parted
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
 from bushfit.units import format_range
@@ -88,7 +88,9 @@ _COMBINATIONS = (
 )
 
 
-def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], covariance: Covariance) -> list[str]:
+def left_open(
+    model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], covariance: Covariance
+) -> list[str]:
     """Sentences on what the tests leave open of a fitted model; none where everything is determined.
 
     Each group of parameters that share open directions has a sentence, with the standard errors of the covariance.
@@ -159,7 +161,7 @@ def _meaning(known: FisherInformation, group: Sequence[str]) -> str:
     return f"{group[0]} is not determined"
 
 
-def _reasons(model: Model, data_sets: Sequence[DataSet], involved: Sequence[str]) -> Iterator[str]:
+def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence[str]) -> Iterator[str]:
     """Reasons why tests leave parameters open: conditions that the tests lack."""
     reach = measured_range(model, data_sets)
     (slow, fast), (small, large) = reach.frequency, reach.strain
@@ -184,7 +186,7 @@ def _reasons(model: Model, data_sets: Sequence[DataSet], involved: Sequence[str]
 
 
 def _combinations(
-    model: Model, data_sets: Sequence[DataSet], known: FisherInformation, involved: Sequence[str]
+    model: Model, data_sets: Sequence[MeasuredTest], known: FisherInformation, involved: Sequence[str]
 ) -> Iterator[str]:
     """Combinations of what is open that are known well, with their errors."""
     errors = dict(zip(known.names, known.errors(), strict=True))

@@ -12,7 +12,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.coordinates import jacobian
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, new_loop, new_sweep, parted
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, new_loop, new_sweep, parted
 from bushfit.fitting.rig_class import ASSUMED
 from bushfit.model.model import Model
 
@@ -50,12 +50,12 @@ class FisherInformation:
     matrix: Array
 
     @classmethod
-    def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> "FisherInformation":
+    def of(cls, model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> "FisherInformation":
         """Information of data sets on the named parameters of a model at its values."""
         slope = jacobian(model, data_sets, names) * relative_sizes(model, names)[:, None]
         return cls(tuple(names), slope @ slope.T)
 
-    def with_more(self, model: Model, data_sets: Sequence[DataSet]) -> "FisherInformation":
+    def with_more(self, model: Model, data_sets: Sequence[MeasuredTest]) -> "FisherInformation":
         """Information with that of further data sets added."""
         return replace(self, matrix=self.matrix + FisherInformation.of(model, data_sets, self.names).matrix)
 
@@ -87,7 +87,7 @@ def percent(error: float) -> str:
     return f"{float(f'{100.0 * error:.2g}'):g} %" if error < _BEYOND else "beyond 1000 %"
 
 
-def further_test(model: Model, data_sets: Sequence[DataSet], known: FisherInformation) -> list[str]:
+def further_test(model: Model, data_sets: Sequence[MeasuredTest], known: FisherInformation) -> list[str]:
     """A sentence on the test that shrinks the worst standard error most, and to what; none where none helps."""
     before = known.errors()
     worst = int(np.argmax(before))
@@ -106,7 +106,7 @@ def further_test(model: Model, data_sets: Sequence[DataSet], known: FisherInform
     ]
 
 
-def _tests(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str, list[DataSet]]]:
+def _tests(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tuple[str, list[MeasuredTest]]]:
     """Tests that a lab could add: in words, and as the data sets that they would make."""
     loops, sweeps = parted(data_sets)
     yield "every test once more", list(data_sets)
@@ -116,7 +116,7 @@ def _tests(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str, li
         yield words, [sweep]
 
 
-def _repeated_loops(model: Model, loops: Sequence[LoopData]) -> Iterator[tuple[str, LoopData]]:
+def _repeated_loops(model: Model, loops: Sequence[MeasuredLoop]) -> Iterator[tuple[str, MeasuredLoop]]:
     """The loop of the largest strain at other amplitudes and rates."""
     largest = max(loops, key=lambda loop: loop.drive.amplitude * model.unit_strain(loop.direction))
     for factor in (3.0, 10.0):
@@ -125,7 +125,7 @@ def _repeated_loops(model: Model, loops: Sequence[LoopData]) -> Iterator[tuple[s
         yield f"a loop at {words} the rate", _changed(largest, model, rate=factor)
 
 
-def _new_loops(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str, LoopData]]:
+def _new_loops(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tuple[str, MeasuredLoop]]:
     """Slow loops of the largest amplitude and more, where the campaign has none."""
     direction = data_sets[0].direction
     largest = max(float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction == direction)
@@ -135,7 +135,7 @@ def _new_loops(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str
         yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", replace(loop, gain_error=ASSUMED[0])
 
 
-def _changed(loop: LoopData, model: Model, *, amplitude: float = 1.0, rate: float = 1.0) -> LoopData:
+def _changed(loop: MeasuredLoop, model: Model, *, amplitude: float = 1.0, rate: float = 1.0) -> MeasuredLoop:
     """A loop of so many times the amplitude and rate, as the model would have it, with the same relative noise."""
     drive = loop.drive
     moved = replace(drive, coefficients=drive.coefficients * amplitude, frequency=drive.frequency * rate)
@@ -143,8 +143,8 @@ def _changed(loop: LoopData, model: Model, *, amplitude: float = 1.0, rate: floa
 
 
 def _new_sweeps(
-    model: Model, data_sets: Sequence[DataSet], sweeps: Sequence[SweepData]
-) -> Iterator[tuple[str, SweepData]]:
+    model: Model, data_sets: Sequence[MeasuredTest], sweeps: Sequence[MeasuredSweep]
+) -> Iterator[tuple[str, MeasuredSweep]]:
     """Sweeps beyond the frequencies and amplitudes of the campaign, and within them."""
     reach = measured_range(model, data_sets)
     unit_strain = model.unit_strain(data_sets[0].direction)
@@ -165,8 +165,12 @@ def _new_sweeps(
 
 
 def _sweep(
-    model: Model, sweeps: Sequence[SweepData], like: DataSet, band: tuple[float, float], amplitudes: Sequence[float]
-) -> SweepData:
+    model: Model,
+    sweeps: Sequence[MeasuredSweep],
+    like: MeasuredTest,
+    band: tuple[float, float],
+    amplitudes: Sequence[float],
+) -> MeasuredSweep:
     """A sweep as the model would have it, as noisy as the campaign's or most rigs', in its direction or `like`'s."""
     frequency, amplitude = (x.ravel() for x in np.meshgrid(np.geomspace(*band, 9), amplitudes))
     direction = sweeps[0].direction if sweeps else like.direction

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, SweepData, parted, rows_of
+from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, parted, rows_of
 
 #: Relative change of the variances at which the scoring ends: far below their standard error.
 _SETTLED = 1e-3
@@ -36,7 +36,7 @@ class LevelErrors(NamedTuple):
 
 
 def level_errors(
-    data_sets: Sequence[DataSet], residual: Array, absorbed: Array, most: tuple[float, float]
+    data_sets: Sequence[MeasuredTest], residual: Array, absorbed: Array, most: tuple[float, float]
 ) -> LevelErrors:
     """Errors of the levels of sweeps by restricted maximum likelihood, never below 0 and never beyond `most`.
 
@@ -92,13 +92,13 @@ def level_errors(
     return LevelErrors((gain, phase), int(freedoms.min()) if freedoms.size else 0, fall, matters)
 
 
-def level_columns(data_sets: Sequence[DataSet]) -> tuple[Array, Array, tuple[float, float]]:
+def level_columns(data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, tuple[float, float]]:
     """Whitened unit error of each level in gain and in phase, (c, n), which of the two it is, (c,), and the error that
     is counted already."""
     rows, which, before = [], [], (0.0, 0.0)
     size = sum(data_set.size for data_set in data_sets)
     for sweep, own in zip(data_sets, rows_of(data_sets), strict=True):
-        if isinstance(sweep, SweepData):
+        if isinstance(sweep, MeasuredSweep):
             before, columns = sweep.noise.level, level_errors_of(sweep)
             rows.append(np.zeros((len(columns), size)))
             rows[-1][:, own] = columns
@@ -106,6 +106,6 @@ def level_columns(data_sets: Sequence[DataSet]) -> tuple[Array, Array, tuple[flo
     return np.concatenate(rows or [np.empty((0, size))]), np.array(which), before
 
 
-def level_errors_of(sweep: SweepData) -> Array:
+def level_errors_of(sweep: MeasuredSweep) -> Array:
     """Whitened unit error of each level of a sweep, in gain and then in phase, (2 levels, n)."""
     return np.array([column for held in np.unique(sweep.held) for column in sweep.moved_together(sweep.held == held)])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bushfit.effects.contract import Array, Circumstances
-from bushfit.fitting.sweep_data import SweepData
+from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Sweep
@@ -35,7 +35,7 @@ class Shifted:
             at f a_T, over what it has at theirs, (n,).
     """
 
-    sweep: SweepData
+    sweep: MeasuredSweep
     temperature: float
     shift: tuple[float, float]
     own: tuple[float, float]
@@ -43,7 +43,7 @@ class Shifted:
     reduced_stiffness: Array
 
 
-def master_curve(result: Result, sweeps: Sequence[SweepData]) -> tuple[Shifted, ...]:
+def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shifted, ...]:
     """The sweeps over frequency whose temperature is known, coldest first, by a model with an effect of temperature."""
     swept = (_shifted(result, sweep) for sweep in sweeps if can_shift(sweep.sweep))
     return tuple(sorted(swept, key=lambda each: each.temperature))
@@ -66,7 +66,7 @@ def law(result: Result, temperature: Array) -> tuple[Array, Array]:
     return shift(value), np.abs(slope) * (error or np.nan)
 
 
-def _shifted(result: Result, sweep: SweepData) -> Shifted:
+def _shifted(result: Result, sweep: MeasuredSweep) -> Shifted:
     model, frequency = result.model, sweep.frequency
     pace = np.broadcast_to(model.shift_factor(sweep.circumstances), frequency.shape)
     at_reference = model.stiffness(sweep.direction, frequency * pace, sweep.amplitude)
@@ -78,7 +78,7 @@ def _shifted(result: Result, sweep: SweepData) -> Shifted:
     return Shifted(sweep, temperature, mine, (mine[0] + more, unsure), frequency * pace, reduced)
 
 
-def _more(model: Model, sweep: SweepData) -> tuple[float, float]:
+def _more(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:
     """Further shift of a sweep's time scale beyond that of the model [neper], and its standard error.
 
     Notes: Gauss-Newton steps in the one number, all points weighing alike: what is left is mostly no noise;

@@ -33,7 +33,6 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import Process, beyond_noise
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, Solution
-from bushfit.fitting.data_sets import DataSet, LoopData, rows_of
 from bushfit.fitting.discrepancy import (
     OVER_FREQUENCY,
     OVER_STRAIN,
@@ -44,6 +43,7 @@ from bushfit.fitting.discrepancy import (
     discrepancies,
 )
 from bushfit.fitting.levels import level_errors_of
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, rows_of
 from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.robust import WeightedFit
 from bushfit.fitting.solve import solve
@@ -124,7 +124,7 @@ def closest_fit(found: WeightedFit, bounds: Bounds) -> tuple[Solution, float]:
     return solution, size
 
 
-def likeliest_size(model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> float:
+def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> float:
     """Relative size of an independent model error of the largest restricted likelihood, the parameters near a model's.
 
     Notes:
@@ -216,7 +216,7 @@ def _is_smooth(found: WeightedFit, rig: RigSettings) -> bool:
     return float(np.logaddexp.reduce(evidence)) - np.log(len(evidence)) + np.log(_ODDS) >= 0.0
 
 
-def _restarted(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
+def _restarted(solution: Solution, data_sets: Sequence[MeasuredTest]) -> list[Model]:
     """A model with its branches as read off the tests: a fit bent by noise may have lost one for good."""
     model, moved = solution.model, solution.coordinates.names
     known = {name: value for name, value in model.values.items() if name not in moved}
@@ -228,10 +228,10 @@ def _restarted(solution: Solution, data_sets: Sequence[DataSet]) -> list[Model]:
     return []
 
 
-def _errors_of_class(data_set: DataSet, rig: RigSettings) -> Array:
+def _errors_of_class(data_set: MeasuredTest, rig: RigSettings) -> Array:
     """Whitened residuals of a test by the errors of a rig of the class beside what counts already: the gain of a loop,
     and gain and phase of each level, (w, n)."""
-    if isinstance(data_set, LoopData):
+    if isinstance(data_set, MeasuredLoop):
         gain = data_set.gain_error * data_set.unit_gain[None]
         return gain[:0] if data_set.gain_weighs else gain
     beyond = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(data_set.noise.level), 0.0))
@@ -239,17 +239,17 @@ def _errors_of_class(data_set: DataSet, rig: RigSettings) -> Array:
     return columns * np.tile(beyond, len(columns) // 2)[:, None]
 
 
-def _in_noise(solution: Solution, data_sets: Sequence[DataSet]) -> FittedTests:
+def _in_noise(solution: Solution, data_sets: Sequence[MeasuredTest]) -> FittedTests:
     """The model of a fit with other weights, beside no errors of the rig."""
     none = [np.empty((0, data_set.size)) for data_set in data_sets]
     return FittedTests(solution.at(solution.model, data_sets), data_sets, none)
 
 
-def _thinned(data_sets: Sequence[DataSet]) -> list[DataSet]:
+def _thinned(data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:
     """The tests with evenly chosen points of dense sweeps: enough for what is smooth."""
-    return [data_set if isinstance(data_set, LoopData) else data_set.thinned(_ENOUGH) for data_set in data_sets]
+    return [data_set if isinstance(data_set, MeasuredLoop) else data_set.thinned(_ENOUGH) for data_set in data_sets]
 
 
-def _with_shape_error(data_set: DataSet, size: float) -> DataSet:
+def _with_shape_error(data_set: MeasuredTest, size: float) -> MeasuredTest:
     """The test in noise; a loop with the model error of its shape, which no change of the stiffness makes."""
-    return replace(data_set, model_error=size, first_error=2) if isinstance(data_set, LoopData) else data_set
+    return replace(data_set, model_error=size, first_error=2) if isinstance(data_set, MeasuredLoop) else data_set

@@ -22,11 +22,11 @@ from bushfit.fitting.assess import (
     unfitted,
 )
 from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, anderson
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, LoopData, parted, sources, with_level_errors
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.model_error import model_error_warning, with_model_error
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, parted, sources, with_level_errors
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.profile import limit95, profile95
 from bushfit.fitting.rig_class import largest_error, words_of
 from bushfit.fitting.robust import WeightedFit, estimate, outlier_warnings
@@ -67,7 +67,7 @@ class TwoStep:
 
 
 def fit_joint(
-    data: Data,
+    data: PreparedCampaign,
     *,
     effects: Sequence[str] | None = None,
     directions: Sequence[str] | None = None,
@@ -77,7 +77,7 @@ def fit_joint(
 
     Args:
         effects: the model; the paper's three branches, and what [fit] adds to them, unless told.
-        directions: and specimens whose tests to use; see `Data.chosen`.
+        directions: and specimens whose tests to use; see `PreparedCampaign.chosen`.
         profile: whether to add 95 % intervals by profile likelihood.
 
     Raises:
@@ -108,7 +108,7 @@ def fit_joint(
     return replace(result, profile=profile95(found.solution, found.minimised, result.covariance, data.bounds))
 
 
-def fit_static(data: Data, springpot: Result | None = None) -> Result:
+def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Result:
     """mu, sigma_fmax and eps_half from the loops, the springpot held (paper, section 4.1).
 
     m and alpha come from the result given, or else from the campaign's [fit] where both have values; failing that the
@@ -124,17 +124,17 @@ def fit_static(data: Data, springpot: Result | None = None) -> Result:
     return _result(data, [found], known, notes)
 
 
-def fit_dynamic(data: Data, static: Result) -> Result:
+def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
     """m and alpha from the smallest-amplitude sweep, the rest held at the static result (paper, section 4.2).
 
     The static parameters' own errors are carried into those of m and alpha.
     """
-    data_sets: list[DataSet] = [data.smallest_sweep]
+    data_sets: list[MeasuredTest] = [data.smallest_sweep]
     held = {name: static.model.values[name] for name in STATIC}
     return _result(data, [_solve(data, data_sets, BASE, held)], static.covariance.restricted(STATIC))
 
 
-def given_static(data: Data) -> Result | None:
+def given_static(data: PreparedCampaign) -> Result | None:
     """mu, sigma_fmax and eps_half as the campaign's [fit] holds them; None where it does not hold all three."""
     held = {name: data.given[name] for name in STATIC if name in data.given and name not in data.free(STATIC)}
     if len(held) < len(STATIC):
@@ -143,7 +143,7 @@ def given_static(data: Data) -> Result | None:
 
 
 @lru_cache(maxsize=1)  # `run` asks for it, and so does what its static fit says of the springpot
-def fit_two_step(data: Data) -> TwoStep:
+def fit_two_step(data: PreparedCampaign) -> TwoStep:
     """Static and dynamic fit in turn, each holding what the other found, until they agree.
 
     Raises:
@@ -176,14 +176,14 @@ def fit_two_step(data: Data) -> TwoStep:
     )
 
 
-def _springpot(data: Data, springpot: Result | None) -> tuple[dict[str, float], Covariance | None]:
+def _springpot(data: PreparedCampaign, springpot: Result | None) -> tuple[dict[str, float], Covariance | None]:
     if springpot is not None:
         return {name: springpot.model.values[name] for name in DYNAMIC}, springpot.covariance.restricted(DYNAMIC)
     given = {name: data.given[name] for name in DYNAMIC if name in data.given}
     return (given if len(given) == len(DYNAMIC) else {}), None
 
 
-def _without_springpot(data: Data, solution: Solution, loops: Sequence[LoopData]) -> str:
+def _without_springpot(data: PreparedCampaign, solution: Solution, loops: Sequence[MeasuredLoop]) -> str:
     """Sentence on how leaving the springpot out changed the static parameters, in per cent."""
     found = solution.model.values
     try:
@@ -202,8 +202,8 @@ def _without_springpot(data: Data, solution: Solution, loops: Sequence[LoopData]
 
 
 def _solve(
-    data: Data,
-    data_sets: Sequence[DataSet],
+    data: PreparedCampaign,
+    data_sets: Sequence[MeasuredTest],
     effects: Sequence[str],
     held: Mapping[str, float],
     model: Model | None = None,
@@ -216,11 +216,11 @@ def _solve(
 
 
 def _result(
-    data: Data,
+    data: PreparedCampaign,
     steps: Sequence[WeightedFit],
     held: Covariance | None = None,
     notes: Sequence[str] = (),
-    left: Sequence[DataSet] = (),
+    left: Sequence[MeasuredTest] = (),
 ) -> Result:
     """Collect the result of the steps of a procedure: the last model, with the uncertainty of all of them."""
     model, data_sets = steps[-1].solution.model, [data_set for step in steps for data_set in step.data_sets]
@@ -269,7 +269,7 @@ def cautions(model: Model, step: WeightedFit, bounds: Bounds, covariance: Covari
     ]
 
 
-def _checked(model: Model, data_sets: Sequence[DataSet]) -> str:
+def _checked(model: Model, data_sets: Sequence[MeasuredTest]) -> str:
     """How well a model that was given in full meets the data, in words."""
     found = quality(model, data_sets, 0)
     missed = lack_of_fit(model, data_sets, 0)
@@ -281,7 +281,7 @@ def _checked(model: Model, data_sets: Sequence[DataSet]) -> str:
     )
 
 
-def _at_edge(name: str, end: End, solution: Solution, data_sets: Sequence[DataSet], bounds: Bounds) -> str:
+def _at_edge(name: str, end: End, solution: Solution, data_sets: Sequence[MeasuredTest], bounds: Bounds) -> str:
     """Sentence on a parameter that rests on a bound: how far from there the tests let it be."""
     if bounds.get(name, (None, None))[end == "max"] is not None:
         return f"{name} rests on the {end} given in [fit]"

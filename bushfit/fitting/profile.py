@@ -14,7 +14,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.assess import linear_errors, reduced
 from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, coordinate_bounds
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.solve import solve
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.progress import track
@@ -49,7 +49,7 @@ class _Profile:
 
     name: str
     best: Solution
-    data_sets: Sequence[DataSet]
+    data_sets: Sequence[MeasuredTest]
     bounds: Bounds
     known: dict[float, Solution]
 
@@ -96,7 +96,7 @@ class _Profile:
 
 
 def profile95(
-    best: Solution, data_sets: Sequence[DataSet], covariance: Covariance, bounds: Bounds
+    best: Solution, data_sets: Sequence[MeasuredTest], covariance: Covariance, bounds: Bounds
 ) -> Mapping[str, Interval]:
     """95 % intervals of the fitted parameters by profile likelihood.
 
@@ -131,7 +131,7 @@ def profile95(
     return found
 
 
-def limit95(best: Solution, data_sets: Sequence[DataSet], name: str, bounds: Bounds) -> float | None:
+def limit95(best: Solution, data_sets: Sequence[MeasuredTest], name: str, bounds: Bounds) -> float | None:
     """How far a parameter that came to rest on a bound can go from there: its one-sided 95 % limit, None where the data
     set none. A model that misses the data may miss them by as much more."""
     i = best.coordinates.names.index(name)
@@ -141,12 +141,12 @@ def limit95(best: Solution, data_sets: Sequence[DataSet], name: str, bounds: Bou
     return profile.end(start, other_end, _BLIND_STEP, _ONE_SIDED * np.sqrt(_excess(best, data_sets)))
 
 
-def _excess(best: Solution, data_sets: Sequence[DataSet]) -> float:
+def _excess(best: Solution, data_sets: Sequence[MeasuredTest]) -> float:
     """Reduced chi-square, 1 at the least."""
     return max(reduced(best.model, data_sets, len(best.coordinates.names))[0], 1.0)
 
 
-def _allowed(best: Solution, data_sets: Sequence[DataSet], covariance: Covariance, linear: Array) -> Array:
+def _allowed(best: Solution, data_sets: Sequence[MeasuredTest], covariance: Covariance, linear: Array) -> Array:
     """Root of the rise of chi-square that each parameter's interval may reach."""
     names = best.coordinates.names  # of what counts as held where it rests on a bound the covariance tells nothing
     half = np.array([covariance.half(name) if name in covariance.names else 0.0 for name in names])

@@ -17,8 +17,8 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.assess import Process
 from bushfit.fitting.coordinates import Bounds, Solution
-from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.outliers import misfit_scale
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -46,15 +46,15 @@ class WeightedFit:
     """
 
     solution: Solution
-    data_sets: Sequence[DataSet]
-    minimised: Sequence[DataSet]
-    weighed: Sequence[DataSet]
+    data_sets: Sequence[MeasuredTest]
+    minimised: Sequence[MeasuredTest]
+    weighed: Sequence[MeasuredTest]
     outliers: tuple[Outlier, ...]
     process: Process | None = None
 
 
 def outliers_at(
-    model: Model, data_sets: Sequence[DataSet], outlying: Sequence[Array] | None = None
+    model: Model, data_sets: Sequence[MeasuredTest], outlying: Sequence[Array] | None = None
 ) -> tuple[Outlier, ...]:
     """Outliers of some data sets by file and row: those whose numbers are given, else those that the model sees."""
     numbers = outlying or [data_set.outlying(model) for data_set in data_sets]
@@ -64,7 +64,7 @@ def outliers_at(
 
 def estimate(
     model: Model,
-    data_sets: Sequence[DataSet],
+    data_sets: Sequence[MeasuredTest],
     names: Sequence[str],
     bounds: Bounds | None = None,
     *,
@@ -98,7 +98,7 @@ def estimate(
     )
 
 
-def _softened(data_set: DataSet, model: Model) -> DataSet:
+def _softened(data_set: MeasuredTest, model: Model) -> MeasuredTest:
     distance = data_set.distance(model)
     scale = _SOFT * misfit_scale(distance[distance > 0.0] * np.sqrt(data_set.parts), data_set.parts)
     return data_set.weighted(1.0 / np.sqrt(1.0 + (distance / scale) ** 2))

@@ -96,7 +96,7 @@ class RowNoise:
         return white
 
     def unsure(self, influence: Array) -> list[Array]:
-        """Reactions of an estimator to each parameter of the noise, (k, n) each, as `DataSet.unsure`.
+        """Reactions of an estimator to each parameter of the noise, (k, n) each, as `MeasuredTest.unsure`.
 
         Notes:
             Of V = L^-1 L^-T, L the filter, the whitened derivative is -(G + G^T) with G = dL L^-1.

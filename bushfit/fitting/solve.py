@@ -20,8 +20,8 @@ from bushfit.fitting.coordinates import (
     residual,
     starting_point,
 )
-from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.model.model import Model
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ _EVALUATIONS, _TOLERANCE = 400, 1e-9
 
 def solve(
     model: Model,
-    data_sets: Sequence[DataSet],
+    data_sets: Sequence[MeasuredTest],
     names: Sequence[str],
     bounds: Bounds | None = None,
     *,
@@ -67,7 +67,7 @@ def solve(
 
 
 def solve_with_lmfit(
-    model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds | None = None
+    model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], bounds: Bounds | None = None
 ) -> Solution:
     """Fit by lmfit's MINPACK, as the paper's procedure, static and dynamic fit in turn, is made.
 
@@ -92,7 +92,7 @@ class _OutOfBoundsError(Exception):
 
 def _by_minpack(
     model: Model,
-    data_sets: Sequence[DataSet],
+    data_sets: Sequence[MeasuredTest],
     names: Sequence[str],
     bounds: Bounds,
 ) -> Solution:

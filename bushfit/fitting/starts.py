@@ -13,7 +13,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.friction import harmonic_shape
 from bushfit.errors import FitError
 from bushfit.fitting.assess import implausible
-from bushfit.fitting.data_sets import DataSet, reached
+from bushfit.fitting.preparation import MeasuredTest, reached
 from bushfit.geometry import Bushing, stiffness_per_modulus
 
 #: Strain amplitude of the largest test over eps_half, before anything is known; chosen: the fit finds the rest.
@@ -35,7 +35,9 @@ _USUAL = (0.2, 0.25)
 _ALPHA_RANGE = (0.1, 0.6)
 
 
-def start_values(bushing: Bushing | None, data_sets: Sequence[DataSet], known: Mapping[str, float]) -> dict[str, float]:
+def start_values(
+    bushing: Bushing | None, data_sets: Sequence[MeasuredTest], known: Mapping[str, float]
+) -> dict[str, float]:
     """Values of mu, m, alpha, sigma_fmax, eps_half to start from; `known` ones are kept and allowed for.
 
     What lies beyond the bounds of its parameter is moved to them.

@@ -162,7 +162,7 @@ class Whitening:
         return parts / self.random
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        """Reactions of an estimator to each variance of the noise, (k, 2 n) each, as `DataSet.unsure`.
+        """Reactions of an estimator to each variance of the noise, (k, 2 n) each, as `MeasuredTest.unsure`.
 
         Notes:
             Within a block V has the derivatives I by s^2 and 1 1^T by t^2, whitened W^2 and (W 1)(W 1)^T. The estimate

@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.campaign.campaign import TEST_FILES
 from bushfit.errors import BushfitError, NoColumnError, NoTestError, printable
-from bushfit.fitting.data_sets import loop_data, sweep_data
+from bushfit.fitting.preparation import prepare_loops, prepare_sweeps
 from bushfit.geometry import Direction
 from bushfit.inspection.labels import temperatures_of
 from bushfit.inspection.opening import inspect_file, open_table, recognize_table
@@ -110,7 +110,10 @@ def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
         tests = [inspection.measured for inspection in placed if inspection.part == part]
         loops = [test for test in tests if isinstance(test, Loop)]
         sweeps = [test for test in tests if isinstance(test, Sweep)]
-        data_sets = [*(loop_data(loops) if len(loops) > 1 else ()), *(sweep_data(sweeps) if len(sweeps) > 1 else ())]
+        data_sets = [
+            *(prepare_loops(loops) if len(loops) > 1 else ()),
+            *(prepare_sweeps(sweeps) if len(sweeps) > 1 else ()),
+        ]
         contradictions |= {id(one.test): one.contradiction for one in data_sets if one.contradiction}
     return [
         replace(inspection, odd=(*inspection.odd, sentence))

@@ -7,10 +7,10 @@ from scipy.special import pdtrc, stdtr
 
 from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import MISTAKES
-from bushfit.fitting.data_set import shown_amplitude
+from bushfit.fitting.measured_sweep import MeasuredSweep
+from bushfit.fitting.measured_test import shown_amplitude
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.fitting.outliers import least_absolute
-from bushfit.fitting.sweep_data import SweepData
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.plausible import implausible_sizes
 from bushfit.inspection.record import Findings, format_frequencies
@@ -65,7 +65,7 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
         "noise": noise.describe(),
     }
     odd = [
-        *SweepData(sweep, noise).notes,
+        *MeasuredSweep(sweep, noise).notes,
         *implausible_sizes(sweep.direction, sweep.frequency, sweep.amplitude, np.abs(sweep.stiffness)),
         *wrong_labels(labels, sweep.direction, levels.tolist(), frequencies.tolist()),
         *_copied_rows(sweep, noise),

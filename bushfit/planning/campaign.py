@@ -23,8 +23,8 @@ from bushfit.effects import BASE, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import Coordinates
-from bushfit.fitting.data import Data
 from bushfit.fitting.information import relative_sizes
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Specimen
 from bushfit.planning.contract import Noise, Plan, Test
@@ -180,7 +180,7 @@ def _fit_one(
     coordinates, sizes = Coordinates.of(truth, names), relative_sizes(truth, names)
     with threadpool_limits(1), suppress(FitError):
         campaign = replace(measure(clean, replace(settings, seed=seed)).campaign(), rig=rig)
-        data = Data.of(campaign)
+        data = PreparedCampaign.of(campaign)
         places = list(dict.fromkeys(str(data_set.direction) for data_set in data.data_sets))
         model = fit_joint(data, effects=truth.effects, directions=places).model
         return np.asarray((coordinates.point(model.values) - coordinates.point(truth.values)) / sizes)

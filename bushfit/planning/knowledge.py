@@ -17,9 +17,9 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, LIBRARY, twins_of
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.coordinates import Bounds, Coordinates
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.information import relative_sizes
+from bushfit.fitting.preparation import MeasuredTest, parted
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.rig_class import of_class
 from bushfit.geometry import Bushing
 from bushfit.model.covariance import Z95
@@ -86,7 +86,7 @@ def of_result(result: Result, noise: Noise | None = None, source: str = "") -> K
     )
 
 
-def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
+def of_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -> Knowledge:
     """Knowledge from the tests of a campaign, fitted together, and with each rival effect added in turn.
 
     The class of the rig counts as noise, stated or not, as it does in what is planned. Beside rivals the model has
@@ -103,7 +103,7 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
     _check_rivals(rivals or (), LIBRARY)
     found = None if rivals is None else diagnose(data)
     noise = noise_of(data)
-    data = Data.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
+    data = PreparedCampaign.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
     data_sets = data.data_sets
     model = data.started(data.effects, data_sets, {})
     held = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
@@ -158,7 +158,7 @@ def _check_rivals(names: Iterable[str], possible: Container[str]) -> None:
         )
 
 
-def _with_bounded(knowledge: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[DataSet]) -> Knowledge:
+def _with_bounded(knowledge: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[MeasuredTest]) -> Knowledge:
     """Knowledge in which parameters at a bound count as free, except those that the tests do not show.
 
     Noise beyond the one that was counted is taken from the errors of the other parameters."""
@@ -200,7 +200,7 @@ def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:
     return [names for names in sets if len(names) > 1]
 
 
-def noise_of(data: Data) -> Noise:
+def noise_of(data: PreparedCampaign) -> Noise:
     """Noise of the rig of a campaign, from its tests where they show it, else assumed."""
     loops, sweeps = parted(data.data_sets)
     found = replace(Noise(), level=of_class(data.campaign.rig))
@@ -221,7 +221,7 @@ def rig_of(rig: RigSettings, noise: Noise) -> RigSettings:
     return replace(rig, gain_error=noise.level[0], phase_error=noise.level[1], displacement_error=None)
 
 
-def _tests(data: Data) -> Iterator[Test]:
+def _tests(data: PreparedCampaign) -> Iterator[Test]:
     """The runs of a campaign, as a plan has them; what swings free is none."""
     for loop in data.loops:
         yield SimulatedLoop(

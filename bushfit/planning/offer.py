@@ -12,7 +12,7 @@ from bushfit.diagnosis.priors import TELLS
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.coordinates import residual
-from bushfit.fitting.data_sets import new_sweep
+from bushfit.fitting.preparation import new_sweep
 from bushfit.geometry import TRANSLATION, Direction, Place
 from bushfit.model.covariance import Z95
 from bushfit.planning.contract import Knowledge, Test, Wanted, operating_points

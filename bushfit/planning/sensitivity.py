@@ -19,9 +19,9 @@ from bushfit.diagnosis.propose import missing_effects, sensitivity
 from bushfit.effects import Effect
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances
 from bushfit.fitting.coordinates import Coordinates, jacobian
-from bushfit.fitting.data_sets import DataSet, new_loop, new_sweep, parted
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.noise import SweepNoise
+from bushfit.fitting.preparation import MeasuredTest, new_loop, new_sweep, parted
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.planning.contract import Knowledge, Test, operating_points
@@ -110,7 +110,7 @@ class Grid:
     tests: tuple[Test, ...]
 
     @cached_property
-    def data_sets(self) -> list[DataSet]:
+    def data_sets(self) -> list[MeasuredTest]:
         """A cycle of each loop, in units of its noise, and of each place one sweep of all points, in units of ln K;
         after the largest strain so far."""
         model, noise = self.knowledge.model, self.knowledge.noise
@@ -188,7 +188,7 @@ class Grid:
         return [Column(effect, row) for effect, rows in of_effects for row in rows]
 
 
-def relative_slopes(knowledge: Knowledge, data_sets: Sequence[DataSet]) -> Array:
+def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> Array:
     """Derivatives of whitened residuals by relative change of each parameter, of the bounded by typical size, (k + b,
     n)."""
     model, bounded = knowledge.model, Coordinates.of(knowledge.model, knowledge.bounded)

@@ -17,7 +17,7 @@ import numpy as np
 from bushfit.effects import Level
 from bushfit.effects.contract import Array, Circumstances, Setting
 from bushfit.errors import ModelError
-from bushfit.fitting.data_sets import SweepData
+from bushfit.fitting.preparation import MeasuredSweep
 from bushfit.geometry import TRANSLATION, Place
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
@@ -90,7 +90,7 @@ def predict(
     amplitudes: Sequence[float] | Array,
     *,
     rig: bool = False,
-    sweeps: Sequence[SweepData] | None = None,
+    sweeps: Sequence[MeasuredSweep] | None = None,
     temperature: float | None = None,
 ) -> Prediction:
     """Dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
@@ -189,7 +189,7 @@ def _open_to(
     return parts * np.hypot(off, [share.real, share.imag]) * stiffness, np.sqrt(1.0 - np.square(stands))
 
 
-def _measured(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequence[SweepData]) -> Array:
+def _measured(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequence[MeasuredSweep]) -> Array:
     """Complex stiffness measured at operating points, each (n,): the mean of the repeats, nan where there is none."""
     mine = [sweep.with_weight() for sweep in sweeps if sweep.direction == direction]
     f, x, stiffness = (

@@ -10,8 +10,8 @@ import pandas as pd
 from bushfit.diagnosis.record import Diagnosis, level_of
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.fitting.master_curve import Shifted
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Display, Place
 from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
@@ -167,13 +167,13 @@ def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> p
     return pd.DataFrame(columns)
 
 
-def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
+def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame:
     """Measured and modelled force of every loop: a row per recorded row, or per bin of phase where a loop is long.
 
     The residual is measured minus model, in units of the noise of one row. An outlier was left out of the fit.
     """
 
-    def rows(data_set: LoopData) -> pd.DataFrame:
+    def rows(data_set: MeasuredLoop) -> pd.DataFrame:
         place, drive = data_set.direction, data_set.drive
         (_, length), (_, factor), _ = place.display
         force = columns_of(place)[2]
@@ -196,14 +196,14 @@ def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
     return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
 
 
-def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
+def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFrame:
     """Measured and modelled dynamic stiffness of every sweep, sorted by amplitude, repeat and frequency.
 
     Residuals are measured minus model, in units of noise. Temperature, part and stated error are columns only where a
     test states them.
     """
 
-    def rows(data_set: SweepData) -> pd.DataFrame:
+    def rows(data_set: MeasuredSweep) -> pd.DataFrame:
         place, modelled = data_set.direction, data_set.stiffness(model)
         gain, phase = np.split(-data_set.shown(model), 2)
         return pd.DataFrame(
@@ -227,7 +227,7 @@ def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
     return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
 
 
-def _stated(data_set: SweepData) -> dict[str, Any]:
+def _stated(data_set: MeasuredSweep) -> dict[str, Any]:
     """Columns with what a sweep steps through and with the conditions that its test states."""
     sweep, conditions = data_set.sweep, data_set.source.conditions if data_set.source else {}
     columns: dict[str, Any] = {"stepped": sweep.stepped or "neither"}
@@ -248,9 +248,9 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """
     before, after = diagnosis.before, diagnosis.after
 
-    def rows(data_set: DataSet, corrected: DataSet) -> pd.DataFrame:
+    def rows(data_set: MeasuredTest, corrected: MeasuredTest) -> pd.DataFrame:
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
-        columns |= _stated(data_set) if isinstance(data_set, SweepData) else {}
+        columns |= _stated(data_set) if isinstance(data_set, MeasuredSweep) else {}
         columns |= data_set.columns()
         for name, model, test in (("before", before.model, data_set), ("after", after.model, corrected)):
             in_noise, percent = np.split(-test.misfit(model), test.parts), -100.0 * test.off(model)

@@ -45,7 +45,7 @@ BUSHFIT = (
     "from bushfit import units\n"
     "units.si_factor('mm', 'm')  # imports what knows units\n"
     "from bushfit.campaign.campaign import Campaign\n"
-    "from bushfit.fitting.data import Data\n"
+    "from bushfit.fitting.prepared_campaign import Data\n"
     "from bushfit.fitting.procedures import fit_static\n"
     "from bushfit.geometry import Bushing, Direction\n"
     "from bushfit.reading.loops import read_loop\n"

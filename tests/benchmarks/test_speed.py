@@ -30,8 +30,8 @@ from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, History
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import loop_data, sweep_data
+from bushfit.fitting.preparation import prepare_loops, prepare_sweeps
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
@@ -57,8 +57,8 @@ def table() -> Iterator[Rows]:
 
 
 @pytest.fixture(scope="module")
-def data(root: Path) -> Data:
-    return Data.of(load_campaign(root / "configs/cmp_15961.toml"))
+def data(root: Path) -> PreparedCampaign:
+    return PreparedCampaign.of(load_campaign(root / "configs/cmp_15961.toml"))
 
 
 def seconds(works: Sequence[Callable[[], object]], repeats: int) -> list[float]:
@@ -104,7 +104,7 @@ def test_stiffness_against_bare_numpy(
     table.append((f"stiffness of {points} operating points over bare NumPy", f"{fast / bare:.2f}", "<= 1.3"))
 
 
-def test_joint_fit_against_bare_minpack(benchmark: BenchmarkFixture, data: Data, table: Rows) -> None:
+def test_joint_fit_against_bare_minpack(benchmark: BenchmarkFixture, data: PreparedCampaign, table: Rows) -> None:
     """The fit with covariance and advice over MINPACK with the same residual, Jacobian, start and tolerance."""
     found = benchmark(fit_joint, data)
     data_sets = data.chosen(None)
@@ -182,7 +182,7 @@ def test_diagnose(
     campaign = simulated.campaign()
 
     def work() -> object:
-        return diagnose(Data.of(campaign), None, Settings(without=without))
+        return diagnose(PreparedCampaign.of(campaign), None, Settings(without=without))
 
     benchmark.pedantic(work, rounds=1)
     if benchmark.enabled:
@@ -211,7 +211,7 @@ def loop(model: Model, rows: int) -> Loop:
 
 def fitted(model: Model, loops: Sequence[Loop], sweeps: Sequence[Sweep]) -> Callable[[], object]:
     """From measurements to a solution."""
-    return lambda: solve(model, [*loop_data(loops), *sweep_data(sweeps)], FIVE)
+    return lambda: solve(model, [*prepare_loops(loops), *prepare_sweeps(sweeps)], FIVE)
 
 
 @pytest.mark.parametrize("axis", ["rows of a loop", "frequencies", "amplitudes"])

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.session import Visit, session
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, UnitError
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction, Specimen, unit_strain
 from bushfit.reading.tablefile import folder_name
 
@@ -200,7 +200,7 @@ def write(folder: Path, order: tuple[str, str]) -> Path:
 
 @pytest.mark.parametrize(("order", "first"), [(("", ""), "cold"), (("order = 2", "order = 1"), "warm")])
 def test_a_campaign_gives_temperatures_and_order(tmp_path: Path, order: tuple[str, str], first: str) -> None:
-    data = Data.of(load_campaign(write(tmp_path, order)))
+    data = PreparedCampaign.of(load_campaign(write(tmp_path, order)))
     under = {sweep.name: sweep.circumstances for sweep in data.sweeps}
     assert under["cold"].temperature == pytest.approx(293.15)
     np.testing.assert_allclose(under["warm"].temperature, [303.15, 304.15, 305.15])

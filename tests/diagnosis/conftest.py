@@ -16,7 +16,7 @@ from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.rig_errors import scattering_alone
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, get_effect
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import Model
 from bushfit.simulation.measured import measure
@@ -57,7 +57,7 @@ def diagnosed(measured: Measured) -> Diagnosed:
     ) -> Diagnosis:
         key = repr((effects, plan, seed, settings))
         if key not in known:
-            data = Data.of(measured(effects, plan, seed))
+            data = PreparedCampaign.of(measured(effects, plan, seed))
             known[key] = diagnose(data, None, Settings(**settings))  # type: ignore[arg-type]
         return known[key]
 
@@ -69,7 +69,7 @@ def fitted() -> Fitted:
     """fitted(campaign, *effects): the paper's model and more, fitted to all tests of a campaign."""
 
     def evidence(campaign: Campaign, *effects: str) -> Evidence:
-        data = Data.of(campaign)
+        data = PreparedCampaign.of(campaign)
         data_sets = [*data.loops, *data.sweeps]
         start = start_values(campaign.bushing, data_sets, {})
         gone = {get_effect(name).replaces for name in effects}

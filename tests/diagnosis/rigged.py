@@ -14,7 +14,7 @@ from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.model.rig import Record
@@ -104,7 +104,7 @@ TWO = {"delay": {"tau": 1e-4}, "strain_stiffening": {"c3": 20.0}}
 
 
 def asked(campaign: Campaign, model: Model | None = None, **settings: object) -> Diagnosis:
-    diagnosis = diagnose(Data.of(campaign), model, Settings(**settings))  # type: ignore[arg-type]
+    diagnosis = diagnose(PreparedCampaign.of(campaign), model, Settings(**settings))  # type: ignore[arg-type]
     odds = [
         f"{label} {share:.3f}" for label, (_, share) in zip(diagnosis.odds.labels, diagnosis.odds.told, strict=True)
     ]

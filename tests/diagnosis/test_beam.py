@@ -33,7 +33,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import Loss
 from bushfit.diagnosis.explanations import meetings
 from bushfit.effects import BASE
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
@@ -142,11 +142,11 @@ def test_hum_is_told_though_its_rows_are_left_out(measured: Measured) -> None:
 
 
 @pytest.fixture
-def left(measured: Measured, paper_model: Model) -> tuple[Data, Model]:
-    return Data.of(measured({}, SHARED)), paper_model
+def left(measured: Measured, paper_model: Model) -> tuple[PreparedCampaign, Model]:
+    return PreparedCampaign.of(measured({}, SHARED)), paper_model
 
 
-def at(data: Data, *points: tuple[int, float, int]) -> list[Outlier]:
+def at(data: PreparedCampaign, *points: tuple[int, float, int]) -> list[Outlier]:
     """Outliers of sweeps, by number, at a frequency: and its place among the rows there."""
     found = []
     for number, frequency, which in points:
@@ -156,7 +156,7 @@ def at(data: Data, *points: tuple[int, float, int]) -> list[Outlier]:
     return found
 
 
-def test_odds_by_hand(left: tuple[Data, Model]) -> None:
+def test_odds_by_hand(left: tuple[PreparedCampaign, Model]) -> None:
     data, model = left
     count = np.unique(np.concatenate([sweep.frequency for sweep in data.sweeps])).size
     (three,) = meetings(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 65.0, 0)), data.sweeps, model)
@@ -169,7 +169,7 @@ def test_odds_by_hand(left: tuple[Data, Model]) -> None:
     assert meetings([], (), model) == []
 
 
-def test_odds_that_no_float_holds_are_large_ones(left: tuple[Data, Model]) -> None:
+def test_odds_that_no_float_holds_are_large_ones(left: tuple[PreparedCampaign, Model]) -> None:
     """Of 400 rows at one of 16 frequencies: 16 to the power of -399."""
     _, model = left
     count = 16 * 400

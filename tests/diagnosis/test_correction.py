@@ -26,7 +26,7 @@ from bushfit.diagnosis.terms import Measure, Terms
 from bushfit.effects.contract import Array, Level
 from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.errors import ModelError
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.file import from_document, to_document
@@ -285,7 +285,7 @@ def power_law(size: float, phase_deg: float, p: float, q: float) -> Term:
 
 
 def found_in(campaign: Campaign, fitted: Fitted) -> Fingerprint | None:
-    evidence, data = fitted(campaign), Data.of(campaign)
+    evidence, data = fitted(campaign), PreparedCampaign.of(campaign)
     start = start_values(campaign.bushing, data.sweeps, {})
     return fingerprint(evidence, *weighed(evidence, campaign.rig), start, {})
 

@@ -21,7 +21,7 @@ from bushfit.diagnosis.propose import proposals, scores, sensitivity
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects import BASE, LIBRARY, get_effect
 from bushfit.effects.contract import Array, Values
-from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.fitting.preparation import MeasuredTest, parted
 from bushfit.model.model import Model
 
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
@@ -136,7 +136,7 @@ class Gapped:
 def test_shapes_without_a_response_are_left_out(paper_model: Model) -> None:
     """The widest gap, at which no stop is asked for its stiffness either, is one of them."""
     stop = get_effect("bump_stop")
-    shapes, columns = sensitivity(paper_model, cast(Sequence[DataSet], [Gapped()]), stop)
+    shapes, columns = sensitivity(paper_model, cast(Sequence[MeasuredTest], [Gapped()]), stop)
     assert 0 < len(shapes) == len(columns)
     assert all(shape["bump_stop.gap"] <= 5e-4 for shape in shapes)
     np.testing.assert_allclose(columns, 2.0 * stop.amount.typical, rtol=1e-6)

@@ -23,7 +23,7 @@ from bushfit.commands.diagnose import diagnose as diagnose_campaign
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import twins_of
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.report.page.record import read_results
@@ -125,7 +125,7 @@ def test_sizes(root: Path, truths: Truths, found: Found, name: str) -> None:
         result = found[case].result
         if found[case].verdict == "ambiguous":  # it has its size once the reader says which it is
             campaign = load_campaign(root / "data/practice" / case / "bushing.toml")
-            result = diagnose(Data.of(campaign), settings=Settings(adopt=(effect,))).result
+            result = diagnose(PreparedCampaign.of(campaign), settings=Settings(adopt=(effect,))).result
         assert effect in result.model.effects
         truth = truths[case]["effects"][theirs][key]
         truth = 1.0 / truth if theirs == "rig" else truth
@@ -163,7 +163,7 @@ def misread(clean: Undisturbed, reached: float, seen: float = 1.0) -> Undisturbe
 
 
 def asked(tests: Undisturbed) -> list[Diagnosis]:
-    return [diagnose(Data.of(measure(tests, replace(PLAN, seed=seed)).campaign())) for seed in (1, 2)]
+    return [diagnose(PreparedCampaign.of(measure(tests, replace(PLAN, seed=seed)).campaign())) for seed in (1, 2)]
 
 
 @pytest.mark.slow

@@ -14,8 +14,8 @@ from rigged import SHARED, Measured, asked, no_loops, no_repeats, no_sweeps, one
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, entropy_left
 from bushfit.effects import BASE
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction
 from bushfit.model.file import to_document
 from bushfit.model.model import Model
@@ -44,7 +44,7 @@ def test_the_class_of_a_rig_that_is_assumed_is_said(measured: Measured) -> None:
         (RigSettings(gain_error=4e-3), "0.4 % gain and 0.25 deg phase, phase assumed"),
         (RigSettings(gain_error=4e-3, phase_error=3.5e-3), ""),
     ):
-        assumed = Data.of(replace(campaign, rig=rig)).assumed
+        assumed = PreparedCampaign.of(replace(campaign, rig=rig)).assumed
         assert [note.partition(" class, ")[2] for note in assumed] == [words] * bool(words)
 
 
@@ -92,12 +92,12 @@ EVEN = (0.5, 0.5)
 
 
 @pytest.fixture
-def data_sets(measured: Measured) -> list[DataSet]:
-    data = Data.of(measured())
+def data_sets(measured: Measured) -> list[MeasuredTest]:
+    data = PreparedCampaign.of(measured())
     return [*data.loops, *data.sweeps]
 
 
-def test_one_model_needs_none(paper_model: Model, data_sets: list[DataSet]) -> None:
+def test_one_model_needs_none(paper_model: Model, data_sets: list[MeasuredTest]) -> None:
     assert deciding_test([paper_model], EVEN[:1], data_sets) == ""
     assert deciding_test([], (), data_sets) == ""
     assert deciding_test([paper_model, paper_model], EVEN, data_sets) == ""
@@ -126,7 +126,11 @@ STOP = {"bump_stop.gap": 4e-4, "bump_stop.stiffness": 1e5}
     ids=lambda value: next(iter(value)).partition(".")[0] if isinstance(value, dict) else "",
 )
 def test_pairs(
-    paper_model: Model, data_sets: list[DataSet], one: dict[str, float], other: dict[str, float], words: tuple[str, ...]
+    paper_model: Model,
+    data_sets: list[MeasuredTest],
+    one: dict[str, float],
+    other: dict[str, float],
+    words: tuple[str, ...],
 ) -> None:
     models = with_each(paper_model, one, other)
     found = deciding_test(models, EVEN, data_sets)
@@ -139,13 +143,13 @@ def test_a_direction_that_is_swept_is_no_next_test(paper_model: Model, measured:
     """Compliance and a softer rubber differ most in the stiff direction: to be swept where it has not been."""
     models = with_each(paper_model, {"viscous.eta": 100.0}, {"interface_slip.force": 1.0})
     campaign = measured()
-    alone, both = Data.of(one_direction(campaign)).sweeps, Data.of(campaign).sweeps
+    alone, both = PreparedCampaign.of(one_direction(campaign)).sweeps, PreparedCampaign.of(campaign).sweeps
     assert "axial" not in deciding_test(models, EVEN, alone)
     assert not any(direction in deciding_test(models, EVEN, both) for direction in ("axial", "radial"))
 
 
 def test_a_factor_of_one_direction_is_settled_by_a_reference_spring_in_its_fixture(
-    paper_model: Model, data_sets: list[DataSet]
+    paper_model: Model, data_sets: list[MeasuredTest]
 ) -> None:
     """An empty fixture and a steel dummy read the same whatever the gain of a transducer is."""
     models = [
@@ -156,14 +160,16 @@ def test_a_factor_of_one_direction_is_settled_by_a_reference_spring_in_its_fixtu
     assert found == "put a reference spring of known stiffness in the radial fixture"
 
 
-def test_the_next_test_is_within_the_limits_of_the_rig(paper_model: Model, data_sets: list[DataSet]) -> None:
+def test_the_next_test_is_within_the_limits_of_the_rig(paper_model: Model, data_sets: list[MeasuredTest]) -> None:
     models = with_each(paper_model, {"viscous.eta": 60.0}, {"maxwell.mu1": 1e5, "maxwell.tau": 6e-4})
     top = max(float(data_set.frequency.max()) for data_set in data_sets)
     assert "highest frequency" in deciding_test(models, EVEN, data_sets)
     assert "highest frequency" not in deciding_test(models, EVEN, data_sets, RigSettings(max_frequency=top))
 
 
-def test_a_test_without_the_rig_parts_nothing_inside_the_rubber(paper_model: Model, data_sets: list[DataSet]) -> None:
+def test_a_test_without_the_rig_parts_nothing_inside_the_rubber(
+    paper_model: Model, data_sets: list[MeasuredTest]
+) -> None:
     models = with_each(paper_model, {"viscous.eta": 100.0}, {"strain_stiffening.c3": 20.0})
     found = deciding_test(models, EVEN, data_sets)
     assert found in SENTENCES

@@ -15,13 +15,13 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import WAVES
 from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import SweepData, parted
+from bushfit.fitting.preparation import MeasuredSweep, parted
 
 RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 RUN, LEVEL, WAVE, LOOP = range(4)
 
 
-def off(evidence: Evidence, sweep: SweepData, change: Callable[[SweepData], Array]) -> Array:
+def off(evidence: Evidence, sweep: MeasuredSweep, change: Callable[[MeasuredSweep], Array]) -> Array:
     """What a small relative change of the measured stiffness does to the residuals, per unit of it."""
     step = 1e-6
     changed = replace(sweep, sweep=replace(sweep.sweep, stiffness=sweep.sweep.stiffness * (1.0 - step * change(sweep))))

@@ -10,7 +10,7 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulateSettings
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.model import Model
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
@@ -45,6 +45,6 @@ def rig(paper_model: Model) -> Callable[..., Campaign]:
 
 
 @pytest.fixture(scope="session")
-def measured(campaign: Campaign) -> Data:
+def measured(campaign: Campaign) -> PreparedCampaign:
     """The paper's bushing as an independent rig simulation measured it; its joint fit is `result`."""
-    return Data.of(campaign)
+    return PreparedCampaign.of(campaign)

@@ -17,8 +17,8 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.assess import FitStage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.coordinates import jacobian
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import LoopData, new_loop
+from bushfit.fitting.preparation import MeasuredLoop, new_loop
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint, fit_two_step
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
@@ -30,7 +30,9 @@ from bushfit.units import CELSIUS
 BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
 
 
-def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measured: Data, result: Result) -> None:
+def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(
+    measured: PreparedCampaign, result: Result
+) -> None:
     """The noise is estimated too, which can only add to the inverse of J J^T."""
     model, data_sets = result.model, measured.chosen(None)
     found = covariance(model, [FitStage(FIVE, data_sets)])
@@ -39,12 +41,12 @@ def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measu
     plain = np.sqrt(np.diag(np.linalg.inv(slope @ slope.T))) * values
     stated = np.array([found.stderr(name) for name in FIVE])
     assert np.all(stated >= plain * (1.0 - 1e-6))
-    known = [replace(each, gain_error=0.0) if isinstance(each, LoopData) else each for each in data_sets]
+    known = [replace(each, gain_error=0.0) if isinstance(each, MeasuredLoop) else each for each in data_sets]
     certain = covariance(model, [FitStage(FIVE, known)])  # of gain
     np.testing.assert_allclose([certain.stderr(name) for name in FIVE], plain, rtol=0.1)
 
 
-def test_quality_and_reach_are_those_of_the_data(measured: Data, result: Result) -> None:
+def test_quality_and_reach_are_those_of_the_data(measured: PreparedCampaign, result: Result) -> None:
     data_sets = measured.chosen(None)
     found = quality(result.model, data_sets, 5)
     assert found.points == sum(data_set.counted for data_set in data_sets)
@@ -56,7 +58,9 @@ def test_quality_and_reach_are_those_of_the_data(measured: Data, result: Result)
     assert reach.directions == (Direction.AXIAL,)
 
 
-def test_a_model_that_misses_the_data_is_told_and_one_that_does_not_is_not(measured: Data, result: Result) -> None:
+def test_a_model_that_misses_the_data_is_told_and_one_that_does_not_is_not(
+    measured: PreparedCampaign, result: Result
+) -> None:
     data_sets = measured.chosen(None)
     assert lack_of_fit(result.model, data_sets, 5) is None
     assert misfit(result.model, data_sets, 5) == []
@@ -72,7 +76,7 @@ def test_a_model_that_misses_the_data_is_told_and_one_that_does_not_is_not(measu
 def test_a_parameter_that_no_test_sees_has_an_error_beyond_all_bounds(
     rig: Callable[..., Campaign], paper_model: Model
 ) -> None:
-    data_sets = Data.of(replace(rig(), sweeps=())).chosen(None)
+    data_sets = PreparedCampaign.of(replace(rig(), sweeps=())).chosen(None)
     model = paper_model.with_effect("stiffness_factor.radial")
     names = (*FIVE[:1], "stiffness_factor.radial")
     found = covariance(model, [FitStage(names, data_sets)])
@@ -98,7 +102,7 @@ def without(campaign: Campaign, direction: Direction) -> tuple[Sweep, ...]:
 @pytest.mark.parametrize("factor", [1.0, 1.05])
 def test_a_test_that_was_left_out_is_told_where_the_model_misses_it(small: Campaign, factor: float) -> None:
     radial = [stiffer(sweep, factor) for sweep in without(small, Direction.AXIAL)]
-    data = Data.of(replace(small, sweeps=(*without(small, Direction.RADIAL), *radial)))
+    data = PreparedCampaign.of(replace(small, sweeps=(*without(small, Direction.RADIAL), *radial)))
     told = [line for line in fit_joint(data).warnings if "was not fitted" in line]
     assert len(told) == (factor != 1.0)
     if told:
@@ -112,11 +116,11 @@ def test_kilonewtons_taken_for_newtons_are_told(small: Campaign) -> None:
     """In the sweep, and in the loop as well."""
     axial = without(small, Direction.RADIAL)
     slip = replace(small, sweeps=tuple(stiffer(sweep, 1e-3) for sweep in axial))
-    (told,) = [line for line in fit_joint(Data.of(slip)).warnings if "units" in line]
+    (told,) = [line for line in fit_joint(PreparedCampaign.of(slip)).warnings if "units" in line]
     assert told.startswith(f"{small.loops[0].name} shows ")
     assert f"times the modulus of {axial[0].name}, which no rubber does: check the units" in told
     loops = tuple(replace(loop, force=1e-3 * loop.force) for loop in small.loops)
-    (told,) = [line for line in fit_joint(Data.of(replace(slip, loops=loops))).warnings if "units" in line]
+    (told,) = [line for line in fit_joint(PreparedCampaign.of(replace(slip, loops=loops))).warnings if "units" in line]
     assert "kPa is that of no rubber" in told
 
 
@@ -124,7 +128,7 @@ def test_kilonewtons_taken_for_newtons_are_told(small: Campaign) -> None:
 def test_tests_at_other_temperatures_are_told_by_fit_and_diagnose(small: Campaign, warm: float, told: int) -> None:
     (loop,), (sweep,) = small.loops, without(small, Direction.RADIAL)
     at_23, hot = replace(loop, temperature=23.0 + CELSIUS), replace(sweep, temperature=warm + CELSIUS)
-    data = Data.of(replace(small, loops=(at_23,), sweeps=(hot,)))
+    data = PreparedCampaign.of(replace(small, loops=(at_23,), sweeps=(hot,)))
     for result in (fit_joint(data), fit_two_step(data).result, diagnose(data).result):
         lines = [line for line in result.warnings if "degC" in line]
         assert len(lines) == told
@@ -140,7 +144,7 @@ def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model: Mo
     new = {400: (1e-3, 0.01), 1000: (4e-4, 0.006)}  # rows, amplitude and noise
     loops = [new_loop(paper_model, Direction.AXIAL, 0.1, *of, cycles=2.0, rows=rows) for rows, of in new.items()]
 
-    def stated(noise: float | None) -> list[LoopData]:
+    def stated(noise: float | None) -> list[MeasuredLoop]:
         tests = [replace(loop.test, name=f"{number}", noise=noise) for number, loop in enumerate(loops)]
         return [replace(each, drive=replace(each.drive, loop=test)) for each, test in zip(loops, tests, strict=True)]
 
@@ -156,7 +160,7 @@ def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model: Mo
 
 def test_a_gain_that_does_not_weigh_moves_parameters_as_a_refit_says(small: Campaign, paper_model: Model) -> None:
     """What its standard error adds to the covariance are the squares of how far a loop that is off by it leads."""
-    data = Data.of(small)
+    data = PreparedCampaign.of(small)
     loop = replace(data.loops[0], gain_error=0.01, gain_weighs=False)
     fitted = solve(paper_model, (*data.sweeps, loop), FIVE).model
     off = replace(loop, drive=replace(loop.drive, force=1.01 * loop.drive.force))
@@ -201,7 +205,7 @@ def runs(result: Result, direction: str) -> dict[float | None, Misfit]:
 
 
 def test_thousands_of_rows_of_a_loop_do_not_hide_a_level_that_is_off(levelled: Campaign) -> None:
-    result = fit_joint(Data.of(level_off(levelled, 1, 2e-4, 1.03)))
+    result = fit_joint(PreparedCampaign.of(level_off(levelled, 1, 2e-4, 1.03)))
     assert result.quality is not None
     told = runs(result, "radial")
     assert result.quality.nrmse < 0.01, "the loop's rows make the total look well"
@@ -213,7 +217,7 @@ def test_thousands_of_rows_of_a_loop_do_not_hide_a_level_that_is_off(levelled: C
 
 def test_a_run_held_out_is_a_refit_without_it(levelled: Campaign) -> None:
     """One Gauss-Newton step against the real refit: the same to a tenth of the standard errors."""
-    data = Data.of(replace(levelled, loops=()))
+    data = PreparedCampaign.of(replace(levelled, loops=()))
     (sweep,) = data.chosen(None)
     best = solve(Model.with_defaults(levelled.bushing, ("elastic", "springpot", "friction"), {}), [sweep], FIVE)
     errors = np.sqrt(np.diag(np.linalg.inv(best.jacobian @ best.jacobian.T)))
@@ -238,7 +242,7 @@ def test_what_the_rest_leaves_open_is_not_held_out() -> None:
 
 
 def test_usable_within_what_95_of_a_hundred_points_show(levelled: Campaign) -> None:
-    result = fit_joint(Data.of(level_off(levelled, 1, 5e-4, 1.05)))
+    result = fit_joint(PreparedCampaign.of(level_off(levelled, 1, 5e-4, 1.05)))
     by_place = {place.place: place for place in result.usable}
     assert by_place["axial"].held_out
     assert 0.004 < by_place["axial"].stiffness < 0.02
@@ -251,14 +255,14 @@ def test_what_the_rest_cannot_tell_counts_as_fitted(levelled: Campaign, paper_mo
     that are given are predictions."""
     alone = of_levels(levelled, levelled.sweeps[0].amplitude == 2e-4)
     held = FitSettings(parameters={"mu": ParameterSetting(value=1e6)})
-    (place,) = fit_joint(Data.of(replace(alone, fit=held))).usable
+    (place,) = fit_joint(PreparedCampaign.of(replace(alone, fit=held))).usable
     assert not place.held_out
     two = replace(of_levels(levelled, levelled.sweeps[0].amplitude != 5e-4), loops=())
-    (place,) = fit_joint(Data.of(level_off(two, 0, 2e-4, 1.1))).usable
+    (place,) = fit_joint(PreparedCampaign.of(level_off(two, 0, 2e-4, 1.1))).usable
     assert not place.held_out
     assert place.stiffness < 0.2
     every = {name: ParameterSetting(value=value, vary=False) for name, value in paper_model.values.items()}
-    result = fit_joint(Data.of(replace(levelled, fit=FitSettings(parameters=every))))
+    result = fit_joint(PreparedCampaign.of(replace(levelled, fit=FitSettings(parameters=every))))
     assert all(place.held_out for place in result.usable)
 
 
@@ -266,7 +270,9 @@ def test_a_robust_fit_counts_no_outliers(levelled: Campaign) -> None:
     sweep = levelled.sweeps[0]
     spoiled = sweep.stiffness.copy()
     spoiled[10] *= 2.0
-    data = Data.of(replace(levelled, sweeps=(replace(sweep, stiffness=spoiled),), fit=FitSettings(loss="soft_l1")))
+    data = PreparedCampaign.of(
+        replace(levelled, sweeps=(replace(sweep, stiffness=spoiled),), fit=FitSettings(loss="soft_l1"))
+    )
     result = fit_joint(data)
     whole = runs(result, "axial")[None]
     assert whole.points == sweep.frequency.size - 1

@@ -10,10 +10,10 @@ import pytest
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.data_sets import LoopData
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.loop_cycles import steady_cycles
 from bushfit.fitting.loop_harmonics import MOST_ROWS
+from bushfit.fitting.preparation import MeasuredLoop
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
@@ -71,7 +71,7 @@ CASES: dict[str, dict[str, Any]] = {
 def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model: Model, case: str) -> None:
     """One peak and one trough a cycle, where the motion has them, although the sensor turns at every other row."""
     loop = measured(paper_model, **CASES[case])
-    data_set = LoopData(drive_of(loop))
+    data_set = MeasuredLoop(drive_of(loop))
     cycle = data_set.drive.history(settles=False).value
     turns = np.flatnonzero(np.diff(np.sign(np.diff(np.append(cycle, cycle[0])))) != 0)
     residual = data_set.residual(paper_model)
@@ -91,7 +91,7 @@ def test_from_rest_the_virgin_curve_is_followed(paper_model: Model) -> None:
     drive = drive_of(loop)
     assert drive.from_rest
     assert not drive.history(settles=False).periodic
-    gap = np.max(np.abs(LoopData(drive).force(paper_model) - loop.force)) / drive.half_range
+    gap = np.max(np.abs(MeasuredLoop(drive).force(paper_model) - loop.force)) / drive.half_range
     print(f"from rest: model within {gap:.1e} of the record")
     assert gap < 2e-3
     settled = drive_of(measured(paper_model))
@@ -105,7 +105,7 @@ def test_rest_may_be_a_preload(paper_model: Model, cycles: float, amplitude: flo
     noise = 3e-3 * np.ptp(whole.force) * np.random.default_rng(0).standard_normal(whole.force.size)
     force, settled = whole.force + 640.0 + noise, slice(2000, None)
     loop = Loop("loop", Direction.AXIAL, whole.time[rows], whole.displacement[rows] + 1.2e-3, force[rows])
-    data_set = LoopData(drive_of(loop))
+    data_set = MeasuredLoop(drive_of(loop))
     residual = data_set.residual(paper_model)
     reduced = float(residual @ residual) / data_set.counted
     print(f"{cycles} cycles of {1e3 * amplitude:g} mm from rest about a preload: reduced chi-square {reduced:.3f}")
@@ -122,7 +122,7 @@ def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
     assert drive.force.size <= 5 * 1024 + 1
     assert 0.99 * loop.force.size < drive.weight.sum() < loop.force.size  # the turning points carry none
     assert loop.force.size > MOST_ROWS
-    residual = LoopData(drive).residual(paper_model)
+    residual = MeasuredLoop(drive).residual(paper_model)
     reduced = float(residual @ residual) / residual.size
     print(f"{loop.force.size} rows in {drive.force.size} bins: reduced chi-square {reduced:.3f}")
     assert 0.9 < reduced < 1.15
@@ -132,7 +132,7 @@ def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
 
 def test_a_wrong_zero_of_the_load_cell_alone_stays_visible(paper_model: Model) -> None:
     """Only where the displacement is off zero too is the mean force taken for unknown."""
-    data_set = LoopData(drive_of(measured(paper_model, preload=5.0)))
+    data_set = MeasuredLoop(drive_of(measured(paper_model, preload=5.0)))
     assert np.mean(data_set.drive.force - data_set.force(paper_model)) == pytest.approx(5.0, abs=0.3)
 
 
@@ -221,7 +221,7 @@ def recorded(model: Model, *motions: Array, noise: float = 3e-3) -> Loop:
 @pytest.mark.parametrize("case", RUN_INS)
 def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model: Model, case: str) -> None:
     drive = drive_of(recorded(paper_model, *RUN_INS[case]))
-    gap = float(np.sqrt(np.mean(np.square(LoopData(drive).relative(paper_model)))))
+    gap = float(np.sqrt(np.mean(np.square(MeasuredLoop(drive).relative(paper_model)))))
     print(f"{case}: {drive.notes}; true model within {100 * gap:.2f} % of half the force range, noise 0.3 %")
     (note,) = drive.notes
     assert "left out" in note

@@ -10,9 +10,9 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings, SimulateSettings
-from bushfit.fitting.data_sets import LoopData
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.noise import SweepNoise, sweep_noise
+from bushfit.fitting.preparation import MeasuredLoop
 from bushfit.fitting.rig_class import ASSUMED
 from bushfit.fitting.row_noise import RowNoise, row_noise
 from bushfit.geometry import Direction
@@ -229,7 +229,7 @@ def test_a_record_that_misses_its_last_cycle_by_rounding_tells_its_noise_from_al
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9, 0.98])
 def test_the_rig_s_filter_is_found_and_taken_out(rig: Rig, paper_model: Model, correlation: float) -> None:
-    found = [LoopData(drive_of(rig(seed, force_correlation=correlation).loops[0])) for seed in range(15)]
+    found = [MeasuredLoop(drive_of(rig(seed, force_correlation=correlation).loops[0])) for seed in range(15)]
     rows = np.array([data_set.drive.row_noise.rows_as_one for data_set in found])
     true = (1.0 + correlation) / (1.0 - correlation)
     assert rows.mean() == pytest.approx(true, rel=0.15)
@@ -248,7 +248,7 @@ def test_the_rig_s_filter_is_found_and_taken_out(rig: Rig, paper_model: Model, c
 
 
 def test_a_row_left_out_tells_nothing(rig: Rig, paper_model: Model) -> None:
-    data_set = LoopData(drive_of(rig(2, force_correlation=0.9).loops[0]))
+    data_set = MeasuredLoop(drive_of(rig(2, force_correlation=0.9).loops[0]))
     weight = np.ones(data_set.size)
     weight[400:420] = 0.0
     light = data_set.weighted(weight)
@@ -308,7 +308,7 @@ def test_harmonics_err_as_the_noise_says(kind: str, cycles: int, rows: int, corr
         made = low_passed(random, phase.size) if kind == "low-passed" else filtered(random, phase.size, correlation)
         motion = 1e-3 * np.sin(2.0 * np.pi * phase + 0.4)
         force = true_force(phase) + 0.3 * made
-        data_set = LoopData(drive_of(Loop("long", Direction.AXIAL, 10.0 * phase, motion, force)))
+        data_set = MeasuredLoop(drive_of(Loop("long", Direction.AXIAL, 10.0 * phase, motion, force)))
         drive = data_set.drive
         assert drive.force.size < phase.size or cycles < 5
         error = data_set._whitened((true_force(drive.phase) - drive.force) * data_set._per_noise)

@@ -25,8 +25,8 @@ from bushfit.campaign.schema import (
     SimulateSettings,
 )
 from bushfit.errors import FitError
-from bushfit.fitting.data import Data
 from bushfit.fitting.levels import level_errors
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import STATIC, fit_dynamic, fit_joint, fit_static, fit_two_step
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
@@ -55,7 +55,9 @@ def shown(values: np.ndarray) -> str:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_an_ideal_rig_gives_the_truth_within_0_2_percent(rig: Rig, models: dict[str, Model], name: str) -> None:
-    found = errors(fit_joint(Data.of(rig(model=models[name], settings=SimulateSettings()))), models[name].values)
+    found = errors(
+        fit_joint(PreparedCampaign.of(rig(model=models[name], settings=SimulateSettings()))), models[name].values
+    )
     print(f"{name}, no noise: {shown(found)}")
     assert np.max(np.abs(found)) < 2e-3
 
@@ -66,7 +68,7 @@ def test_an_ideal_rig_gives_the_truth_within_0_2_percent(rig: Rig, models: dict[
 def test_the_mean_over_seeds_is_the_truth(rig: Rig, models: dict[str, Model], name: str, seeds: int) -> None:
     truth, joint, two_step, spread = models[name], [], [], []
     for seed in range(seeds):
-        data = Data.of(rig(seed, truth))
+        data = PreparedCampaign.of(rig(seed, truth))
         result = fit_joint(data)
         joint.append(errors(result, truth.values))
         spread.append([(result.covariance.stderr(n) or 0.0) / truth.values[n] for n in FIVE])
@@ -85,7 +87,7 @@ def test_two_step_errors_are_those_of_many_campaigns(rig: Rig) -> None:
     values, stated = [], []
     for seed in range(SEEDS):
         campaign = replace(rig(seed), rig=RigSettings(gain_error=0.0))
-        result = fit_two_step(Data.of(campaign)).result
+        result = fit_two_step(PreparedCampaign.of(campaign)).result
         order = [result.covariance.names.index(n) for n in FIVE]
         values.append(np.log([result.model.values[n] for n in FIVE]))
         scale = np.array([result.model.values[n] for n in FIVE])
@@ -100,7 +102,7 @@ def test_two_step_errors_are_those_of_many_campaigns(rig: Rig) -> None:
     assert np.all(np.abs(correlation[0] - correlation[1]) <= chance + 0.02)
 
 
-def test_radial_sweep_follows_from_axial_tests(measured: Data, result: Result) -> None:
+def test_radial_sweep_follows_from_axial_tests(measured: PreparedCampaign, result: Result) -> None:
     """The paper's claim: within 3 % in magnitude and 0.01 in loss factor of the means over the repeats."""
     (sweep,) = [data_set.sweep for data_set in measured.sweeps if data_set.direction is Direction.RADIAL]
     points = np.stack((sweep.frequency, sweep.amplitude))
@@ -119,11 +121,11 @@ def test_radial_sweep_follows_from_axial_tests(measured: Data, result: Result) -
 def test_either_waveform_gives_the_truth(rig: Rig, paper_model: Model, waveform: str) -> None:
     loops = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2, waveform=waveform),)  # type: ignore[arg-type]
     sweeps = (SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), BAND),)
-    results = [fit_joint(Data.of(rig(seed, loops=loops, sweeps=sweeps))) for seed in range(20)]
+    results = [fit_joint(PreparedCampaign.of(rig(seed, loops=loops, sweeps=sweeps))) for seed in range(20)]
     assert np.max(np.abs(np.mean([errors(result, paper_model.values) for result in results], axis=0))) < 0.015
 
 
-def test_passes_agree_and_settle_where_plain_passes_would(measured: Data) -> None:
+def test_passes_agree_and_settle_where_plain_passes_would(measured: PreparedCampaign) -> None:
     found = fit_two_step(measured)
     before, last = found.passes[-2], found.passes[-1]
     assert all(abs(last[name] / before[name] - 1.0) < 1e-4 for name in FIVE)
@@ -132,7 +134,7 @@ def test_passes_agree_and_settle_where_plain_passes_would(measured: Data) -> Non
     assert np.max(np.abs(errors(dynamic, found.result.model.values))) < 1e-3
 
 
-def test_the_first_pass_leaves_the_springpot_out_and_says_what_this_does(measured: Data) -> None:
+def test_the_first_pass_leaves_the_springpot_out_and_says_what_this_does(measured: PreparedCampaign) -> None:
     static = fit_static(measured)
     assert static.model.effects == ("elastic", "friction")
     assert static.fitted == STATIC
@@ -145,9 +147,11 @@ def test_the_first_pass_leaves_the_springpot_out_and_says_what_this_does(measure
     assert static.model.values["sigma_fmax"] > 1.3 * settled["sigma_fmax"]
 
 
-def test_a_known_springpot_is_held_and_nothing_is_left_out(measured: Data, table_1: dict[str, float]) -> None:
+def test_a_known_springpot_is_held_and_nothing_is_left_out(
+    measured: PreparedCampaign, table_1: dict[str, float]
+) -> None:
     settings = {name: ParameterSetting(value=table_1[name]) for name in ("m", "alpha")}
-    data = Data.of(replace(measured.campaign, fit=FitSettings(parameters=settings)))
+    data = PreparedCampaign.of(replace(measured.campaign, fit=FitSettings(parameters=settings)))
     static = fit_static(data)
     assert not any("left out" in line for line in static.warnings)
     assert static.model.values["m"] == table_1["m"]
@@ -155,7 +159,7 @@ def test_a_known_springpot_is_held_and_nothing_is_left_out(measured: Data, table
     assert np.max(np.abs(errors(static, table_1))) < 0.03
 
 
-def test_errors_of_held_parameters_are_carried_over(measured: Data, result: Result) -> None:
+def test_errors_of_held_parameters_are_carried_over(measured: PreparedCampaign, result: Result) -> None:
     carried, sharp = fit_dynamic(measured, result), fit_dynamic(measured, Result(result.model))
     for name, most in (("m", 0.02), ("alpha", 0.01)):
         alone = sharp.covariance.stderr(name)
@@ -165,22 +169,24 @@ def test_errors_of_held_parameters_are_carried_over(measured: Data, result: Resu
 
 def test_hidden_physics_is_told_and_widens_the_errors(rig: Rig, paper_model: Model) -> None:
     heavy = paper_model.with_effect("inertia", {"inertia.mass": 0.1})
-    plain, hidden = (fit_joint(Data.of(rig(0, model))) for model in (paper_model, heavy))
+    plain, hidden = (fit_joint(PreparedCampaign.of(rig(0, model))) for model in (paper_model, heavy))
     assert any("the model misses the tests by" in line for line in hidden.warnings)
     shares = [(each.covariance.stderr("m") or 0.0) / each.model.values["m"] for each in (hidden, plain)]
     assert shares[0] > 3.0 * shares[1]
 
 
-def test_magnitude_and_loss_factor_residuals_give_the_same_answer(measured: Data, result: Result) -> None:
-    other = fit_joint(Data.of(replace(measured.campaign, fit=FitSettings(residuals="magnitude_loss_factor"))))
+def test_magnitude_and_loss_factor_residuals_give_the_same_answer(measured: PreparedCampaign, result: Result) -> None:
+    other = fit_joint(
+        PreparedCampaign.of(replace(measured.campaign, fit=FitSettings(residuals="magnitude_loss_factor")))
+    )
     for name in FIVE:
         error = 0.3 * (result.covariance.stderr(name) or 0.0)
         assert other.model.values[name] == pytest.approx(result.model.values[name], abs=error)
 
 
-def test_held_and_bounded_parameters(measured: Data) -> None:
+def test_held_and_bounded_parameters(measured: PreparedCampaign) -> None:
     settings = {"alpha": ParameterSetting(value=0.3, vary=False), "mu": ParameterSetting(max=1.05e6)}
-    result = fit_joint(Data.of(replace(measured.campaign, fit=FitSettings(parameters=settings))))
+    result = fit_joint(PreparedCampaign.of(replace(measured.campaign, fit=FitSettings(parameters=settings))))
     assert result.model.values["alpha"] == 0.3
     assert "alpha" not in result.fitted
     assert result.covariance.stderr("alpha") is None
@@ -188,11 +194,11 @@ def test_held_and_bounded_parameters(measured: Data) -> None:
     assert any(line.startswith("mu rests on the max given in [fit]") for line in result.warnings)
 
 
-def test_missing_tests_are_said(measured: Data, result: Result) -> None:
+def test_missing_tests_are_said(measured: PreparedCampaign, result: Result) -> None:
     with pytest.raises(FitError, match="fit-static needs a loop"):
-        fit_static(Data.of(replace(measured.campaign, loops=())))
+        fit_static(PreparedCampaign.of(replace(measured.campaign, loops=())))
     with pytest.raises(FitError, match="fit-dynamic needs a sweep"):
-        fit_dynamic(Data.of(replace(measured.campaign, sweeps=())), result)
+        fit_dynamic(PreparedCampaign.of(replace(measured.campaign, sweeps=())), result)
 
 
 @pytest.mark.parametrize(
@@ -211,7 +217,7 @@ def test_a_value_extrapolated_beyond_its_bounds_is_moved_back(
     loops = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),)
     sweeps = (SimulatedSweep(Direction.AXIAL, (1e-4,), (5.0, 25.0, 75.0, 155.0)),)
     plan = SimulateSettings(repeats=2, noise=noise, force_noise=0.003, loops=loops, sweeps=sweeps)
-    found = fit_two_step(Data.of(rig(seed, truth, settings=plan)))
+    found = fit_two_step(PreparedCampaign.of(rig(seed, truth, settings=plan)))
     low, high = truth.parameters["alpha"].bounds
     assert all(low <= values["alpha"] <= high for values in found.passes)
 
@@ -252,7 +258,7 @@ def bands_covered(result: Result, truth: Model) -> np.ndarray:
 def coverage(rig: Rig, truth: Model, seeds: int, **noise: Any) -> tuple[np.ndarray, np.ndarray]:
     """Per seed whether each parameter's interval, (seeds, 5), and the share of each band, hold the truth."""
     exact = RigSettings(gain_error=0.0, phase_error=0.0)  # as it is simulated: no calibration is off
-    results = [fit_joint(Data.of(replace(rig(seed, truth, **noise), rig=exact))) for seed in range(seeds)]
+    results = [fit_joint(PreparedCampaign.of(replace(rig(seed, truth, **noise), rig=exact))) for seed in range(seeds)]
     inside = np.array([covered(result, truth.values) for result in results])
     return inside, np.array([bands_covered(result, truth) for result in results])
 
@@ -304,7 +310,9 @@ def test_95_percent_intervals_cover_where_the_gain_of_a_loop_is_off(
     inside, wide = [], []
     for seed in range(seeds):
         campaign = rig(seed, gain_error=5e-3, level_gain_error=5e-3)
-        result = fit_joint(Data.of(replace(campaign, rig=RigSettings(gain_error=5e-3) if stated else UNSTATED)))
+        result = fit_joint(
+            PreparedCampaign.of(replace(campaign, rig=RigSettings(gain_error=5e-3) if stated else UNSTATED))
+        )
         inside.append(covered(result, paper_model.values))
         ends = np.log([result.interval(name) or (np.nan, np.nan) for name in FIVE])
         off = np.log([paper_model.values[name] for name in FIVE]) - ends.mean(axis=1)
@@ -336,7 +344,7 @@ def off_by_level(campaign: Campaign, error: float, seed: int) -> Campaign:
 def test_errors_of_levels_are_told(rig: Rig, paper_model: Model, error: float) -> None:
     found, matters, freedom = [], [], []
     for seed in range(30):
-        data = Data.of(off_by_level(rig(seed), error, seed))
+        data = PreparedCampaign.of(off_by_level(rig(seed), error, seed))
         solution = solve(paper_model, data.chosen(BOTH), FIVE)
         told = level_errors(data.chosen(BOTH), solution.residual, solution.jacobian, (1.0, 1.0))
         found.append(np.square(told.error))

@@ -15,9 +15,9 @@ from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSetti
 from bushfit.effects import BASE, with_base
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import Bounds, Coordinates, at_bound, residual, starting_point
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
+from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.robust import WeightedFit
 from bushfit.fitting.solve import solve
@@ -48,16 +48,18 @@ STARTS = 5
 
 
 @pytest.fixture
-def axial(measured: Data) -> list[DataSet]:
+def axial(measured: PreparedCampaign) -> list[MeasuredTest]:
     return measured.chosen(None)
 
 
 @pytest.fixture
-def data_sets(rig: Callable[..., Campaign]) -> list[DataSet]:
-    return Data.of(rig(1)).data_sets
+def data_sets(rig: Callable[..., Campaign]) -> list[MeasuredTest]:
+    return PreparedCampaign.of(rig(1)).data_sets
 
 
-def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(axial: list[DataSet], paper_model: Model) -> None:
+def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(
+    axial: list[MeasuredTest], paper_model: Model
+) -> None:
     solution = solve(paper_model, axial, FIVE, {"mu": (None, 1.05e6)})
     assert dict(solution.at_bound) == {"mu": "max"}
     assert solution.model.values["mu"] == pytest.approx(1.05e6, rel=1e-2)
@@ -67,7 +69,7 @@ def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(axial: list
     assert free.chi_square < solution.chi_square
 
 
-def test_a_solver_that_runs_out_of_evaluations_says_so(axial: list[DataSet], paper_model: Model) -> None:
+def test_a_solver_that_runs_out_of_evaluations_says_so(axial: list[MeasuredTest], paper_model: Model) -> None:
     start = paper_model.with_values({name: 5.0 * paper_model.values[name] for name in ("mu", "sigma_fmax")})
     assert solve(start, axial, FIVE, evaluations=2, strict=False).stopped
     with pytest.raises(FitError, match="did not converge"):
@@ -75,7 +77,7 @@ def test_a_solver_that_runs_out_of_evaluations_says_so(axial: list[DataSet], pap
 
 
 def test_a_fit_that_is_stopped_where_chi_square_is_flat_is_one_and_is_told(
-    axial: list[DataSet], result: Result
+    axial: list[MeasuredTest], result: Result
 ) -> None:
     near = result.model.with_values({"mu": 1.0001 * result.model.values["mu"]})
     stopped = solve(near, axial, FIVE, evaluations=2)
@@ -85,11 +87,13 @@ def test_a_fit_that_is_stopped_where_chi_square_is_flat_is_one_and_is_told(
 
 
 @pytest.mark.parametrize("many", [10, pytest.param(100, marks=pytest.mark.slow)])
-def test_random_starts_end_at_one_minimum(measured: Data, axial: list[DataSet], result: Result, many: int) -> None:
+def test_random_starts_end_at_one_minimum(
+    measured: PreparedCampaign, axial: list[MeasuredTest], result: Result, many: int
+) -> None:
     """Two decades per parameter: a tenth to ten times the answer, alpha over its own range.
 
     From a start that is far too stiff a fit may lose a branch for good. It then says that the branch rests on a bound,
-    and `Data.started` takes no such start: it takes what is read off the tests where that meets them better.
+    and `PreparedCampaign.started` takes no such start: it takes values read off the tests where they meet these better.
     """
     best, rng = np.array([result.model.values[name] for name in FIVE]), np.random.default_rng(1)
     read_off = residual(measured.started(measured.effects, axial, {}), axial)
@@ -111,7 +115,7 @@ def test_random_starts_end_at_one_minimum(measured: Data, axial: list[DataSet], 
     assert np.all(np.abs(np.array(ends) - best) < 0.02 * stderr)
 
 
-def started(paper_model: Model, data_sets: list[DataSet], *effects: str) -> Model:
+def started(paper_model: Model, data_sets: list[MeasuredTest], *effects: str) -> Model:
     start = start_values(paper_model.bushing, data_sets, {})
     return Model.with_defaults(paper_model.bushing, (*BASE, *effects), start)
 
@@ -119,7 +123,7 @@ def started(paper_model: Model, data_sets: list[DataSet], *effects: str) -> Mode
 @pytest.mark.parametrize("effects", [(), ("delay",), ("viscous", "strain_stiffening")], ids="+".join)
 @pytest.mark.parametrize("bounds", [{}, {"alpha": (0.26, 0.5)}, {"mu": (None, 9e5)}], ids=str)
 def test_it_ends_where_lmfit_ends(
-    paper_model: Model, data_sets: list[DataSet], effects: tuple[str, ...], bounds: Bounds
+    paper_model: Model, data_sets: list[MeasuredTest], effects: tuple[str, ...], bounds: Bounds
 ) -> None:
     model = started(paper_model, data_sets, *effects)
     names = tuple(model.parameters)
@@ -143,7 +147,7 @@ def test_it_ends_where_lmfit_ends(
     assert found.solution.at_bound == at_bound(names, end, low, high)
 
 
-def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, data_sets: list[DataSet]) -> None:
+def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, data_sets: list[MeasuredTest]) -> None:
     model = started(paper_model, data_sets)
     here = Descent.start(model, data_sets, tuple(model.parameters), {})
     path = [here]
@@ -158,7 +162,7 @@ def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, data_set
     assert path[-1].expected_fall < 0.01 < path[0].expected_fall
 
 
-def test_what_is_not_seen_stays(paper_model: Model, data_sets: list[DataSet]) -> None:
+def test_what_is_not_seen_stays(paper_model: Model, data_sets: list[MeasuredTest]) -> None:
     """An effect of no amount has no shape that data could tell."""
     model = started(paper_model, data_sets, "maxwell")
     first = Descent.start(model, data_sets, tuple(model.parameters), {"maxwell.mu1": (0.0, 1e-9)}).finished(100)
@@ -166,7 +170,7 @@ def test_what_is_not_seen_stays(paper_model: Model, data_sets: list[DataSet]) ->
     assert first.solution.at_bound["maxwell.mu1"] in ("min", "max")
 
 
-def test_too_few_points_are_refused(data_sets: list[DataSet], paper_model: Model) -> None:
+def test_too_few_points_are_refused(data_sets: list[MeasuredTest], paper_model: Model) -> None:
     sweep = data_sets[-1].test
     columns = {name: getattr(sweep, name)[:2] for name in ("frequency", "amplitude", "stiffness", "repeat")}
     few = replace(data_sets[-1], sweep=replace(sweep, **columns))  # type: ignore[call-arg]
@@ -185,7 +189,7 @@ def test_it_follows_the_bend_of_a_valley(paper_model: Model, monkeypatch: pytest
         settings = SimulateSettings(
             loops=(loop,), sweeps=(sweep,), repeats=2, noise=0.003, force_noise=0.003, seed=seed
         )
-        data = Data.of(simulate(damped, settings).campaign())
+        data = PreparedCampaign.of(simulate(damped, settings).campaign())
         data_sets = [*data.loops, *data.sweeps]
         model = started(paper_model, data_sets, "delay", "maxwell")
         bent = Descent.start(model, data_sets, tuple(model.parameters), {}).finished(400)
@@ -212,7 +216,7 @@ def elsewhere(model: Model, names: list[str], rng: np.random.Generator) -> Model
 def test_no_random_start_ends_lower(root: Path, campaigns: tuple[str, ...]) -> None:
     rng, lowest, errors, others = np.random.default_rng(0), [], 0, []
     for campaign in campaigns:
-        data = Data.of(load_campaign(root / f"configs/{campaign}.toml"))
+        data = PreparedCampaign.of(load_campaign(root / f"configs/{campaign}.toml"))
         data_sets = data.chosen(TESTS[campaign])
         for family in FAMILIES:
             model = data.started(with_base((*data.campaign.fit.effects, *family)), data_sets, {})

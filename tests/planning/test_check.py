@@ -14,7 +14,7 @@ from bushfit.campaign.quantities import Compound, Polymer
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.commands.plan import plan_sheet
 from bushfit.effects import BASE
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model.covariance import Z95
@@ -121,7 +121,7 @@ def test_the_guess_holds_the_papers_and_a_measured_rubber(root: Path) -> None:
     print("paper, in standard errors", found.round(2))
     assert np.abs(found).max() < Z95
     # An EPDM of 70 Shore A whose filler nobody states; its strain sweeps alone, which the five parameters can meet.
-    fitted = fit_joint(Data.of(load_campaign(root / "configs/epdm_70.toml")), directions=["DMA"]).model
+    fitted = fit_joint(PreparedCampaign.of(load_campaign(root / "configs/epdm_70.toml")), directions=["DMA"]).model
     for phr in (40.0, 50.0, 60.0):
         found = off(guess(BUSHING, Compound(70, phr, "EPDM")), dict(fitted.values))
         print(f"coupon, taken for {phr:g} phr, in standard errors", found.round(2))
@@ -172,13 +172,13 @@ LOOP = SimulatedLoop(AXIAL, 1e-3, 0.1)
 
 
 @pytest.fixture(scope="module")
-def data() -> Data:
+def data() -> PreparedCampaign:
     settings = SimulateSettings(loops=(LOOP,), sweeps=(SWEEP,), repeats=2, noise=0.005, force_noise=0.005, seed=2)
-    return Data.of(simulate(Model(PAPER, BASE, NO_SPRING), settings).campaign())
+    return PreparedCampaign.of(simulate(Model(PAPER, BASE, NO_SPRING), settings).campaign())
 
 
 @pytest.fixture(scope="module")
-def measured(data: Data) -> Knowledge:
+def measured(data: PreparedCampaign) -> Knowledge:
     return of_campaign(data)
 
 
@@ -198,10 +198,10 @@ def test_what_a_fit_within_bounds_finds_scatters_as_counted() -> None:
     assert counted[0, 0] < 0.97 * covariance[0, 0]
 
 
-def test_tests_tell_a_bounded_parameter_as_if_it_were_free(data: Data, measured: Knowledge) -> None:
+def test_tests_tell_a_bounded_parameter_as_if_it_were_free(data: PreparedCampaign, measured: Knowledge) -> None:
     """The others go with it as they would to make up for it, and are known worse than where it is held."""
     k, covariance = len(measured.names), measured.covariance
-    counted = Data.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise_of(data))))
+    counted = PreparedCampaign.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise_of(data))))
     slopes = relative_slopes(measured, [*counted.loops, *counted.sweeps])
     made_up = -np.linalg.lstsq(slopes[:k].T, slopes[k])[0]
     assert measured.bounded == ("mu",)
@@ -222,10 +222,10 @@ def test_a_plan_beside_a_bound_counts_it_and_says_so(measured: Knowledge) -> Non
 
 
 @pytest.mark.parametrize("effect", ["temperature", "force_saturation"])
-def test_a_parameter_that_the_tests_do_not_see_stops_no_plan(data: Data, effect: str) -> None:
+def test_a_parameter_that_the_tests_do_not_see_stops_no_plan(data: PreparedCampaign, effect: str) -> None:
     """Tests at one temperature, and a force that saturates nowhere."""
     campaign = replace(data.campaign, fit=replace(data.campaign.fit, effects=(effect,)))
-    known = of_campaign(Data.of(campaign))
+    known = of_campaign(PreparedCampaign.of(campaign))
     points = (Points(AXIAL, np.array([20.0, 100.0]), np.array([2e-4, 2e-4])),)
     planned = plan(known, Wanted("predictions", 2.0, RigSettings(), (AXIAL,), points, known.names)).planned
     assert np.all(np.isfinite(known.covariance))

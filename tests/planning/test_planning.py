@@ -15,8 +15,8 @@ from bushfit.commands.plan import plan as plan_tests
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.coordinates import residual
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import SweepData, new_loop, new_sweep
+from bushfit.fitting.preparation import MeasuredSweep, new_loop, new_sweep
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Covariance
@@ -150,7 +150,7 @@ def test_an_effect_shows_as_a_fit_without_it_misses_it(known: Knowledge) -> None
     assert found == pytest.approx(expected * (2e-6 / amount.typical) ** 2, rel=0.02)
 
 
-def _noise_free(model: Model, truth: Model, test: SimulatedSweep) -> SweepData:
+def _noise_free(model: Model, truth: Model, test: SimulatedSweep) -> MeasuredSweep:
     """One run of a sweep, as the truth has it."""
     place, frequency, amplitude = points_of(test)
     sweep = new_sweep(model, place, frequency, amplitude, NOISE.scatter, NOISE.shared)
@@ -290,7 +290,7 @@ def test_rivals_stand_beside_what_a_diagnosis_is_sure_of_and_take_few_hours(know
         seed=4, repeats=3, noise=0.004, force_noise=0.003, loops=PAPER_LOOPS, sweeps=PAPER_SWEEPS
     )
     campaign = replace(simulate(model, settings).campaign(), rig=RigSettings(max_frequency=300.0))
-    after = of_campaign(Data.of(campaign), ("viscous", "delay"))
+    after = of_campaign(PreparedCampaign.of(campaign), ("viscous", "delay"))
     assert {rival.model.effects[3] for rival in after.rivals} <= {"inertia", "fixture_resonance"}  # whose limit it is
     assert [rival.model.effects[4:] for rival in after.rivals] == [("viscous",), ("delay",)]
     found = plan_tests(after, campaign, aim="rivals").plan
@@ -335,7 +335,7 @@ def test_what_is_given_by_hand_half_of_the_rows_and_a_rig_that_can_make_no_test(
     # Whatever its sampling, the noise of a force is that of as many rows as planned loops have.
     (loop,) = campaign.loops
     thin = replace(loop, **{key: getattr(loop, key)[::2] for key in ("time", "displacement", "force")})
-    whole, half = (noise_of(Data.of(replace(campaign, loops=(each,)))).force for each in (loop, thin))
+    whole, half = (noise_of(PreparedCampaign.of(replace(campaign, loops=(each,)))).force for each in (loop, thin))
     assert half == pytest.approx(np.sqrt(2.0) * whole, rel=0.05)
 
 

@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
@@ -38,7 +38,7 @@ OTHER = {"mu": 1.08, "m": 1.05, "alpha": 1.04, "sigma_fmax": 0.9}
 
 
 def fitted(clean: Undisturbed, seed: int) -> Result:
-    return fit_joint(Data.of(measure(clean, replace(PLAN, seed=seed)).campaign()))
+    return fit_joint(PreparedCampaign.of(measure(clean, replace(PLAN, seed=seed)).campaign()))
 
 
 def against(reference: Result, other: Result) -> Comparison:

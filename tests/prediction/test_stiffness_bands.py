@@ -10,8 +10,8 @@ import pytest
 
 from bushfit.campaign.schema import SimulatedSweep, SimulateSettings
 from bushfit.errors import ModelError
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import sweep_data
+from bushfit.fitting.preparation import prepare_sweeps
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, Shape, Specimen
 from bushfit.model.covariance import Covariance
@@ -41,7 +41,7 @@ def test_bands_of_an_open_model_are_narrow_where_it_was_measured_and_only_there(
 ) -> None:
     """The direction that such sweeps leave wholly open cancels where the stiffness does not depend on it."""
     plan = SimulateSettings(repeats=3, noise=5e-3, sweeps=(SimulatedSweep(Direction.AXIAL, amplitudes, frequencies),))
-    result = fit_joint(Data.of(measure(undisturbed(paper_model, plan), plan).campaign()))
+    result = fit_joint(PreparedCampaign.of(measure(undisturbed(paper_model, plan), plan).campaign()))
 
     def width(frequency: float, amplitude: float) -> float:
         band = predict(result, Direction.AXIAL, [frequency], [amplitude]).stiffness
@@ -141,7 +141,7 @@ def test_the_measured_stiffness_stands_beside_and_what_the_rig_took_is_said(pape
     frequency, amplitude = np.array([5.0, 5.02, 55.0, 155.0]), np.array([1e-4, 1.005e-4, 1e-4, 3e-4])
     stiffness = rigged.stiffness("radial", frequency, amplitude) * np.array([1.01, 0.99, 1.0, 1.0])
     sweep = Sweep("radial", Direction.RADIAL, frequency, amplitude, stiffness, repeat=np.array([1, 2, 1, 1]))
-    sweeps = sweep_data([sweep])
+    sweeps = prepare_sweeps([sweep])
     found = predict(Result(rigged), Direction.RADIAL, FREQUENCIES, AMPLITUDES, sweeps=sweeps)
     table = prediction_table(found)
     measured = table["measured stiffness [N/mm]"].to_numpy() * 1e3

@@ -28,7 +28,7 @@ from bushfit.commands.compare import compare, compared_result
 from bushfit.commands.fit import fit
 from bushfit.commands.predict import predict
 from bushfit.errors import CONTROL, OutputError
-from bushfit.fitting.data import Data
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.model import Model
 from bushfit.reading.tablefile import Form
 from bushfit.report.plots.style import to_image
@@ -240,8 +240,8 @@ NASTY = "<script>alert(1)</script> --> & $x_1$ 衬套"
 
 
 @pytest.fixture(scope="module")
-def data(root: Path) -> Data:
-    return Data.of(load_campaign(root / "configs/cmp_15961.toml"))
+def data(root: Path) -> PreparedCampaign:
+    return PreparedCampaign.of(load_campaign(root / "configs/cmp_15961.toml"))
 
 
 def drawn() -> Figure:
@@ -280,7 +280,9 @@ def test_a_picture_is_the_same_bytes_each_time_without_date_or_version(form: Pic
         assert not {"script", "text", "image"} & names
 
 
-def test_loops_row_by_row_and_sweeps_by_amplitude_repeat_and_frequency(data: Data, paper_model: Model) -> None:
+def test_loops_row_by_row_and_sweeps_by_amplitude_repeat_and_frequency(
+    data: PreparedCampaign, paper_model: Model
+) -> None:
     table, loop = loops_table(paper_model, data.loops), data.loops[0].test
     assert len(table) == loop.time.size
     np.testing.assert_allclose(table["force [N]"], loop.force, rtol=1e-12)

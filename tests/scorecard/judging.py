@@ -13,8 +13,8 @@ from lab_campaign import Answer
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.fitting.coordinates import residual
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, with_gains
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, with_gains
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.solve import solve
 from bushfit.model.file import load_result
 
@@ -93,7 +93,7 @@ def against_truth(folder: Path, silent: Path, model: Path) -> float:
         is as good as the truth comes out at minus half the number of its parameters.
     """
     told = load_result(model).model
-    tests, true = (Data.of(load_campaign(each / "bushing.toml")) for each in (folder, silent))
+    tests, true = (PreparedCampaign.of(load_campaign(each / "bushing.toml")) for each in (folder, silent))
     data_sets = with_gains((*tests.loops, *tests.sweeps), weigh=True)
     told = solve(told, data_sets, tuple(told.values)).model
     off = residual(told, data_sets)
@@ -102,11 +102,11 @@ def against_truth(folder: Path, silent: Path, model: Path) -> float:
     return float(off @ off - noise @ noise) / 2.0
 
 
-def _with(test: DataSet, true: DataSet) -> DataSet:
+def _with(test: MeasuredTest, true: MeasuredTest) -> MeasuredTest:
     """A test, its weights and its noise as they are, with what another one measured."""
-    if isinstance(test, LoopData) and isinstance(true, LoopData):
+    if isinstance(test, MeasuredLoop) and isinstance(true, MeasuredLoop):
         force = np.interp(test.drive.phase, true.drive.phase, true.drive.force)
         return replace(test, drive=replace(test.drive, force=force))
-    assert isinstance(test, SweepData)
-    assert isinstance(true, SweepData)
+    assert isinstance(test, MeasuredSweep)
+    assert isinstance(true, MeasuredSweep)
     return replace(test, sweep=replace(test.sweep, stiffness=true.sweep.stiffness))

@@ -11,8 +11,8 @@ import pytest
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE, LIBRARY, get_effect, qualified_name
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import loop_data, sources
+from bushfit.fitting.preparation import prepare_loops, sources
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction, Specimen
 from bushfit.model import rig
@@ -214,7 +214,7 @@ def test_tests_are_read_back_and_what_is_fitted_to_them_is_the_truth(paper_model
     for looped, loop in zip(campaign.loops, simulated.loops, strict=True):
         np.testing.assert_allclose(looped.force, loop.force, atol=1e-5 * np.ptp(loop.force))
     places = [test.direction for test in (*campaign.sweeps, *campaign.loops)]
-    fitted = fit_joint(Data.of(campaign), directions=places).model.values
+    fitted = fit_joint(PreparedCampaign.of(campaign), directions=places).model.values
     largest = {"mu": 0.04, "m": 0.15, "alpha": 0.08, "sigma_fmax": 0.12, "eps_half": 0.12}
     for name in FIVE:
         assert fitted[name] == pytest.approx(paper_model.values[name], rel=largest[name])
@@ -242,7 +242,7 @@ def test_a_programme_is_one_file_of_several_loops(paper_model: Model, tmp_path: 
     for loops in (read, in_memory):
         assert [part.name for part in loops] == [f"loop_axial_1_part_{number}" for number in (1, 2, 3, 4)]
         assert [np.ptp(part.displacement) / 2.0 for part in loops] == pytest.approx([*sizes, *sizes], rel=1e-3)
-    assert sources(loop_data(read)) == (read[0].source,)
+    assert sources(prepare_loops(read)) == (read[0].source,)
 
 
 def test_the_rig_is_warm_and_drifts_as_planned(paper_model: Model, tmp_path: Path) -> None:
@@ -251,7 +251,7 @@ def test_the_rig_is_warm_and_drifts_as_planned(paper_model: Model, tmp_path: Pat
     truth = paper_model.with_effect("temperature", values).with_effect("drift", values)
     tests = (replace(LOOP, temperature=300.0), replace(SWEEP, temperature=305.0))
     simulated = simulate(truth, SimulateSettings(repeats=2, loops=tests[:1], sweeps=tests[1:]))
-    data = Data.of(written(simulated, tmp_path))
+    data = PreparedCampaign.of(written(simulated, tmp_path))
     (loop,), (sweep,) = data.loops, data.sweeps
     assert loop.circumstances.temperature == pytest.approx(300.0)
     assert (loop.circumstances.turn, sweep.circumstances.turn[-1]) == (0.0, 1.0)

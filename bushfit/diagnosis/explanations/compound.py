@@ -10,7 +10,7 @@ import numpy as np
 from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.unnamed import harmonics
-from bushfit.fitting.data_sets import alike, parted
+from bushfit.fitting.preparation import alike, parted
 from bushfit.gaussian_process import coordinates, in_lengths, patterns
 
 #: Lengths in ln frequency and ln strain: what relaxes does so over decades of frequency, and what breaks over more than
@@ -18,7 +18,7 @@ from bushfit.gaussian_process import coordinates, in_lengths, patterns
 _LENGTHS = (8.0, 3.0)
 #: Patterns of the process that count; on plans of three to five levels more gain nothing.
 _PATTERNS = 12
-#: First of the rows of `LoopData.contrasts` that the stiffness at the loop's frequency does not make.
+#: First of the rows of `MeasuredLoop.contrasts` that the stiffness at the loop's frequency does not make.
 _OVERTONES = 3
 
 

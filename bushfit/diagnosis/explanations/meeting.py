@@ -12,7 +12,7 @@ from scipy.special import bdtrc
 
 from bushfit.diagnosis.explanations.contract import FaultyPlace
 from bushfit.effects.contract import Array
-from bushfit.fitting.sweep_data import SweepData
+from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
@@ -40,7 +40,7 @@ class Meeting(FaultyPlace):
         return self.apart
 
 
-def meetings(left: Sequence[Outlier], sweeps: Sequence[SweepData], model: Model) -> list[Meeting]:
+def meetings(left: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model) -> list[Meeting]:
     """Frequencies that several of the points that were left out have in common."""
     apart = {(outlier.test, outlier.row): outlier.distance for outlier in left}
     found: dict[float, list[_Left]] = defaultdict(list)
@@ -54,7 +54,7 @@ def meetings(left: Sequence[Outlier], sweeps: Sequence[SweepData], model: Model)
 
 
 #: A point that was left out: its sweep, its number there, and how far it lies off in units of noise.
-_Left = tuple[SweepData, int, float]
+_Left = tuple[MeasuredSweep, int, float]
 
 
 def _meeting(frequency: float, points: Sequence[_Left], left: int, chance: float, model: Model) -> Meeting:

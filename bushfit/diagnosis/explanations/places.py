@@ -11,7 +11,7 @@ from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import FaultyPlace
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, parted
 
 #: Neighbouring frequencies that one disturbance covers at most: mains hum and its sidebands.
 _WIDEST = 3
@@ -31,20 +31,20 @@ def places(evidence: Evidence) -> list[FaultyPlace]:
     return found + ([_loop(evidence, loop) for loop in loops] if len(loops) < len(evidence.data_sets) else [])
 
 
-def _loop(evidence: Evidence, loop: LoopData) -> FaultyPlace:
+def _loop(evidence: Evidence, loop: MeasuredLoop) -> FaultyPlace:
     """A loop wrong as a whole, in gain or offset."""
     ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
     group = _group(evidence, [loop], np.array(loop.gain_and_offset()), np.eye(2))
     return FaultyPlace("place", "loop", f"the loop {loop.name}", group, loop.direction, *ends)
 
 
-def _rows(evidence: Evidence, data_sets: Sequence[DataSet]) -> slice:
+def _rows(evidence: Evidence, data_sets: Sequence[MeasuredTest]) -> slice:
     """Slice from the first row of some data sets to their last."""
     places = [evidence.place[each] for each in data_sets]
     return slice(min(place.start for place in places), max(place.stop for place in places))
 
 
-def _group(evidence: Evidence, data_sets: Sequence[DataSet], columns: Array, unit: Array) -> Group:
+def _group(evidence: Evidence, data_sets: Sequence[MeasuredTest], columns: Array, unit: Array) -> Group:
     among = _rows(evidence, data_sets), evidence.residual.size
     return Group(columns, unit, together=True, among=among)
 
@@ -60,7 +60,7 @@ def _changed(columns: int, kind: str) -> Array:
 
 
 def _place(
-    evidence: Evidence, words: str, kind: str, sweeps: Sequence[SweepData], chosen: Sequence[Array], columns: Array
+    evidence: Evidence, words: str, kind: str, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], columns: Array
 ) -> FaultyPlace:
     """Chosen points of sweeps, (n,) bool each."""
     pairs = list(zip(sweeps, chosen, strict=True))
@@ -72,7 +72,7 @@ def _place(
     return FaultyPlace("place", kind, words, group, sweeps[0].direction, *ends)
 
 
-def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
+def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
     levels = Counter(_direction(sweep) for sweep in sweeps for _ in np.unique(sweep.held))
     ends = {
         name: [end for sweep in sweeps if _direction(sweep) == name for end in (sweep.held.min(), sweep.held.max())]
@@ -94,7 +94,7 @@ def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyP
                 yield _place(evidence, f"repeat {number} of {words}", "repeat", [sweep], [mine], columns)
 
 
-def _repeats(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
+def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
     """A repeat as a whole, of one direction or of all."""
     for _, which, scope in _scopes(sweeps):
         if not all(np.unique(sweep.repeat).size > 1 for sweep in scope):
@@ -106,7 +106,7 @@ def _repeats(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Faulty
                 yield _place(evidence, f"repeat {number} of {which}", "repeat", scope, chosen, columns)
 
 
-def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
+def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
     """A disturbance at one frequency or a few neighbours, in one direction or in all."""
     steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
     if steps.size < _FEWEST_FREQUENCIES:
@@ -127,7 +127,7 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Fa
                 yield _place(evidence, words, "frequency", scope, rows, np.concatenate(columns[window]))
 
 
-def _scopes(sweeps: Sequence[SweepData]) -> Iterator[tuple[str, str, Sequence[SweepData]]]:
+def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequence[MeasuredSweep]]]:
     """Sweeps that may be off together: one alone, those of a direction in several files, and all; where that is, and
     which sweeps these are, in words."""
     of_directions = [(name, list(own)) for name, own in groupby(sorted(sweeps, key=_direction), _direction)]
@@ -142,11 +142,13 @@ def _scopes(sweeps: Sequence[SweepData]) -> Iterator[tuple[str, str, Sequence[Sw
         yield "all directions", "every sweep", sweeps
 
 
-def _direction(sweep: SweepData) -> str:
+def _direction(sweep: MeasuredSweep) -> str:
     return str(sweep.direction)
 
 
-def _off(evidence: Evidence, sweeps: Sequence[SweepData], chosen: Sequence[Array], *, sloping: bool = False) -> Array:
+def _off(
+    evidence: Evidence, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], *, sloping: bool = False
+) -> Array:
     """Residuals of some points of sweeps that are off together: in gain, in phase, and if `sloping` along the step."""
     among = _rows(evidence, sweeps)
     columns = np.zeros((2 + 2 * sloping, among.stop - among.start))

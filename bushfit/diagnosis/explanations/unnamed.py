@@ -9,8 +9,8 @@ from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import Explanation
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import LoopData, SweepData, alike, parted
-from bushfit.fitting.loop_data import smooth_waves
+from bushfit.fitting.measured_loop import smooth_waves
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, alike, parted
 from bushfit.gaussian_process import spread_nodes
 from bushfit.reading.measurement import SAME_TEMPERATURE
 
@@ -36,7 +36,7 @@ def unnamed(evidence: Evidence) -> list[Explanation]:
     return [Explanation("unnamed", "unnamed", name, group) for name, group in found]
 
 
-def harmonics(evidence: Evidence, loops: Sequence[LoopData]) -> Array:
+def harmonics(evidence: Evidence, loops: Sequence[MeasuredLoop]) -> Array:
     """Columns of the harmonics that repeated loops share, (c, n)."""
     columns = np.zeros((len(loops[0].contrasts()), evidence.residual.size))
     for loop in loops:
@@ -44,7 +44,7 @@ def harmonics(evidence: Evidence, loops: Sequence[LoopData]) -> Array:
     return columns
 
 
-def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Iterator[tuple[str, Group]]:
+def _processes(evidence: Evidence, sweeps: Sequence[MeasuredSweep], how: str) -> Iterator[tuple[str, Group]]:
     """Sweeps of one direction and temperature share a process, however many files they come in."""
     if not sweeps:
         return
@@ -71,7 +71,7 @@ def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Ite
         yield "all", Group(columns, share, together=True)
 
 
-def _degrees(sweep: SweepData) -> int | None:
+def _degrees(sweep: MeasuredSweep) -> int | None:
     """The temperature of a sweep in steps of what counts as one; None where it is not known."""
     kelvin = sweep.sweep.temperature
     return None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)

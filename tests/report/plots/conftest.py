@@ -9,7 +9,7 @@ import pytest
 from figures import AMPLITUDES, FREQUENCIES
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import LoopData, SweepData, loop_data, sweep_data
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, prepare_loops, prepare_sweeps
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
@@ -17,7 +17,7 @@ from bushfit.reading.measurement import Loop, Sweep
 
 
 @pytest.fixture(scope="session")
-def swept() -> Callable[..., SweepData]:
+def swept() -> Callable[..., MeasuredSweep]:
     """A sweep of a model, 1 % noise; `left_out` rows are missing."""
 
     def sweep(
@@ -27,7 +27,7 @@ def swept() -> Callable[..., SweepData]:
         amplitudes: Array = AMPLITUDES,
         repeats: int = 3,
         left_out: slice = slice(0, 0),
-    ) -> SweepData:
+    ) -> MeasuredSweep:
         noise = np.random.default_rng(7)
         numbers = np.arange(1, repeats + 1)
         frequency, amplitude, repeat = (
@@ -35,22 +35,24 @@ def swept() -> Callable[..., SweepData]:
         )
         scatter = 0.01 * (noise.normal(size=frequency.size) + 1j * noise.normal(size=frequency.size))
         stiffness = model.stiffness(direction, frequency, amplitude) * (1.0 + scatter)
-        return sweep_data([Sweep(f"{direction}.csv", direction, frequency, amplitude, stiffness, repeat)])[0]
+        return prepare_sweeps([Sweep(f"{direction}.csv", direction, frequency, amplitude, stiffness, repeat)])[0]
 
     return sweep
 
 
 @pytest.fixture(scope="session")
-def looped() -> Callable[..., LoopData]:
+def looped() -> Callable[..., MeasuredLoop]:
     """A loop of a model at 0.1 Hz, 0.5 % noise."""
 
     def loop(
         model: Model, amplitude: float, *, cycles: int = 3, run_in: int = 0, direction: Direction = Direction.AXIAL
-    ) -> LoopData:
+    ) -> MeasuredLoop:
         record = rig.record(
             model, direction, 0.1, amplitude, cycles=cycles, run_in=run_in, steps_per_cycle=1024, kind="loop"
         )
         force = record.force + 0.005 * np.ptp(record.force) * np.random.default_rng(7).normal(size=record.force.size)
-        return loop_data([Loop(f"{1e3 * amplitude:g} mm.csv", direction, record.time, record.displacement, force)])[0]
+        return prepare_loops([Loop(f"{1e3 * amplitude:g} mm.csv", direction, record.time, record.displacement, force)])[
+            0
+        ]
 
     return loop

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -24,8 +24,8 @@ from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.prediction import prediction_figure
 from bushfit.report.tables import gap_table, loops_table, sweeps_table
 
-Swept = Callable[..., SweepData]
-Looped = Callable[..., LoopData]
+Swept = Callable[..., MeasuredSweep]
+Looped = Callable[..., MeasuredLoop]
 FREQUENCIES = np.arange(5.0, 156.0, 10.0)
 AMPLITUDES = np.array([1e-4, 2e-4, 5e-4])
 TORSION = np.radians([0.5, 1.0, 2.0])
@@ -36,16 +36,16 @@ def fitted(model: Model) -> Result:
     return Result(model, names, Covariance(names, np.diag([(0.02 * model.values[name]) ** 2 for name in names])))
 
 
-def sweeps(model: Model, *data_sets: SweepData) -> Figure:
+def sweeps(model: Model, *data_sets: MeasuredSweep) -> Figure:
     return sweeps_figure(Result(model), sweeps_table(model, data_sets), "CMP 15 961")
 
 
-def loops(model: Model, *data_sets: LoopData) -> Figure:
+def loops(model: Model, *data_sets: MeasuredLoop) -> Figure:
     return loops_figure(Result(model), loops_table(model, data_sets), "CMP 15 961")
 
 
 def prediction(
-    result: Result, direction: Direction, *data_sets: SweepData, amplitudes: Array = AMPLITUDES, note: str = ""
+    result: Result, direction: Direction, *data_sets: MeasuredSweep, amplitudes: Array = AMPLITUDES, note: str = ""
 ) -> Figure:
     grid = predict(result, direction, FREQUENCIES, amplitudes)
     table = sweeps_table(result.model, data_sets) if data_sets else None
@@ -53,7 +53,11 @@ def prediction(
 
 
 def gap(
-    before: Model, after: Model, data_sets: Sequence[DataSet], corrected: Sequence[DataSet] = (), test: str = ""
+    before: Model,
+    after: Model,
+    data_sets: Sequence[MeasuredTest],
+    corrected: Sequence[MeasuredTest] = (),
+    test: str = "",
 ) -> Figure:
     """The gap of two models of the same tests, or of tests that are corrected in the second."""
     sides = [

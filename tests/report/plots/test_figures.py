@@ -34,7 +34,7 @@ from matplotlib.figure import Figure
 from stepped import stepped
 from tries import some
 
-from bushfit.fitting.data_sets import loop_data, sweep_data
+from bushfit.fitting.preparation import prepare_loops, prepare_sweeps
 from bushfit.geometry import Direction
 from bushfit.inspection.opening import inspect_file
 from bushfit.inspection.record import Inspection
@@ -274,10 +274,10 @@ def test_one_level_at_several_temperatures_is_a_curve_each(paper_model: Model) -
               stepped="frequency", temperature=273.15 + celsius)
         for celsius, factor in ((40.0, 1.0), (-10.0, 3.0), (20.0, 2.0))
     ]  # fmt: skip
-    figure = checked(sweeps(paper_model, *sweep_data(warm)))
+    figure = checked(sweeps(paper_model, *prepare_sweeps(warm)))
     names = ["-10 °C, 0.1 um", "20 °C, 0.1 um", "40 °C, 0.1 um"]
     assert legend(figure.axes[1]) == names
-    maps = checked(gap(paper_model, paper_model, sweep_data(warm)))
+    maps = checked(gap(paper_model, paper_model, prepare_sweeps(warm)))
     assert [tick.get_text() for tick in maps.axes[0].get_yticklabels()] == names
     stiffness = [line.get_ydata() for line in points(figure.axes[0])]
     assert np.array([np.mean(each) for each in stiffness]) == pytest.approx(np.array([3.0, 2.0, 1.0]) * abs(1e3 + 1e2j))
@@ -289,7 +289,9 @@ def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, .
     frequency, amplitude = (axis.ravel() for axis in np.meshgrid(frequencies, np.geomspace(2e-5, 1e-3, 15)))
     stiffness = paper_model.stiffness("axial", frequency, amplitude)
     stiffness = stiffness * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(frequency.size))
-    data_sets = sweep_data([Sweep("sweep.csv", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")])
+    data_sets = prepare_sweeps(
+        [Sweep("sweep.csv", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")]
+    )
     figure = checked(sweeps(paper_model, *data_sets))
     assert figure.axes[2].get_xlabel() == "amplitude [mm]"
     assert figure.axes[2].get_xscale() == "log"
@@ -302,7 +304,7 @@ def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, .
 @pytest.mark.parametrize("count", some([2, 40], {40}))
 def test_many_loops(paper_model: Model, looped: Looped, count: int) -> None:
     one = looped(paper_model, 1e-3, cycles=2).test
-    data_sets = loop_data(
+    data_sets = prepare_loops(
         [
             Loop(f"$ loop {k} $.csv", one.direction, one.time, scale * one.displacement, scale * one.force)
             for k, scale in enumerate(np.linspace(0.5, 2.0, count))

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.report.plots.batch import Panel, batch_figure
@@ -34,7 +34,7 @@ def heavier(paper_model: Model) -> Heavier:
 
 
 @pytest.fixture
-def campaign(heavier: Heavier, swept: Swept, looped: Looped) -> list[DataSet]:
+def campaign(heavier: Heavier, swept: Swept, looped: Looped) -> list[MeasuredTest]:
     """Two directions and two loops of a bushing with a mass that the paper's model lacks."""
     truth = heavier(0.1)
     return [swept(truth), swept(truth, Direction.RADIAL), looped(truth, 1e-3), looped(truth, 2e-3)]
@@ -59,7 +59,7 @@ def headings(figure: Figure) -> list[str]:
 
 
 def test_rows_are_directions_and_parts_columns_before_and_after(
-    paper_model: Model, heavier: Heavier, campaign: list[DataSet]
+    paper_model: Model, heavier: Heavier, campaign: list[MeasuredTest]
 ) -> None:
     figure = whole(gap(paper_model, heavier(0.1), campaign))
     assert names(figure) == ["axial storage", "axial loss", "radial storage", "radial loss", "axial loops [%]"]
@@ -76,7 +76,7 @@ def test_rows_are_directions_and_parts_columns_before_and_after(
 
 
 def test_one_symmetric_scale_and_cells_that_are_measured_minus_model_in_percent(
-    paper_model: Model, heavier: Heavier, campaign: list[DataSet], swept: Swept
+    paper_model: Model, heavier: Heavier, campaign: list[MeasuredTest], swept: Swept
 ) -> None:
     figure = gap(paper_model, heavier(0.1), campaign)
     coloured = [found for axes in maps(figure) for found in cells(axes)]

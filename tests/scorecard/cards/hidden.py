@@ -17,8 +17,8 @@ from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSetti
 from bushfit.diagnosis.evidence import fit
 from bushfit.effects import BASE, LIBRARY, Effect, get_effect, qualified_name
 from bushfit.effects.contract import Array
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
@@ -251,7 +251,7 @@ def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:
     return max(data_set.change(fitted, model) for data_set in data_sets)
 
 
-def _noise_free_data(model: Model, plan: SimulateSettings) -> list[DataSet]:
+def _noise_free_data(model: Model, plan: SimulateSettings) -> list[MeasuredTest]:
     """The plan's tests as the model's own closed form has them: used for the choice of a size, never as data."""
     swept = [(test.direction, *_points(test)) for test in plan.sweeps]
     sweeps = [
@@ -265,7 +265,7 @@ def _noise_free_data(model: Model, plan: SimulateSettings) -> list[DataSet]:
         for number, (test, motion) in enumerate(motions)
     ]
     campaign = Campaign("plan", Path("plan"), model.bushing, tuple(loops), tuple(sweeps))
-    data = Data.of(campaign)
+    data = PreparedCampaign.of(campaign)
     silent = [loop.noise_free(model).with_noise(3e-3) for loop in data.loops]
     return [*silent, *(sweep.noise_free(model) for sweep in data.sweeps)]
 

@@ -10,7 +10,7 @@ import numpy as np
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.fitting.common_error import ErrorProducts
-from bushfit.fitting.data_set import MeasuredTest, keep, kept, shown_amplitude
+from bushfit.fitting.measured_test import MeasuredBase, keep, kept, shown_amplitude
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import contradictions, outlying_points
 from bushfit.fitting.repeats import FLOOR, unit
@@ -72,10 +72,10 @@ class LineMisfit:
 
 
 @dataclass(frozen=True, eq=False)
-class SweepData(MeasuredTest):
+class MeasuredSweep(MeasuredBase):
     """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor.
 
-    What has no explanation here answers as in `LoopData`.
+    What has no explanation here answers as in `MeasuredLoop`.
 
     Points stand sorted by run (what it holds, repeat), then step; a run is a block. The residual
     ln K/K_meas has the gain error in its real and the phase error in its imaginary part.

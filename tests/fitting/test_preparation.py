@@ -12,9 +12,9 @@ import pytest
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, RigSettings
 from bushfit.errors import FitError
-from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data
 from bushfit.fitting.noise import SweepNoise
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, prepare_loops, prepare_sweeps
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.reading.measurement import Sweep
@@ -25,7 +25,7 @@ BLOCKS = {(1e-4, 1): 16, (1e-4, 2): 9, (5e-4, 1): 16}
 
 
 @pytest.fixture
-def sweep(paper_model: Model) -> SweepData:
+def sweep(paper_model: Model) -> MeasuredSweep:
     """Three blocks, one of them short, in scrambled order, exactly on the model."""
     amplitude = np.concatenate([np.full(n, x) for (x, _), n in BLOCKS.items()])
     repeat = np.concatenate([np.full(n, r) for (_, r), n in BLOCKS.items()])
@@ -35,16 +35,16 @@ def sweep(paper_model: Model) -> SweepData:
     stiffness = paper_model.stiffness("axial", frequency, amplitude)
     test = Sweep("sweep", Direction.AXIAL, frequency, amplitude, stiffness, repeat)
     levels = {("sweep", 1e-4): RANDOM, ("sweep", 5e-4): (1e-2, 2e-3)}
-    return SweepData(test, SweepNoise(levels, SHARED, "repeats", 6))
+    return MeasuredSweep(test, SweepNoise(levels, SHARED, "repeats", 6))
 
 
 @pytest.fixture
-def loop(rig: Rig) -> LoopData:
+def loop(rig: Rig) -> MeasuredLoop:
     """A loop of a rig whose gain is known: its rows are independent."""
-    return loop_data(rig(1).loops, RigSettings(gain_error=0.0))[0]
+    return prepare_loops(rig(1).loops, RigSettings(gain_error=0.0))[0]
 
 
-def covariance_of(sweep: SweepData) -> np.ndarray:
+def covariance_of(sweep: MeasuredSweep) -> np.ndarray:
     """Covariance of all gain, then all phase deviations, in the data set's order: random and shared by block."""
     repeat = sweep.repeat
     same = (sweep.amplitude[:, None] == sweep.amplitude) & (repeat[:, None] == repeat)
@@ -54,13 +54,13 @@ def covariance_of(sweep: SweepData) -> np.ndarray:
     return np.block([[halves[0], zero], [zero, halves[1]]])
 
 
-def test_whitening_gives_the_identity(sweep: SweepData) -> None:
+def test_whitening_gives_the_identity(sweep: MeasuredSweep) -> None:
     n = sweep.frequency.size
     whitening = sweep.whiten(np.concatenate([np.eye(n), 1j * np.eye(n)])).T
     np.testing.assert_allclose(whitening @ covariance_of(sweep) @ whitening.T, np.eye(2 * n), atol=1e-12)
 
 
-def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep: SweepData) -> None:
+def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep: MeasuredSweep) -> None:
     """Of whitened residuals, by each variance times its standard error: scatter, what runs and what levels share."""
     level, freedom = (3e-3, 2e-3), {"scatter": 20, "shared": 6, "level": 5}
     noise = replace(sweep.noise, level=level, scatter_freedom=20, level_freedom=5)
@@ -88,16 +88,16 @@ def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep: SweepData) 
         np.testing.assert_allclose(found, influence @ whitening @ whole @ whitening.T, atol=1e-9, err_msg=kind)
 
 
-def test_the_right_model_of_a_sweep_leaves_no_residual(sweep: SweepData, paper_model: Model) -> None:
+def test_the_right_model_of_a_sweep_leaves_no_residual(sweep: MeasuredSweep, paper_model: Model) -> None:
     assert np.max(np.abs(sweep.residual(paper_model))) < 1e-10
     assert np.max(sweep.relative(paper_model)) < 1e-12
 
 
 @pytest.mark.parametrize("kind", ["complex", "magnitude_loss_factor", "loop", "loop of correlated rows"])
-def test_the_jacobian_is_that_of_the_residual(rig: Rig, sweep: SweepData, paper_model: Model, kind: str) -> None:
-    data_set: DataSet
+def test_the_jacobian_is_that_of_the_residual(rig: Rig, sweep: MeasuredSweep, paper_model: Model, kind: str) -> None:
+    data_set: MeasuredTest
     if kind.startswith("loop"):
-        (data_set,) = loop_data(rig(1, force_correlation=0.98 if "correlated" in kind else 0.0).loops)
+        (data_set,) = prepare_loops(rig(1, force_correlation=0.98 if "correlated" in kind else 0.0).loops)
     else:
         data_set = replace(sweep, residuals=kind)  # type: ignore[arg-type]
     wrong = paper_model.with_values({"mu": 1.3e6, "alpha": 0.3, "sigma_fmax": 1e4, "eps_half": 3e-3})
@@ -109,7 +109,7 @@ def test_the_jacobian_is_that_of_the_residual(rig: Rig, sweep: SweepData, paper_
         np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
 
 
-def test_magnitude_and_loss_factor_are_what_they_say(sweep: SweepData, paper_model: Model) -> None:
+def test_magnitude_and_loss_factor_are_what_they_say(sweep: MeasuredSweep, paper_model: Model) -> None:
     stiffer = paper_model.with_values({"mu": 1.2e6})
     found, measured = sweep.stiffness(stiffer), sweep.measured
     deviation = replace(sweep, residuals="magnitude_loss_factor").deviation(stiffer)
@@ -118,7 +118,7 @@ def test_magnitude_and_loss_factor_are_what_they_say(sweep: SweepData, paper_mod
     np.testing.assert_allclose(deviation.imag, loss * (measured.real / np.abs(measured)) ** 2, atol=1e-12)
 
 
-def test_the_right_model_of_a_loop_leaves_noise_alone(loop: LoopData, paper_model: Model) -> None:
+def test_the_right_model_of_a_loop_leaves_noise_alone(loop: MeasuredLoop, paper_model: Model) -> None:
     residual, counted = loop.residual(paper_model), loop.drive.weight > 0.0
     assert residual.size == loop.size == loop.test.time.size
     assert loop.counted == np.count_nonzero(counted) > 0.99 * loop.size
@@ -131,7 +131,7 @@ def test_the_right_model_of_a_loop_leaves_noise_alone(loop: LoopData, paper_mode
     assert np.max(np.abs(loop.noise_free(paper_model).residual(paper_model))) < 1e-9
 
 
-def test_of_a_loop_that_stands_on_its_first_harmonic_no_other_departs(loop: LoopData, paper_model: Model) -> None:
+def test_of_a_loop_that_stands_on_its_first_harmonic_no_other_departs(loop: MeasuredLoop, paper_model: Model) -> None:
     """A model 3 % too stiff departs by 3 % in the slope, and in nothing that was left out."""
     fundamental = loop.fundamental()
     assert np.flatnonzero(np.linalg.norm(fundamental.contrasts(), axis=1)).tolist() == [1, 2]
@@ -139,7 +139,7 @@ def test_of_a_loop_that_stands_on_its_first_harmonic_no_other_departs(loop: Loop
     assert 0.005 < fundamental.smooth_misfit(stiffer) < 0.04
 
 
-def test_rows_without_weight_count_for_nothing_and_are_still_shown(loop: LoopData, paper_model: Model) -> None:
+def test_rows_without_weight_count_for_nothing_and_are_still_shown(loop: MeasuredLoop, paper_model: Model) -> None:
     light = loop.weighted(np.where(np.arange(loop.size) < 500, 0.0, 1.0))
     assert light.counted == np.count_nonzero(loop.drive.weight[500:])
     assert np.all(light.residual(paper_model)[:500] == 0.0)
@@ -151,7 +151,7 @@ def test_rows_without_weight_count_for_nothing_and_are_still_shown(loop: LoopDat
     np.testing.assert_allclose(quarter.residual(paper_model), 0.5 * loop.residual(paper_model), rtol=1e-12)
 
 
-def test_answers_to_the_same_model_are_kept_and_cannot_be_written_over(loop: LoopData, paper_model: Model) -> None:
+def test_answers_to_the_same_model_are_kept_and_cannot_be_written_over(loop: MeasuredLoop, paper_model: Model) -> None:
     found = loop.force(paper_model)
     assert np.array_equal(loop.force(paper_model.with_values({})), found)
     assert not np.array_equal(loop.force(paper_model.with_values({"mu": 2e6})), found)
@@ -169,7 +169,7 @@ def test_a_gain_error_of_the_rig_pulls_no_fit(rig: Rig, paper_model: Model) -> N
     """
     stated, asked = RigSettings(gain_error=5e-3), []
     for seed in range(8):
-        (loop,) = loop_data(rig(seed, force_noise=5e-3).loops, stated)
+        (loop,) = prepare_loops(rig(seed, force_noise=5e-3).loops, stated)
         residual, column = loop.residual(paper_model), loop.moved(loop.measured, paper_model)
         asked.append(-(column @ residual) / (column @ column))
     print("mean gain asked for, less 1:", np.mean(asked))
@@ -182,11 +182,11 @@ def test_repeats_of_a_loop_share_the_error_of_its_gain(campaign: Campaign) -> No
     (loop,) = campaign.loops
     faster = replace(loop, name="faster", time=loop.time / 2.0)
     again = [replace(loop, name=f"again_{number}", displacement=1.01 * loop.displacement) for number in range(3)]
-    found = Data.of(replace(campaign, loops=(loop, *again, faster), rig=RigSettings(gain_error=5e-3))).loops
+    found = PreparedCampaign.of(replace(campaign, loops=(loop, *again, faster), rig=RigSettings(gain_error=5e-3))).loops
     np.testing.assert_allclose([each.gain_error for each in found], [1e-2] * 4 + [5e-3])
 
 
-def test_only_tests_of_the_same_points_contradict_one_another(measured: Data) -> None:
+def test_only_tests_of_the_same_points_contradict_one_another(measured: PreparedCampaign) -> None:
     """Dense sweeps that follow one another do not, nor do tests at other temperatures; the same ones 15 % apart do."""
     sweep, frequency = measured.sweeps[0].sweep, np.geomspace(20.0, 200.0, 4000)
     low, high = (
@@ -198,27 +198,27 @@ def test_only_tests_of_the_same_points_contradict_one_another(measured: Data) ->
     loop = measured.loops[0].test
     hot = replace(loop, name="hot", force=1.15 * loop.force, temperature=313.15)
     for tests in ([low, high], [cold, warm]):
-        assert [one.contradiction for one in sweep_data(tests)] == [None, None]
-    assert [one.contradiction for one in loop_data([replace(loop, temperature=296.15), hot])] == [None, None]
-    for _, one in (sweep_data([sweep, other]), loop_data([loop, replace(hot, temperature=None)])):
+        assert [one.contradiction for one in prepare_sweeps(tests)] == [None, None]
+    assert [one.contradiction for one in prepare_loops([replace(loop, temperature=296.15), hot])] == [None, None]
+    for _, one in (prepare_sweeps([sweep, other]), prepare_loops([loop, replace(hot, temperature=None)])):
         assert one.contradiction is not None
         assert re.search(r"lies 1[5-7] % apart", one.contradiction)
 
 
-def test_dynamic_amplitudes_choose_the_levels(measured: Data) -> None:
+def test_dynamic_amplitudes_choose_the_levels(measured: PreparedCampaign) -> None:
     assert set(measured.smallest_sweep.amplitude) == {1e-4}
     other = replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(2e-4, 5e-4)))
-    assert set(Data.of(other).smallest_sweep.amplitude) == {2e-4, 5e-4}
-    absent = Data.of(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
+    assert set(PreparedCampaign.of(other).smallest_sweep.amplitude) == {2e-4, 5e-4}
+    absent = PreparedCampaign.of(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
     with pytest.raises(FitError, match="no sweep at these amplitudes"):
         _ = absent.smallest_sweep
 
 
-def test_a_direction_without_tests_is_refused_with_those_there_are(measured: Data) -> None:
+def test_a_direction_without_tests_is_refused_with_those_there_are(measured: PreparedCampaign) -> None:
     with pytest.raises(FitError, match=r"no test in the directions[\s\S]*axial, radial[\s\S]*torsion"):
         measured.chosen([Direction.TORSION])
     with pytest.raises(FitError, match="there is nothing to fit"):
-        Data.of(replace(measured.campaign, loops=(), sweeps=())).chosen(None)
+        PreparedCampaign.of(replace(measured.campaign, loops=(), sweeps=())).chosen(None)
 
 
 def test_magnitudes_in_coarse_steps_are_told(campaign: Campaign) -> None:
@@ -226,6 +226,6 @@ def test_magnitudes_in_coarse_steps_are_told(campaign: Campaign) -> None:
     sweep = campaign.sweeps[0]
     size, turn = np.abs(sweep.stiffness), sweep.stiffness / np.abs(sweep.stiffness)
     for step, told in ((5e4, True), (50.0, False)):
-        (data_set,) = sweep_data([replace(sweep, stiffness=np.round(size / step) * step * turn)])
+        (data_set,) = prepare_sweeps([replace(sweep, stiffness=np.round(size / step) * step * turn)])
         lines = [note for note in data_set.notes if "are rounded" in note]
         assert bool(lines) == told

@@ -15,8 +15,15 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError, error_location
 from bushfit.fitting.assess import mixed_conditions, refuse_strain
 from bushfit.fitting.coordinates import Bounds, residual
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data, with_level_errors
 from bushfit.fitting.design import designed
+from bushfit.fitting.preparation import (
+    MeasuredLoop,
+    MeasuredSweep,
+    MeasuredTest,
+    prepare_loops,
+    prepare_sweeps,
+    with_level_errors,
+)
 from bushfit.fitting.rig_class import class_words
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, Specimen, get_place
@@ -27,20 +34,20 @@ from bushfit.reading.measurement import Sweep
 #: Difference of two amplitudes relative to their size up to which they are the same level.
 _SAME_LEVEL = 1e-3
 
-_Kind = TypeVar("_Kind", LoopData, SweepData, LoopData | SweepData)
+_Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep, MeasuredLoop | MeasuredSweep)
 
 
 @dataclass(frozen=True, eq=False)
-class Data:
+class PreparedCampaign:
     """A campaign made ready to fit: one data set per loop and per sweep, and the limits that [fit] gives parameters."""
 
     campaign: Campaign
-    loops: tuple[LoopData, ...]
-    sweeps: tuple[SweepData, ...]
+    loops: tuple[MeasuredLoop, ...]
+    sweeps: tuple[MeasuredSweep, ...]
     bounds: Bounds = field(default_factory=dict)
 
     @classmethod
-    def of(cls, campaign: Campaign) -> "Data":
+    def of(cls, campaign: Campaign) -> "PreparedCampaign":
         """The data sets of a campaign as its [fit] asks for them.
 
         Raises:
@@ -51,22 +58,22 @@ class Data:
             Model.with_defaults(None, with_base(campaign.fit.effects), {})
         data = cls(
             campaign,
-            tuple(loop_data(campaign.loops, campaign.rig, without_outliers=campaign.fit.loss != "linear")),
-            tuple(sweep_data(campaign.sweeps, campaign.fit.residuals, campaign.rig)),
+            tuple(prepare_loops(campaign.loops, campaign.rig, without_outliers=campaign.fit.loss != "linear")),
+            tuple(prepare_sweeps(campaign.sweeps, campaign.fit.residuals, campaign.rig)),
             {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
         )
         with error_location(campaign.path):
             refuse_strain(campaign.bushing, data.data_sets)
         return data.in_session()
 
-    def in_session(self) -> "Data":
+    def in_session(self) -> "PreparedCampaign":
         """Data whose points know what they were measured under."""
         under = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
         loops = tuple(replace(loop, under=next(under).select(0)) for loop in self.loops)
         return replace(self, loops=loops, sweeps=tuple(replace(sweep, under=next(under)) for sweep in self.sweeps))
 
     @property
-    def data_sets(self) -> list[DataSet]:
+    def data_sets(self) -> list[MeasuredTest]:
         """All tests, loops first."""
         return [*self.loops, *self.sweeps]
 
@@ -97,7 +104,7 @@ class Data:
             raise FitError(message, file=self.campaign.path, found=found, hint=hint)
         return tests
 
-    def without(self, outliers: Sequence[Outlier]) -> "Data":
+    def without(self, outliers: Sequence[Outlier]) -> "PreparedCampaign":
         """Data without weight on these outliers of the sweeps; those of loops have none where `robust`."""
         sweeps = []
         for data_set in self.sweeps:
@@ -105,10 +112,10 @@ class Data:
             sweeps.append(data_set.without(np.flatnonzero(np.isin(data_set.order, rows))))
         return replace(self, sweeps=tuple(sweeps))
 
-    def with_sweeps(self, sweeps: Sequence[Sweep]) -> "Data":
+    def with_sweeps(self, sweeps: Sequence[Sweep]) -> "PreparedCampaign":
         """Data with its sweeps read anew, row by row: noise is estimated again, rows left out stay so."""
         fit, new = self.campaign.fit, []
-        for old, data_set in zip(self.sweeps, sweep_data(sweeps, fit.residuals, self.campaign.rig), strict=True):
+        for old, data_set in zip(self.sweeps, prepare_sweeps(sweeps, fit.residuals, self.campaign.rig), strict=True):
             rows = old.order[old.weights == 0.0]
             new.append(data_set.without(np.flatnonzero(np.isin(data_set.order, rows))))
         noise = self.sweeps[0].noise
@@ -120,12 +127,12 @@ class Data:
         settings = self.campaign.fit.parameters
         return {name: setting.value for name, setting in settings.items() if setting.value is not None}
 
-    def start(self, data_sets: Sequence[DataSet], held: Mapping[str, float]) -> dict[str, float]:
+    def start(self, data_sets: Sequence[MeasuredTest], held: Mapping[str, float]) -> dict[str, float]:
         """Values of the paper's parameters, and what the campaign gives, to start a fit of some tests from."""
         with error_location(self.campaign.path):
             return start_values(self.campaign.bushing, data_sets, {**self.given, **held})
 
-    def started(self, effects: Sequence[str], data_sets: Sequence[DataSet], held: Mapping[str, float]) -> Model:
+    def started(self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], held: Mapping[str, float]) -> Model:
         """A model to fit to some tests: with the values that the campaign gives to start from, or, where those meet the
         tests worse, with what is read off them."""
         fixed = {name: value for name, value in self.given.items() if not self.free((name,))}
@@ -156,7 +163,7 @@ class Data:
         """The model that [fit] asks for: the paper's three branches and the effects that it adds."""
         return with_base(self.campaign.fit.effects)
 
-    def chosen(self, places: Sequence[str] | None) -> list[DataSet]:
+    def chosen(self, places: Sequence[str] | None) -> list[MeasuredTest]:
         """Data sets of the places of these names; by default the axial ones, as in the paper, and the specimens'.
 
         Where no loop of the bushing is axial, all loops are taken by default, and so with sweeps.
@@ -181,13 +188,13 @@ class Data:
             )
         return chosen
 
-    def static_loops(self) -> list[LoopData]:
+    def static_loops(self) -> list[MeasuredLoop]:
         """The loops `fit-static` uses: the axial ones, else those of the bushing, else all."""
         hint = "add a quasi-static loop, or run bushfit fit for the sweeps alone"
         return [*_first(self.some(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))]
 
     @cached_property
-    def smallest_sweep(self) -> SweepData:
+    def smallest_sweep(self) -> MeasuredSweep:
         """The sweep levels `fit-dynamic` uses: those the campaign names, else the smallest axial one.
 
         Sweeps of the frequency go first, then those of the bushing. Of a sweep of the amplitude it takes the smallest
@@ -217,7 +224,7 @@ class Data:
         )
 
 
-def _misfit(model: Model, data_sets: Sequence[DataSet]) -> float:
+def _misfit(model: Model, data_sets: Sequence[MeasuredTest]) -> float:
     """chi-square; infinite where there is no response."""
     with suppress(ModelError), np.errstate(all="ignore"):
         chi_square = float(np.sum(np.square(residual(model, data_sets))))
@@ -238,7 +245,7 @@ def _first(data_sets: Sequence[_Kind]) -> Sequence[_Kind]:
     return axial or [each for each in data_sets if not isinstance(each.direction, Specimen)] or data_sets
 
 
-def _smallest(sweep: SweepData) -> Array:
+def _smallest(sweep: MeasuredSweep) -> Array:
     """Amplitudes of a sweep's smallest level, or the smallest at each frequency, or all, by what is stepped, (k,)."""
     if sweep.test.stepped == "frequency":
         return sweep.amplitude.min(keepdims=True)

@@ -13,12 +13,12 @@ from bushfit.model.model import Kind, Model
 from bushfit.reading.measurement import Loop, Source, Sweep
 
 
-class MeasuredTest(ABC):
-    """One measured test with its noise; `data_sets.DataSet` is either of its kinds, a loop or a sweep.
+class MeasuredBase(ABC):
+    """One measured test with its noise; `preparation.MeasuredTest` is either of its kinds, a loop or a sweep.
 
-    Fits, quality figures, pictures and the diagnosis ask both kinds the same questions, which `LoopData` explains. A
-    whitened residual is model less measured in units of noise; residuals are independent with unit variance where the
-    model is right. Of n points a loop has n residuals, a sweep 2 n: all gains, then all phases.
+    Fits, quality figures, pictures and the diagnosis use both kinds in the same way; `MeasuredLoop` documents the
+    methods. A whitened residual is model less measured in units of noise; residuals are independent with unit variance
+    if the model is right. A loop of n points has n residuals, a sweep 2 n: all gains, then all phases.
 
     Args:
         kind: whether it is a loop or a sweep.
@@ -87,7 +87,7 @@ def kept(answer: Callable[..., Array]) -> Callable[..., Array]:
     return asked
 
 
-def keep(data_set: MeasuredTest, answer: str, model: Model, found: Array) -> None:
+def keep(data_set: MeasuredBase, answer: str, model: Model, found: Array) -> None:
     """Let a data set know an answer to a model that came with another one; `answer` is a method that is `kept`."""
     data_set.__dict__[f"_last_{answer}"] = model, (), found
     found.flags.writeable = False

@@ -10,18 +10,18 @@ import numpy as np
 from bushfit.campaign.schema import UNSTATED, Residuals, RigSettings
 from bushfit.effects.contract import Array
 from bushfit.fitting.drive import Drive, drive_of
-from bushfit.fitting.loop_data import LoopData
+from bushfit.fitting.measured_loop import MeasuredLoop
+from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.fitting.outliers import contradictions
 from bushfit.fitting.rig_class import of_class
-from bushfit.fitting.sweep_data import SweepData
 from bushfit.geometry import Bushing, Place, Specimen, unit_strain
 from bushfit.model.model import Model
 from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.units import number
 
-__all__ = ["DataSet", "LoopData", "SweepData", "loop_data", "parted", "sources", "sweep_data"]
+__all__ = ["MeasuredLoop", "MeasuredSweep", "MeasuredTest", "parted", "prepare_loops", "prepare_sweeps", "sources"]
 
 #: Relative difference of two loops' amplitudes, or frequencies, up to which one repeats the other; chosen: rigs come
 #: back to an amplitude within it.
@@ -29,22 +29,22 @@ _SAME_LOOP = 0.02
 #: Step in temperature up to which tests count as made at one [K].
 _SAME_KELVIN = 1.0
 
-#: One measured test with its noise, see `data_set.MeasuredTest`.
-DataSet = LoopData | SweepData
+#: One measured test with its noise, see `data_set.MeasuredBase`.
+MeasuredTest = MeasuredLoop | MeasuredSweep
 
-_Kind = TypeVar("_Kind", LoopData, SweepData)
+_Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep)
 
 
-def loop_data(
+def prepare_loops(
     loops: Sequence[Loop], stated: RigSettings = UNSTATED, *, without_outliers: bool = False
-) -> list[LoopData]:
+) -> list[MeasuredLoop]:
     """One data set per loop; rows that are outliers carry no weight where they are to be left out."""
     drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
-    found = [LoopData(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
+    found = [MeasuredLoop(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
     return with_gain_errors(with_contradictions(found, [_first_alike(found)]), stated)
 
 
-def with_gain_errors(loops: Sequence[LoopData], stated: RigSettings) -> list[LoopData]:
+def with_gain_errors(loops: Sequence[MeasuredLoop], stated: RigSettings) -> list[MeasuredLoop]:
     """Loops with the gain error that a rig of the class makes, stated or assumed.
 
     Notes:
@@ -58,39 +58,39 @@ def with_gain_errors(loops: Sequence[LoopData], stated: RigSettings) -> list[Loo
     ]
 
 
-def with_gains(data_sets: Iterable[DataSet], *, weigh: bool) -> list[DataSet]:
+def with_gains(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
     """Tests whose loops' gain errors are part of their noise, or not."""
-    return [replace(each, gain_weighs=weigh) if isinstance(each, LoopData) else each for each in data_sets]
+    return [replace(each, gain_weighs=weigh) if isinstance(each, MeasuredLoop) else each for each in data_sets]
 
 
-def repeats_of(loops: Sequence[LoopData]) -> Array:
+def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
     """Mask of the loops that repeat one another, themselves among them, (n, n)."""
     at = np.log([(loop.drive.amplitude, loop.drive.frequency) for loop in loops]).reshape(-1, 2)
     place = np.array([str(loop.direction) for loop in loops])
     return np.all(np.abs(at[:, None] - at) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
 
 
-def _first_alike(loops: Sequence[LoopData]) -> Array:
+def _first_alike(loops: Sequence[MeasuredLoop]) -> Array:
     """The number of the first loop that each repeats, (n,)."""
     return np.argmax(repeats_of(loops), axis=1) if loops else np.empty(0, dtype=np.intp)
 
 
-def alike(loops: Sequence[LoopData]) -> list[list[LoopData]]:
+def alike(loops: Sequence[MeasuredLoop]) -> list[list[MeasuredLoop]]:
     """Loops in groups that repeat one another; each is in one, that of the first that it repeats."""
     first = _first_alike(loops)
     return [[loops[place] for place in np.flatnonzero(first == lead).tolist()] for lead in np.unique(first).tolist()]
 
 
-def sweep_data(
+def prepare_sweeps(
     sweeps: Sequence[Sweep], residuals: Residuals = "complex", stated: RigSettings = UNSTATED
-) -> list[SweepData]:
+) -> list[MeasuredSweep]:
     """One data set per sweep; the noise of those of one rig, the bushing's or a specimen's, is estimated together."""
     rigs = [sweep.direction if isinstance(sweep.direction, Specimen) else None for sweep in sweeps]
     noises = {
         rig: sweep_noise([sweep for sweep, own in zip(sweeps, rigs, strict=True) if own == rig], stated)
         for rig in dict.fromkeys(rigs)
     }
-    data_sets = [SweepData(sweep, noises[rig], residuals) for sweep, rig in zip(sweeps, rigs, strict=True)]
+    data_sets = [MeasuredSweep(sweep, noises[rig], residuals) for sweep, rig in zip(sweeps, rigs, strict=True)]
     found = [data_set.weighted(np.array(data_set.sweep.weight)) for data_set in data_sets]
     names = [str(one.direction) for one in found]
     places = [np.full(one.measured.size, names.index(name)) for one, name in zip(found, names, strict=True)]
@@ -124,7 +124,9 @@ def _sessions(temperature: Array) -> Array:
     return groups
 
 
-def with_level_errors(sweeps: Sequence[SweepData], error: tuple[float, float], freedom: int) -> tuple[SweepData, ...]:
+def with_level_errors(
+    sweeps: Sequence[MeasuredSweep], error: tuple[float, float], freedom: int
+) -> tuple[MeasuredSweep, ...]:
     """Sweeps with gain and phase errors [rad] that all runs of a level share, known by so many degrees of freedom; 0
     where they count as exact.
     """
@@ -132,34 +134,34 @@ def with_level_errors(sweeps: Sequence[SweepData], error: tuple[float, float], f
     return tuple(replace(sweep, noise=noises[id(sweep.noise)]) for sweep in sweeps)
 
 
-def parted(data_sets: Iterable[DataSet]) -> tuple[list[LoopData], list[SweepData]]:
+def parted(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop], list[MeasuredSweep]]:
     """The loops and the sweeps among some data sets, for what is said of all of a kind together."""
     every = list(data_sets)
-    loops = [data_set for data_set in every if isinstance(data_set, LoopData)]
-    return loops, [data_set for data_set in every if isinstance(data_set, SweepData)]
+    loops = [data_set for data_set in every if isinstance(data_set, MeasuredLoop)]
+    return loops, [data_set for data_set in every if isinstance(data_set, MeasuredSweep)]
 
 
-def rows_of(data_sets: Iterable[DataSet]) -> list[slice]:
+def rows_of(data_sets: Iterable[MeasuredTest]) -> list[slice]:
     """Slices of the residuals of each data set among those of all."""
     ends = accumulate((data_set.size for data_set in data_sets), initial=0)
     return [slice(*pair) for pair in pairwise(ends)]
 
 
-def reached(bushing: Bushing | None, data_sets: Iterable[DataSet]) -> tuple[Array, Array]:
+def reached(bushing: Bushing | None, data_sets: Iterable[MeasuredTest]) -> tuple[Array, Array]:
     """Frequencies [Hz] and equivalent strains of all operating points, loops included, (n,) each."""
     every = list(data_sets)
     strains = [data_set.amplitude * unit_strain(bushing, data_set.direction) for data_set in every]
     return np.concatenate([data_set.frequency for data_set in every]), np.concatenate(strains)
 
 
-def log_slopes(model: Model, data_set: DataSet, names: Sequence[str]) -> Array:
+def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Array:
     """Derivatives of ln K of a model at the operating points of a test by parameter, complex (len(names), n)."""
     test = data_set.direction, data_set.frequency, data_set.amplitude
     stiffness, slopes = stiffness_and_slopes(model, *test, names, data_set.kind, data_set.circumstances)
     return slopes / stiffness
 
 
-def sources(data_sets: Iterable[DataSet]) -> tuple[Source, ...]:
+def sources(data_sets: Iterable[MeasuredTest]) -> tuple[Source, ...]:
     """The files that data sets came from, each once: a record may hold several loops."""
     found = [data_set.source for data_set in data_sets if data_set.source is not None]
     return tuple(source for place, source in enumerate(found) if source not in found[:place])
@@ -175,7 +177,7 @@ def new_loop(
     cycles: float = 1.0,
     rows: int,
     from_rest: bool = False,
-) -> LoopData:
+) -> MeasuredLoop:
     """A sinusoidal loop of so many rows in all.
 
     Args:
@@ -197,7 +199,7 @@ def new_loop(
         coefficients=np.array([0.0, -1j * amplitude]),
         half_range=1.0,
     )
-    return LoopData(silent).noise_free(model).with_noise(noise)
+    return MeasuredLoop(silent).noise_free(model).with_noise(noise)
 
 
 def new_sweep(
@@ -207,11 +209,11 @@ def new_sweep(
     amplitude: Array,
     scatter: tuple[float, float],
     shared: tuple[float, float],
-) -> SweepData:
+) -> MeasuredSweep:
     """A sweep at operating points [Hz, m or rad], (n,) each, a run for each amplitude.
 
     Args:
         scatter, shared: standard deviations of gain and phase, from point to point and of a run.
     """
     noise = SweepNoise({("new", float(x)): scatter for x in np.unique(amplitude)}, shared, "stated", 0)
-    return SweepData(Sweep("new", place, frequency, amplitude, model.stiffness(place, frequency, amplitude)), noise)
+    return MeasuredSweep(Sweep("new", place, frequency, amplitude, model.stiffness(place, frequency, amplitude)), noise)

@@ -10,8 +10,8 @@ import numpy as np
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.effects.history import History
 from bushfit.fitting.common_error import CommonError, ErrorProducts
-from bushfit.fitting.data_set import MeasuredTest, keep, kept
 from bushfit.fitting.drive import Drive
+from bushfit.fitting.measured_test import MeasuredBase, keep, kept
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
@@ -34,7 +34,7 @@ def smooth_waves(phase: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class LoopData(MeasuredTest):
+class MeasuredLoop(MeasuredBase):
     """Force over the rows of a loop.
 
     Rows that are left out carry no weight from the start, see `drive_of`, and stay: the others need them to keep time.
