@@ -207,7 +207,7 @@ def read_limits(path: Path) -> Limits:
     Raises:
         CampaignError: keys or values that are not understood, or no limit at all.
     """
-    limits = read_toml(path, Limits, what="a limits file")
+    limits = read_toml(path, Limits, description="a limits file")
     if not (limits.bounds or limits.verdicts):
         raise CampaignError("there is no limit in it", file=path, expected='such as [parameters.mu] with max = "2 MPa"')
     return limits

@@ -203,7 +203,7 @@ def _exists(path: Path) -> bool:
 def _read_toml_manifest(path: Path) -> ManifestFile:
     """Read a TOML manifest; a campaign in its place is a batch of one."""
     try:
-        return read_toml(path, ManifestFile, what="a manifest", largest=_LARGEST_MANIFEST)
+        return read_toml(path, ManifestFile, description="a manifest", largest=_LARGEST_MANIFEST)
     except CampaignError as error:
         if error.found not in ('"bushing"', '"specimens"'):
             raise

@@ -64,7 +64,13 @@ class Campaign:
 
 
 def load_campaign(path: str | Path) -> Campaign:
-    """Read a campaign file and the measurements that it names, each once; a record of several loops gives each.
+    """Read a campaign file and the measurements that it names.
+
+    Args:
+        path: TOML file of the campaign.
+
+    Returns:
+        Campaign in SI; a record of several loops is split, and copies of a test count once.
 
     Raises:
         CampaignError: the file is missing, no TOML, or has keys or values that are not understood.
@@ -95,10 +101,13 @@ def load_campaign(path: str | Path) -> Campaign:
     found: dict[str, Any] = {
         **{"name": content.name or (bushing or specimens[0]).name, "bushing": bushing, "specimens": specimens},
         "loops": tuple(
-            without_copied_tests([loop for each in loops for loop in programme(read_loop(**each), each["test"])])
+            without_copied_tests(
+                [loop for keywords in loops for loop in programme(read_loop(**keywords), keywords["test"])]
+            )
         ),
         "sweeps": tuple(
-            without_copied_repeats(sweep) for sweep in without_copied_tests([read_sweep(**each) for each in sweeps])
+            without_copied_repeats(sweep)
+            for sweep in without_copied_tests([read_sweep(**keywords) for keywords in sweeps])
         ),
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "logo": logo,
@@ -122,7 +131,7 @@ def load_bushing(path: Path) -> Bushing:
 
 
 def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
-    """Raise a CampaignError where there is no body or two have one name, a ModelError where a place is none of them."""
+    """Refuse a campaign without a body, two specimens of one name, and names of unknown directions or specimens."""
     names = [specimen.name for specimen in specimens]
     if not (content.bushing or names):
         expected = "[bushing] with its name, radii and length, or [[specimens]]"
@@ -133,15 +142,21 @@ def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
         for name in content.predict.directions or ():
             get_place(name, specimens)
     simulated = content.simulate.effects if content.simulate else {}
-    own = [f"{effect}.{name}" for effect, table in simulated.items() for name in table]
-    for name in (*content.fit.effects, *content.fit.parameters, *own):
+    simulated_names = [f"{effect}.{name}" for effect, table in simulated.items() for name in table]
+    for name in (*content.fit.effects, *content.fit.parameters, *simulated_names):
         if place := place_suffix(name):
             with error_location(place=name):
                 get_place(place, specimens)
 
 
 def model_of(campaign: Campaign) -> Model:
-    """The model that a campaign's [simulate] table describes.
+    """Build the model that a campaign's [simulate] table describes.
+
+    Args:
+        campaign: campaign with a [simulate] table.
+
+    Returns:
+        Model with the parameters of that table.
 
     Raises:
         CampaignError: no such table, or a parameter of the paper's five that has no value.
@@ -165,11 +180,13 @@ def model_of(campaign: Campaign) -> Model:
             expected="all of " + ", ".join(FIVE),
         )
     effects = campaign.simulate.effects
-    own = {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
+    effect_parameters = {
+        f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()
+    }
     with error_location(campaign.path):
-        names = with_base(dict.fromkeys(map(effect_name_of, own)))
-        kept = {name: value for name, value in values.items() if effect_name_of(name) in names}
-        return Model(campaign.bushing, names, {**kept, **own})
+        names = with_base(dict.fromkeys(map(effect_name_of, effect_parameters)))
+        used = {name: value for name, value in values.items() if effect_name_of(name) in names}
+        return Model(campaign.bushing, names, {**used, **effect_parameters})
 
 
 def refuse_tests(paths: Sequence[Path]) -> None:
@@ -191,22 +208,30 @@ def refuse_tests(paths: Sequence[Path]) -> None:
 def reader_keywords(
     campaign: Path, tests: Sequence[LoopFile | SweepFile], specimens: Sequence[Specimen] = ()
 ) -> Iterator[dict[str, Any]]:
-    """The keywords of `read_loop` or `read_sweep` for each test of a campaign.
+    """Keywords of `read_loop` or `read_sweep` for the tests of a campaign.
 
-    A test is named by the stem of its file; where two files have one stem, by the file as the campaign lists it. Tests
-    of one file are told apart by its sheet, by temperature, or by rows of which columns tell them.
+    The name of a test is the stem of its file, or the file as the campaign lists it if two files have one stem. Tests
+    of one file have its sheet, temperature, direction, specimen number and selected rows in their names.
+
+    Args:
+        campaign: campaign file.
+        tests: [[loops]] or [[sweeps]] tables.
+        specimens: specimens of the campaign.
+
+    Yields:
+        Keywords of one test, in order.
 
     Raises:
         CampaignError: a test that is listed twice, or one of no body.
     """
-    seen = set()
+    listed_tests = set()
     places = [(os.path.normpath(campaign.parent / test.file), test.sheet, test.temperature) for test in tests]
     for test, place, name in zip(tests, places, _test_names(tests), strict=True):
-        if (own := (*place, test.direction, test.specimen_number, *test.rows.items())) in seen:
+        if (identity := (*place, test.direction, test.specimen_number, *test.rows.items())) in listed_tests:
             raise CampaignError(
                 "a file is listed twice", file=campaign, found=test.file, expected="each file once, or each sheet of it"
             )
-        seen.add(own)
+        listed_tests.add(identity)
         keywords: dict[str, Any] = {
             "file": campaign.parent / test.file,
             "test": test,
@@ -216,21 +241,27 @@ def reader_keywords(
         with error_location(campaign, place=test.file):
             keywords["direction"] = body = place_tested(test.specimen, test.direction, specimens)
             if isinstance(test, SweepFile) and (amplitude := test.at_amplitude):
-                keywords["at_amplitude"] = held = parse_quantity(amplitude, body.motion.displacement_unit)
-                if held <= 0.0:
+                keywords["at_amplitude"] = level = parse_quantity(amplitude, body.motion.displacement_unit)
+                if level <= 0.0:
                     raise CampaignError("at_amplitude is not positive", found=f'"{amplitude}"', expected="above zero")
         yield keywords
 
 
 def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
-    """A name of its own for each test."""
+    """Unique names of tests, in order."""
     files, stems = Counter(test.file for test in tests), Counter(Path(test.file).stem for test in tests)
     names = []
     for test in tests:
         stem = Path(test.file).stem
-        at = None if test.temperature is None else f"{test.temperature - CELSIUS:.4g} degC"
-        others = [other for other in tests if other.file == test.file] if files[test.file] > 1 else []
-        keys = [key for key in ("direction", "specimen_number") if len({getattr(one, key) for one in others}) > 1]
-        parts = (stem, test.sheet, at, *(getattr(test, key) for key in keys), *test.rows.values())
-        names.append(" ".join(filter(None, parts)) if others else test.file if stems[stem] > 1 else stem)
+        temperature = None if test.temperature is None else f"{test.temperature - CELSIUS:.4g} degC"
+        tests_of_file = (
+            [candidate for candidate in tests if candidate.file == test.file] if files[test.file] > 1 else []
+        )
+        keys = [
+            key
+            for key in ("direction", "specimen_number")
+            if len({getattr(candidate, key) for candidate in tests_of_file}) > 1
+        ]
+        parts = (stem, test.sheet, temperature, *(getattr(test, key) for key in keys), *test.rows.values())
+        names.append(" ".join(filter(None, parts)) if tests_of_file else test.file if stems[stem] > 1 else stem)
     return names

@@ -18,41 +18,56 @@ _DIGITS = 9
 _Test = TypeVar("_Test", Loop, Sweep)
 
 
-def without_copied_tests(tests: Sequence[_Test]) -> list[_Test]:
-    """Leave out tests whose numbers are those of an earlier test in the same direction, or of the same specimen.
+def group_copies(tests: Sequence[_Test]) -> list[list[_Test]]:
+    """Group tests whose numbers are identical, in the same direction or of the same specimen.
 
-    Two measurements never agree in all digits. A copy holds no information, so the fit must not count it again.
+    Two measurements never agree in all digits. Sweeps of fewer than five points may, and are never grouped.
+
+    Args:
+        tests: loops, or sweeps, in order.
+
+    Returns:
+        Groups in the order of their first test; a test without copies is a group by itself.
+    """
+    groups: defaultdict[object, list[_Test]] = defaultdict(list)
+    for number, test in enumerate(tests):
+        is_short = isinstance(test, Sweep) and test.frequency.size < _FEWEST_POINTS
+        groups[test.direction, number if is_short else _numbers(test)].append(test)
+    return list(groups.values())
+
+
+def without_copied_tests(tests: Sequence[_Test]) -> list[_Test]:
+    """Leave out tests that are copies of an earlier test. A copy holds no information, so the fit counts it once.
 
     Args:
         tests: loops, or sweeps, of a campaign in its order.
 
     Returns:
-        The tests that remain, each with a note that names its copies.
+        The remaining tests, each with a note that names its copies.
     """
-    copies: defaultdict[object, list[_Test]] = defaultdict(list)
-    for number, test in enumerate(tests):
-        is_short = isinstance(test, Sweep) and test.frequency.size < _FEWEST_POINTS
-        copies[test.direction, number if is_short else _numbers(test)].append(test)
     return [
-        _with_note(same[0], f"the same data are in {_listed([_file(copy) for copy in same[1:]])}: counted once")
-        if len(same) > 1
-        else same[0]
-        for same in copies.values()
+        _with_note(first, f"the same data are in {_listed([_file(copy) for copy in copies])}: counted once")
+        if copies
+        else first
+        for first, *copies in group_copies(tests)
     ]
 
 
 def without_copied_repeats(sweep: Sweep) -> Sweep:
     """Leave out the runs of a sweep that repeat an earlier run of the same level, or frequency, in all digits.
 
+    Args:
+        sweep: sweep of a campaign.
+
     Returns:
-        The sweep itself where there is none; else the rows that remain, with a note that names the repeats.
+        The remaining rows, with a note that names the copied repeats; the sweep itself without copies.
     """
     runs: set[bytes] = set()
     is_copy = np.zeros(sweep.frequency.size, dtype=bool)
     repeats: list[int] = []
     for repeat in np.unique(sweep.repeat).tolist():
-        for held in np.unique(sweep.held[sweep.repeat == repeat]).tolist():
-            rows = (sweep.repeat == repeat) & (sweep.held == held)
+        for level in np.unique(sweep.held[sweep.repeat == repeat]).tolist():
+            rows = (sweep.repeat == repeat) & (sweep.held == level)
             numbers = _digits(sweep, rows)
             if numbers in runs:
                 is_copy |= rows
@@ -61,14 +76,14 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
     points = int(np.count_nonzero(is_copy))
     if sweep.stepped is None or points < _FEWEST_POINTS:
         return sweep
-    kept = ~is_copy
+    remaining = ~is_copy
     names = ("frequency", "amplitude", "stiffness", "repeat", "reached", "relative_error", "temperature")
     columns = {name: getattr(sweep, name) for name in names}
-    columns = {name: values[kept] for name, values in columns.items() if isinstance(values, np.ndarray)}
-    which = _listed([f"{repeat}" for repeat in dict.fromkeys(repeats)])
+    columns = {name: values[remaining] for name, values in columns.items() if isinstance(values, np.ndarray)}
+    listed = _listed([f"{repeat}" for repeat in dict.fromkeys(repeats)])
     one = len(set(repeats)) == 1
     note = (
-        f"{points} points of repeat{'' if one else 's'} {which} are those of an earlier repeat in all digits: counted "
+        f"{points} points of repeat{'' if one else 's'} {listed} are those of an earlier repeat in all digits: counted "
         "once, and data rows are numbered without them"
     )
     return _with_note(replace(sweep, **columns), note)

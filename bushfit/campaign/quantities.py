@@ -1,4 +1,4 @@
-"""What only a campaign file states: model parameters by name; [compound], of an untested rubber; [report], its head."""
+"""Quantities of a campaign file: model parameters, the [compound] of an untested rubber, and [report]."""
 
 import base64
 import re
@@ -30,19 +30,29 @@ _PNG, _SVG, _HEAD = b"\x89PNG\r\n\x1a\n", b"<svg", 4096
 
 
 def parameter_value(place: str, name: str, raw: Any) -> float:
-    """The SI value of a model parameter by its name in files; an error names the place.
+    """Convert the value of a model parameter to SI. Ratios, and parameters of added effects, may be plain numbers.
 
-    Ratios, and parameters of added effects, may be plain numbers.
+    Args:
+        place: key of the value in the file, which errors name.
+        name: name of the parameter.
+        raw: text with a unit, or number.
+
+    Returns:
+        Value in SI.
+
+    Raises:
+        UnitError: a unit that is missing or does not fit.
+        CampaignError: an unknown parameter.
     """
     with error_location(place=place):
         if not is_parameter(name):
             raise unknown_key(name, parameter_names())
-        stated = get_parameter(name).unit
-        unit = _S_TO_ALPHA.sub("", stated)
+        file_unit = get_parameter(name).unit
+        unit = _S_TO_ALPHA.sub("", file_unit)
         is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
         if is_number and (unit == "1" or "." in name) and abs(raw) <= LARGEST_NUMBER:
             return check_size(float(raw), unit)
-        return parse_quantity(_S_TO_ALPHA.sub("", raw) if unit != stated and isinstance(raw, str) else raw, unit)
+        return parse_quantity(_S_TO_ALPHA.sub("", raw) if unit != file_unit and isinstance(raw, str) else raw, unit)
 
 
 def parameter_values(raw: dict[str, Any]) -> dict[str, float]:
@@ -53,8 +63,8 @@ def parameter_values(raw: dict[str, Any]) -> dict[str, float]:
 def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
     """Values by effect and parameter, in SI."""
 
-    def values(effect: str, own: dict[str, Any]) -> dict[str, float]:
-        return {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in own.items()}
+    def values(effect: str, table: dict[str, Any]) -> dict[str, float]:
+        return {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
 
     return _each_table(raw, values)
 
@@ -62,21 +72,30 @@ def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
 def with_sizes(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
     """Tables by parameter with the values of some keys in SI; what is no table is left alone."""
 
-    def sized_table(name: str, own: dict[str, Any]) -> dict[str, Any]:
-        return own | {key: parameter_value(f"{name}.{key}", name, own[key]) for key in keys if key in own}
+    def sized_table(name: str, table: dict[str, Any]) -> dict[str, Any]:
+        return table | {key: parameter_value(f"{name}.{key}", name, table[key]) for key in keys if key in table}
 
     return _each_table(raw, sized_table)
 
 
 def _each_table(raw: dict[str, Any], convert: Callable[[str, dict[str, Any]], Any]) -> dict[str, Any]:
     """Tables by name, each converted; what is no table is left to pydantic."""
-    return {name: convert(name, own) if isinstance(own, dict) else own for name, own in raw.items()}
+    return {name: convert(name, table) if isinstance(table, dict) else table for name, table in raw.items()}
 
 
 def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
-    """Tables of value, min, max and vary by parameter, with the first three in SI.
+    """Convert the tables of [fit.parameters] to SI.
 
-    A min or a max beyond what the parameter can have is moved there: "0 MPa" as the least modulus is meant well.
+    A min or a max outside the bounds of the parameter is moved to the bound, such as a min of "0 MPa".
+
+    Args:
+        raw: tables of value, min, max and vary, by parameter.
+
+    Returns:
+        The same tables with value, min and max in SI.
+
+    Raises:
+        CampaignError: limits that hold no value.
     """
     keys = ("min", "value", "max")
     settings = with_sizes(raw, keys)
@@ -120,11 +139,11 @@ def filler(raw: object) -> float:
     return found
 
 
-def _number(raw: object, unit: str, what: str, expected: str) -> float:
+def _number(raw: object, unit: str, quantity: str, expected: str) -> float:
     """The number before a unit that pint does not know."""
     match = re.fullmatch(rf"\s*(\d{{1,4}}(?:\.\d{{1,6}})?)\s*(?:{unit})\s*", str(raw), re.ASCII | re.IGNORECASE)
     if not (isinstance(raw, str) and match):
-        raise UnitError(f"this is not {what}", found=str(raw), expected=expected)
+        raise UnitError(f"this is not {quantity}", found=str(raw), expected=expected)
     return float(match[1])
 
 
@@ -145,7 +164,7 @@ class Compound:
 
 @dataclass(frozen=True)
 class ReportSettings:
-    """[report]: what stands at the head of the report, as it is to be read there.
+    """[report]: texts and logo in the head of the report.
 
     Args:
         customer: whose part it is.
@@ -167,12 +186,18 @@ class ReportSettings:
 
     @property
     def lines(self) -> dict[str, str]:
-        """Lines of [report] that are stated, in the order in which they are read."""
+        """Texts of the head by key, in order, without the logo."""
         return {key: value for key, value in vars(self).items() if value is not None and key != "logo"}
 
 
 def embedded(file: Path) -> str:
-    """A logo as a data URI: the picture itself, for a page that stands alone.
+    """Encode a logo as a data URI.
+
+    Args:
+        file: PNG or SVG file.
+
+    Returns:
+        Data URI with the content of the file.
 
     Raises:
         CampaignError: the file is missing, too large, or neither PNG nor SVG.

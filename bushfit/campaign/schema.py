@@ -60,7 +60,7 @@ _SIMULATED_PLACES = converter(
 
 
 @dataclass(frozen=True)
-class BushingTable:
+class BushingSettings:
     """[bushing]: a tube of rubber between two sleeves, by its radii or its diameters.
 
     Args:
@@ -97,7 +97,7 @@ class BushingTable:
 
 
 @dataclass(frozen=True)
-class SpecimenTable:
+class SpecimenSettings:
     """[[specimens]]: another body of the same compound, and what its tests give. See geometry.Specimen.
 
     Args:
@@ -145,7 +145,7 @@ class RigSettings:
     Args:
         gain_error, displacement_error: standard deviations of the force's and of the displacement's calibration,
             relative, which all repeats of a test may share.
-        phase_error: likewise [rad].
+        phase_error: standard deviation of the phase [rad], which all repeats of a test may share.
         max_force, max_moment: zero-to-peak [N, N m]; None where nothing is stated, as of all that follows.
         max_displacement, max_rotation: zero-to-peak [m, rad].
         max_frequency: [Hz].
@@ -167,9 +167,11 @@ class RigSettings:
     minutes_per_setup: Annotated[float, si("s"), Field(ge=0)] | None = None
 
     @property
-    def stated(self) -> tuple[float | None, float | None]:
-        """Standard deviation of the stiffness in gain and phase, None where nothing is stated; K is force over
-        displacement, so either calibration is a gain error of it."""
+    def stiffness_errors(self) -> tuple[float | None, float | None]:
+        """Standard deviations of the stiffness in gain [1] and phase [rad]; None if the campaign does not state them.
+
+        The gain error of K = F/x combines the calibrations of force and displacement.
+        """
         gains = [error for error in (self.gain_error, self.displacement_error) if error is not None]
         return float(np.linalg.norm(gains)) if gains else None, self.phase_error
 
@@ -217,7 +219,7 @@ class PredictSettings:
 
 @dataclass(frozen=True)
 class SimulatedTest:
-    """Keys that [[simulate.loops]], [[simulate.sweeps]] and [[simulate.resonances]] have in common.
+    """Common keys of [[simulate.loops]], [[simulate.sweeps]] and [[simulate.resonances]].
 
     Args:
         direction: of the bushing that is tested; a specimen has none, which may be written "shear".
@@ -255,11 +257,11 @@ class SimulatedLoop(SimulatedTest):
 
     def __post_init__(self) -> None:
         for one, several in (("amplitude", "amplitudes"), ("frequency", "frequencies")):
-            given = [key for key in (one, several) if getattr(self, key)]
-            if len(given) != 1:
-                message = "one of these keys is too many" if given else "a key is missing"
+            stated_keys = [key for key in (one, several) if getattr(self, key)]
+            if len(stated_keys) != 1:
+                message = "one of these keys is too many" if stated_keys else "a key is missing"
                 expected = f"{one} = ..., or {several} = [...] of a programme"
-                raise ValueError(CampaignError(message, found=" and ".join(given) or None, expected=expected))
+                raise ValueError(CampaignError(message, found=" and ".join(stated_keys) or None, expected=expected))
 
     @property
     def parts(self) -> list[tuple[float, float]]:
@@ -287,20 +289,20 @@ class SimulatedSweep(SimulatedTest):
     repeats: Count | None = None
 
     @property
-    def held(self) -> tuple[float, ...]:
-        """Values that are constant in a run: amplitudes [m or rad, or strain] or frequencies [Hz]."""
+    def levels(self) -> tuple[float, ...]:
+        """Constant quantity of each run: amplitudes [m or rad, or strain] or frequencies [Hz]."""
         return self.amplitudes if self.stepped == "frequency" else self.frequencies
 
     @property
     def steps(self) -> tuple[float, ...]:
-        """Values that change from point to point of a run: frequencies [Hz] or amplitudes [m or rad, or strain]."""
+        """Stepped quantity of a run: frequencies [Hz] or amplitudes [m or rad, or strain]."""
         return self.frequencies if self.stepped == "frequency" else self.amplitudes
 
     @property
     def points(self) -> tuple[Array, Array]:
-        """Frequency [Hz] and amplitude [m or rad, or strain] of each point, (held, steps) each."""
-        held, step = np.meshgrid(self.held, self.steps, indexing="ij")
-        return (step, held) if self.stepped == "frequency" else (held, step)
+        """Frequency [Hz] and amplitude [m or rad, or strain] of each point, (levels, steps) each."""
+        level, step = np.meshgrid(self.levels, self.steps, indexing="ij")
+        return (step, level) if self.stepped == "frequency" else (level, step)
 
 
 @dataclass(frozen=True)
@@ -321,10 +323,10 @@ class SimulatedResonance(SimulatedTest):
         if self.direction.motion is not TRANSLATION:
             expected = "a direction with a displacement, or a specimen in shear"
             raise ValueError(CampaignError("no mass swings on this", found=str(self.direction), expected=expected))
-        known = [f for f in self.frequencies if 1.0 / LARGEST_SHAKEN <= f <= LARGEST_SHAKEN]
-        if len(known) < max(FEWEST_ROWS, len(self.frequencies)):
+        usable = [f for f in self.frequencies if 1.0 / LARGEST_SHAKEN <= f <= LARGEST_SHAKEN]
+        if len(usable) < max(FEWEST_ROWS, len(self.frequencies)):
             expected = f"at least {FEWEST_ROWS}, through the resonance"
-            raise ValueError(CampaignError("no frequencies of a shaker", found=f"{len(known)}", expected=expected))
+            raise ValueError(CampaignError("no frequencies of a shaker", found=f"{len(usable)}", expected=expected))
 
 
 @dataclass(frozen=True)
@@ -336,8 +338,8 @@ class SimulateSettings:
         effects: added effects, each with the values of its parameters [SI].
         seed: of the random numbers.
         repeats: of each sweep and resonance test, unless it states its own.
-        noise: standard deviation of a sweep point's real and imaginary part, relative to |K|; of a resonance test's
-            transmissibility likewise.
+        noise: standard deviation of a sweep point's real and imaginary part, relative to |K|, or of those of a
+            resonance test's transmissibility.
         force_noise, displacement_noise: standard deviation of a loop's samples, relative to the amplitude.
         force_correlation: of the noise of one row's force with that of the next, as a filter makes it (AR(1)).
         gain_error: standard deviation of the gain of a run: of one repeat of what is held, or of a resonance test.
@@ -380,14 +382,14 @@ class CampaignFile:
         compound: of a bushing that was not tested yet.
         fit: how the model is fitted.
         predict: what to predict, and where.
-        report: what stands at the head of the report.
+        report: texts and logo in the head of the report.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 
-    bushing: BushingTable | None = None
+    bushing: BushingSettings | None = None
     name: Name | None = None
-    specimens: tuple[SpecimenTable, ...] = ()
+    specimens: tuple[SpecimenSettings, ...] = ()
     loops: tuple[LoopFile, ...] = ()
     sweeps: tuple[SweepFile, ...] = ()
     rig: RigSettings = field(default_factory=RigSettings)

@@ -1,4 +1,4 @@
-"""The session of a campaign: in which turn each point was measured, at which temperature, and after which strains."""
+"""Session of a campaign: order of the points, their temperature, and the strains before them."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -32,7 +32,15 @@ class Visit(NamedTuple):
 
 
 def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> list[Circumstances]:
-    """Circumstances of the rows of each measured test; a loop has one turn. Its `order` is a stated condition."""
+    """Circumstances of measured tests.
+
+    Args:
+        bushing: None if only specimens were tested.
+        tests: loops and sweeps, in order; the condition `order` of a test takes precedence.
+
+    Returns:
+        Circumstances of each test: one entry per row of a sweep, one entry for a loop.
+    """
 
     def visit(test: Loop | Sweep) -> Visit:
         order = test.source.conditions.get("order") if test.source else None
@@ -43,9 +51,15 @@ def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> 
 
 
 def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], repeats: int) -> list[Circumstances]:
-    """Circumstances of the points of each planned test, in the order of a sweep's rows; one per part of a loop.
+    """Circumstances of planned tests. The strains of a resonance test depend on its result and are taken as zero.
 
-    The strains of a resonance test are not known beforehand and count as none.
+    Args:
+        bushing: None if only specimens are tested.
+        tests: tables of [simulate].
+        repeats: repeats of each sweep and resonance test that states none.
+
+    Returns:
+        Circumstances of each test: one entry per row of a sweep or resonance test, one per part of a loop.
     """
 
     def amplitudes(test: SimulatedTest) -> Array:
@@ -60,23 +74,29 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
 
 
 def session(bushing: Bushing | None, visits: Sequence[Visit]) -> list[Circumstances]:
-    """Circumstances of the points of each test, (n,) each; every body has a session of its own.
+    """Circumstances of the tests of a session. Each body has a session of its own.
 
-    Every point of a sweep and every loop takes one turn; turns go from 0 to 1.
+    Args:
+        bushing: None if only specimens were tested.
+        visits: tests in the order of the campaign.
+
+    Returns:
+        Circumstances of each test, in the order given: temperature, turn (0 to 1 over the session), and the strains
+        before each point, (n,) each.
     """
     numbers = [place if visit.order is None else visit.order for place, visit in enumerate(visits, start=1)]
     bodies = [visit.place if isinstance(visit.place, Specimen) else None for visit in visits]
-    found: dict[int, Circumstances] = {}
+    circumstances: dict[int, Circumstances] = {}
     for body in dict.fromkeys(bodies):
-        mine = sorted((i for i, own in enumerate(bodies) if own == body), key=numbers.__getitem__)
-        strains = [visits[i].amplitude * unit_strain(bushing, visits[i].place) for i in mine]
+        visited = sorted((i for i, tested in enumerate(bodies) if tested == body), key=numbers.__getitem__)
+        strains = [visits[i].amplitude * unit_strain(bushing, visits[i].place) for i in visited]
         ends = np.cumsum([strain.size for strain in strains])
         turn = np.arange(ends[-1]) / max(float(ends[-1]) - 1.0, 1.0)
         strained = np.maximum.accumulate(np.concatenate([[0.0], *strains]))[:-1]
-        known = (turn, strained, *_last_larger(np.concatenate(strains), turn))
-        for i, *own in zip(mine, *(np.split(each, ends[:-1]) for each in known), strict=True):
-            found[i] = Circumstances(visits[i].temperature, *own)
-    return [found[i] for i in range(len(visits))]
+        histories = (turn, strained, *_last_larger(np.concatenate(strains), turn))
+        for i, *columns in zip(visited, *(np.split(column, ends[:-1]) for column in histories), strict=True):
+            circumstances[i] = Circumstances(visits[i].temperature, *columns)
+    return [circumstances[i] for i in range(len(visits))]
 
 
 def _last_larger(strain: Array, turn: Array) -> tuple[Array, Array]:
@@ -87,13 +107,13 @@ def _last_larger(strain: Array, turn: Array) -> tuple[Array, Array]:
     # an unknown strain, of a resonance test, counts as none
     level = np.round(np.log(np.maximum(strain, 1e-9)) / np.log1p(_LEVEL_STEP))
     ends = np.append(np.flatnonzero(np.diff(level)), strain.size - 1)
-    left, since = np.zeros(ends.size), np.zeros(ends.size)
+    larger, since = np.zeros(ends.size), np.zeros(ends.size)
     above: list[int] = []  # ends of runs before, each of a larger level than all after it
     for run, end in enumerate(ends):
         while above and level[above[-1]] <= level[end]:
             above.pop()
         if above:
-            left[run], since[run] = strain[above[-1]], turn[above[-1]]
+            larger[run], since[run] = strain[above[-1]], turn[above[-1]]
         above.append(int(end))
     runs = np.searchsorted(ends, np.arange(strain.size))
-    return left[runs], turn - since[runs]
+    return larger[runs], turn - since[runs]

@@ -24,23 +24,27 @@ _WAYS = {
 }
 
 
-def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", largest: int = 1_000_000) -> T:
-    """The content of a TOML file as the dataclass `schema`, all quantities in SI.
+def read_toml(path: Path, schema: type[T], *, description: str = "a campaign file", largest: int = 1_000_000) -> T:
+    """Read a TOML file and check it against a schema.
 
     Args:
+        path: TOML file.
         schema: a pydantic dataclass, or one of its tables; unknown keys are refused.
-        what: the file in words, for errors.
+        description: kind of file, for errors.
         largest: size of the file at most [bytes]; that of a campaign of thousands of tests.
+
+    Returns:
+        Content as an instance of `schema`, quantities in SI.
 
     Raises:
         CampaignError: the file is missing, too large, no TOML, or has keys or values that are not understood.
         UnitError: a quantity without a unit, or with one that does not fit.
     """
-    return validate_tables(_parsed(path, what, largest), path, schema)
+    return validate_tables(_parsed(path, description, largest), path, schema)
 
 
-def _parsed(path: Path, what: str, largest: int) -> dict[str, Any]:
-    data = read_utf8(path, CampaignError, largest=largest, hint=f"give {what}, not a measurement")
+def _parsed(path: Path, description: str, largest: int) -> dict[str, Any]:
+    data = read_utf8(path, CampaignError, largest=largest, hint=f"give {description}, not a measurement")
     chain = _DEEP_KEY.search(data)
     try:
         if not chain:
@@ -68,7 +72,15 @@ def _parsed(path: Path, what: str, largest: int) -> dict[str, Any]:
 
 
 def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[str]:
-    """The lines of [bushing] and [[specimens]]."""
+    """Lines of the tables [bushing] and [[specimens]].
+
+    Args:
+        bushing: None for specimens alone.
+        specimens: bodies of the same compound.
+
+    Returns:
+        Lines of TOML.
+    """
     lines = []
     if bushing:
         lines += ["[bushing]", f"name = {toml_value(bushing.name)}"]
@@ -82,7 +94,14 @@ def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[s
 
 
 def specimen_lines(specimen: Specimen) -> list[str]:
-    """The lines of one of [[specimens]]."""
+    """Lines of one [[specimens]] table.
+
+    Args:
+        specimen: body of the compound.
+
+    Returns:
+        Lines of TOML.
+    """
     lines = ["[[specimens]]", f"name = {toml_value(specimen.name)}", f'kind = "{specimen.kind}"']
     if specimen.strain != "engineering":
         lines.append(f'strain = "{specimen.strain}"')
@@ -93,7 +112,17 @@ def specimen_lines(specimen: Specimen) -> list[str]:
 
 
 def table_lines(kind: str, file: str, place: Place, temperature: Any = None) -> list[str]:
-    """The lines of one of [[loops]] or [[sweeps]]: the file, what was tested, and at what temperature [K], if one."""
+    """Lines of one [[loops]] or [[sweeps]] table.
+
+    Args:
+        kind: "loops" or "sweeps".
+        file: test file, relative to the campaign.
+        place: direction or specimen that was tested.
+        temperature: of the test [K]; None if it is not known.
+
+    Returns:
+        Lines of TOML, the first empty.
+    """
     warm = [] if temperature is None else [f'temperature = "{temperature - CELSIUS:.6g} degC"']
     return ["", f"[[{kind}]]", f"file = {toml_value(file)}", place_line(place), *warm]
 

@@ -142,7 +142,7 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
 
     Errors name the options, diameters where these were given and halved.
     """
-    from bushfit.campaign.schema import BushingTable
+    from bushfit.campaign.schema import BushingSettings
     from bushfit.validation import validate_tables
 
     table = {f"{side}_radius": _radius(side, sizes) for side in _SIDES}
@@ -151,7 +151,7 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
     table["length"] = length
     halved = [f"{side}_radius" for side in _SIDES if sizes[f"{side}_diameter"]]
     try:
-        bushing = validate_tables({"name": name, **table}, None, BushingTable).to_bushing()
+        bushing = validate_tables({"name": name, **table}, None, BushingSettings).to_bushing()
         if bushing.correction is not None:
             table["shape"] = "calibrated"
         return bushing, table

@@ -26,7 +26,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.comparison import Comparison, holm, with_holm
 from bushfit.prediction.comparison import compare as compare_two
-from bushfit.prediction.grid import asked_or, common_grid
+from bushfit.prediction.grid import common_grid, requested_grid
 from bushfit.reading.measurement import Source, Sweep
 from bushfit.report import plots
 from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparedPair, ComparisonFile, FamilyEntry
@@ -105,7 +105,7 @@ class ComparisonOutput:
     def words(self) -> list[str]:
         """Sentences on what differs, one for each result and direction."""
         pairs = zip(self.labels[1:], self.comparisons, strict=True)
-        return [f"{label} against A, {line}" for label, comparison in pairs for line in comparison.words()]
+        return [f"{label} against A, {line}" for label, comparison in pairs for line in comparison.sentences()]
 
     @cached_property
     def advice(self) -> list[str]:
@@ -249,7 +249,7 @@ def _compared(
         if len({place.motion for place in places}) > 1:
             found = ", ".join(f"{place}: {place.motion.words[0]}" for place in places)
             raise ModelError("a place that is not one kind of motion in all", found=found, expected="one kind")
-        grids.append(asked_or(common_grid(results, places, entries[0].sweeps), grid, places[0]))
+        grids.append(requested_grid(common_grid(results, places, entries[0].sweeps), grid, places[0]))
     comparisons = [
         compare_two(results[0], result, [(places[0], places[index]) for places in columns], grids)
         for index, result in enumerate(results[1:], start=1)

@@ -35,7 +35,7 @@ from bushfit.planning.contract import (
 from bushfit.planning.knowledge import guess, of_campaign, of_result, rig_of
 from bushfit.planning.offer import RIVALS_APART
 from bushfit.planning.plan import plan as choose_tests
-from bushfit.prediction.grid import asked_or, default_grid, grid_settings
+from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
 from bushfit.report import plots
 from bushfit.report.results import ResultFile, figure_file, json_file, raw_file, table_file
 from bushfit.units import number
@@ -322,7 +322,7 @@ def _wanted_points(
     places = [get_place(name, result.specimens) for name in settings.directions or ()]
     for place in places or default:
         usual = default_grid(result, place, campaign.sweeps if campaign else ())
-        frequencies, amplitudes = asked_or(usual, settings, place)
+        frequencies, amplitudes = requested_grid(usual, settings, place)
         amplitude, frequency = np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
         yield Points(place, frequency.ravel(), amplitude.ravel())
 

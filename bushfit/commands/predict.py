@@ -24,7 +24,7 @@ from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
 from bushfit.model.arms import Arms, model_arms
 from bushfit.model.result import Misfit, Result, Usable, carried
 from bushfit.prediction.caveats import warnings_of
-from bushfit.prediction.grid import asked_or, default_grid, grid_settings
+from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
 from bushfit.prediction.stiffness import PredictedResonance, Prediction, predict_resonance
 from bushfit.prediction.stiffness import predict as predict_stiffness
 from bushfit.reading.measurement import SAME_TEMPERATURE, Loop, Sweep
@@ -154,7 +154,7 @@ def predict(
         predict_stiffness(
             result,
             place,
-            *asked_or(default_grid(result, place, sweeps), settings, place),
+            *requested_grid(default_grid(result, place, sweeps), settings, place),
             sweeps=at_temperature if campaign else None,
             temperature=temperature,
         )

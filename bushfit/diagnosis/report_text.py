@@ -286,7 +286,7 @@ class DiagnosisWriter:
     def _fitted(self, evidence: Evidence) -> Evidence:
         """The same model as a fit has it, in which a loop's gain weighs only where its class is stated."""
         loops = parted(evidence.data_sets)[0]
-        if self.data.campaign.rig.stated[0] is not None or not any(loop.gain_weighs for loop in loops):
+        if self.data.campaign.rig.stiffness_errors[0] is not None or not any(loop.gain_weighs for loop in loops):
             return evidence
         if evidence not in self._refitted:
             asked, data_sets = self.search.asked, with_gains(evidence.data_sets, weigh=False)

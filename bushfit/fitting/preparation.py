@@ -52,7 +52,7 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], stated: RigSettings) -> list
         repeats, all that tells of the bushing, just as unsure.
     """
     errors = of_class(stated)[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
-    weighs = stated.stated[0] is not None
+    weighs = stated.stiffness_errors[0] is not None
     return [
         replace(loop, gain_error=each, gain_weighs=weighs) for loop, each in zip(loops, errors.tolist(), strict=True)
     ]

@@ -86,7 +86,9 @@ class PreparedCampaign:
     @property
     def assumed(self) -> list[str]:
         """Warning on an assumed class of the rig, where nothing was repeated and not all of the class is stated."""
-        if None not in self.campaign.rig.stated or all(sweep.noise.origin != "assumed" for sweep in self.sweeps):
+        if None not in self.campaign.rig.stiffness_errors or all(
+            sweep.noise.origin != "assumed" for sweep in self.sweeps
+        ):
             return []
         shared = class_words(self.campaign.rig)
         return [f"nothing was repeated at three points or more: errors shared by a run are the rig's class, {shared}"]

@@ -13,7 +13,7 @@ _MOST_CLASSES = 3.0
 
 def of_class(rig: RigSettings, unstated: tuple[float, float] = ASSUMED) -> tuple[float, float]:
     """Gain and phase error [rad] that a rig's class states, else the one given."""
-    gain, phase = (default if one is None else one for one, default in zip(rig.stated, unstated, strict=True))
+    gain, phase = (default if one is None else one for one, default in zip(rig.stiffness_errors, unstated, strict=True))
     return gain, phase
 
 
@@ -30,6 +30,6 @@ def words_of(error: tuple[float, float]) -> str:
 
 def class_words(rig: RigSettings) -> str:
     """A rig's class as it counts, in words: gain and phase error, and which of them is assumed."""
-    unstated = [name for name, error in zip(("gain", "phase"), rig.stated, strict=True) if error is None]
+    unstated = [name for name, error in zip(("gain", "phase"), rig.stiffness_errors, strict=True) if error is None]
     whose = f"{' and '.join(unstated)} assumed" if unstated else "as [rig] states"
     return f"{words_of(of_class(rig))}, {whose}"

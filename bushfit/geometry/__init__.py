@@ -251,11 +251,11 @@ def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
     >>> get_place("mount", [Specimen("mount", "shear", area=1e-3, thickness=0.01)]).motion.words
     ('displacement', 'force', 'stiffness')
     """
-    known: dict[str, Place] = {str(place): place for place in (*Direction, *specimens)}
-    if name not in known:
-        near = did_you_mean(name, known)
-        raise ModelError("no such direction or specimen", found=name, expected="one of " + ", ".join(known), hint=near)
-    return known[name]
+    places: dict[str, Place] = {str(place): place for place in (*Direction, *specimens)}
+    if name not in places:
+        near = did_you_mean(name, places)
+        raise ModelError("no such direction or specimen", found=name, expected="one of " + ", ".join(places), hint=near)
+    return places[name]
 
 
 def unit_strain(bushing: Bushing | None, place: Place) -> float:

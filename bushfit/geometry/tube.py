@@ -22,7 +22,7 @@ _LARGEST_Q_OF_SERIES = 0.5
 
 
 def axial_strain(a: float, b: float) -> float:
-    """e/d = 1 / sqrt(2 (b^2 - a^2) ln(b/a)) (Eq. 7).
+    """Axial strain per displacement [1/m], e/d = 1 / sqrt(2 (b^2 - a^2) ln(b/a)) (Eq. 7), of radii a < b [m].
 
     >>> round(axial_strain(0.010, 0.018), 2)
     61.62
@@ -31,7 +31,14 @@ def axial_strain(a: float, b: float) -> float:
 
 
 def axial_stiffness(a: float, b: float, length: float) -> float:
-    """k/mu = 2 pi L / ln(b/a) (Eq. 10).
+    """Axial stiffness, k/mu = 2 pi L / ln(b/a) (Eq. 10).
+
+    Args:
+        a, b: inner and outer radius [m].
+        length: length of the rubber [m].
+
+    Returns:
+        Stiffness per unit shear modulus [m].
 
     >>> round(axial_stiffness(0.010, 0.018, 0.034), 4)
     0.3634
@@ -41,10 +48,11 @@ def axial_stiffness(a: float, b: float, length: float) -> float:
 
 @lru_cache(maxsize=256)  # a fit asks for those of one bushing thousands of times
 def radial_strain(a: float, b: float) -> float:
-    """e/d = sqrt((a^2 + b^2) / ((b^4 - a^4) ln(b/a) - (a^2 - b^2)^2)) (Eq. 8).
+    """Radial strain per displacement [1/m] of radii a < b [m] (Eq. 8).
 
-    Notes: with q = (b^2 - a^2)/(b^2 + a^2) this is 1 / sqrt((b^2 - a^2) (ln(b/a) - q)). Where ln(b/a) and q cancel, the
-    difference is summed as q^3/3 + q^5/5 + ..., because ln(b/a) = atanh(q).
+    Notes: e/d = sqrt((a^2 + b^2) / ((b^4 - a^4) ln(b/a) - (a^2 - b^2)^2)). With q = (b^2 - a^2)/(b^2 + a^2) this is
+    1 / sqrt((b^2 - a^2) (ln(b/a) - q)). Where ln(b/a) and q cancel, the difference is summed as q^3/3 + q^5/5 + ...,
+    because ln(b/a) = atanh(q).
 
     >>> round(radial_strain(0.010, 0.018), 1)
     274.0
@@ -57,14 +65,22 @@ def radial_strain(a: float, b: float) -> float:
 
 @lru_cache(maxsize=256)
 def radial_stiffness(a: float, b: float, length: float) -> float:
-    """k/mu = 10 pi L / (7/2 ln(b/a) - 3/2 q + D), with q = (b^2 - a^2)/(b^2 + a^2) and D of Eq. 12 (Eq. 11).
+    """Radial stiffness (Eqs. 11 and 12).
+
+    Args:
+        a, b: inner and outer radius [m].
+        length: length of the rubber [m].
+
+    Returns:
+        Stiffness per unit shear modulus [m].
 
     Raises:
         ModelError: a shape for which the formula was not checked.
 
-    Notes: every Bessel product of D is written with the scaled functions, and the common factor exp(alpha (b - a)) is
-    divided out of numerator and denominator, so short bushings neither over- nor underflow. Agrees with 60-digit
-    arithmetic to 1e-9, and to 1e-7 for tubes that are both long and thin, over the checked range.
+    Notes: k/mu = 10 pi L / (7/2 ln(b/a) - 3/2 q + D), with q = (b^2 - a^2)/(b^2 + a^2) and D of Eq. 12. Every Bessel
+    product of D is written with the scaled functions, and the common factor exp(alpha (b - a)) is divided out of
+    numerator and denominator, so short bushings neither over- nor underflow. Agrees with 60-digit arithmetic to 1e-9,
+    and to 1e-7 for tubes that are both long and thin, over the checked range.
 
     >>> round(radial_stiffness(0.010, 0.018, 0.034), 4)
     2.8431
@@ -92,7 +108,9 @@ def radial_stiffness(a: float, b: float, length: float) -> float:
 
 
 def torsion_strain(a: float, b: float) -> float:
-    """e/theta = a b / (b^2 - a^2), from the energy: k theta^2/2 = V mu (2 e)^2/2.
+    """Torsional strain per rotation [1/rad], e/theta = a b / (b^2 - a^2), of radii a < b [m].
+
+    Notes: from the energy, k theta^2/2 = V mu (2 e)^2/2.
 
     >>> round(torsion_strain(0.010, 0.018), 4)
     0.8036
@@ -101,7 +119,14 @@ def torsion_strain(a: float, b: float) -> float:
 
 
 def torsion_stiffness(a: float, b: float, length: float) -> float:
-    """k/mu = 4 pi L a^2 b^2 / (b^2 - a^2).
+    """Torsional stiffness, k/mu = 4 pi L a^2 b^2 / (b^2 - a^2).
+
+    Args:
+        a, b: inner and outer radius [m].
+        length: length of the rubber [m].
+
+    Returns:
+        Stiffness per unit shear modulus [m^3/rad].
 
     >>> round(torsion_stiffness(0.010, 0.018, 0.034) * 1e6, 1)  # [mm^2 m]
     61.8

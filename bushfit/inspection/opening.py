@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign.campaign import reader_keywords
-from bushfit.campaign.schema import SpecimenTable
+from bushfit.campaign.schema import SpecimenSettings
 from bushfit.errors import BushfitError, MeasurementError, NoTestError, error_location, quote_path
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.inspection.labels import keys_from_labels, labels_of_file, temperatures_of
@@ -137,7 +137,7 @@ def test_place(file: Path, table: Table, test_options: Mapping[str, Any]) -> Pla
     elif len(keys) == 1:
         return test_direction(file, table, test_options)
     name = test_options.get("specimen", "bar" if "strain" in keys else "coupon")
-    return Specimen(**vars(validate_tables({"name": name, **keys}, None, SpecimenTable)))
+    return Specimen(**vars(validate_tables({"name": name, **keys}, None, SpecimenSettings)))
 
 
 def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) -> Direction | None:

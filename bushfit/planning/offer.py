@@ -248,7 +248,7 @@ class Offer:
         lines = [
             (test.direction, test.amplitude, test.frequency)
             if isinstance(test, SimulatedLoop)
-            else (test.direction, test.stepped, test.held)
+            else (test.direction, test.stepped, test.levels)
             for test in self.tests
         ]
         knowledge, setup = list(dict.fromkeys(lines)), self.wanted.rig.minutes_per_setup

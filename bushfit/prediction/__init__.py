@@ -1,1 +1,1 @@
-"""What a model predicts: stiffness with bands, what these cannot say, and two results side by side."""
+"""Predictions of a model: stiffness with bands, their caveats, and the comparison of two results."""

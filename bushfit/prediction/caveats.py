@@ -75,10 +75,17 @@ def warnings_of(result: Result, predicted: Iterable[Iterable[str]] = (), notes: 
 
 
 def caveats(result: Result) -> list[str]:
-    """Warnings about a result itself, whatever is predicted from it."""
+    """Warnings about a result itself, independent of the prediction.
+
+    Args:
+        result: fitted result.
+
+    Returns:
+        Sentences: unfitted directions, unresolved effects, and the limits of the model.
+    """
     fitted = result.measured.directions if result.measured else ()
-    known = {*Direction, *(specimen.name for specimen in result.specimens)}  # a compound was fitted on other bodies
-    lines = [line for name in fitted if name in known for line in unfitted(result, result.place(name))]
+    places = {*Direction, *(specimen.name for specimen in result.specimens)}  # a compound was fitted on other bodies
+    lines = [line for name in fitted if name in places for line in unfitted(result, result.place(name))]
     for name in result.unresolved:
         twins = " or ".join(get_effect(name).twins)
         lines.append(f"{name} is counted as part of the bushing, but these tests cannot distinguish it from {twins}")
@@ -119,8 +126,11 @@ def unfitted(result: Result, direction: Place) -> Iterator[str]:
     """Warnings for a direction that was not fitted, or was fitted with a formula that deviates from finite elements.
 
     Args:
-        result: the result.
+        result: fitted result.
         direction: direction or specimen of the prediction.
+
+    Yields:
+        Sentences.
     """
     fitted = result.measured.directions if result.measured else ()
     if not fitted:
@@ -193,14 +203,17 @@ def of_points(
         rig_stiffness: |K| if the unresolved effects belong to the rig, (n,).
         measured: measured complex stiffness, nan without a measurement, (n,).
         temperature: [K]; None for the reference temperature.
+
+    Yields:
+        Sentences.
     """
     frequency, amplitude, stiffness = points
     yield from result.undecided
     yield from unfitted(result, place)
     yield from extrapolations(result, place, frequency, amplitude, temperature)
-    known = set() if temperature is None else {"temperature"}
+    conditions = set() if temperature is None else {"temperature"}
     effects = result.model.without(Level.INSTRUMENT).records
-    yield from (effect.assumption for effect in effects if effect.assumption and not known & {*effect.under})
+    yield from (effect.assumption for effect in effects if effect.assumption and not conditions & {*effect.under})
     rig = rig_effects(result)
     if rig and measured is not None and not np.isnan(measured).all():
         percent = percent_off(stiffness / np.abs(measured))
@@ -234,6 +247,9 @@ def extrapolations(
         amplitude: predicted amplitudes [m, rad or 1], (n,).
         temperature: predicted temperature [K], if one was asked for.
         subject: beginning of the warnings; default the direction.
+
+    Yields:
+        Sentences.
     """
     if result.measured is None:
         return

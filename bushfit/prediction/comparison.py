@@ -1,7 +1,7 @@
-"""Two fitted results side by side: how far parameters, stiffness and loss factor are apart, and whether by chance.
+"""Comparison of two fitted results: differences of parameters, stiffness and loss factor, and their significance.
 
-The errors of the two count as independent. What they share, such as the tests, or the gain of one transducer, makes the
-intervals of their difference too wide as a rule.
+The errors of the two results are taken as independent. Errors that both share, such as the gain of one transducer, make
+the intervals of the differences too wide as a rule.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Band, Prediction, predict
 from bushfit.units import format_aligned, format_range, number
 
-#: Probability with which chance alone makes a difference somewhere that is said to be one.
+#: Probability with which chance alone makes a reported difference.
 CHANCE = 0.05
 #: Draws of the largest of many correlated errors; chosen: its 95 % quantile is then good to a hundredth.
 _DRAWS = 20_000
 #: Eigenvalue of a correlation matrix, relative to the largest, below which it is rounding.
 _LEAST_EIGENVALUE = 1e-10
-#: Size of a parameter over its typical one, below which its logarithm tells no differences any more.
+#: Ratio of a parameter to its typical value below which its logarithm shows no differences.
 _NOTHING = 1e-9
 #: Digits of a difference at most, however small its error.
 _MOST_DIGITS = 4
-#: Logarithm of the ratio of two quantities beyond which nothing is known of it: no parameter has bounds further apart.
+#: Logarithm of the ratio of two quantities that counts as unbounded: no parameter has bounds further apart.
 _FURTHEST = float(np.log(1e10))
 #: Decimals of a difference without an error at most: those that follow are rounding.
 _MOST_DECIMALS = 6
@@ -42,18 +42,18 @@ _EXPONENT = re.compile(r"\^([a-z]\w*)$")
 
 @dataclass(frozen=True)
 class ParameterContrast:
-    """One parameter of both results, or a quantity that they make together.
+    """Comparison of one parameter of both results, or of a quantity that parameters make together.
 
     Args:
         name: of the parameter, or of the quantity at a frequency.
         unit: SI, of both values and of a difference that is not relative.
-        reference, other: its value in each.
+        reference, other: value in the reference and in the other result.
         relative: whether the difference is relative to the reference, or in the unit.
-        difference: of the other less the reference, ; None where it is not tested.
-        interval: of the difference, low and high with 95 %; None as of it.
-        p: probability of so large a difference, or a larger one, by chance; None where it is not tested.
-        holm: the same over all that are tested together (Holm, Scand. J. Statist. 6 (1979) 65).
-        note: why it is not tested.
+        difference: other less reference; None if it is not tested.
+        interval: of the difference, low and high end of its 95 % interval; None if it is not tested.
+        p: probability of a difference at least as large by chance; None if it is not tested.
+        holm: p adjusted for all parameters tested together (Holm, Scand. J. Statist. 6 (1979) 65).
+        note: reason why it is not tested.
     """
 
     name: str
@@ -73,8 +73,9 @@ class Contrast:
     """Dynamic stiffness of two results at the same operating points of a place.
 
     Args:
+        reference, other: predictions of the two results.
         stiffness: ln |K| of the other less that of the reference, with its 95 % band at each point.
-        loss_factor: that of the other less that of the reference.
+        loss_factor: loss factor of the other less that of the reference, with its 95 % band.
     """
 
     reference: Prediction
@@ -87,24 +88,32 @@ class Contrast:
         return self.reference.direction
 
     @classmethod
-    def of(cls, reference: Prediction, other: Prediction) -> Contrast:
-        """The difference of two predictions at the same points.
+    def between(cls, reference: Prediction, compared: Prediction) -> Contrast:
+        """Difference of two predictions at the same points.
 
-        Notes: an end of the band is as far from the difference as the root sum of squares of the ends of the two bands
-        on that side (G. Zou, A. Donner, Stat. Med. 27 (2008) 1693).
+        Args:
+            reference, compared: predictions.
+
+        Returns:
+            Differences with 95 % bands.
+
+        Notes: the distance from the difference to an end of its band is the root sum of squares of the distances in the
+        two bands (G. Zou, A. Donner, Stat. Med. 27 (2008) 1693).
         """
-        one, two = (_logarithm(each.stiffness) for each in (reference, other))
-        return cls(reference, other, _less(two, one), _less(other.loss_factor, reference.loss_factor))
+        stiffness = _subtract(_logarithm(compared.stiffness), _logarithm(reference.stiffness))
+        return cls(reference, compared, stiffness, _subtract(compared.loss_factor, reference.loss_factor))
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A result against the reference.
+    """Comparison of a result with a reference.
 
     Args:
-        joint: probability by chance of differences as these of all parameters together, correlations counted, and how
-            many they are; None where none is tested.
-        shared: files that both were fitted to.
+        parameters: parameters that both results have.
+        joint: p of the differences of all parameters together, with their correlations, and the number of parameters;
+            None if none is tested.
+        contrasts: differences of the dynamic stiffness, one per place.
+        shared: files to which both were fitted.
     """
 
     parameters: tuple[ParameterContrast, ...]
@@ -114,81 +123,93 @@ class Comparison:
 
     @cached_property
     def widening(self) -> float:
-        """Factor on the bands of the contrasts with which they hold everywhere at once with 95 %.
+        """Factor on the bands of the contrasts that makes them a simultaneous 95 % band.
 
         Notes: the 95 % quantile of the largest of all standardised errors, whose correlations are known (T. Hothorn, F.
         Bretz, P. Westfall, Biometrical J. 50 (2008) 346), over that of one. Drawn from a fixed seed.
         """
-        columns = [band.root for each in self.contrasts for band in (each.stiffness, each.loss_factor)]
+        columns = [band.root for contrast in self.contrasts for band in (contrast.stiffness, contrast.loss_factor)]
         if not columns or not len(columns[0]):
             return 1.0
-        every = np.concatenate(columns, axis=1)
-        size = np.linalg.norm(every, axis=0)
-        every = every[:, size > 0.0] / size[size > 0.0]
-        drawn = np.random.default_rng(0).standard_normal((_DRAWS, len(every)))
+        errors = np.concatenate(columns, axis=1)
+        size = np.linalg.norm(errors, axis=0)
+        errors = errors[:, size > 0.0] / size[size > 0.0]
+        drawn = np.random.default_rng(0).standard_normal((_DRAWS, len(errors)))
         largest = np.zeros(_DRAWS)
-        for column in every.T:
+        for column in errors.T:
             np.maximum(largest, np.abs(drawn @ column), out=largest)
         return max(float(np.quantile(largest, 1.0 - CHANCE)) / Z95, 1.0)
 
     def widened(self, band: Band) -> Band:
-        """A band of the contrasts that holds with all others at once."""
+        """Simultaneous 95 % band: a band of the contrasts, wider by `widening`."""
         low, high = (band.value + self.widening * (end - band.value) for end in (band.low, band.high))
         return replace(band, low=low, high=high)
 
-    def words(self) -> list[str]:
-        """A sentence a place on what differs by more than chance, and how much may differ where nothing is seen."""
-        said = []
-        for each in self.contrasts:
-            stiffness, loss = self.widened(each.stiffness), self.widened(each.loss_factor)
+    def sentences(self) -> list[str]:
+        """Sentences on the differences of stiffness and loss factor.
+
+        Returns:
+            One sentence per place: differences beyond chance, and an upper limit elsewhere.
+        """
+        sentences = []
+        for contrast in self.contrasts:
+            stiffness, loss = self.widened(contrast.stiffness), self.widened(contrast.loss_factor)
             percent = replace(stiffness, **{end: 100.0 * relative(getattr(stiffness, end)) for end in _ENDS})
-            resisted = each.place.motion.words[2]
-            said.append(f"{each.place}: {resisted} {_told(percent, ' %', each)}; loss factor {_told(loss, '', each)}")
-        return said
+            quantity, place = contrast.place.motion.words[2], contrast.place
+            differences = _describe_difference(percent, " %", contrast)
+            losses = _describe_difference(loss, "", contrast)
+            sentences.append(f"{place}: {quantity} {differences}; loss factor {losses}")
+        return sentences
 
 
-#: What a band has at each point.
+#: Arrays of a band.
 _ENDS = ("value", "low", "high")
 
 
 def compare(
-    reference: Result, other: Result, places: Sequence[tuple[Place, Place]], grids: Sequence[tuple[Array, Array]]
+    reference: Result, compared: Result, places: Sequence[tuple[Place, Place]], grids: Sequence[tuple[Array, Array]]
 ) -> Comparison:
     """Compare a result with a reference: parameters that both have, and stiffness over operating points.
 
     Args:
-        places: each as the reference and as the other has it, of one kind of motion.
-        grids: frequencies [Hz] and amplitudes [m, rad or 1] of each place.
+        reference, compared: fitted results.
+        places: pairs of a place of the reference and one of the compared result, of one kind of motion.
+        grids: frequencies [Hz] and amplitudes [m, rad or 1] of each pair.
+
+    Returns:
+        Comparison over the common parameters and the grids.
     """
     frequencies = np.concatenate([frequency for frequency, _ in grids])
     middle = float(np.sqrt(frequencies.min() * frequencies.max()))
-    parameters, joint = _parameters(reference, other, middle)
+    parameters, joint = _parameters(reference, compared, middle)
     contrasts = tuple(
-        Contrast.of(predict(reference, one, *grid), predict(other, two, *grid))
+        Contrast.between(predict(reference, one, *grid), predict(compared, two, *grid))
         for (one, two), grid in zip(places, grids, strict=True)
     )
-    files = {source.sha256 for source in other.inputs}
+    files = {source.sha256 for source in compared.inputs}
     shared = tuple(str(source.file) for source in reference.inputs if source.sha256 in files)
     return Comparison(parameters, joint, contrasts, shared)
 
 
 def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
-    """The comparisons with the probabilities of all their parameters taken together."""
-    found = iter(holm([row.p for each in comparisons for row in each.parameters if row.p is not None]))
+    """Adjust the probabilities of parameters for all parameters of all comparisons, see `holm`."""
+    adjusted = iter(holm([row.p for comparison in comparisons for row in comparison.parameters if row.p is not None]))
 
-    def counted(row: ParameterContrast) -> ParameterContrast:
-        return row if row.p is None else replace(row, holm=next(found))
+    def with_adjusted(row: ParameterContrast) -> ParameterContrast:
+        return row if row.p is None else replace(row, holm=next(adjusted))
 
-    return [replace(each, parameters=tuple(map(counted, each.parameters))) for each in comparisons]
+    return [
+        replace(comparison, parameters=tuple(map(with_adjusted, comparison.parameters))) for comparison in comparisons
+    ]
 
 
 def holm(probabilities: Sequence[float]) -> list[float]:
-    """Probabilities of several tests as they count together (Holm 1979), in the same order."""
+    """Adjust the probabilities of several tests for their number (Holm 1979); same order."""
     order = np.argsort(probabilities)
     steps = np.asarray(probabilities)[order] * np.arange(len(order), 0, -1)
-    together = np.empty(len(order))
-    together[order] = np.minimum(np.maximum.accumulate(steps), 1.0)
-    return together.tolist()
+    adjusted = np.empty(len(order))
+    adjusted[order] = np.minimum(np.maximum.accumulate(steps), 1.0)
+    return adjusted.tolist()
 
 
 def _logarithm(band: Band) -> Band:
@@ -198,41 +219,45 @@ def _logarithm(band: Band) -> Band:
 
 
 def relative(logarithm: Array) -> Array:
-    """How far a quantity is off another, relative, from the logarithm of their ratio, which is cut where it is open."""
+    """Relative difference of two quantities from the logarithm of their ratio, which is limited to +-ln(1e10)."""
     return np.expm1(np.clip(logarithm, -_FURTHEST, _FURTHEST))
 
 
-def _less(one: Band, other: Band) -> Band:
-    """One quantity less another whose errors are independent."""
-    value = one.value - other.value
-    low = value - np.hypot(one.value - one.low, other.high - other.value)
-    high = value + np.hypot(one.high - one.value, other.value - other.low)
-    return Band(value, low, high, np.concatenate((one.root, -other.root)))
+def _subtract(minuend: Band, subtrahend: Band) -> Band:
+    """Difference of two quantities with independent errors."""
+    value = minuend.value - subtrahend.value
+    low = value - np.hypot(minuend.value - minuend.low, subtrahend.high - subtrahend.value)
+    high = value + np.hypot(minuend.high - minuend.value, subtrahend.value - subtrahend.low)
+    return Band(value, low, high, np.concatenate((minuend.root, -subtrahend.root)))
 
 
 def _parameters(
-    reference: Result, other: Result, frequency: float
+    reference: Result, compared: Result, frequency: float
 ) -> tuple[tuple[ParameterContrast, ...], tuple[float, int] | None]:
-    """All parameters that both have, and all together; a constant whose unit has an exponent also at a frequency [Hz].
+    """Compare the parameters that both results have, one by one and all together.
 
-    Notes: a strictly positive parameter counts by its logarithm. m [Pa s^alpha] and alpha make the modulus m (2 pi
-    f)^alpha, which compares whatever alpha is.
+    A constant whose unit has an exponent is also compared as a modulus at the frequency [Hz].
+
+    Notes: strictly positive parameters are compared by their logarithm. m [Pa s^alpha] and alpha make the modulus
+    m (2 pi f)^alpha, which is comparable at any alpha.
     """
-    rows, known = list[tuple[str, str | None]](), other.model.parameters
+    rows, compared_parameters = list[tuple[str, str | None]](), compared.model.parameters
     for name, parameter in reference.model.parameters.items():
-        if name in known:
+        if name in compared_parameters:
             exponent = _exponent(name, parameter)
-            varies = exponent is not None and not _equally_held(exponent, reference, other)
+            varies = exponent is not None and not _equally_held(exponent, reference, compared)
             rows += [(name, None), (name, exponent)] if varies else [(name, None)]
-    (one, slopes), (two, others) = (_side(result, rows, 2.0 * np.pi * frequency) for result in (reference, other))
-    covariance = _of_difference((slopes, reference.covariance), (others, other.covariance))
+    (one, slopes), (two, compared_slopes) = (
+        _side(result, rows, 2.0 * np.pi * frequency) for result in (reference, compared)
+    )
+    covariance = _of_difference((slopes, reference.covariance), (compared_slopes, compared.covariance))
     difference, error = two - one, np.sqrt(np.diag(covariance.matrix))
     half, freedom = covariance.half_width(np.eye(len(rows))), covariance.freedom(np.eye(len(rows)))
-    found, tested = list[ParameterContrast](), list[int]()
+    contrasts, tested = list[ParameterContrast](), list[int]()
     for i, (name, exponent) in enumerate(rows):
         parameter = reference.model.parameters[name]
         of_ratio = parameter.log or exponent is not None
-        bounds = dict.fromkeys(result.at_bound[name] for result in (reference, other) if name in result.at_bound)
+        bounds = dict.fromkeys(result.at_bound[name] for result in (reference, compared) if name in result.at_bound)
         note = f"at its {' and '.join(bounds)}" if bounds else ""
         if not note and not np.isfinite(difference[i]):
             note = "zero in one"
@@ -242,33 +267,33 @@ def _parameters(
             tested.append(i)
         if not note and exponent is None and rows[i + 1 : i + 2] == [(name, _exponent(name, parameter))]:
             note = f"only at equal {_exponent(name, parameter)}"
-        shown = f"{name} at {number(frequency, 3)} Hz" if exponent else name
+        label = f"{name} at {number(frequency, 3)} Hz" if exponent else name
         unit = _EXPONENT.sub("", parameter.unit).removesuffix("*s") if exponent else parameter.unit
         values = [float(np.exp(value) if of_ratio else value) for value in (one[i], two[i])]
-        row = ParameterContrast(shown, unit, values[0], values[1], of_ratio, note=note)
+        row = ParameterContrast(label, unit, values[0], values[1], of_ratio, note=note)
         if not note:
             ends = difference[i] - half[i], difference[i], difference[i] + half[i]
             low, value, high = (float(relative(end) if of_ratio else end) for end in ends)
             p = 2.0 * float(stdtr(freedom[i], -abs(difference[i]) / error[i]))
             row = replace(row, difference=value, interval=(low, high), p=p)
-        found.append(row)
-    return tuple(found), _joint(difference[tested], covariance.matrix[np.ix_(tested, tested)], freedom[tested])
+        contrasts.append(row)
+    return tuple(contrasts), _joint(difference[tested], covariance.matrix[np.ix_(tested, tested)], freedom[tested])
 
 
 def _exponent(name: str, parameter: Parameter) -> str | None:
-    """The name of the parameter that stands as an exponent in the unit of another; None where none does."""
-    found = _EXPONENT.search(parameter.unit)
-    return found and "".join(name.rpartition(".")[:2]) + found[1]
+    """Name of the parameter that is the exponent in the unit of another; None if the unit has no exponent."""
+    match = _EXPONENT.search(parameter.unit)
+    return match and "".join(name.rpartition(".")[:2]) + match[1]
 
 
 def _equally_held(name: str, *results: Result) -> bool:
-    """Return True if a parameter was held at one value in all results."""
+    """Check for a parameter that was fixed at the same value in all results."""
     free = any(result.covariance.stderr(name) for result in results)
     return not free and len({result.model.values[name] for result in results}) == 1
 
 
 def _side(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) -> tuple[Array, Array]:
-    """The quantities of some rows, (r,), and their derivatives by the parameters of the covariance, (r, k)."""
+    """Quantities of rows, (r,), and their derivatives with respect to the parameters of the covariance, (r, k)."""
     values, names = result.model.values, list(result.covariance.names)
     quantities, slopes = np.empty(len(rows)), np.zeros((len(rows), len(names)))
     for i, (name, exponent) in enumerate(rows):
@@ -277,8 +302,8 @@ def _side(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) 
         with np.errstate(divide="ignore"):
             quantities[i] = np.log(values[name]) if logarithmic else values[name]
         if name in names:
-            least = max(parameter.bounds[0], _NOTHING * parameter.typical)
-            slopes[i, names.index(name)] = 1.0 / max(values[name], least) if logarithmic else 1.0
+            floor = max(parameter.bounds[0], _NOTHING * parameter.typical)
+            slopes[i, names.index(name)] = 1.0 / max(values[name], floor) if logarithmic else 1.0
         if exponent:
             quantities[i] += values[exponent] * np.log(omega)
             if exponent in names:
@@ -287,15 +312,17 @@ def _side(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) 
 
 
 def _of_difference(*sides: tuple[Array, Covariance]) -> Covariance:
-    """The covariance of differences of r quantities by their slopes, (r, k) each, of independent results."""
+    """Covariance of the differences of r quantities of independent results, from their slopes, (r, k) each."""
     rows = range(len(sides[0][0]))
-    matrix = sum((slopes @ own.matrix @ slopes.T for slopes, own in sides), start=np.zeros((len(rows), len(rows))))
-    spread = [slopes @ part @ slopes.T for slopes, own in sides for part in own.spread]
+    matrix = sum(
+        (slopes @ covariance.matrix @ slopes.T for slopes, covariance in sides), start=np.zeros((len(rows), len(rows)))
+    )
+    spread = [slopes @ part @ slopes.T for slopes, covariance in sides for part in covariance.spread]
     return Covariance(tuple(map(str, rows)), matrix, tuple(spread))
 
 
 def _joint(difference: Array, matrix: Array, freedom: Array) -> tuple[float, int] | None:
-    """Probability by chance of differences with a covariance, (k,) and (k, k), and how many count.
+    """Probability by chance of differences (k,) with covariance (k, k), and the number of independent ones.
 
     Notes: Hotelling's T^2 with the fewest degrees of freedom of any; infinitely many make it chi-square.
     """
@@ -303,21 +330,21 @@ def _joint(difference: Array, matrix: Array, freedom: Array) -> tuple[float, int
         return None
     size = np.sqrt(np.diag(matrix))
     values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
-    kept = values > _LEAST_EIGENVALUE * values.max()
-    square = float(np.sum(np.square(vectors[:, kept].T @ (difference / size)) / values[kept]))
-    count, least = int(kept.sum()), float(freedom.min())
-    left = max(least - count + 1.0, 1.0)
-    return float(fdtrc(count, left, square * left / (least * count))), count
+    significant = values > _LEAST_EIGENVALUE * values.max()
+    square = float(np.sum(np.square(vectors[:, significant].T @ (difference / size)) / values[significant]))
+    count, fewest = int(significant.sum()), float(freedom.min())
+    denominator = max(fewest - count + 1.0, 1.0)
+    return float(fdtrc(count, denominator, square * denominator / (fewest * count))), count
 
 
-def _told(band: Band, unit: str, at: Contrast) -> str:
-    """What of a difference is sure at some operating point, and how large it may be where none is."""
+def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
+    """Describe differences beyond chance with their points, and give an upper limit for the other points."""
 
     def figures(i: int, word: str) -> str:
         value, ends = abs(band.value[i]), sorted((abs(band.low[i]), abs(band.high[i])))
         digits = int(np.clip(np.floor(np.log10(value)) - np.floor(np.log10(ends[1] - ends[0])) + 1, 2, _MOST_DIGITS))
-        shown = format_aligned([value, *ends], digits)
-        return f"{shown[0]}{unit} ({shown[1]} to {shown[2]}) {word}"
+        texts = format_aligned([value, *ends], digits)
+        return f"{texts[0]}{unit} ({texts[1]} to {texts[2]}) {word}"
 
     if not len(band.root):
         ends = (number(round(end, _MOST_DECIMALS), 3, "+") for end in (band.value.min(), band.value.max()))
@@ -326,11 +353,11 @@ def _told(band: Band, unit: str, at: Contrast) -> str:
     for sure, word in ((band.low > 0.0, "higher"), (band.high < 0.0, "lower")):
         if sure.any():
             size = np.where(sure, np.abs(band.value), np.nan)
-            most, least = int(np.nanargmax(size)), int(np.nanargmin(size))
-            alike_all = sure.all() and min(abs(band.low[most]), abs(band.high[most])) <= size[least]
-            parts.append(f"{figures(most, word)} {'throughout' if alike_all else f'at {_point(at, most)}'}")
+            top, bottom = int(np.nanargmax(size)), int(np.nanargmin(size))
+            alike_all = sure.all() and min(abs(band.low[top]), abs(band.high[top])) <= size[bottom]
+            parts.append(f"{figures(top, word)} {'throughout' if alike_all else f'at {_format_point(contrast, top)}'}")
             if sure.all() and not alike_all:
-                parts.append(f"at least {figures(least, word)}, at {_point(at, least)}")
+                parts.append(f"at least {figures(bottom, word)}, at {_format_point(contrast, bottom)}")
     none = (band.low <= 0.0) & (band.high >= 0.0)
     if none.any():
         largest = number(float(np.maximum(-band.low, band.high)[none].max()), 2)
@@ -338,7 +365,8 @@ def _told(band: Band, unit: str, at: Contrast) -> str:
     return ", ".join(parts)
 
 
-def _point(at: Contrast, i: int) -> str:
-    """An operating point in words."""
-    unit, factor = at.place.display.displacement
-    return f"{format_range('Hz', at.reference.frequency[i])}, {format_range(unit, factor * at.reference.amplitude[i])}"
+def _format_point(contrast: Contrast, i: int) -> str:
+    """Frequency and amplitude of a point as text."""
+    unit, factor = contrast.place.display.displacement
+    frequency, amplitude = contrast.reference.frequency[i], factor * contrast.reference.amplitude[i]
+    return f"{format_range('Hz', frequency)}, {format_range(unit, amplitude)}"

@@ -1,4 +1,4 @@
-"""The grid of a prediction where none is asked for: that of the sweeps, or the paper's as far as it was measured."""
+"""Grids of a prediction: requested, measured, or the paper's grid within the measured range."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -34,26 +34,42 @@ _AMPLITUDES = 3
 _MOST_STEPS = 10
 
 
-def asked_or(usual: tuple[Array, Array], asked: PredictSettings, place: Place) -> tuple[Array, Array]:
-    """Frequencies and amplitudes at a place as they are asked for, else the usual ones."""
-    every = asked.frequencies, getattr(asked, _AMPLITUDE_KEYS[place.motion])
-    frequencies, amplitudes = (np.array(stated or own) for stated, own in zip(every, usual, strict=True))
-    return frequencies, amplitudes
+def requested_grid(default: tuple[Array, Array], requested: PredictSettings, place: Place) -> tuple[Array, Array]:
+    """Grid of a place as requested, with defaults for what is not requested.
+
+    Args:
+        default: frequencies [Hz] and amplitudes [m, rad or 1].
+        requested: settings of a command or campaign.
+        place: direction or specimen.
+
+    Returns:
+        Frequencies [Hz] and amplitudes [m, rad or 1].
+    """
+    frequencies = requested.frequencies or default[0]
+    amplitudes = getattr(requested, _AMPLITUDE_KEYS[place.motion]) or default[1]
+    return np.array(frequencies), np.array(amplitudes)
 
 
-def grid_settings(asked: PredictSettings, campaign: Campaign | None) -> PredictSettings:
-    """Settings asked for, completed by the [predict] of a campaign."""
-    given = {key: value for key, value in vars(asked).items() if value is not None}
-    return replace(campaign.predict if campaign else PredictSettings(), **given)
+def grid_settings(requested: PredictSettings, campaign: Campaign | None) -> PredictSettings:
+    """Settings of a command, completed with the [predict] table of a campaign."""
+    overrides = {key: value for key, value in vars(requested).items() if value is not None}
+    return replace(campaign.predict if campaign else PredictSettings(), **overrides)
 
 
 def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
-    """Frequencies [Hz] and amplitudes [m or rad] to predict at where none are asked for, rising.
+    """Default grid of a prediction.
 
-    They are those of the sweeps at this place, so that prediction and measurement stand side by side, a level that
-    several sweeps reached more or less counting once; of amplitudes that were stepped, and of what swings free, at most
-    ten over their range. Without sweeps they are those that the model file lists. Without any they are the paper's as
-    far as they lie in the measured range, or an even grid over that range where fewer than two do.
+    The first of these that exists: the points of the sweeps (at most ten values of a quantity that was stepped, and one
+    value per level); the points of the tests that the model file lists; the paper's grid within the measured range; ten
+    or fewer values over the measured range.
+
+    Args:
+        result: fitted result.
+        direction: direction or specimen.
+        sweeps: measured sweeps; those of other places are ignored.
+
+    Returns:
+        Frequencies [Hz] and amplitudes [m, rad or 1], increasing.
     """
     mine = [sweep for sweep in sweeps if sweep.direction == direction]
     if mine:
@@ -74,32 +90,38 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
     if direction.is_rotation:
         return inside, amplitudes
     per_displacement = result.model.unit_strain(direction if isinstance(direction, Specimen) else Direction.AXIAL)
-    return inside, _within(amplitudes, [np.array(result.measured.strain) / per_displacement], _AMPLITUDES)
+    return inside, _limit(amplitudes, [np.array(result.measured.strain) / per_displacement], _AMPLITUDES)
 
 
 def common_grid(
     results: Sequence[Result], places: Sequence[Place], sweeps: Sequence[Sweep] = ()
 ) -> tuple[Array, Array]:
-    """Frequencies [Hz] and amplitudes [m, rad or 1] at which several results compare at one place, rising.
+    """Grid for the comparison of several results at one place.
 
-    It is the default grid of the first, as far as all were fitted there, so that differences are stated where something
-    was measured; an even grid over the common range where fewer than two of its values are. Where the ranges have
-    nothing in common, or are not known, it is that of the first.
+    The default grid of the first result within the range to which all were fitted; an even grid over that range if
+    fewer than two values are in it. If there is no common range, the default grid of the first result.
 
     Args:
-        places: the place as each result has it.
+        results: fitted results.
+        places: place of each result.
+        sweeps: measured sweeps.
+
+    Returns:
+        Frequencies [Hz] and amplitudes [m, rad or 1], increasing.
     """
-    known = [(result.measured, place, result) for result, place in zip(results, places, strict=True) if result.measured]
+    fitted = [
+        (result.measured, place, result) for result, place in zip(results, places, strict=True) if result.measured
+    ]
     frequency, amplitude = default_grid(results[0], places[0], sweeps)
-    if not known:
+    if not fitted:
         return frequency, amplitude
-    frequencies = [measured.frequency for measured, _, _ in known]
-    strains = [(np.array(measured.strain) / result.model.unit_strain(place)) for measured, place, result in known]
-    return _within(frequency, frequencies, _FREQUENCIES), _within(amplitude, strains, _AMPLITUDES)
+    frequencies = [measured.frequency for measured, _, _ in fitted]
+    strains = [(np.array(measured.strain) / result.model.unit_strain(place)) for measured, place, result in fitted]
+    return _limit(frequency, frequencies, _FREQUENCIES), _limit(amplitude, strains, _AMPLITUDES)
 
 
-def _within(values: Array, ranges: Sequence[Any], count: int) -> Array:
-    """The values within all ranges, or so many evenly over what these have in common; all where that is nothing."""
+def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
+    """Values within all ranges; if fewer than two, `count` even values over the common range; all if there is none."""
     inside, low, high = _inside(values, ranges), max(low for low, _ in ranges), min(high for _, high in ranges)
     if low > high * (1 + MARGIN):
         return values
@@ -107,23 +129,30 @@ def _within(values: Array, ranges: Sequence[Any], count: int) -> Array:
 
 
 def _inside(values: Array, ranges: Sequence[Any]) -> Array:
-    """The values within all ranges."""
+    """Values within all ranges."""
     return values[np.all([(values >= a * (1 - MARGIN)) & (values <= b * (1 + MARGIN)) for a, b in ranges], axis=0)]
 
 
 def _levelled(sweeps: Sequence[Sweep]) -> list[Sweep]:
     """Sweeps of one place in which amplitudes of one level, as each sweep has it, are the same."""
-    held = [sweep for sweep in sweeps if sweep.stepped]
-    points = np.hstack([np.empty((2, 0)), *(np.stack((sweep.amplitude, sweep.frequency)) for sweep in held)])
+    controlled = [sweep for sweep in sweeps if sweep.stepped]
+    points = np.hstack([np.empty((2, 0)), *(np.stack((sweep.amplitude, sweep.frequency)) for sweep in controlled)])
     amplitude = np.unique(points, axis=1)[0]  # each point once, however often it was repeated
     level = dict(zip(amplitude, nominal(amplitude), strict=True))
-    changed = (replace(sweep, amplitude=np.array([level[each] for each in sweep.amplitude])) for sweep in held)
+    changed = (replace(sweep, amplitude=np.array([level[x] for x in sweep.amplitude])) for sweep in controlled)
     return [*changed, *(sweep for sweep in sweeps if not sweep.stepped)]
 
 
 def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
-    """The values of some sweeps of one place, rising; in place of many that were taken as they came, some that span
-    them."""
+    """Distinct frequencies or amplitudes of sweeps of one place.
+
+    Args:
+        sweeps: sweeps of one place.
+        axis: "frequency" or "amplitude".
+
+    Returns:
+        Values [Hz, m, rad or 1], increasing; at most ten over the range of values that no program has set.
+    """
     sweeps = _levelled(sweeps) if axis == "amplitude" else sweeps
     parts: tuple[list[Array], list[Array]] = [], []
     for sweep in sweeps:
@@ -134,15 +163,15 @@ def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitu
     return _distinct(np.concatenate([planned, spanned]))
 
 
-def _even(least: float, most: float, count: int) -> Array:
-    """Values of three digits in equal ratios between two ends."""
-    return _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(least, most, count)]))
+def _even(low: float, high: float, count: int) -> Array:
+    """Values in equal ratios, rounded to three digits."""
+    return _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(low, high, count)]))
 
 
 def _distinct(values: Array) -> Array:
-    """The values, rising, each further above the last than a rig that misses its set point would be."""
-    kept: list[float] = []
+    """Values in increasing order, without those that a rig that misses its set point may have added."""
+    distinct: list[float] = []
     for value in np.unique(values):
-        if not kept or value > kept[-1] * (1.0 + MARGIN):
-            kept.append(float(value))
-    return np.array(kept)
+        if not distinct or value > distinct[-1] * (1.0 + MARGIN):
+            distinct.append(float(value))
+    return np.array(distinct)

@@ -1,7 +1,7 @@
 """Dynamic stiffness with 95 % bands at any frequency and amplitude, of the bushing as the car will have it.
 
-Material and component effects are kept, instrument effects are left out: the car does not have the rig's faults. What
-may be either's, an effect with a twin that these tests cannot tell from it, gives two readings; the bands span both.
+Material and component effects are included, instrument effects are left out: the car does not have the rig's faults. An
+effect that the tests cannot distinguish from one of the rig gives two predictions; the bands span both.
 """
 
 from __future__ import annotations
@@ -32,22 +32,23 @@ from bushfit.units import number
 _SMALL_STRAIN = 1e-4
 #: Lowest and highest frequency about a resonance over that of small strain.
 _DECADE = (0.2, 4.0)
-#: Frequencies there; chosen: 0.5 % apart, which is as near as tests tell a peak.
+#: Frequencies of this range; chosen: 0.5 % apart, the accuracy to which tests determine a peak.
 _RESONANCE_POINTS = 600
 #: Transmissibility from which a point counts as near the peak; chosen: about 0.6 to 1.3 of the peak's frequency, where
 #: the mount decides how far the mass moves.
 _NEAR_PEAK = 1.5
-#: What is predicted, each with its band.
+#: Predicted quantities.
 _BANDS = ("stiffness", "loss_factor", "storage_stiffness", "loss_stiffness")
 
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """A predicted quantity with its 95 % band, each (n,).
+    """A predicted quantity with its 95 % band.
 
     Args:
-        root: what independent errors of one standard deviation each do to the quantity, (r, n): their root sum of
-            squares is its standard error; none where it has no uncertainty.
+        value, low, high: prediction and ends of its band, (n,).
+        root: changes of the quantity by independent errors of one standard deviation, (r, n); their root sum of squares
+            is its standard error; r is 0 if it has no uncertainty.
     """
 
     value: Array
@@ -64,11 +65,12 @@ class Prediction:
         frequency: [Hz], (n,).
         amplitude: zero-to-peak [m or rad], (n,).
         stiffness, storage_stiffness, loss_stiffness: [N/m or N m/rad].
-        warnings: sentences on directions, frequencies and strains that were not fitted, on what differs from the
-            measurement because it is left out, and on what may be the rig's.
-        if_rigs: the same if what is unresolved is the rig's, which all bands here then span; None where nothing is.
-        measured: complex, of the sweeps at these points, mean of the repeats, nan where there is none [N/m or N m/rad],
-            (n,); None where no sweeps are known.
+        warnings: sentences on directions, frequencies and strains that were not fitted, on effects of the rig that are
+            left out, and on unresolved effects.
+        if_rigs: prediction if the unresolved effects belong to the rig, which all bands here span; None without
+            unresolved effects.
+        measured: complex stiffness of the sweeps at these points, mean of the repeats [N/m or N m/rad], (n,); nan at a
+            point without a measurement; None without sweeps.
     """
 
     direction: Place
@@ -95,69 +97,85 @@ def predict(
 ) -> Prediction:
     """Dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
 
-    Frequencies are in Hz, amplitudes zero-to-peak in m or rad. With `rig` its effects are kept, as in the tests;
-    `sweeps` are what was measured, to stand beside. A temperature [K] is for a model with an effect of it, which
-    stands at its reference otherwise. The bands hold every model that the tests leave possible: with and without what
-    may be the rig's, and with each of the effects that they cannot tell apart.
+    The bands span every model that the tests leave possible: with and without the unresolved effects, and with each of
+    the effects that the tests cannot distinguish.
+
+    Args:
+        result: fitted result.
+        direction: direction or specimen.
+        frequencies: [Hz], in any order.
+        amplitudes: zero-to-peak [m, rad or 1], in any order.
+        rig: True to include the effects of the rig, as in the tests.
+        sweeps: measured data for comparison; None without any.
+        temperature: [K]; None for the reference temperature.
+
+    Returns:
+        Prediction at all combinations of frequency and amplitude.
 
     Raises:
         ModelError: a frequency or amplitude that is not positive.
     """
-    for name, given in (("frequency", frequencies), ("amplitude", amplitudes)):
-        if not (np.size(given) and np.all(np.isfinite(given)) and np.min(given) > 0):
-            raise ModelError(f"impossible {name} to predict at", found=str(np.asarray(given)), expected="above zero")
+    for name, values in (("frequency", frequencies), ("amplitude", amplitudes)):
+        if not (np.size(values) and np.all(np.isfinite(values)) and np.min(values) > 0):
+            raise ModelError(f"impossible {name} to predict at", found=str(np.asarray(values)), expected="above zero")
     amplitude, frequency = (
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
-    at = direction, frequency, amplitude, temperature
-    models = [result.model] if rig else _readings(result.model, result.unresolved)
-    first, *others = (_predicted(result, model, *at) for model in models)
+    points = direction, frequency, amplitude, temperature
+    models = [result.model] if rig else _car_models(result.model, result.unresolved)
+    predictions = [_predicted(result, model, *points) for model in models]
+    bushings, rigs = predictions[0], predictions[-1] if len(predictions) > 1 else None
     explained = replace(result, model_error=None)
-    alternatives = [_predicted(explained, model, *at) for model in _alternatives(result, rig=rig)]
+    predictions += [_predicted(explained, model, *points) for model in _alternatives(result, rig=rig)]
     measured = None if sweeps is None else _measured(direction, frequency, amplitude, sweeps)
-    found = replace(first, if_rigs=others[-1] if others else None, measured=measured)
-    every = (first, *others, *alternatives)
     bands: dict[str, Any] = {}
-    for name in _BANDS:  # from the least to the largest of all
-        each_band = [getattr(each, name) for each in every]
-        low, high = (np.array([getattr(band, end) for band in each_band]) for end in ("low", "high"))
-        bands[name] = replace(each_band[0], low=low.min(axis=0), high=high.max(axis=0))
-    points = np.array((frequency, amplitude, first.stiffness.value))
-    if_rigs = others[-1].stiffness.value if others else None
-    told = of_points(result, direction, points, if_rigs, None if rig else measured, temperature)
-    return replace(found, **bands, warnings=tuple(told))
+    for name in _BANDS:
+        candidates = [getattr(prediction, name) for prediction in predictions]
+        low, high = (np.array([getattr(band, end) for band in candidates]) for end in ("low", "high"))
+        bands[name] = replace(candidates[0], low=low.min(axis=0), high=high.max(axis=0))
+    warnings = of_points(
+        result,
+        direction,
+        np.array((frequency, amplitude, bushings.stiffness.value)),
+        rigs.stiffness.value if rigs else None,
+        None if rig else measured,
+        temperature,
+    )
+    return replace(bushings, **bands, if_rigs=rigs, measured=measured, warnings=tuple(warnings))
 
 
-def _readings(model: Model, unresolved: Sequence[str]) -> list[Model]:
-    """The models that the car may have: without the rig's effects, and of those that are unresolved with all first,
-    with none last."""
+def _car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
+    """Models that may hold in the car: without instrument effects, and with all of the unresolved ones (first) to none
+    of them (last)."""
     bare = model.without(Level.INSTRUMENT)
     count = range(len(unresolved) + 1)
-    return [bare.without(*left) for size in count for left in combinations(unresolved, size)]
+    return [bare.without(*names) for size in count for names in combinations(unresolved, size)]
 
 
 def _alternatives(result: Result, *, rig: bool) -> Iterator[Model]:
-    """The models that may be right instead, each as the rig has it, or in all its readings."""
-    for each in result.alternatives:
-        known = {*result.model.effects} - {*result.unresolved}
-        twins = [effect.name for effect in each.model.records if effect.twins and effect.name not in known]
-        yield from [each.model] if rig else _readings(each.model, twins)
+    """Other models that the tests leave possible: with the effects of the rig, or as they may hold in the car."""
+    resolved = {*result.model.effects} - {*result.unresolved}
+    for model in (alternative.model for alternative in result.alternatives):
+        twins = [effect.name for effect in model.records if effect.twins and effect.name not in resolved]
+        yield from [model] if rig else _car_models(model, twins)
 
 
 def _predicted(
     result: Result, model: Model, direction: Place, frequency: Array, amplitude: Array, temperature: float | None
 ) -> Prediction:
-    """The prediction of one model at operating points, each (n,), with the uncertainty of the fit."""
+    """Prediction of one model at operating points, (n,), with the uncertainty of the fit."""
     under = Circumstances(temperature)
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)
     stiffness, slopes = stiffness_and_slopes(model, direction, frequency, amplitude, names, under=under)
-    open_to, beyond = _open_to(result, model, model.setting(direction, under=under), frequency, amplitude, stiffness)
-    count, slopes = len(names), np.concatenate((slopes, open_to))
+    model_errors, scale = _model_errors(
+        result, model, model.setting(direction, under=under), frequency, amplitude, stiffness
+    )
+    count, slopes = len(names), np.concatenate((slopes, model_errors))
 
     def band(value: Array, slope: Array) -> Band:
-        half = np.hypot(beyond * covariance.half_width(slope[:count]), Z95 * np.linalg.norm(slope[count:], axis=0))
-        root = np.concatenate((beyond * (covariance.root.T @ slope[:count]), slope[count:]))
+        half = np.hypot(scale * covariance.half_width(slope[:count]), Z95 * np.linalg.norm(slope[count:], axis=0))
+        root = np.concatenate((scale * (covariance.root.T @ slope[:count]), slope[count:]))
         return Band(value, value - half, value + half, root)
 
     relative = slopes / stiffness
@@ -173,24 +191,28 @@ def _predicted(
     )
 
 
-def _open_to(
+def _model_errors(
     result: Result, model: Model, setting: Setting, frequency: Array, amplitude: Array, stiffness: Array
 ) -> tuple[Array, Array]:
-    """What a standard deviation of each part of what has no name does to the stiffness, (0 or 2, n), and the share of
-    the parameters' errors that counts beside it, (n,): among its nodes, where errors are of both together, none of
-    them. A model error is told and not mended, so that it counts itself."""
-    found = model.unnamed or result.model_error
-    if found is None:
+    """Errors of the stiffness by an unnamed correction, or by a model error that is reported but not corrected.
+
+    Returns:
+        Change of the stiffness by one standard deviation of the real and of the imaginary part, (2, n), or (0, n)
+        without such an error; and the factor on the errors of the parameters, (n,): 0 within the range of the
+        correction's nodes, where its errors include those of the parameters, and 1 far outside.
+    """
+    correction = model.unnamed or result.model_error
+    if correction is None:
         return np.zeros((0, frequency.size)), np.ones(frequency.size)
-    share, off, stands = found.evaluate(setting, 2.0 * np.pi * frequency, amplitude)
-    parts = np.array([[1.0], [1.0j]])
+    share, error, weight = correction.evaluate(setting, 2.0 * np.pi * frequency, amplitude)
+    parts, scale = np.array([[1.0], [1.0j]]), np.sqrt(1.0 - np.square(weight))
     if model.unnamed:
-        return parts * off * stiffness / (1.0 + share), np.sqrt(1.0 - np.square(stands))
-    return parts * np.hypot(off, [share.real, share.imag]) * stiffness, np.sqrt(1.0 - np.square(stands))
+        return parts * error * stiffness / (1.0 + share), scale
+    return parts * np.hypot(error, [share.real, share.imag]) * stiffness, scale
 
 
 def _measured(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequence[MeasuredSweep]) -> Array:
-    """Complex stiffness measured at operating points, each (n,): the mean of the repeats, nan where there is none."""
+    """Measured complex stiffness at operating points, (n,): mean of the repeats, nan without a measurement."""
     mine = [sweep.with_weight() for sweep in sweeps if sweep.direction == direction]
     f, x, stiffness = (
         np.concatenate([np.empty(0), *(getattr(sweep, name) for sweep in mine)])
@@ -204,16 +226,19 @@ def _measured(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequ
 
 @dataclass(frozen=True, eq=False)
 class PredictedResonance:
-    """A mass [kg] on a mount whose base is shaken with a sine of constant acceleration [m/s^2], as the model has it.
+    """Predicted response of a mass on a mount whose base is shaken with a sine of constant acceleration.
 
     Args:
+        place: direction or specimen.
+        mass: [kg].
+        base_acceleration: zero-to-peak [m/s^2].
         frequency: [Hz], (n,).
         amplitude: of the mount's deformation, zero-to-peak [m], (n,).
         transmissibility: complex, acceleration of the mass over that of the base [-], (n,).
         stiffness: complex, of the mount at that frequency and amplitude [N/m], (n,).
-        warnings: sentences on a place, and on frequencies and strains near the peak, that were not fitted, and on what
-            may be the rig's.
-        if_rigs: the same at these frequencies if what is unresolved is the rig's; None where nothing is.
+        warnings: sentences on a place, and on frequencies and strains near the peak, that were not fitted, and on
+            unresolved effects.
+        if_rigs: response at these frequencies if the unresolved effects belong to the rig; None without such effects.
     """
 
     place: Place
@@ -229,8 +254,8 @@ class PredictedResonance:
     @property
     def peak(self) -> tuple[float, float]:
         """Frequency of the largest transmissibility [Hz], and this |T|."""
-        place = int(np.argmax(np.abs(self.transmissibility)))
-        return float(self.frequency[place]), float(abs(self.transmissibility[place]))
+        index = int(np.argmax(np.abs(self.transmissibility)))
+        return float(self.frequency[index]), float(abs(self.transmissibility[index]))
 
 
 def predict_resonance(
@@ -242,21 +267,30 @@ def predict_resonance(
     *,
     temperature: float | None = None,
 ) -> PredictedResonance:
-    """Transmissibility and amplitude of a mass [kg] on the bushing or specimen, whose stiffness depends on amplitude.
+    """Predict the response of a mass on the bushing or specimen, whose stiffness depends on amplitude.
 
-    The base is shaken at an amplitude in m/s^2; without frequencies [Hz] these are a decade about the resonance.
+    Args:
+        result: fitted result.
+        place: direction of translation, or specimen in shear.
+        mass: [kg].
+        base_acceleration: zero-to-peak [m/s^2].
+        frequencies: [Hz]; None for a range about the resonance.
+        temperature: [K]; None for the reference temperature.
+
+    Returns:
+        Transmissibility and amplitude at the frequencies.
 
     Raises:
-        ModelError: a place that does not count displacement and force.
+        ModelError: a place without displacement and force.
     """
     if place.motion is not TRANSLATION:
         raise ModelError("no mass stands on this", found=str(place), expected="a direction or mount with a stiffness")
-    bushings, *others = _readings(result.model, result.unresolved)
+    bushings, *rig_models = _car_models(result.model, result.unresolved)
     under = Circumstances(temperature)
     if frequencies is None:
         small = bushings.stiffness(place, 1.0, _SMALL_STRAIN / bushings.unit_strain(place), under=under)
-        about = float(np.sqrt(np.abs(small) / mass)) / (2.0 * np.pi)
-        frequencies = about * np.geomspace(_DECADE[0], _DECADE[1], _RESONANCE_POINTS)
+        resonance = float(np.sqrt(np.abs(small) / mass)) / (2.0 * np.pi)
+        frequencies = resonance * np.geomspace(_DECADE[0], _DECADE[1], _RESONANCE_POINTS)
     frequency = np.asarray(frequencies, dtype=float)
     base = base_acceleration / (2.0 * np.pi * frequency) ** 2
 
@@ -266,19 +300,19 @@ def predict_resonance(
         stiffness = stiffness_at(amplitude)
         return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness)
 
-    found, if_rigs = shaken(bushings), shaken(others[-1]) if others else None
-    near = np.abs(found.transmissibility) >= min(_NEAR_PEAK, found.peak[1])
-    what = f"{place}, resonance of {number(mass, 3)} kg"
-    told = [
+    predicted, if_rigs = shaken(bushings), shaken(rig_models[-1]) if rig_models else None
+    near = np.abs(predicted.transmissibility) >= min(_NEAR_PEAK, predicted.peak[1])
+    subject = f"{place}, resonance of {number(mass, 3)} kg"
+    warnings = [
         *unfitted(result, place),
-        *extrapolations(result, place, frequency[near], found.amplitude[near], temperature, what),
+        *extrapolations(result, place, frequency[near], predicted.amplitude[near], temperature, subject),
     ]
     if result.alternatives:
-        peaks = np.array([shaken(each).peak for each in _alternatives(result, rig=False)])
-        (low, least), (high, most) = peaks.min(axis=0), peaks.max(axis=0)
-        span = f"{number(low, 4)} to {number(high, 4)} Hz, |T| {number(least, 4)} to {number(most, 4)}"
-        told += [*result.undecided, f"{what}: {span}, by the models that the tests leave possible"]
+        peaks = np.array([shaken(model).peak for model in _alternatives(result, rig=False)])
+        (low, smallest), (high, largest) = peaks.min(axis=0), peaks.max(axis=0)
+        span = f"{number(low, 4)} to {number(high, 4)} Hz, |T| {number(smallest, 4)} to {number(largest, 4)}"
+        warnings += [*result.undecided, f"{subject}: {span}, by the models that the tests leave possible"]
     if if_rigs:
-        there, largest = (number(each, 4) for each in if_rigs.peak)
-        told.append(f"{what}: at {there} Hz, |T| {largest}, if {' and '.join(result.unresolved)} is the rig's")
-    return replace(found, warnings=tuple(told), if_rigs=if_rigs)
+        peak, ratio = (number(value, 4) for value in if_rigs.peak)
+        warnings.append(f"{subject}: at {peak} Hz, |T| {ratio}, if {' and '.join(result.unresolved)} is the rig's")
+    return replace(predicted, warnings=tuple(warnings), if_rigs=if_rigs)

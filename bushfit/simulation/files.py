@@ -76,7 +76,14 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
 
 
 def raw_loop_table(loop: Loop) -> pd.DataFrame:
-    """Table of a loop: time, displacement and force, or strain and stress, in display units."""
+    """Table of a loop: time, displacement and force, or strain and stress, in display units.
+
+    Args:
+        loop: simulated loop.
+
+    Returns:
+        Columns of time, displacement and force, or of strain and stress.
+    """
     moves, resists, _ = loop.direction.motion.words
     (length, length_factor), (force, force_factor), _ = _as_stated(loop.direction)
     return pd.DataFrame(
@@ -92,6 +99,12 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
     """Table of a sweep: frequency, amplitude, repeat, stiffness and loss factor in display units.
 
     A stepped amplitude is written as reached, without its nominal level.
+
+    Args:
+        sweep: simulated sweep.
+
+    Returns:
+        One row per point.
     """
     motion = sweep.direction.motion
     amplitude, relates = "strain amplitude" if motion is STRAINING else "amplitude", motion.words[2]
@@ -112,7 +125,14 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
 
 
 def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
-    """Table of a resonance test: frequency, accelerations of base and mass, and their phase."""
+    """Table of a resonance test: frequency, accelerations of base and mass, and their phase.
+
+    Args:
+        test: simulated resonance test.
+
+    Returns:
+        Columns of frequency [Hz], base and mass acceleration [m/s^2], and phase [deg].
+    """
     return pd.DataFrame(
         {
             "frequency [Hz]": test.frequency,
@@ -126,5 +146,5 @@ def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
 def _as_stated(place: Place) -> Display:
     """Units of displacement, force and stiffness in the files of a place; a tensor strain is gamma/2."""
     (unit, factor), force, stiffness = place.display
-    stated = strain_factor_of_files(place)
-    return Display(Unit(unit, factor / stated), force, stiffness)
+    ratio = strain_factor_of_files(place)
+    return Display(Unit(unit, factor / ratio), force, stiffness)

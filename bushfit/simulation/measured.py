@@ -93,8 +93,10 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
     loops = tuple(
         _loop(test, force, number, plan, random, gains) for number, (test, force) in enumerate(clean.loops, start=1)
     )
-    sweeps = tuple(_sweep(clean.truth, test, k, name, plan, random, own) for name, (test, k), own in named)
-    shaken = [each for each in clean.resonances for _ in range(plan.repeats)]
+    sweeps = tuple(
+        _sweep(clean.truth, test, k, name, plan, random, circumstances) for name, (test, k), circumstances in named
+    )
+    shaken = [resonance for resonance in clean.resonances for _ in range(plan.repeats)]
     resonances = tuple(
         (test.mass, _resonance(test, ratio, name, plan, random))
         for name, (test, ratio) in zip(_names("resonance", [t for t, _ in shaken]), shaken, strict=True)
@@ -144,7 +146,7 @@ def _sweep(
 ) -> Sweep:
     """All repeats of a sweep; for a stepped amplitude, with the levels that a reader determines."""
     plan = replace(plan, repeats=test.repeats or plan.repeats)
-    shape = (len(test.held), plan.repeats, len(test.steps))
+    shape = (len(test.levels), plan.repeats, len(test.steps))
     frequency, level = (np.broadcast_to(values[:, None], shape).ravel() for values in test.points)
     repeat = np.broadcast_to(np.arange(1, plan.repeats + 1)[:, None], shape).ravel()
     stiffness, reached = np.broadcast_to(clean[:, None], shape), None
@@ -154,7 +156,7 @@ def _sweep(
         planned = frequency, level, stiffness.ravel(), Circumstances(test.temperature)
         nearby = near(truth, test.direction, *planned, under)
         stiffness = nearby(level if reached is None else reached).reshape(shape)
-    stiffness = stiffness * level_errors(len(test.held), plan, random)
+    stiffness = stiffness * level_errors(len(test.levels), plan, random)
     measured = np.stack([with_noise(stiffness[:, number], plan, random) for number in range(plan.repeats)], axis=1)
     if test.stepped == "amplitude" and reached is not None:
         level = runs_of(frequency, reached, repeat).amplitude
@@ -186,7 +188,16 @@ def _resonance(
 
 
 def filtered_noise(rows: int, plan: SimulateSettings, random: Generator) -> Array:
-    """Stationary noise of unit variance with the correlation of the plan between rows, (rows,)."""
+    """Stationary noise of unit variance, as a first-order autoregressive process.
+
+    Args:
+        rows: number of rows.
+        plan: settings with the correlation between neighbouring rows.
+        random: generator.
+
+    Returns:
+        Noise [1], (rows,).
+    """
     noise = random.standard_normal(rows)
     if not plan.force_correlation:
         return noise
@@ -214,20 +225,20 @@ def with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array
     return clean * (1.0 + gain) * np.exp(1j * phase) * (1.0 + scatter)
 
 
-def level_errors(held: int, plan: SimulateSettings, random: Generator) -> Array:
+def level_errors(levels: int, plan: SimulateSettings, random: Generator) -> Array:
     """Factors of the gain and phase errors that all repeats of a level share.
 
     Args:
-        held: number of levels.
+        levels: number of levels.
         plan: settings with the errors.
         random: generator.
 
     Returns:
-        Complex factors, (held, 1, 1).
+        Complex factors, (levels, 1, 1).
     """
     if not (plan.level_gain_error or plan.level_phase_error):
-        return np.ones((held, 1, 1))
-    gain, phase = random.standard_normal((2, held, 1, 1))
+        return np.ones((levels, 1, 1))
+    gain, phase = random.standard_normal((2, levels, 1, 1))
     return (1.0 + plan.level_gain_error * gain) * np.exp(1j * plan.level_phase_error * phase)
 
 
@@ -244,5 +255,5 @@ def amplitude_ratios(test: SimulatedSweep, plan: SimulateSettings, random: Gener
     """
     at_frequency = random.standard_normal(len(test.frequencies))
     at_frequency = at_frequency if test.stepped == "frequency" else at_frequency[:, None, None]
-    at_point = random.standard_normal((len(test.held), plan.repeats, len(test.steps)))
+    at_point = random.standard_normal((len(test.levels), plan.repeats, len(test.steps)))
     return np.exp(test.reached * np.sqrt(0.5) * (at_frequency + at_point)).ravel()

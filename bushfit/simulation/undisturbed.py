@@ -170,7 +170,7 @@ def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Ar
     points = (values.ravel() for values in test.points)
     under = Circumstances(test.temperature)
     stiffness = rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle, under=under)
-    return stiffness.reshape(len(test.held), -1)
+    return stiffness.reshape(len(test.levels), -1)
 
 
 def _clean_resonance(truth: Model, test: SimulatedResonance, steps_per_cycle: int) -> Array:

@@ -75,7 +75,7 @@ def test_equal_bushings_differ_no_oftener_than_said(fits: list[tuple[Result, Res
     alarms = {
         "a parameter, Holm": sum(any(row.holm is not None and row.holm < 0.05 for row in f.parameters) for f in found),
         "all together": sum(f.joint is not None and f.joint[0] < 0.05 for f in found),
-        "words": sum(any("higher" in line or "lower" in line for line in f.words()) for f in found),
+        "words": sum(any("higher" in line or "lower" in line for line in f.sentences()) for f in found),
     }
     print(f"false alarms of {len(fits)} pairs: {alarms}")
     assert max(alarms.values()) <= binom.isf(3e-3, len(fits), 0.05)  # more in 3 of a thousand
@@ -170,13 +170,13 @@ def test_a_parameter_at_its_bound_is_not_tested_and_bands_widen_at_most_as_bonfe
 def test_words_say_what_is_sure_and_how_much_may_differ_where_nothing_is(paper_model: Model) -> None:
     covariance = np.diag([1e6, 1.0, 1e-12, 1.0, 1e-14])
     one = known(paper_model, covariance)
-    (line,) = against(one, one).words()
+    (line,) = against(one, one).sentences()
     assert line.startswith("axial: stiffness no difference shown, none above 0.")
     stiffer = scaled(paper_model, mu=1.25, m=1.25, sigma_fmax=1.25)
-    (line,) = against(one, replace(one, model=stiffer)).words()
+    (line,) = against(one, replace(one, model=stiffer)).sentences()
     assert line.startswith("axial: stiffness 25.0 % (24.")
     assert "throughout; loss factor no difference shown, none above 0.000" in line
-    (line,) = against(Result(paper_model), Result(stiffer)).words()
+    (line,) = against(Result(paper_model), Result(stiffer)).sentences()
     assert line == "axial: stiffness +25 % by value, of unknown error; loss factor +0 by value, of unknown error"
 
 

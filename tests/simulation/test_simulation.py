@@ -112,7 +112,7 @@ def test_gain_and_phase_errors_are_shared_by_a_run(clean: Undisturbed, coupon: U
     test, stiffness = (clean if held == "amplitude" else coupon).sweeps[0]
     own = replace(clean, sweeps=((replace(test, reached=0.0), stiffness),))
     plan = SimulateSettings(repeats=2000, gain_error=0.01, phase_error=0.02)
-    off = np.log(measure(own, plan).sweeps[0].stiffness.reshape(len(test.held), 2000, -1) / stiffness[:, None])
+    off = np.log(measure(own, plan).sweeps[0].stiffness.reshape(len(test.levels), 2000, -1) / stiffness[:, None])
     assert np.ptp(off.real, axis=-1).max() < 1e-12
     assert np.ptp(off.imag, axis=-1).max() < 1e-12
     assert np.std(off.real) == pytest.approx(0.01, rel=0.1)
