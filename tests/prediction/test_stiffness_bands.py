@@ -288,7 +288,7 @@ OFF = "+4.9 % in stiffness and +36 % in strain against finite elements"
             "axial",
             0.010,
             "paper",
-            [f"axial tests. The band excludes the error of the radial formula, for this shape {OFF}"],
+            [f"agrees within its noise. The band excludes the error of the radial formula, for this shape {OFF}"],
         ),
         (
             "torsion",
