@@ -89,7 +89,7 @@ def diagnosed(folder: Path) -> tuple[dict[str, Any] | None, str, float]:
     signal.signal(signal.SIGVTALRM, _give_up)
     signal.setitimer(signal.ITIMER_VIRTUAL, _LONGEST)
     started = time.process_time()
-    done = _typed("diagnose", folder / "bushing.toml", "-o", folder / "out", "--no-report", "--json")
+    done = typed("diagnose", folder / "bushing.toml", "-o", folder / "out", "--no-report", "--json")
     seconds = time.process_time() - started
     signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
     if done.exit_code:
@@ -99,10 +99,10 @@ def diagnosed(folder: Path) -> tuple[dict[str, Any] | None, str, float]:
 
 def usable(folder: Path) -> bool:
     """Whether `predict` reads back the model that was written."""
-    return _typed("predict", folder / "out" / "model.json", "-o", folder / "predicted").exit_code == 0
+    return typed("predict", folder / "out" / "model.json", "-o", folder / "predicted").exit_code == 0
 
 
-def _typed(*arguments: object) -> Result:
+def typed(*arguments: object) -> Result:
     return CliRunner().invoke(cli, [*map(str, arguments), "--no-plots"])
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from hidden_kinds import aimed, diagnosed_all, hidden, rates, table
-from judging import Judged, acceptable
+from hidden_kinds import aimed, diagnosed_all, hidden, rates, table, typed
+from judging import Judged, acceptable, against_truth
 from kinds import SIZES, Bench, largest, sized
 from lab_campaign import KINDS, Answer, a_specimen, campaign
 from time_rig import DIRECTIONS, Bushing, Rubber, Tests, friction, respond
@@ -97,6 +97,14 @@ def test_a_campaign_is_diagnosed_as_typed() -> None:
     assert outcome.judged
     assert outcome.answer.visible
     assert outcome.judged.seen
+
+
+def test_the_truth_is_as_likely_as_the_fit_of_a_clean_campaign(tmp_path: Path) -> None:
+    """Less half the number of parameters, on average; repeats without noise agree in all digits, and all count."""
+    for silent in (False, True):
+        campaign("", 0.0, 4, tmp_path / ("silent" if silent else "noisy"), silent=silent)
+    typed("fit", tmp_path / "noisy" / "bushing.toml", "-o", tmp_path / "fit")
+    assert -8.0 < against_truth(tmp_path / "noisy", tmp_path / "silent", tmp_path / "fit" / "model.json") < 0.0
 
 
 @pytest.mark.parametrize(
