@@ -21,7 +21,7 @@ from bushfit.diagnosis.hypotheses import COMPOUND, DiagnosisRequest, Hypothesis,
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, FAR, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_what_it_uses
-from bushfit.diagnosis.refit import beside, refitted, within_reach
+from bushfit.diagnosis.refit import refit_with_free_columns, refitted, within_reach
 from bushfit.diagnosis.verdict import judged
 from bushfit.errors import FitError, ModelError
 from bushfit.progress import track
@@ -216,7 +216,7 @@ class Search:
                 evidence = state.evidence
                 if evidence.reduced > _BENT:  # by the place, too
                     start = {} if state.effects else self.asked.start
-                    evidence = beside(evidence, weighed.bare, each.columns, start, self.asked.bounds)
+                    evidence = refit_with_free_columns(evidence, weighed.bare, each.columns, start, self.asked.bounds)
                 more = replace(
                     state,
                     evidence=evidence,

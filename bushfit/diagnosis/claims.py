@@ -46,7 +46,7 @@ class Claim:
     tests: tuple[int, ...]
 
     @property
-    def each(self) -> list[Claim]:
+    def single_tests(self) -> list[Claim]:
         """One claim for each test alone."""
         return [Claim(self.mistake, (place,)) for place in self.tests] or [self]
 
@@ -56,18 +56,18 @@ class Claim:
 
     def labels(self, data: PreparedCampaign) -> tuple[str, ...]:
         """The mistake with each of its tests, as --adopt takes it."""
-        return tuple(labelled(self.mistake.name, one.test(data)) for one in self.each)
+        return tuple(labelled(self.mistake.name, claim.test(data)) for claim in self.single_tests)
 
     def words(self, data: PreparedCampaign) -> str:
         """Sentence that states the mistake."""
-        every = [*data.loops, *data.sweeps]
-        files = [file_or_name(every[place].test) for place in self.tests]
+        data_sets = [*data.loops, *data.sweeps]
+        files = [file_or_name(data_sets[place].test) for place in self.tests]
         return self.mistake.sentence.format(files=" and ".join(filter(None, (", ".join(files[:-1]), *files[-1:]))))
 
     def corrections(self, data: PreparedCampaign) -> tuple[str, ...]:
         """Lines to write into the campaign, one for each test."""
-        every = [*data.loops, *data.sweeps]
-        return tuple(self.mistake.corrected(every[place].test) for place in self.tests) or (
+        data_sets = [*data.loops, *data.sweeps]
+        return tuple(self.mistake.corrected(data_sets[place].test) for place in self.tests) or (
             self.mistake.corrected(None),
         )
 
@@ -96,22 +96,22 @@ def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCam
     Raises:
         ModelError: a mistake that was not made in the test named, or no such test.
     """
-    said = []
+    messages = []
     for name in names:
         claim = _claimed(data, name)
-        said.append(f"mended by --adopt {name}: read as if {claim.words(data)}; {claim.corrections(data)[0]}")
+        messages.append(f"mended by --adopt {name}: read as if {claim.words(data)}; {claim.corrections(data)[0]}")
         data = claim.mended(data)
-    return data, said
+    return data, messages
 
 
 def _claimed(data: PreparedCampaign, name: str) -> Claim:
     """Claim that one --adopt option makes."""
     mistake, test = get_mistake(name), name.partition(SEPARATOR)[2]
-    every: list[MeasuredTest] = [*data.loops, *data.sweeps]
-    possible = [place for place, one in enumerate(every) if mistake and _is_possible(mistake, one, data)]
-    tests = tuple(place for place in possible if every[place].name == test)
+    data_sets: list[MeasuredTest] = [*data.loops, *data.sweeps]
+    possible = [place for place, one in enumerate(data_sets) if mistake and _is_possible(mistake, one, data)]
+    tests = tuple(place for place in possible if data_sets[place].name == test)
     if mistake is None or bool(tests) != bool(mistake.kinds) or (test and not tests):
-        expected = [labelled(name.partition(SEPARATOR)[0], every[place].name) for place in possible]
+        expected = [labelled(name.partition(SEPARATOR)[0], data_sets[place].name) for place in possible]
         raise ModelError(
             "this mistake cannot have been made there",
             found=name,
@@ -130,7 +130,7 @@ def _is_possible(mistake: Mistake, data_set: MeasuredTest, data: PreparedCampaig
 
 def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
     """Every mistake that may have been made: in one test, in all of a kind or of a direction, or in all."""
-    every: list[MeasuredTest] = [*data.loops, *data.sweeps]
+    data_sets: list[MeasuredTest] = [*data.loops, *data.sweeps]
     found = []
     for mistake in MISTAKES.values():
         if mistake.name in without:
@@ -140,13 +140,13 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
             continue
         places = [
             place
-            for place, data_set in enumerate(every)
+            for place, data_set in enumerate(data_sets)
             if _is_possible(mistake, data_set, data) and labelled(mistake.name, data_set.name) not in without
         ]
         groups: list[tuple[int, ...]] = [(place,) for place in places]
-        groups += [tuple(p for p in places if every[p].kind == kind) for kind in ("loop", "sweep")]
-        directions = dict.fromkeys(data_set.direction for data_set in every)
-        groups += [tuple(p for p in places if every[p].direction == direction) for direction in directions]
+        groups += [tuple(p for p in places if data_sets[p].kind == kind) for kind in ("loop", "sweep")]
+        directions = dict.fromkeys(data_set.direction for data_set in data_sets)
+        groups += [tuple(p for p in places if data_sets[p].direction == direction) for direction in directions]
         found += [Claim(mistake, group) for group in dict.fromkeys([*groups, tuple(places)]) if group]
     return found
 
@@ -163,30 +163,30 @@ class Screen:
     _known: dict[tuple[int, str, Bushing | None], Array] = field(default_factory=dict)
     _responses: dict[tuple[Bushing | None, Place, bytes, bytes], Array] = field(default_factory=dict)
 
-    def best(self, found: Sequence[Claim], most: int) -> list[Claim]:
+    def best(self, found: Sequence[Claim], limit: int) -> list[Claim]:
         """The claims under which the tests could agree best, as far as these are worth a fit."""
         before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in found])
         changed = np.abs(misfits - before) > _LEAST_CHANGE * before
         order = np.argsort(misfits, kind="stable")
-        return [found[place] for place in order if changed[place] and misfits[place] < _WORTH_A_FIT * before][:most]
+        return [found[place] for place in order if changed[place] and misfits[place] < _WORTH_A_FIT * before][:limit]
 
     def misfit(self, claim: Claim | None) -> float:
         """Least sum of squares over the grid, in units of a coarse noise; infinite where no model has a response."""
         bushing = self.data.campaign.bushing
         if claim and not claim.tests and bushing:
             bushing = claim.mistake.mended_bushing(bushing)
-        every: list[MeasuredTest] = [*self.data.loops, *self.data.sweeps]
-        mistakes = [claim.mistake if claim and place in claim.tests else None for place in range(len(every))]
+        data_sets: list[MeasuredTest] = [*self.data.loops, *self.data.sweeps]
+        mistakes = [claim.mistake if claim and place in claim.tests else None for place in range(len(data_sets))]
         try:
-            parts = [self._part(place, test, mistakes[place], bushing) for place, test in enumerate(every)]
+            parts = [self._part(place, test, mistakes[place], bushing) for place, test in enumerate(data_sets)]
         except ModelError:  # a shape for which a formula was not checked
             return np.inf
         whole = np.sum(parts, axis=0)
-        gram, along, total = whole[:, :3, :3], whole[:, :3, 3], whole[:, 3, 3]
+        gram, products, total = whole[:, :3, :3], whole[:, :3, 3], whole[:, 3, 3]
         scale = np.sqrt(np.einsum("gii->gi", gram)) + 1e-300
-        unit, right = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3), along / scale
+        unit, right = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3), products / scale
         explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
-        return max(_least((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
+        return max(_paraboloid_minimum((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
 
     def _part(self, place: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None) -> Array:
         """Products of a test's three columns, and of what they are to meet, at each point of the grid, (g, 4, 4)."""
@@ -208,7 +208,7 @@ class Screen:
         return self._responses[key]
 
 
-def _least(misfit: Array) -> float:
+def _paraboloid_minimum(misfit: Array) -> float:
     """The least value between the points of a grid, by a paraboloid through the least point and its neighbours."""
     row, column = (
         int(np.clip(i, 1, n - 2))
@@ -231,13 +231,13 @@ def _columns(bushing: Bushing | None, direction: Place, frequency: Array, amplit
     alpha, eps_half = (axis.reshape(-1, 1) for axis in np.meshgrid(_ALPHA, _EPS_HALF))
     model = Model.with_defaults(bushing, BASE, {})
     none = {**dict.fromkeys(names, 0.0), "alpha": alpha, "eps_half": eps_half}
-    each = [
+    responses = [
         np.broadcast_to(
             model.stiffness(direction, frequency, amplitude, values={**none, name: 1.0}), (alpha.size, frequency.size)
         )
         for name in names
     ]
-    return np.stack(each, axis=1)
+    return np.stack(responses, axis=1)
 
 
 def _points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[Place, Array, Array, Array, Array]:

@@ -46,27 +46,27 @@ def condensed(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]
     Rows without weight are in no mean. The noise from point to point of a line in means is theirs, estimated anew; what
     runs share stays as it was.
     """
-    rig, loops, said = data.campaign.rig, _some(data.loops), tuple[str, ...]()
+    rig, loops, messages = data.campaign.rig, _some(data.loops), tuple[str, ...]()
     if len(loops) < len(data.loops):
-        data, every = replace(data, loops=tuple(with_gain_errors(loops, rig))), len(data.loops)
-        said = (f"{len(loops)} of the {every} loops are diagnosed: together they have more than {_MOST_ROWS} rows",)
-    made = {data_set: means for data_set in data.sweeps if (means := _told(data_set))}
-    if not made:
-        return data, said
+        data, total = replace(data, loops=tuple(with_gain_errors(loops, rig))), len(data.loops)
+        messages = (f"{len(loops)} of the {total} loops are diagnosed: together they have more than {_MOST_ROWS} rows",)
+    means_by_sweep = {data_set: means for data_set in data.sweeps if (means := _condensed_sweep(data_set))}
+    if not means_by_sweep:
+        return data, messages
     noises = {
-        id(noise): _noise(noise, [means for data_set, means in made.items() if data_set.noise is noise], rig)
+        id(noise): _noise(noise, [means for data_set, means in means_by_sweep.items() if data_set.noise is noise], rig)
         for noise in (data_set.noise for data_set in data.sweeps)
     }
     sweeps = []
     for data_set in data.sweeps:
-        noise, means = noises[id(data_set.noise)], made.get(data_set)
+        noise, means = noises[id(data_set.noise)], means_by_sweep.get(data_set)
         if means:
             weight = np.full(means.sweep.frequency.size, data_set.sweep.weight)
             sweeps.append(replace(data_set, sweep=means.sweep, noise=noise, weight=weight, under=means.under))
         else:
             sweeps.append(replace(data_set, noise=noise))
-    said += tuple(f"{each.sweep.name}: {each.words}" for each in made.values())
-    return replace(data, sweeps=tuple(sweeps)), said
+    messages += tuple(f"{means.sweep.name}: {means.words}" for means in means_by_sweep.values())
+    return replace(data, sweeps=tuple(sweeps)), messages
 
 
 def _some(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
@@ -78,11 +78,11 @@ def _some(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
     sizes = np.array([loop.size for loop in loops])
     if sizes.sum() <= _MOST_ROWS:
         return loops
-    at = [(str(loop.direction), loop.drive.amplitude, loop.drive.frequency) for loop in loops]
+    keys = [(str(loop.direction), loop.drive.amplitude, loop.drive.frequency) for loop in loops]
     times_before = np.tril(repeats_of(loops), -1).sum(axis=1)
-    once = sorted(np.flatnonzero(times_before == 0).tolist(), key=at.__getitem__)
+    once = sorted(np.flatnonzero(times_before == 0).tolist(), key=keys.__getitem__)
     again = [n for n in np.argsort(times_before, kind="stable").tolist() if times_before[n]]
-    of_each = {next(n for n in once if at[n][0] == direction) for direction, *_ in at}
+    of_each = {next(n for n in once if keys[n][0] == direction) for direction, *_ in keys}
 
     def fit(chosen: set[int]) -> bool:
         return bool(sizes[list(chosen)].sum() <= _MOST_ROWS)
@@ -95,13 +95,17 @@ def _some(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
     return [loops[n] for n in sorted(chosen)]
 
 
-def _noise(before: SweepNoise, made: Sequence[_Means], rig: RigSettings) -> SweepNoise:
+def _noise(before: SweepNoise, condensations: Sequence[_Means], rig: RigSettings) -> SweepNoise:
     """The noise of the sweeps of a rig with some of them in means; a stated one falls with the rows of each."""
-    if not made:
+    if not condensations:
         return before
-    anew, random = sweep_noise([means.sweep for means in made], rig), dict(before.random)
-    slopes = {name: slope for name, slope in before.slopes.items() if name not in {each.sweep.name for each in made}}
-    for means in made:
+    anew, random = sweep_noise([means.sweep for means in condensations], rig), dict(before.random)
+    slopes = {
+        name: slope
+        for name, slope in before.slopes.items()
+        if name not in {means.sweep.name for means in condensations}
+    }
+    for means in condensations:
         for key, share in means.shares.items():
             gain, phase = np.sqrt(share) * np.array(before.random[key])
             random[key] = anew.random[key] if means.sweep.noise is None else (float(gain), float(phase))
@@ -109,7 +113,7 @@ def _noise(before: SweepNoise, made: Sequence[_Means], rig: RigSettings) -> Swee
     return replace(before, random=random, slopes={**slopes, **anew.slopes}, scatter_freedom=freedom)
 
 
-def _told(data_set: MeasuredSweep) -> _Means | None:
+def _condensed_sweep(data_set: MeasuredSweep) -> _Means | None:
     """Part of a sweep that is diagnosed; None if that is the whole sweep."""
     sweep, rows, words = data_set.sweep, data_set.order[data_set.weights > 0.0], ""
     lines = np.unique(sweep.held[rows])
@@ -117,26 +121,26 @@ def _told(data_set: MeasuredSweep) -> _Means | None:
         some = lines[np.linspace(0, lines.size - 1, _MOST_LINES).round().astype(int)]
         rows = rows[np.isin(sweep.held[rows], some)]
         words = f"{some.size} of its {lines.size} runs at one level, or frequency, are diagnosed, evenly spread"
-    held, repeat = sweep.held[rows], sweep.repeat[rows]
+    levels, repeat = sweep.held[rows], sweep.repeat[rows]
     step = sweep.step[rows] if sweep.stepped else rows  # where neither is held, in the turn they were measured
     band, long = np.arange(rows.size), list[float]()  # each of its own
-    for line in np.unique(held).tolist():
-        mine = held == line
+    for line in np.unique(levels).tolist():
+        mine = levels == line
         if np.unique(repeat[mine], return_counts=True)[1].max() > _LONG:
             edges = np.quantile(step[mine], np.linspace(0.0, 1.0, _BANDS + 1)[1:-1])
             band[mine] = -1 - np.searchsorted(edges, step[mine])
             long.append(line)
     if not long and not words:
         return None
-    groups = _Groups.of(rows, np.stack((held, repeat.astype(float), band.astype(float))))
+    groups = _Groups.from_keys(rows, np.stack((levels, repeat.astype(float), band.astype(float))))
     means = groups.sweep(sweep)
     if means.frequency.size < rows.size:
         counted = f"{rows.size} points are diagnosed as {means.frequency.size} means over narrow bands"
         words = "; ".join(filter(None, (words, counted)))
     shares = {(sweep.name, line): float(np.mean(1.0 / groups.counts[means.held == line])) for line in long}
     under = data_set.under
-    known = (under.temperature, under.turn, under.strained, under.left, under.rested)
-    return _Means(means, Circumstances(*map(groups.mean, known)), shares, words)
+    conditions = (under.temperature, under.turn, under.strained, under.left, under.rested)
+    return _Means(means, Circumstances(*map(groups.mean, conditions)), shares, words)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +160,7 @@ class _Groups:
     counts: Array
 
     @classmethod
-    def of(cls, rows: Array, keys: Array) -> "_Groups":
+    def from_keys(cls, rows: Array, keys: Array) -> "_Groups":
         """Means of the values that have the same key."""
         _, first, place, counts = np.unique(keys, axis=1, return_index=True, return_inverse=True, return_counts=True)
         turn = np.argsort(np.bincount(place, rows) / counts, kind="stable")

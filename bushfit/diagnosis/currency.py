@@ -126,7 +126,7 @@ class LinearModel:
     @cached_property
     def _plain(self) -> Array:
         """Mask of the nodes without level errors beyond the rig's class and without a deviation of the compound."""
-        return self.rig.within[self._at] & ~self._bent
+        return self.rig.within_class[self._at] & ~self._bent
 
     @cached_property
     def _bent(self) -> Array:

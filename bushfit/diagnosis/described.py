@@ -57,13 +57,13 @@ class Described:
     def description(self) -> Description | None:
         """The power law, where the gap is one."""
         found = self.fingerprint
-        if found is None or not found.is_power_law or not any(found.told):
+        if found is None or not found.is_power_law or not any(found.determined):
             return None
         return Description(found.phase_deg, found.frequency_power, found.amplitude_power, found.words)
 
 
 def describe(
-    evidence: Evidence, rig: RigSettings, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
+    evidence: Evidence, rig: RigSettings, start: Mapping[str, float], fixed: Sequence[str], bounds: Bounds
 ) -> Described | None:
     """What a fitted model misses as a smooth correction of it, the same error of the model that every fit counts, and
     the power law that it is like; None where the tests are no likelier with it, or its error is larger than the gap.
@@ -81,29 +81,29 @@ def describe(
         return None
     harmonic = tuple(data_set.fundamental() for data_set in evidence.data_sets)
     try:
-        base = _refitted(evidence.model, harmonic, held, bounds)
-        base = _refitted(base.model, harmonic, (*held, *base.solution.at_bound), bounds)
+        base = _refitted(evidence.model, harmonic, fixed, bounds)
+        base = _refitted(base.model, harmonic, (*fixed, *base.solution.at_bound), bounds)
     except FitError:  # too few points are left for the parameters
         return None
     model = replace(fitted.solution.model, effects=(*evidence.model.effects, NAME), unnamed=correction)
     after = Evidence(fitted.solution.at(model, harmonic), harmonic)
     whole = Evidence(fitted.solution.at(model, evidence.data_sets), evidence.data_sets)
     like = fingerprint(base, *weighed(base, rig), start, bounds)
-    told = _words(correction, like), _trusted(correction, whole)
-    return Described(after, fitted, _held_out(evidence, fitted), like, *told)
+    texts = _words(correction, like), _trusted(correction, whole)
+    return Described(after, fitted, _held_out(evidence, fitted), like, *texts)
 
 
 def weighed(fitted: Evidence, rig: RigSettings) -> tuple[Evidence, LinearModel]:
     """The fit with residuals in units of what scatters from point to point, and what anything smooth beside it is worth
     at the sizes of the rig's errors that matter."""
     bare = scattering_alone(fitted)
-    rows, curves = bare.solution.jacobian, [each.group for each in unnamed(bare) if each.group]
+    rows, curves = bare.solution.jacobian, [explanation.group for explanation in unnamed(bare) if explanation.group]
     plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), curves)
     return bare, replace(plain, at=plain.likely(_NEAR))
 
 
-def _refitted(model: Model, data_sets: Sequence[MeasuredTest], held: Sequence[str], bounds: Bounds) -> Evidence:
-    return Evidence(fit_from(model, data_sets, held, bounds).finished(_EVALUATIONS).solution, tuple(data_sets))
+def _refitted(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Evidence:
+    return Evidence(fit_from(model, data_sets, fixed, bounds).finished(_EVALUATIONS).solution, tuple(data_sets))
 
 
 def _held_out(before: Evidence, fitted: WeightedFit) -> HoldOut:
@@ -113,15 +113,17 @@ def _held_out(before: Evidence, fitted: WeightedFit) -> HoldOut:
         LeaveOut.of(solution.jacobian[solution.moving], solution.residual),
         LeaveOut.of(fitted.solution.jacobian[fitted.solution.moving], fitted.solution.residual),
     )
-    told = dict[str, Array]()
+    residuals = dict[str, Array]()
     for part in _inside(before.data_sets):
         rows = part.rows(before.data_sets)
-        held = [np.pad(rows, (0, each.residual.size - rows.size)) for each in both]
-        if any(each.open(chosen).any() for each, chosen in zip(both, held, strict=True)):
+        masks = [np.pad(rows, (0, leave_out.residual.size - rows.size)) for leave_out in both]
+        if any(leave_out.open(chosen).any() for leave_out, chosen in zip(both, masks, strict=True)):
             continue  # the rest does not tell the model
-        pairs = [each.predicted(chosen, np.arange(chosen.size)) for each, chosen in zip(both, held, strict=True)]
-        told[part.name] = np.array(pairs)
-    return HoldOut.of(told)
+        pairs = [
+            leave_out.predicted(chosen, np.arange(chosen.size)) for leave_out, chosen in zip(both, masks, strict=True)
+        ]
+        residuals[part.name] = np.array(pairs)
+    return HoldOut.from_residuals(residuals)
 
 
 def _inside(data_sets: Sequence[MeasuredTest]) -> Iterator[Part]:
@@ -138,23 +140,26 @@ def _inside(data_sets: Sequence[MeasuredTest]) -> Iterator[Part]:
         ):
             if points.any():
                 chosen.setdefault(name, {})[sweep] = points
-    for name, own in chosen.items():
-        yield Part(name, [own.get(data, np.zeros(data.size // data.parts, dtype=bool)) for data in data_sets])
+    for name, points_by_sweep in chosen.items():
+        yield Part(
+            name, [points_by_sweep.get(data, np.zeros(data.size // data.parts, dtype=bool)) for data in data_sets]
+        )
 
 
 def _words(correction: Unnamed, like: Fingerprint | None) -> str:
     """How large it is and what it is like."""
     largest, band = (number(100.0 * share, 2) for share in (correction.largest, Z95 * correction.uncertainty))
-    said = [f"up to {largest} % of |K|, known within {band} % of itself"]
-    if like is None or not any(like.told):
-        said.append("nothing is told of its form")
+    sentences = [f"up to {largest} % of |K|, known within {band} % of itself"]
+    if like is None or not any(like.determined):
+        sentences.append("nothing is told of its form")
     elif like.is_power_law:
-        said.append(like.words)
+        sentences.append(like.words)
     else:
-        said.append(
-            "it is no power law of frequency and amplitude" + (f"; nearest: {like.words}" if all(like.told) else "")
+        sentences.append(
+            "it is no power law of frequency and amplitude"
+            + (f"; nearest: {like.words}" if all(like.determined) else "")
         )
-    return "; ".join(said)
+    return "; ".join(sentences)
 
 
 def _trusted(correction: Unnamed, whole: Evidence) -> str:
@@ -163,8 +168,8 @@ def _trusted(correction: Unnamed, whole: Evidence) -> str:
         f"{', '.join(patch.directions)} {_span(patch.frequency_Hz)} Hz, {_span(patch.strain, 100.0)} % strain"
         for patch in correction.patches
     ]
-    off = max((where.excess for where in locate(whole) if where.kind == "loop"), default=0.0)
-    stays = f" (their form stays off by {number(off, 2)} times the noise)" if off else ""
+    misfit = max((region.excess for region in locate(whole) if region.kind == "loop"), default=0.0)
+    stays = f" (their form stays off by {number(misfit, 2)} times the noise)" if misfit else ""
     loops = f", of loops the first harmonic only{stays}" if parted(whole.data_sets)[0] else ""
     return f"to be trusted between these tests alone ({'; '.join(patches)}){loops}, and of this bushing"
 

@@ -86,7 +86,7 @@ class Evidence:
         basis, size, _ = np.linalg.svd(self.solution.jacobian.T, full_matrices=False)
         return basis[:, size > 1e-10 * size[0]]
 
-    def beside(self, columns: Array) -> Array:
+    def project_out(self, columns: Array) -> Array:
         """Columns, (c, n), less what the model's own parameters can absorb."""
         return columns - (columns @ self.span) @ self.span.T
 
@@ -97,21 +97,21 @@ class Evidence:
         return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
 
 
-def fit(model: Model, data_sets: Sequence[MeasuredTest], held: Sequence[str], bounds: Bounds) -> Evidence:
+def fit(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Evidence:
     """Fit every parameter of a model but the held ones, from its own values.
 
     Raises:
         FitError: fewer data than parameters, or no finite response.
         ModelError: no response.
     """
-    descent = fit_from(model, data_sets, held, bounds).finished(EVALUATIONS)
+    descent = fit_from(model, data_sets, fixed, bounds).finished(EVALUATIONS)
     return Evidence(descent.solution, tuple(data_sets))
 
 
 def result_of(
     evidence: Evidence,
     bounds: Bounds,
-    told: Collection[str],
+    resolved: Collection[str],
     *,
     lacking: bool = True,
     corrected: WeightedFit | None = None,
@@ -149,5 +149,5 @@ def result_of(
         # a correction has seen every run
         usable=met_within(model, tests, ()) if corrected else usable(solution, found.minimised),
         model_error=error,
-        unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in told),
+        unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in resolved),
     )

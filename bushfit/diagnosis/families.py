@@ -99,7 +99,7 @@ def fit_families(
     model: Model,
     data_sets: Sequence[MeasuredTest],
     names: Sequence[str],
-    held: Sequence[str],
+    fixed: Sequence[str],
     bounds: Bounds,
 ) -> tuple[list[FittedFamily], dict[str, float]]:
     """The model as it comes first, and it with each of these families, fitted to the tests and held out alike.
@@ -115,41 +115,41 @@ def fit_families(
         FitError: data that cannot support the fit of a family that is named.
         ModelError: an unknown effect, one that the model has already, or one in place of what it has not.
     """
-    first = fit(model, data_sets, held, bounds)
-    own = "+".join(["paper", *(name for name in model.effects if name not in BASE)])
-    chains = {own: [first]}
-    asked = names or known_families(model, data_sets)
-    for name in track("families fitted", asked):
+    first = fit(model, data_sets, fixed, bounds)
+    base_name = "+".join(["paper", *(name for name in model.effects if name not in BASE)])
+    chains = {base_name: [first]}
+    requested = names or known_families(model, data_sets)
+    for name in track("families fitted", requested):
         with nullcontext() if names else suppress(FitError):
-            chains[name] = _chain(chains, first, name, held, bounds)
-    effects = {name: [] if name == own else name.split("+") for name in chains}
+            chains[name] = _chain(chains, first, name, fixed, bounds)
+    effects = {name: [] if name == base_name else name.split("+") for name in chains}
     worth = {name: _log_evidence(chain, effects[name], bounds) for name, chain in chains.items()}
     odds = np.exp(np.array([*worth.values()]) - logsumexp([*worth.values()]))
     probability = dict(zip(worth, odds.tolist(), strict=True))
-    others = sorted((name for name in worth if name != own), key=worth.__getitem__, reverse=True)
-    likely = [name for name in others if names or probability[name] >= _LIKELY] or others[:1]
-    kept, found = {own, *(likely if names else likely[:_MOST])}, []
-    for name in track("families held out", [name for name in worth if name in kept]):
-        told, skipped = predicted_parts(first, chains[name][-1], bounds)
-        out = HoldOut.of({part: of.residuals for part, of in told.items()}, skipped)
-        gain = _gain(told, data_sets) if name != own else (None, None)
+    alternatives = sorted((name for name in worth if name != base_name), key=worth.__getitem__, reverse=True)
+    likely = [name for name in alternatives if names or probability[name] >= _LIKELY] or alternatives[:1]
+    reported, found = {base_name, *(likely if names else likely[:_MOST])}, []
+    for name in track("families held out", [name for name in worth if name in reported]):
+        predictions, skipped = predicted_parts(first, chains[name][-1], bounds)
+        out = HoldOut.from_residuals({part: prediction.residuals for part, prediction in predictions.items()}, skipped)
+        gain = _gain(predictions, data_sets) if name != base_name else (None, None)
         found.append(FittedFamily(name, chains[name][-1], out, *gain, worth[name], probability[name]))
-    return found, {name: share for name, share in probability.items() if name not in kept}
+    return found, {name: share for name, share in probability.items() if name not in reported}
 
 
 def _chain(
-    chains: Mapping[str, list[Evidence]], first: Evidence, name: str, held: Sequence[str], bounds: Bounds
+    chains: Mapping[str, list[Evidence]], first: Evidence, name: str, fixed: Sequence[str], bounds: Bounds
 ) -> list[Evidence]:
     """The fits of a family's effects one after the other, from the longest beginning that was fitted before."""
     before, _, last = name.rpartition("+")
-    chain = [first] if not before else chains.get(before) or _chain(chains, first, before, held, bounds)
+    chain = [first] if not before else chains.get(before) or _chain(chains, first, before, fixed, bounds)
     effect, present = get_effect(last), chain[-1].model.effects
     if not _fits(chain[-1].model, last):
         has = "the model has this effect already"
         problem = has if last in present else "what this effect stands in place of is not in the model"
         laws = " or ".join(name for name in (*_RATE, *_AMPLITUDE) if _fits(chain[-1].model, name))
         raise ModelError(problem, found=last, expected=f"such as {laws}")
-    solution = with_effect(chain[-1].solution, chain[-1].data_sets, effect, held, bounds)
+    solution = with_effect(chain[-1].solution, chain[-1].data_sets, effect, fixed, bounds)
     return [*chain, Evidence(solution, chain[-1].data_sets)]
 
 
@@ -161,12 +161,12 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
     priors = [
         laplace(name, replace(last, solution=found.solution), one) for name, one in zip(names, before, strict=True)
     ]
-    known = {name: value for _, precision, _ in priors for name, value in precision.items()}
-    return sum(density for density, *_ in priors) + log_likelihood(found, known)
+    precisions = {name: value for _, precision, _ in priors for name, value in precision.items()}
+    return sum(density for density, *_ in priors) + log_likelihood(found, precisions)
 
 
 def _gain(
-    told: Mapping[str, Predicted], data_sets: Sequence[MeasuredTest]
+    predictions: Mapping[str, Predicted], data_sets: Sequence[MeasuredTest]
 ) -> tuple[tuple[float, float, float] | None, float | None]:
     """Fall of the mean squared held-out residual, with its 95 % interval and its probability.
 
@@ -175,23 +175,23 @@ def _gain(
     is held out, and through the parameters where it is not. Models that bend and an estimated noise add to that, see
     `_BEYOND_LINEAR`.
     """
-    known = [told[name] for name in _apart(data_sets, told)]
-    if not known:
+    disjoint = [predictions[name] for name in _disjoint_parts(data_sets, predictions)]
+    if not disjoint:
         return None, None
-    plain = np.concatenate([each.residuals[:, 0] for each in known], axis=1)
+    plain = np.concatenate([prediction.residuals[:, 0] for prediction in disjoint], axis=1)
     before, after = np.mean(np.square(plain), axis=1)
-    slope = np.sum([each.pulls[0] - each.pulls[1] for each in known], axis=0)
+    slope = np.sum([prediction.pulls[0] - prediction.pulls[1] for prediction in disjoint], axis=0)
     error = 2.0 * _BEYOND_LINEAR * np.sqrt(max(1.0, min(before, after))) * float(np.linalg.norm(slope)) / plain.shape[1]
     gain = float(before - after)
     p = float(2.0 * ndtr(-abs(gain) / error)) if error else 1.0
     return (gain, float(gain - Z95 * error), float(gain + Z95 * error)), p
 
 
-def _apart(data_sets: Sequence[MeasuredTest], among: Collection[str]) -> Iterator[str]:
+def _disjoint_parts(data_sets: Sequence[MeasuredTest], among: Collection[str]) -> Iterator[str]:
     """Those of the parts of these names that share no point with one that came before."""
-    taken = np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
+    used_rows = np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
     for part in parts(data_sets):
         rows = part.rows(data_sets)
-        if part.name in among and not (rows & taken).any():
+        if part.name in among and not (rows & used_rows).any():
             yield part.name
-            taken |= rows
+            used_rows |= rows

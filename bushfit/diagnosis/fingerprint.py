@@ -87,24 +87,24 @@ class Fingerprint:
     is_power_law: bool
 
     @property
-    def told(self) -> list[bool]:
+    def determined(self) -> list[bool]:
         """True for each of phase, frequency power and amplitude power that the tests determine."""
         found = zip(
             (self.phase_deg, self.frequency_power, self.amplitude_power), (_PHASE_TOLD, _TOLD, _TOLD), strict=True
         )
-        return [high - low < 2.0 * most for (_, low, high), most in found]
+        return [high - low < 2.0 * limit for (_, low, high), limit in found]
 
     @property
     def words(self) -> str:
         """The term for people: "in quadrature, grows as f^0.8, independent of amplitude: acts like a damper"."""
-        measures = " or ".join(_IN_WORDS[each] for each in (self.measure, *self.alike))
+        measures = " or ".join(_IN_WORDS[measure] for measure in (self.measure, *self.alike))
         powers = (
             _power_words(self.frequency_power, "f", "frequency"),
             _power_words(self.amplitude_power, "X", "amplitude"),
         )
-        said = ", ".join((_phase_words(self.phase_deg), *powers, f"as {measures}"))
-        like = self._like() if all(self.told) else ""
-        return f"{said}: acts like {like}" if like else said
+        term = ", ".join((_phase_words(self.phase_deg), *powers, f"as {measures}"))
+        like = self._like() if all(self.determined) else ""
+        return f"{term}: acts like {like}" if like else term
 
     def _like(self) -> str:
         """The known laws that lie nearest, where that is near enough in phase and powers; else ""."""
@@ -113,9 +113,9 @@ class Fingerprint:
         distances = {}
         for *law, measures, words in _LAWS:
             if {self.measure, *self.alike} & {*measures}:
-                off = middle - law
-                off[0] = (off[0] + 180.0) % 360.0 - 180.0
-                distances[words] = float(np.max(np.abs(off) / errors))
+                deviation = middle - law
+                deviation[0] = (deviation[0] + 180.0) % 360.0 - 180.0
+                distances[words] = float(np.max(np.abs(deviation) / errors))
         nearest = min(distances.values())
         return " or ".join(words for words in distances if distances[words] == nearest) if nearest < _LIKE else ""
 
@@ -133,22 +133,28 @@ def fingerprint(
     """
     begun = fitted.model.with_values(start)
     pairs = [(Terms(fitted, measure), Terms(bare, measure)) for measure in _IN_WORDS]
-    found = [_Grid.of_the_likeliest(one, other, plain, begun, bounds) for one, other in pairs if one.sensible]
+    found = [
+        _Grid.of_the_likeliest(terms, bare_terms, plain, begun, bounds) for terms, bare_terms in pairs if terms.sensible
+    ]
     grids = sorted(filter(None, found), key=lambda grid: -grid.log_evidence)
     if not grids or grids[0].log_evidence < grids[0].ledger.log_evidence:
         return None
-    apart = np.array([grid.log_evidence - grids[0].log_evidence for grid in grids])
-    alike = tuple(grid.terms.measure for grid, off in zip(grids[1:], apart[1:], strict=True) if -off < 0.5 * TELLS)
-    counts = np.round(_DRAWS * np.exp(apart)).astype(int).tolist()
+    log_ratios = np.array([grid.log_evidence - grids[0].log_evidence for grid in grids])
+    lookalikes = tuple(
+        grid.terms.measure
+        for grid, log_ratio in zip(grids[1:], log_ratios[1:], strict=True)
+        if -log_ratio < 0.5 * TELLS
+    )
+    counts = np.round(_DRAWS * np.exp(log_ratios)).astype(int).tolist()
     drawn = np.concatenate([grid.drawn(count) for grid, count in zip(grids, counts, strict=True)], axis=-1)
     turn = np.exp(1j * drawn[0])
     middle = np.angle(turn.mean())
     drawn[0] = np.degrees(middle + np.angle(turn * np.exp(-1j * middle)))
-    phase, p, q = (tuple(each) for each in np.quantile(drawn, (0.5, 0.025, 0.975), axis=-1).T.tolist())
-    law = logsumexp(apart) + grids[0].log_evidence - log(len(grids))
+    phase, p, q = (tuple(quantiles) for quantiles in np.quantile(drawn, (0.5, 0.025, 0.975), axis=-1).T.tolist())
+    law = logsumexp(log_ratios) + grids[0].log_evidence - log(len(grids))
     curves = replace(grids[0].ledger, groups=plain.groups).group_evidence  # around the same parameters and term
     smooth = logsumexp([worth.log_evidence for worth in curves]) - log(len(curves))
-    return Fingerprint(grids[0].terms.measure, alike, phase, p, q, bool(law > smooth))
+    return Fingerprint(grids[0].terms.measure, lookalikes, phase, p, q, bool(law > smooth))
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,20 +180,22 @@ class _Grid:
         another; None where these do not come to rest from those of a model."""
         about = bare.points - bare.points.mean(axis=0)
         changes = np.ptp(about, axis=0) > 0.0
-        value = bare.off(model)  # at first around the measured stiffness, by which a term of any size is linear
+        value = bare.measured_value(
+            model
+        )  # at first around the measured stiffness, by which a term of any size is linear
         ends, middle = np.outer((-_MOST, _MOST), changes), np.full(2, np.inf)
         for _ in range(_ROUNDS):
             powers = np.array(list(product(*map(np.unique, np.linspace(ends[0], ends[1], _GRID).T))))
             step = np.ptp(ends, axis=0) / (_GRID - 1)
-            left, rows, columns = _linear(bare, model, value, bare.of_size_one(np.exp(powers @ about.T), model))
+            residual, rows, columns = _linear(bare, model, value, bare.of_size_one(np.exp(powers @ about.T), model))
             groups = [Group(pair, np.ones(2), together=True) for pair in columns]
-            grid = cls(bare, replace(plain, residual=left, jacobian=rows, groups=groups), powers, step)
+            grid = cls(bare, replace(plain, residual=residual, jacobian=rows, groups=groups), powers, step)
             before, middle = middle, grid.share @ powers
             spread = np.sqrt(grid.share @ np.square(powers - middle))
-            moved = np.abs(middle - before)
-            if (moved <= _RESTS * spread).all() and (step <= spread).all():
+            shift = np.abs(middle - before)
+            if (shift <= _RESTS * spread).all() and (step <= spread).all():
                 return grid
-            reach = _REACH * spread + step + np.where(np.isfinite(moved), moved, 0.0)
+            reach = _REACH * spread + step + np.where(np.isfinite(shift), shift, 0.0)
             ends = np.clip(np.stack((middle - reach, middle + reach)), -_MOST * changes, _MOST * changes)
             model, value = _stepped(fitted, model, value, np.exp(middle @ about.T)[None], bounds)
         return None
@@ -224,27 +232,27 @@ class _Grid:
 def _linear(terms: Terms, model: Model, value: Array, shapes: Array) -> tuple[Array, Array, Array]:
     """Around a term of this value: residuals as they would be without it, (n,), derivatives by the parameters, (k, n),
     and by terms of these shapes, in phase and in quadrature, (c, 2, n)."""
-    left = terms.residual(value, model) - terms.columns(value[None], model, value)[0]
+    residual = terms.residual(value, model) - terms.columns(value[None], model, value)[0]
     columns = terms.columns(np.concatenate((shapes, 1j * shapes)), model, value)
-    return left, terms.jacobian(value, model), columns.reshape(2, len(shapes), -1).swapaxes(0, 1)
+    return residual, terms.jacobian(value, model), columns.reshape(2, len(shapes), -1).swapaxes(0, 1)
 
 
 def _stepped(terms: Terms, model: Model, value: Array, shape: Array, bounds: Bounds) -> tuple[Model, Array]:
     """Parameters beside a term of this shape, and its value, one step farther, damped while that lowers the misfit."""
     shape = terms.of_size_one(shape, model)
-    left, rows, columns = _linear(terms, model, value, shape)
-    every, coordinates = np.concatenate((rows, columns[0])), terms.evidence.solution.coordinates
+    residual, rows, columns = _linear(terms, model, value, shape)
+    design, coordinates = np.concatenate((rows, columns[0])), terms.evidence.solution.coordinates
     low, high = coordinate_bounds(coordinates, bounds)
     misfit, best = np.inf, (model, value)
     for damping in _DAMPINGS:
-        damped = damping * np.diag(np.linalg.norm(every, axis=1))[: len(rows)]
-        step = -np.linalg.lstsq(np.vstack((every.T, damped)), np.pad(left, (0, len(rows))), rcond=None)[0]
+        damped = damping * np.diag(np.linalg.norm(design, axis=1))[: len(rows)]
+        step = -np.linalg.lstsq(np.vstack((design.T, damped)), np.pad(residual, (0, len(rows))), rcond=None)[0]
         point = coordinates.point(model.values) + np.clip(step[:-2], -_LONGEST, _LONGEST)
-        there = model.with_values(coordinates.values(np.clip(point, low + _INSIDE, high - _INSIDE)))
+        candidate = model.with_values(coordinates.values(np.clip(point, low + _INSIDE, high - _INSIDE)))
         reached = (step[-2] + 1j * step[-1]) * shape[0]
-        if (now := float(np.linalg.norm(terms.residual(reached, there)))) >= misfit:
+        if (now := float(np.linalg.norm(terms.residual(reached, candidate)))) >= misfit:
             break
-        misfit, best = now, (there, reached)
+        misfit, best = now, (candidate, reached)
     return best
 
 

@@ -45,12 +45,12 @@ class Part:
 
     def rows(self, data_sets: Sequence[MeasuredTest]) -> Array:
         """Mask of the part's residuals among those of all tests, (n,)."""
-        return np.concatenate([np.tile(of, data.parts) for data, of in zip(data_sets, self.points, strict=True)])
+        return np.concatenate([np.tile(mask, data.parts) for data, mask in zip(data_sets, self.points, strict=True)])
 
     def rest(self, data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:
         """The tests without it, with the same noise."""
-        left = [(data, of) for data, of in zip(data_sets, self.points, strict=True) if not of.all()]
-        return [data.without(np.flatnonzero(of)).with_weight() if of.any() else data for data, of in left]
+        remaining = [(data, mask) for data, mask in zip(data_sets, self.points, strict=True) if not mask.all()]
+        return [data.without(np.flatnonzero(mask)).with_weight() if mask.any() else data for data, mask in remaining]
 
 
 @dataclass(frozen=True)
@@ -100,14 +100,14 @@ class HoldOut:
     whitened: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def of(cls, told: Mapping[str, Array], skipped: Sequence[Skipped] = ()) -> HoldOut:
+    def from_residuals(cls, residuals: Mapping[str, Array], skipped: Sequence[Skipped] = ()) -> HoldOut:
         """The figures of residuals that were predicted, (models, plain and whitened, n), by part."""
-        told = {name: pair for name, pair in told.items() if pair.size}  # one frequency has no top third
-        if not told:
+        residuals = {name: pair for name, pair in residuals.items() if pair.size}  # one frequency has no top third
+        if not residuals:
             return cls((), tuple(skipped))
-        figures = {name: _figures(pair) for name, pair in told.items()}
-        every = _figures(np.concatenate(list(told.values()), axis=-1))
-        return cls(tuple(HeldOut(name, *each) for name, each in figures.items()), tuple(skipped), *every)
+        figures = {name: _figures(pair) for name, pair in residuals.items()}
+        overall = _figures(np.concatenate(list(residuals.values()), axis=-1))
+        return cls(tuple(HeldOut(name, *values) for name, values in figures.items()), tuple(skipped), *overall)
 
 
 def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
@@ -116,29 +116,29 @@ def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
     Args:
         bounds: of parameters, where a model has to be fitted to the rest.
     """
-    told, skipped = predicted_parts(before, after, bounds)
-    return HoldOut.of({name: of.residuals for name, of in told.items()}, skipped)
+    predictions, skipped = predicted_parts(before, after, bounds)
+    return HoldOut.from_residuals({name: prediction.residuals for name, prediction in predictions.items()}, skipped)
 
 
 def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[dict[str, Predicted], list[Skipped]]:
     """Predictions by two models of each part from the rest, by name, and the parts that one model cannot predict."""
-    models = [_Fitted.of(evidence) for evidence in dict.fromkeys((before, after))]
-    told, skipped = dict[str, Predicted](), list[Skipped]()
+    models = [_Fitted.from_evidence(evidence) for evidence in dict.fromkeys((before, after))]
+    predictions, skipped = dict[str, Predicted](), list[Skipped]()
     for part in track("parts held out", list(parts(after.data_sets))):
-        predictions = [model.predicted(part, bounds) for model in models]
-        made = [prediction for prediction in predictions if not isinstance(prediction, Skipped)]
-        if len(made) < len(models):
-            skipped.append(next(each for each in predictions if isinstance(each, Skipped)))
+        attempts = [model.predicted(part, bounds) for model in models]
+        pairs = [prediction for prediction in attempts if not isinstance(prediction, Skipped)]
+        if len(pairs) < len(models):
+            skipped.append(next(prediction for prediction in attempts if isinstance(prediction, Skipped)))
             continue
-        residuals, pulls = zip(made[0], made[-1], strict=True)
-        told[part.name] = Predicted(np.array(residuals), np.array(pulls))
-    return told, skipped
+        residuals, pulls = zip(pairs[0], pairs[-1], strict=True)
+        predictions[part.name] = Predicted(np.array(residuals), np.array(pulls))
+    return predictions, skipped
 
 
 def _figures(pair: Array) -> tuple[float, float, tuple[float, float]]:
     """Root mean squares before and after, plain, and both whitened, of residuals (2, 2, n)."""
-    (one, one_whitened), (other, other_whitened) = np.sqrt(np.mean(np.square(pair), axis=-1)).tolist()
-    return one, other, (one_whitened, other_whitened)
+    (before, before_whitened), (after, after_whitened) = np.sqrt(np.mean(np.square(pair), axis=-1)).tolist()
+    return before, after, (before_whitened, after_whitened)
 
 
 class Predicted(NamedTuple):
@@ -167,7 +167,7 @@ class _Fitted:
     whole: LeaveOut
 
     @classmethod
-    def of(cls, evidence: Evidence) -> _Fitted:
+    def from_evidence(cls, evidence: Evidence) -> _Fitted:
         solution = evidence.solution
         free = solution.moving
         return cls(evidence, free, LeaveOut.of(solution.jacobian[free], solution.residual))
@@ -197,14 +197,14 @@ def _with_pull(whole: LeaveOut, rows: Array, clusters: Array, *, stepped: bool) 
 def _refitted(evidence: Evidence, part: Part, bounds: Bounds) -> _Fitted | None:
     """A model fitted to the tests without a part, asked about all of them; None where the fit comes to no end."""
     data_sets, names = evidence.data_sets, evidence.solution.coordinates.names
-    held = [name for name in evidence.model.parameters if name not in names]
+    fixed = [name for name in evidence.model.parameters if name not in names]
     try:
-        rest = fit(evidence.model, part.rest(data_sets), held, bounds).solution
+        rest = fit(evidence.model, part.rest(data_sets), fixed, bounds).solution
     except (FitError, ModelError):
         return None
     slopes = jacobian(rest.model, data_sets, names)
-    told = replace(rest, residual=residual(rest.model, data_sets), jacobian=slopes)
-    return None if rest.stopped else _Fitted.of(Evidence(told, data_sets))
+    solution = replace(rest, residual=residual(rest.model, data_sets), jacobian=slopes)
+    return None if rest.stopped else _Fitted.from_evidence(Evidence(solution, data_sets))
 
 
 def _clusters(data_sets: Sequence[MeasuredTest]) -> Array:
@@ -226,18 +226,18 @@ def parts(data_sets: Sequence[MeasuredTest]) -> Iterator[Part]:
         return Part(name, [chosen.get(data, np.zeros(data.size // data.parts, dtype=bool)) for data in data_sets])
 
     loops, sweeps = parted(data_sets)
-    for stepped, (held, top) in _NAMES.items():
+    for stepped, (line_name, top) in _NAMES.items():
         mine = [sweep for sweep in sweeps if sweep.sweep.stepped == stepped]
         ranks = {sweep: np.unique(sweep.held, return_inverse=True)[1] for sweep in mine}
         for rank in range(max((int(r.max()) + 1 for r in ranks.values()), default=0)):
-            yield part(f"{held} {rank + 1}", {sweep: r == rank for sweep, r in ranks.items()})
+            yield part(f"{line_name} {rank + 1}", {sweep: r == rank for sweep, r in ranks.items()})
         if mine and top:
             limit = np.quantile(np.concatenate([sweep.step for sweep in mine]), 1.0 - _TOP)
             yield part(f"top third of the {top}", {sweep: sweep.step > limit for sweep in mine})
     wholes = {data: np.ones(data.size // data.parts, dtype=bool) for data in data_sets}
     for direction in dict.fromkeys(data.direction for data in data_sets):
-        own = {data: whole for data, whole in wholes.items() if data.direction == direction}
-        if len(own) < len(wholes):
-            yield part(f"{direction} direction", own)
+        members = {data: whole for data, whole in wholes.items() if data.direction == direction}
+        if len(members) < len(wholes):
+            yield part(f"{direction} direction", members)
     for loop in loops if len(loops) > 1 else ():
         yield part(f"loop {loop.name}", {loop: wholes[loop]})

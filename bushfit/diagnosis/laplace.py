@@ -30,15 +30,15 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
     solution = evidence.joint or evidence.solution
     effect, names = get_effect(name), solution.coordinates.names
     data_sets, model = evidence.data_sets, evidence.model
-    other = model.without(name) if effect.replaces is None else before.model
-    size = max(each.change(model, other) for each in data_sets)
+    reference = model.without(name) if effect.replaces is None else before.model
+    size = max(data_set.change(model, reference) for data_set in data_sets)
     density, precision, count = 0.0, {}, 0
     jacobian = solution.jacobian
     variances = np.diag(np.linalg.pinv(jacobian @ jacobian.T, rcond=1e-12, hermitian=True))
     if effect.replaces is not None:
         count = max(len(effect.parameters) - 2, 0)
-        own = {qualified_name(effect, parameter): 0.5 for parameter in effect.parameters}
-        return count * (0.5 * log(2.0 * np.pi) - log(3.0)), own, size
+        precisions = {qualified_name(effect, parameter): 0.5 for parameter in effect.parameters}
+        return count * (0.5 * log(2.0 * np.pi) - log(3.0)), precisions, size
     for parameter in effect.parameters:
         coordinate = qualified_name(effect, parameter)
         if coordinate not in names:

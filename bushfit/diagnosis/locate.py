@@ -41,8 +41,8 @@ def largest_smooth_misfit(evidence: Evidence) -> float:
 def locate(evidence: Evidence) -> tuple[Where, ...]:
     """Regions of smooth misfit, the worst first."""
     found = [*_sweep_regions(evidence), *_loop_regions(evidence)]
-    worth = [where for where in found if where.excess > _WORTH_A_LINE]
-    return tuple(sorted(worth, key=lambda where: -where.excess)[:_MOST_LINES])
+    worth = [region for region in found if region.excess > _WORTH_A_LINE]
+    return tuple(sorted(worth, key=lambda region: -region.excess)[:_MOST_LINES])
 
 
 def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
@@ -59,7 +59,7 @@ def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
             touched = [i for i, size in enumerate(sizes) if np.abs(size).max() > _STRONG * strongest]
             strong = [np.abs(sizes[i]) > _STRONG * strongest for i in touched]
             frequencies, amplitudes = (
-                np.concatenate([getattr(mine[i], axis)[at] for i, at in zip(touched, strong, strict=True)])
+                np.concatenate([getattr(mine[i], axis)[mask] for i, mask in zip(touched, strong, strict=True)])
                 for axis in ("frequency", "amplitude")
             )
             if max(float(np.abs(piece).max()) for piece in pieces) < _LEAST:
@@ -86,14 +86,14 @@ def _read_sweep(
         touched: numbers of the lines that belong to the region.
         spans: least and largest frequency [Hz] and amplitude [m or rad] of the region.
     """
-    what = "stiffness" if part == "storage" else "loss"
+    quantity = "stiffness" if part == "storage" else "loss"
     worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
     largest = max(pieces[worst].tolist(), key=abs)
     sides = ("above", "below") if largest > 0 else ("below", "above")
     size = f"{number(100 * abs(largest), 2)} % of |K| {sides[0]} the model"
     line = lines[worst]
-    held = {"frequency": "amplitude", "amplitude": "frequency", None: "run"}[line.stepped]
-    level = f"at every {held}{_over_lines(pieces, held)}"
+    fixed_axis = {"frequency": "amplitude", "amplitude": "frequency", None: "run"}[line.stepped]
+    level = f"at every {fixed_axis}{_over_lines(pieces, fixed_axis)}"
     if len(touched) < len(lines):
         level = "at " + ", ".join(lines[i].words for i in touched)
     unit, factor = ("Hz", 1.0) if line.stepped != "amplitude" else line.direction.display.displacement
@@ -102,8 +102,11 @@ def _read_sweep(
     if len(touched) > 1 and line.stepped:
         trend = f"most at {line.words}, there {trend}"
     across = [line.words for line, piece in zip(lines, pieces, strict=True) if _crosses(piece, largest)]
-    other = f"; {sides[1]} it at {', '.join(across)}" if across else ""
-    return f"measured {line.direction} {what} is up to {size} ({low:.3g} to {high:.3g} {unit}), {level}, {trend}{other}"
+    opposite = f"; {sides[1]} it at {', '.join(across)}" if across else ""
+    return (
+        f"measured {line.direction} {quantity} is up to {size} ({low:.3g} to {high:.3g} {unit}), {level}, {trend}"
+        f"{opposite}"
+    )
 
 
 def _crosses(piece: Array, largest: float) -> bool:
@@ -124,11 +127,11 @@ def _trend(stepped: str, step: Array, misfit: Array) -> str:
     return f"{_way(float(misfit[np.argmin(step)]), float(misfit[np.argmax(step)]))} {shape}"
 
 
-def _over_lines(pieces: Sequence[Array], held: str) -> str:
+def _over_lines(pieces: Sequence[Array], fixed_axis: str) -> str:
     means = [float(np.mean(piece)) for piece in pieces]
     if len(means) < 2 or np.ptp(means) < _CHANGES * max(abs(mean) for mean in means):
         return ""
-    return f", {_way(means[0], means[-1])} with {held}"
+    return f", {_way(means[0], means[-1])} with {fixed_axis}"
 
 
 def _way(first: float, last: float) -> str:
@@ -145,7 +148,7 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
         columns, amplitude = data_set.contrasts(), data_set.drive.amplitude
         norms = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
         amounts = columns @ evidence.residual[evidence.place[data_set]] / norms
-        by_order = [np.hypot(each[::2], [0.0, *each[1::2]]) for each in (amounts, amounts / norms)]
+        by_order = [np.hypot(values[::2], [0.0, *values[1::2]]) for values in (amounts, amounts / norms)]
         order = int(np.argmax(by_order[0]))
         share = by_order[1][order]
         if share < _LEAST:

@@ -146,8 +146,8 @@ def entropy_left(odds: Sequence[float] | Array, distances: Array) -> Array:
     """
     p = np.maximum(odds, _LEAST_ODDS * np.max(odds))
     p = p / p.sum()
-    others = np.exp(-distances / 8.0) * (1.0 - np.eye(p.size))  # without the diagonal, beside which they would vanish
-    return np.asarray(np.log1p(others @ p / p) @ p)
+    overlap = np.exp(-distances / 8.0) * (1.0 - np.eye(p.size))  # without the diagonal, beside which they would vanish
+    return np.asarray(np.log1p(overlap @ p / p) @ p)
 
 
 def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency: Array, amplitude: Array) -> Array:
@@ -182,9 +182,9 @@ def _fixture(model: Model, place: Place, stiffness: float) -> Model:
 def _points(test: NextTest, data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, Place]:
     """Frequencies [Hz], amplitudes [m or rad, or strain] and place of a test."""
     place = test.place or data_sets[-1].direction
-    same = [data_set for data_set in data_sets if data_set.direction == place] or list(data_sets)
-    amplitudes = np.unique(np.concatenate([data_set.amplitude for data_set in same]))
-    if place.is_rotation and not same[0].direction.is_rotation:
+    same_place = [data_set for data_set in data_sets if data_set.direction == place] or list(data_sets)
+    amplitudes = np.unique(np.concatenate([data_set.amplitude for data_set in same_place]))
+    if place.is_rotation and not same_place[0].direction.is_rotation:
         amplitudes = np.array([_ROTATION])
     if test.amplitudes:
         amplitudes = np.array([amplitudes.min() * -x if x < 0 else amplitudes.max() * x for x in test.amplitudes])

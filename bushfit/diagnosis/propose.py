@@ -52,7 +52,7 @@ class Proposal:
     together: bool = False
 
 
-def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]) -> list[Proposal]:
+def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str]) -> list[Proposal]:
     """Every effect of the library that the model lacks, with its twins, in its best shape, best score first.
 
     `held` are parameters of the model that do not move.
@@ -61,13 +61,13 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
     answers = {
         effect: sensitivity(evidence.model, evidence.data_sets, effect) for effect in missing if effect.replaces is None
     }
-    asked = [effect for effect, (shapes, _) in answers.items() if shapes]
-    probed = [answers[effect] for effect in asked]
+    probed_effects = [effect for effect, (shapes, _) in answers.items() if shapes]
+    probed = [answers[effect] for effect in probed_effects]
     ends = np.cumsum([0, *(len(columns) for _, columns in probed)])
-    every = np.concatenate([np.empty((0, evidence.residual.size)), *(columns for _, columns in probed)])
-    gains, amounts, seen = scores(evidence, every)
+    all_columns = np.concatenate([np.empty((0, evidence.residual.size)), *(columns for _, columns in probed)])
+    gains, amounts, shown_by_tests = scores(evidence, all_columns)
     found = []
-    for effect, (shapes, columns), first, last in zip(asked, probed, ends[:-1], ends[1:], strict=True):
+    for effect, (shapes, columns), first, last in zip(probed_effects, probed, ends[:-1], ends[1:], strict=True):
         amount = effect.amount
         sense = 1 if amount.neutral == amount.bounds[0] else 0
         possible_gains = np.where((amounts[first:last] > 0.0) | (sense == 0), gains[first:last], 0.0)
@@ -75,11 +75,11 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
         suggested = float(np.clip(amounts[first + best] * amount.typical, *amount.bounds))
         shape = shapes[best] | ({qualified_name(effect, amount): suggested} if amount.log else {})
         model = evidence.model.with_effect(effect.name, shape)
-        visible = bool(seen[first:last].any())
+        visible = bool(shown_by_tests[first:last].any())
         found.append(Proposal(effect.name, model, float(possible_gains[best]), columns, sense, visible))
     for effect in missing:
         if effect.replaces in evidence.model.effects:
-            found += filter(None, [_replacing(evidence, effect, held)])
+            found += filter(None, [_replacing(evidence, effect, fixed)])
     return sorted(found, key=lambda proposal: -proposal.score)
 
 
@@ -88,11 +88,11 @@ def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
     and whether these tests show it; 0 of what they do not, (c,) each."""
     lengths = np.linalg.norm(columns, axis=1)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
-    left = evidence.beside(columns / lengths[:, None])
-    size, along = np.einsum("ij,ij->i", left, left), left @ evidence.residual
-    seen = size > _LEFT**2
-    per_size = seen / np.where(seen, size, 1.0)
-    return per_size * np.square(along), -per_size * along / lengths, seen
+    projected = evidence.project_out(columns / lengths[:, None])
+    size, products = np.einsum("ij,ij->i", projected, projected), projected @ evidence.residual
+    visible = size > _LEFT**2
+    per_size = visible / np.where(visible, size, 1.0)
+    return per_size * np.square(products), -per_size * products / lengths, visible
 
 
 def has_what_it_uses(effect: Effect, model: Model) -> bool:
@@ -108,10 +108,10 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
         excluded: names of effects not to consider, with their twins.
     """
     present = (None, *model.effects)
-    told = {name for known in (*model.effects, *excluded) for name in twins_of(known)}
-    there = {*told, *(effect.replaces for effect in model.records)}
+    excluded_names = {name for member in (*model.effects, *excluded) for name in twins_of(member)}
+    unavailable = {*excluded_names, *(effect.replaces for effect in model.records)}
     possible = [effect for effect in effects_for_places(places).values() if has_what_it_uses(effect, model)]
-    missing = [effect for effect in possible if effect.name not in there]
+    missing = [effect for effect in possible if effect.name not in unavailable]
     series = {name for effect in model.records for name in effect.never_with}
     series |= {effect.name for effect in missing if {*effect.never_with} & {*present}}
     return [
@@ -121,18 +121,18 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
     ]
 
 
-def _replacing(evidence: Evidence, effect: Effect, held: Sequence[str]) -> Proposal | None:
+def _replacing(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> Proposal | None:
     """An effect in place of a branch, as its first step from the best start that the branch suggests would leave it;
     None where it has no response there."""
     fits = []
     for start in evidence.model.starts(effect):
         with suppress(FitError, ModelError):  # no response from there
-            fits.append(fit_from(evidence.model.with_effect(effect.name, start), evidence.data_sets, held, {}))
+            fits.append(fit_from(evidence.model.with_effect(effect.name, start), evidence.data_sets, fixed, {}))
     if not fits:
         return None
     best = min(fits, key=_promised)
-    own = [qualified_name(effect, parameter) for parameter in effect.parameters]
-    columns = best.jacobian[[best.coordinates.names.index(name) for name in own]]
+    coordinate_names = [qualified_name(effect, parameter) for parameter in effect.parameters]
+    columns = best.jacobian[[best.coordinates.names.index(name) for name in coordinate_names]]
     score = max(evidence.chi_square - _promised(best), 0.0)
     return Proposal(effect.name, best.model, score, columns, 0, visible=True, together=True)
 
@@ -162,17 +162,17 @@ def sensitivity(
 
     def answers(shapes: Sequence[Mapping[str, float]]) -> Array:
         """Residuals with a little of the effect in each shape, and in the last line with none, whatever its shape."""
-        little = np.append(np.full(len(shapes), none + _STEP * effect.amount.typical), none)[:, None]
+        amounts = np.append(np.full(len(shapes), none + _STEP * effect.amount.typical), none)[:, None]
         grids = {name: np.array([[shape[name]] for shape in (*shapes, shapes[-1])]) for name in axes}
-        values = {**model.values, **grids, amount: little}
+        values = {**model.values, **grids, amount: amounts}
         rows = [
             data_set.residual(model, values) if effect.acts_at(data_set.direction) else data_set.residual(bare)
             for data_set in data_sets
         ]
-        return np.concatenate([np.broadcast_to(row, (len(little), row.shape[-1])) for row in rows], axis=-1)
+        return np.concatenate([np.broadcast_to(row, (len(amounts), row.shape[-1])) for row in rows], axis=-1)
 
     rows = answers(shapes)
-    told = np.asarray(np.isfinite(rows).all(axis=1))
-    shapes = [shape for shape, finite in zip(shapes, told[:-1], strict=True) if finite]
-    rows = answers(shapes) if shapes and not told[-1] else rows[[*told[:-1], True]]
+    is_finite = np.asarray(np.isfinite(rows).all(axis=1))
+    shapes = [shape for shape, finite in zip(shapes, is_finite[:-1], strict=True) if finite]
+    rows = answers(shapes) if shapes and not is_finite[-1] else rows[[*is_finite[:-1], True]]
     return shapes, (rows[:-1] - rows[-1]) / _STEP

@@ -119,16 +119,19 @@ class Odds:
         parameters lie off, times its probability; of several that the tests cannot tell apart each is an alternative
         in what is predicted."""
         cov = result.covariance
-        here = np.array([result.model.values[name] for name in cov.names])
-        matrix, others = cov.matrix.copy(), list[Alternative]()
+        current_values = np.array([result.model.values[name] for name in cov.names])
+        matrix, alternatives = cov.matrix.copy(), list[Alternative]()
         for (_, probability), model in zip(self.told, self.models, strict=True):
             if model is None:
                 continue
-            off = np.array([model.values.get(name, own) for name, own in zip(cov.names, here, strict=True)]) - here
-            matrix += (1.0 - self.nothing) * probability * np.outer(off, off)
+            difference = (
+                np.array([model.values.get(name, value) for name, value in zip(cov.names, current_values, strict=True)])
+                - current_values
+            )
+            matrix += (1.0 - self.nothing) * probability * np.outer(difference, difference)
             if self.apart:
-                others.append(Alternative(model, (1.0 - self.nothing) * probability))
-        return replace(result, covariance=replace(cov, matrix=matrix), alternatives=tuple(others))
+                alternatives.append(Alternative(model, (1.0 - self.nothing) * probability))
+        return replace(result, covariance=replace(cov, matrix=matrix), alternatives=tuple(alternatives))
 
 
 @dataclass(frozen=True)
@@ -203,8 +206,8 @@ class Diagnosis:
             "nothing": self.odds.nothing,
             "odds": [{"words": words, "probability": share} for words, share in self.odds.told],
             "effects": [self._effect(named) for named in self.effects],
-            "where": [_where(where) for where in self.where],
-            "remainder": [_where(where) for where in self.remainder],
+            "where": [_region_entry(region) for region in self.where],
+            "remainder": [_region_entry(region) for region in self.remainder],
             "description": self.description,
             "gap": self._gap(),
             "usable": self._usable(),
@@ -215,12 +218,12 @@ class Diagnosis:
 
     def _gap(self) -> GapEntry:
         before, after = self.calibration
-        held = self.holdout
+        holdout = self.holdout
         return {
             "calibration": {"before": before, "after": after},
-            "heldout": {"before": held.before, "after": held.after} if held.parts else None,
-            "parts": held.parts,
-            "skipped": held.skipped,
+            "heldout": {"before": holdout.before, "after": holdout.after} if holdout.parts else None,
+            "parts": holdout.parts,
+            "skipped": holdout.skipped,
         }
 
     def _usable(self) -> UsableEntry | None:
@@ -257,11 +260,11 @@ class Diagnosis:
         }
 
     def _parameter(self, name: str, value: float) -> SizeEntry:
-        held = name in self.result.model.values
-        interval = self.result.interval(name) if held else None
+        in_model = name in self.result.model.values
+        interval = self.result.interval(name) if in_model else None
         return {
             "value": value,
-            "stderr": self.result.covariance.stderr(name) if held else None,
+            "stderr": self.result.covariance.stderr(name) if in_model else None,
             "ci95": None if interval is None else list(interval),
             "unit": get_parameter(name).unit,
         }
@@ -288,8 +291,8 @@ def odds_in_words(found: Mapping[str, Any]) -> list[str]:
             small = format_probability(1.0 - found["nothing"])
             lines.append(f"Probability of an effect too small for these tests to show: {small}.")
         return lines
-    lines = [f"{format_probability(each['probability'])}: {each['words']}" for each in found["odds"]]
-    rest = 1.0 - sum(each["probability"] for each in found["odds"])
+    lines = [f"{format_probability(entry['probability'])}: {entry['words']}" for entry in found["odds"]]
+    rest = 1.0 - sum(entry["probability"] for entry in found["odds"])
     if lines and rest > _LEAST_TOLD:
         lines.append(f"{format_probability(rest)}: another explanation")
     if lines and found["nothing"] > _LEAST_TOLD:
@@ -308,15 +311,15 @@ def _rms(evidence: Evidence) -> float:
     return float((evidence.chi_square / max(sum(data_set.counted for data_set in evidence.data_sets), 1)) ** 0.5)
 
 
-def _where(where: Where) -> WhereEntry:
-    unit, factor = where.direction.display.displacement
+def _region_entry(region: Where) -> WhereEntry:
+    unit, factor = region.direction.display.displacement
     entry = {
-        "direction": str(where.direction),
-        "kind": where.kind,
-        "frequency_Hz": list(where.frequency),
-        f"amplitude_{unit}": [x * factor for x in where.amplitude],
-        "component": where.component,
-        "excess": where.excess,
-        "reading": where.reading,
+        "direction": str(region.direction),
+        "kind": region.kind,
+        "frequency_Hz": list(region.frequency),
+        f"amplitude_{unit}": [x * factor for x in region.amplitude],
+        "component": region.component,
+        "excess": region.excess,
+        "reading": region.reading,
     }
     return cast(WhereEntry, entry)  # one of its keys is named after the unit

@@ -32,7 +32,7 @@ def refitted(
     evidence: Evidence,
     proposed: Sequence[Proposal],
     start: Mapping[str, float],
-    held: Sequence[str],
+    fixed: Sequence[str],
     bounds: Bounds,
     columns: Array | None = None,
 ) -> dict[str, Evidence]:
@@ -51,9 +51,9 @@ def refitted(
         tests = Joined(evidence.data_sets, CommonError.of_all(columns))
     for proposal in proposed:
         limits = {**within_reach(proposal.model, evidence.data_sets), **bounds}
-        known = {name: value for name, value in start.items() if name in proposal.model.values}
+        start_values = {name: value for name, value in start.items() if name in proposal.model.values}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
-            fits[proposal.name] = fit_from(proposal.model.with_values(known), tests, held, limits)
+            fits[proposal.name] = fit_from(proposal.model.with_values(start_values), tests, fixed, limits)
     list(track("effects refitted", _finished(fits), len(fits)))
     best = min((fit.chi_square for fit in fits.values()), default=0.0)
     near = {name: fit for name, fit in fits.items() if _ended(fit) or fit.chi_square <= best + _FAR}
@@ -90,19 +90,24 @@ def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
     """Limits of the shapes of a model's effects to what the tests can show: a stop that is always met is no stop, and a
     resonance far above all frequencies is a mass."""
     shapes = [
-        (qualified_name(effect, each), each) for effect in model.records for each in effect.parameters if each.scale
+        (qualified_name(effect, parameter), parameter)
+        for effect in model.records
+        for parameter in effect.parameters
+        if parameter.scale
     ]
-    tried = {name: probes(data_sets, model, each) for name, each in shapes}
+    tried = {name: probes(data_sets, model, parameter) for name, parameter in shapes}
     return {name: (float(values.min()), float(values.max())) for name, values in tried.items() if np.ptp(values) > 0.0}
 
 
-def beside(evidence: Evidence, bare: Evidence, columns: Array, start: Mapping[str, float], bounds: Bounds) -> Evidence:
+def refit_with_free_columns(
+    evidence: Evidence, bare: Evidence, columns: Array, start: Mapping[str, float], bounds: Bounds
+) -> Evidence:
     """The fit that the tests ask for where residuals along columns, whitened by scatter alone as in `bare`, are free;
     the best from the fit without that, and from values to start from."""
     names = evidence.solution.coordinates.names
     tests = Joined(bare.data_sets, CommonError.of_all(columns))
-    known = {name: value for name, value in start.items() if name in names}
-    starts = [evidence.model, *([evidence.model.with_values(known)] if known else [])]
+    start_values = {name: value for name, value in start.items() if name in names}
+    starts = [evidence.model, *([evidence.model.with_values(start_values)] if start_values else [])]
     fits = [solve(model, tests, names, bounds, strict=False) for model in starts]
     model = min(fits, key=lambda each: each.chi_square).model
     return replace(evidence, solution=evidence.solution.at(model, evidence.data_sets))

@@ -90,21 +90,29 @@ class DiagnosisWriter:
 
     def _with_names(self, names: Sequence[str]) -> Evidence:
         """The model as it came with these effects, fitted to noise alone."""
-        of_names = [each for each in self.hypotheses if set(each.effects) == set(names) and each.refitted]
-        others = [each for each in self.hypotheses if set(each.effects) >= set(names) and each.refitted]
-        fitted = (of_names or others)[0].weighed.state
+        of_names = [
+            hypothesis
+            for hypothesis in self.hypotheses
+            if set(hypothesis.effects) == set(names) and hypothesis.refitted
+        ]
+        supersets = [
+            hypothesis
+            for hypothesis in self.hypotheses
+            if set(hypothesis.effects) >= set(names) and hypothesis.refitted
+        ]
+        fitted = (of_names or supersets)[0].weighed.state
         model = fitted.evidence.model
         for name in fitted.effects:
             if name not in names:
                 model = model.without(name)
-        asked = self.search.asked
-        return fit(model, fitted.evidence.data_sets, asked.held, asked.bounds)
+        request = self.search.asked
+        return fit(model, fitted.evidence.data_sets, request.held, request.bounds)
 
     def _doubt(self, after: Evidence, names: Sequence[str]) -> str:
         """Why names that are all but sure do not explain the whole gap; "" if they do."""
-        held = hold_out(self._fitted(self.base), self._fitted(after), self.search.asked.bounds)
-        if held.after is not None and held.after > MOST_LEFT:
-            return f"held out, {number(held.after, 3)} times the noise is left"
+        holdout = hold_out(self._fitted(self.base), self._fitted(after), self.search.asked.bounds)
+        if holdout.after is not None and holdout.after > MOST_LEFT:
+            return f"held out, {number(holdout.after, 3)} times the noise is left"
         result = result_of(self._fitted(after), self.search.asked.bounds, after.model.effects, lacking=False)
         for name in names:
             effect = get_effect(name)
@@ -119,23 +127,28 @@ class DiagnosisWriter:
         assert self.first
         best, names = self.first.best, [entry.name for entry in entries]
         base, plain = self._fitted(self.base), self._fitted(after)
-        excess = [max(each.chi_square / sum(d.counted for d in each.data_sets) - 1.0, 0.0) for each in (base, plain)]
+        excess = [
+            max(evidence.chi_square / sum(d.counted for d in evidence.data_sets) - 1.0, 0.0)
+            for evidence in (base, plain)
+        ]
         share = 1.0 - excess[1] / excess[0] if excess[0] else 1.0
         words = f"{_all(names)} {'explains' if len(names) == 1 else 'explain'} {number(100 * share, 2)} % of the gap"
-        beside = [place.name for place in self.first.places]
-        beside += ["errors of levels beyond the rig's class"] if best.levels else []
+        remainder = [place.name for place in self.first.places]
+        remainder += ["errors of levels beyond the rig's class"] if best.levels else []
         gap = self._described(after) if not best.levels else None
         if gap:
             entries = [*entries, Named(UNNAMED, gap.evidence)]
-            beside.append(f"something without a name, {gap.words}")
+            remainder.append(f"something without a name, {gap.words}")
         elif self.first.unnamed:
-            beside.append("something without a name")
-        words += f"; the rest: {', '.join([*beside, *filter(None, [doubt])])}" if beside or doubt else ""
+            remainder.append("something without a name")
+        words += f"; the rest: {', '.join([*remainder, *filter(None, [doubt])])}" if remainder or doubt else ""
         return self._finished("partly", words, gap.after if gap else after, entries, places=best, gap=gap)
 
     def _described(self, evidence: Evidence) -> Described | None:
-        asked, rig = self.search.asked, self.data.campaign.rig
-        return describe(self._fitted(evidence), rig, asked.start, asked.held, asked.bounds) if asked.most else None
+        request, rig = self.search.asked, self.data.campaign.rig
+        return (
+            describe(self._fitted(evidence), rig, request.start, request.held, request.bounds) if request.most else None
+        )
 
     def _of_record(self, claim: Claim) -> Diagnosis:
         """A mistake in the record: the gap shrinks if it was made; the model stays as it was."""
@@ -144,8 +157,10 @@ class DiagnosisWriter:
         names = _entries(self.data, claim, evidence)
         command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(self.data))])
         advice = f"if the records of the tests bear it out, {'; '.join(claim.corrections(self.data))} (or {command})"
-        beside = [*best.effects, *(place.name for place in best.places)]
-        words = f"these tests agree if {claim.words(self.data)}" + f", with {_all(beside)} beside it" * bool(beside)
+        companions = [*best.effects, *(place.name for place in best.places)]
+        words = f"these tests agree if {claim.words(self.data)}" + f", with {_all(companions)} beside it" * bool(
+            companions
+        )
         found = self._finished(self.finding.verdict, words, self.base, names, places=best, next_test=advice)
         warning = f"fitted to the tests as they are, which only agree if {claim.words(self.data)}: {advice}"
         after = self._fitted(best.weighed.state.evidence)
@@ -157,31 +172,32 @@ class DiagnosisWriter:
             result=replace(found.result, warnings=(*found.result.warnings, warning)),
         )
 
-    def _of_claim(self, each: Composition) -> str:
-        gain = self.base.chi_square - each.best.weighed.state.evidence.chi_square
-        return f"lowers chi-square by {gain:.0f} without a parameter; {self._probability(each)}"
+    def _of_claim(self, composition: Composition) -> str:
+        gain = self.base.chi_square - composition.best.weighed.state.evidence.chi_square
+        return f"lowers chi-square by {gain:.0f} without a parameter; {self._probability(composition)}"
 
     def _ambiguous(self) -> Diagnosis:
-        told = self.finding.told
-        labels = {id(each): self.label(each) for each in told}
-        led = next((each for each in told if each.names or each.best.claim), None)
-        others = tuple(labels[id(each)] for each in told if each is not led)
+        compositions = self.finding.told
+        labels = {id(composition): self.label(composition) for composition in compositions}
+        led = next((composition for composition in compositions if composition.names or composition.best.claim), None)
+        lookalikes = tuple(labels[id(composition)] for composition in compositions if composition is not led)
         names: list[Named] = []
         if led and led.best.claim:
             names = [
-                replace(each, alternatives=others) for each in _entries(self.data, led.best.claim, self._of_claim(led))
+                replace(entry, alternatives=lookalikes)
+                for entry in _entries(self.data, led.best.claim, self._of_claim(led))
             ]
         elif led:
-            names = [Named(name, self._probability(led), others) for name in led.names]
+            names = [Named(name, self._probability(led), lookalikes) for name in led.names]
         words = f"these tests cannot distinguish {' from '.join(labels.values())}"
-        fitted = [each for each in told if each.best.effects and each.best.refitted]
-        models = [each.best.weighed.state.evidence.model for each in fitted]
+        fitted = [composition for composition in compositions if composition.best.effects and composition.best.refitted]
+        models = [composition.best.weighed.state.evidence.model for composition in fitted]
         advice = deciding_test(
-            models, [each.probability for each in fitted], self.base.data_sets, self.data.campaign.rig
+            models, [composition.probability for composition in fitted], self.base.data_sets, self.data.campaign.rig
         )
         if led and led.best.claim:
             advice = f"look into the records of the tests; {'; '.join(led.best.claim.corrections(self.data))}"
-        spot = next((each.best for each in told if each.places), None)
+        spot = next((composition.best for composition in compositions if composition.places), None)
         return self._finished("ambiguous", words, self.base, names, places=spot, next_test=advice)
 
     def _without_name(self) -> Diagnosis:
@@ -206,44 +222,47 @@ class DiagnosisWriter:
             advice = "measure the levels again in another session; or state the rig's class, gain_error under [rig]"
         return self._finished("unexplained", words, self.base, places=spot, next_test=advice)
 
-    def label(self, each: Composition) -> str:
+    def label(self, composition: Composition) -> str:
         """A composition by the names of its effects, or what else it is."""
-        best = each.best
-        names = [*(best.claim.labels(self.data) if best.claim else ()), *each.names]
-        return " + ".join((*names, *(f"fault: {place.name}" for place in each.places), *_nameless(each)))
+        best = composition.best
+        names = [*(best.claim.labels(self.data) if best.claim else ()), *composition.names]
+        return " + ".join((*names, *(f"fault: {place.name}" for place in composition.places), *_nameless(composition)))
 
     @cached_property
     def odds(self) -> Odds:
         """Explanations that are reported, the most probable first."""
-        told = sorted(self.finding.told, key=lambda each: -each.probability)
-        models = (each.best.weighed.state.evidence.model if each.best.refitted else None for each in told)
-        pairs = ((self._in_words(each), each.probability) for each in told)
-        labels, apart = tuple(map(self.label, told)), self.finding.verdict == "ambiguous"
-        return Odds(self.finding.nothing, tuple(pairs), tuple(models), labels, apart)
+        compositions = sorted(self.finding.told, key=lambda composition: -composition.probability)
+        models = (
+            composition.best.weighed.state.evidence.model if composition.best.refitted else None
+            for composition in compositions
+        )
+        pairs = ((self._in_words(composition), composition.probability) for composition in compositions)
+        labels, exclusive = tuple(map(self.label, compositions)), self.finding.verdict == "ambiguous"
+        return Odds(self.finding.nothing, tuple(pairs), tuple(models), labels, exclusive)
 
-    def _in_words(self, each: Composition) -> str:
+    def _in_words(self, composition: Composition) -> str:
         """A composition as it is told to people: what each of its parts is, with its name."""
-        best = each.best
+        best = composition.best
         parts = [best.claim.words(self.data)] if best.claim else []
-        parts += [f"{get_effect(name).phrase} ({name})" for name in each.names]
-        parts += [f"the tests are off: {place.name}" for place in each.places]
-        *most, last = (*parts, *_nameless(each))
-        return ", and ".join(filter(None, (", ".join(most), last)))
+        parts += [f"{get_effect(name).phrase} ({name})" for name in composition.names]
+        parts += [f"the tests are off: {place.name}" for place in composition.places]
+        *first_parts, last = (*parts, *_nameless(composition))
+        return ", and ".join(filter(None, (", ".join(first_parts), last)))
 
     def _evidence(self) -> str:
         """Why effects were named."""
         assert self.first
         after = self._fitted(self._with_names(self.finding.names))
         gain = self._fitted(self.base).chi_square - after.chi_square
-        beside = " with what was named beside it" if len(self.finding.names) > 1 else ""
-        return f"lowers chi-square by {gain:.0f}{beside}; {self._probability(self.first)}"
+        suffix = " with what was named beside it" if len(self.finding.names) > 1 else ""
+        return f"lowers chi-square by {gain:.0f}{suffix}; {self._probability(self.first)}"
 
-    def _probability(self, each: Composition) -> str:
-        others = [other for other in self.finding.told if other is not each]
-        words = f"probability {format_probability(each.probability)}"
-        if not others:
+    def _probability(self, composition: Composition) -> str:
+        rivals = [rival for rival in self.finding.told if rival is not composition]
+        words = f"probability {format_probability(composition.probability)}"
+        if not rivals:
             return words
-        return f"{words}, next {self.label(others[0])} {format_probability(others[0].probability)}"
+        return f"{words}, next {self.label(rivals[0])} {format_probability(rivals[0].probability)}"
 
     def _finished(
         self,
@@ -263,15 +282,15 @@ class DiagnosisWriter:
         if spots:
             next_test = f"measure again: {spots[0].name}"
         lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
-        known, corrected = {*base.model.effects} - {*self.unresolved}, gap.fitted if gap else None
-        where = (*(_place_where(base, each, places) for each in spots if places), *locate(base))
-        result = self.odds.averaged(result_of(after, bounds, known, lacking=lacking, corrected=corrected))
+        resolved, corrected = {*base.model.effects} - {*self.unresolved}, gap.fitted if gap else None
+        regions = (*(_place_where(base, place, places) for place in spots if places), *locate(base))
+        result = self.odds.averaged(result_of(after, bounds, resolved, lacking=lacking, corrected=corrected))
         return Diagnosis(
             verdict,
             "; ".join([summary, *filter(None, (_format_amount(entry.name, result) for entry in names))]),
             tuple(names),
-            where,
-            where if after is base else locate(after),
+            regions,
+            regions if after is base else locate(after),
             gap.held if gap else hold_out(base, after, bounds),
             next_test,
             tuple(self.candidates),
@@ -289,8 +308,8 @@ class DiagnosisWriter:
         if self.data.campaign.rig.stiffness_errors[0] is not None or not any(loop.gain_weighs for loop in loops):
             return evidence
         if evidence not in self._refitted:
-            asked, data_sets = self.search.asked, with_gains(evidence.data_sets, weigh=False)
-            self._refitted[evidence] = fit(evidence.model, data_sets, asked.held, asked.bounds)
+            request, data_sets = self.search.asked, with_gains(evidence.data_sets, weigh=False)
+            self._refitted[evidence] = fit(evidence.model, data_sets, request.held, request.bounds)
         return self._refitted[evidence]
 
     @cached_property
@@ -302,12 +321,12 @@ class DiagnosisWriter:
         """Every effect of the library beside the model as it came, and every mistake in the record weighed: its
         score, its refit and its probability; by score."""
         chance = self.hypotheses[0].log_posterior
-        weight = {id(each): float(np.exp(each.log_posterior - chance)) for each in self.hypotheses}
+        weight = {id(candidate): float(np.exp(candidate.log_posterior - chance)) for candidate in self.hypotheses}
         whole = sum(weight.values())
         alone = {
-            each.effects[0]: each
-            for each in self.hypotheses
-            if each.refitted and len(each.effects) == 1 and len(each.key) == 1
+            candidate.effects[0]: candidate
+            for candidate in self.hypotheses
+            if candidate.refitted and len(candidate.effects) == 1 and len(candidate.key) == 1
         }
         found = list[CandidateResult]()
         for hypothesis in self.hypotheses:
@@ -316,10 +335,19 @@ class DiagnosisWriter:
                 gain = self.base.chi_square - hypothesis.weighed.state.evidence.chi_square
                 why = "closes the gap" if self.first and self.first.best is hypothesis else _LESS_LIKELY
                 found.append(CandidateResult(" + ".join(claim.labels(self.data)), gain, gain, share, {}, why))
-        for each in self.search.root.effects:
-            share = sum(weight[id(other)] for other in self.hypotheses if each.name in other.effects) / whole
+        for candidate in self.search.root.effects:
+            share = (
+                sum(weight[id(hypothesis)] for hypothesis in self.hypotheses if candidate.name in hypothesis.effects)
+                / whole
+            )
             found.append(
-                self._judged(each.name, each.proposal.score, each.proposal.visible, alone.get(each.name), share)
+                self._judged(
+                    candidate.name,
+                    candidate.proposal.score,
+                    candidate.proposal.visible,
+                    alone.get(candidate.name),
+                    share,
+                )
             )
         return sorted(found, key=lambda judged: -judged.score)
 
@@ -330,14 +358,14 @@ class DiagnosisWriter:
             why = "score too small to refit" if visible else "not visible in these tests"
             return CandidateResult(name, score, None, share, {}, why)
         after = alone.weighed.state.evidence
-        own = {key: value for key, value in after.model.values.items() if key not in self.base.model.values}
-        told = self.first and name in self.first.names
-        why = "part of the likeliest explanation" if told else _LESS_LIKELY
-        return CandidateResult(name, score, self.base.chi_square - after.chi_square, share, own, why)
+        values = {key: value for key, value in after.model.values.items() if key not in self.base.model.values}
+        is_named = self.first and name in self.first.names
+        why = "part of the likeliest explanation" if is_named else _LESS_LIKELY
+        return CandidateResult(name, score, self.base.chi_square - after.chi_square, share, values, why)
 
     def _notes(self) -> tuple[str, ...]:
         """Sentence on the effects that these tests cannot show."""
-        unseen = [each.name for each in self.search.root.effects if not each.proposal.visible]
+        unseen = [candidate.name for candidate in self.search.root.effects if not candidate.proposal.visible]
         blind = [name for name in unseen if not get_effect(name).under]  # what no test states is not asked for
         notes = [f"not identifiable from these tests: {', '.join(blind)}"] if blind else []
         if self.first and self.first.unnamed and len({str(test.direction) for test in self.base.data_sets}) == 1:
@@ -355,15 +383,15 @@ def _format_amount(name: str, result: Result) -> str:
         result.interval(qualified_name(effect, amount)),
     )
     unit, factor = display_unit(amount.unit, 1.0, value)
-    shown, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
-    told = f"{amount.meaning or amount.name}: {f'{shown} {unit}'.removesuffix(' -').removesuffix(' 1')}"
-    return f"{told} (95 % interval {ends[0]} to {ends[1]})" if ends else told
+    value_text, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
+    text = f"{amount.meaning or amount.name}: {f'{value_text} {unit}'.removesuffix(' -').removesuffix(' 1')}"
+    return f"{text} (95 % interval {ends[0]} to {ends[1]})" if ends else text
 
 
-def _nameless(each: Composition) -> list[str]:
+def _nameless(composition: Composition) -> list[str]:
     """Parts of a composition beside effects, places and mistakes."""
-    levels = ["errors of levels beyond the rig's class"] if each.best.levels else []
-    return [*levels, *(["something without a name"] if each.unnamed else [])]
+    levels = ["errors of levels beyond the rig's class"] if composition.best.levels else []
+    return [*levels, *(["something without a name"] if composition.unnamed else [])]
 
 
 def _all(names: Sequence[str]) -> str:
@@ -380,7 +408,7 @@ def _entries(data: PreparedCampaign, claim: Claim, evidence: str) -> list[Named]
             sentence=one.words(data),
             correction=one.corrections(data)[0],
         )
-        for one in claim.each
+        for one in claim.single_tests
     ]
 
 

@@ -67,7 +67,7 @@ class RigErrors:
     @cached_property
     def _combinations(self) -> dict[tuple[float, ...], int]:
         """Number of each combination of scatter and errors that nodes have."""
-        return {of: number for number, of in enumerate(dict.fromkeys((n.scatter, *n.errors) for n in self.nodes))}
+        return {sizes: number for number, sizes in enumerate(dict.fromkeys((n.scatter, *n.errors) for n in self.nodes))}
 
     @cached_property
     def combination(self) -> Array:
@@ -77,10 +77,10 @@ class RigErrors:
     @cached_property
     def distinct_scatter(self) -> Array:
         """Scatter of each combination, (combinations,)."""
-        return np.array([of[0] for of in self._combinations])
+        return np.array([sizes[0] for sizes in self._combinations])
 
     @cached_property
-    def within(self) -> Array:
+    def within_class(self) -> Array:
         """Mask of the nodes within the class of the rig, (nodes,)."""
         return np.array([not node.wide for node in self.nodes])
 
@@ -109,7 +109,7 @@ class RigErrors:
             kinds[number, :size] = block.kinds
         scatters = np.array([block.scatters for block in self.blocks], dtype=bool)
         share = np.where(scatters, 1.0 / self.distinct_scatter[:, None], 1.0)[..., None]
-        errors = np.array([(*of[1:], 0.0) for of in self._combinations])[:, kinds] * share
+        errors = np.array([(*sizes[1:], 0.0) for sizes in self._combinations])[:, kinds] * share
         root = np.linalg.cholesky(np.eye(self.width) + errors[..., None] * inner * errors[..., None, :])
         log_size = 2.0 * np.sum(np.log(np.einsum("nbii->nbi", root)), axis=(1, 2))
         return np.linalg.inv(root) * (errors * share)[..., None, :], log_size
@@ -121,10 +121,10 @@ def scattering_alone(evidence: Evidence) -> Evidence:
     Of sweeps they are in ln K, whatever is fitted: relative to the measured, noise would shrink where a model is off.
     """
     data_sets = tuple(
-        replace(each, noise=replace(each.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), residuals="complex")
-        if isinstance(each, MeasuredSweep)
-        else each
-        for each in with_gains(evidence.data_sets, weigh=False)
+        replace(data_set, noise=replace(data_set.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), residuals="complex")
+        if isinstance(data_set, MeasuredSweep)
+        else data_set
+        for data_set in with_gains(evidence.data_sets, weigh=False)
     )
     return Evidence(evidence.solution.at(evidence.model, data_sets), data_sets)
 
@@ -137,18 +137,18 @@ def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:
 def nodes(evidence: Evidence) -> list[Node]:
     """Sizes of the rig's errors with their prior weights; the scatter has some of its own where few repeats tell it."""
     sweeps = parted(evidence.data_sets)[1]
-    freedom = max((each.noise.scatter_freedom for each in sweeps), default=0)
+    freedom = max((sweep.noise.scatter_freedom for sweep in sweeps), default=0)
     thirds = (np.arange(3) + 0.5) / 3
     scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < KNOWN else [1.0]
     runs = RUNS if sweeps else ((0.0, 1.0),)
     waves = WANDERING if sweeps else ((0.0, 1.0),)
-    made = [
+    unnormalised = [
         Node(scatter, (run, level, wave, level), log(a * b * c * d / len(scatters)), level > WITHIN_CLASS, deviation)
         for scatter, (run, a), (level, b), (wave, c), (deviation, d) in product(scatters, runs, LEVELS, waves, COMPOUND)
         if deviation == 0.0 or level <= WITHIN_CLASS  # what levels have beyond the class would hide a deviation
     ]
-    whole = logsumexp([node.log_weight for node in made])
-    return [replace(node, log_weight=float(node.log_weight - whole)) for node in made]
+    whole = logsumexp([node.log_weight for node in unnormalised])
+    return [replace(node, log_weight=float(node.log_weight - whole)) for node in unnormalised]
 
 
 def blocks(evidence: Evidence, rig: RigSettings) -> list[Block]:
@@ -172,13 +172,13 @@ def _of_sweep(evidence: Evidence, sweep: MeasuredSweep, classes: Sequence[float]
     first, _ = _ends(evidence, sweep)
     size, runs = sweep.frequency.size, np.split(np.arange(sweep.frequency.size), sweep.block_starts[1:])
     units = sweep.whiten(np.full(size, 1.0 + 1.0j)).reshape(2, size)
-    for held in np.unique(sweep.held):
-        line = np.flatnonzero(sweep.held == held)
-        own = [run - line[0] for run in runs if sweep.held[run[0]] == held]
-        columns, kinds = _shared(line.size, own)
-        for part, each in enumerate(classes):
+    for level in np.unique(sweep.held):
+        line = np.flatnonzero(sweep.held == level)
+        line_runs = [run - line[0] for run in runs if sweep.held[run[0]] == level]
+        columns, kinds = _shared(line.size, line_runs)
+        for part, unit_class in enumerate(classes):
             rows = first + part * size + line
-            yield Block(rows, each * columns * units[part, line], kinds, scatters=True)
+            yield Block(rows, unit_class * columns * units[part, line], kinds, scatters=True)
 
 
 def _shared(size: int, runs: Sequence[Array]) -> tuple[Array, Array]:

@@ -43,25 +43,33 @@ class Terms:
     def place(self) -> list[slice]:
         """Slice of the points of each test."""
         ends = np.cumsum([data_set.frequency.size for data_set in self.data_sets]).tolist()
-        return [slice(end - each.frequency.size, end) for end, each in zip(ends, self.data_sets, strict=True)]
+        return [slice(end - data_set.frequency.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)]
 
     @cached_property
     def directions(self) -> Array:
         """Name of the direction of each point, (p,)."""
-        return np.concatenate([[str(each.direction)] * each.frequency.size for each in self.data_sets])
+        return np.concatenate([[str(data_set.direction)] * data_set.frequency.size for data_set in self.data_sets])
 
     @cached_property
     def points(self) -> Array:
         """Logarithms of frequency [Hz] and motion [m, rad or 1] of each point, (p, 2)."""
         model = self.evidence.model
-        per = [1.0 if self.measure == "stiffness" else model.unit_strain(each.direction) for each in self.data_sets]
-        axes = [(each.frequency, each.amplitude * factor) for each, factor in zip(self.data_sets, per, strict=True)]
+        per = [
+            1.0 if self.measure == "stiffness" else model.unit_strain(data_set.direction) for data_set in self.data_sets
+        ]
+        axes = [
+            (data_set.frequency, data_set.amplitude * factor)
+            for data_set, factor in zip(self.data_sets, per, strict=True)
+        ]
         return np.log(np.concatenate(axes, axis=-1).T)
 
     def stiffness(self, model: Model) -> Array:
         """Complex stiffness of a model at each point, (p,) [N/m or N m/rad]."""
         return np.concatenate(
-            [model.stiffness(each.direction, each.frequency, each.amplitude, kind=each.kind) for each in self.data_sets]
+            [
+                model.stiffness(data_set.direction, data_set.frequency, data_set.amplitude, kind=data_set.kind)
+                for data_set in self.data_sets
+            ]
         )
 
     def unit(self, model: Model) -> Array:
@@ -70,34 +78,36 @@ class Terms:
             case "gain":
                 return self.stiffness(model)
             case "modulus":
-                per = [model.stiffness_per_modulus(each.direction) for each in self.data_sets]
-                return np.repeat(per, [each.frequency.size for each in self.data_sets])
+                per = [model.stiffness_per_modulus(data_set.direction) for data_set in self.data_sets]
+                return np.repeat(per, [data_set.frequency.size for data_set in self.data_sets])
         return np.ones(len(self.points))
 
     def of_size_one(self, shapes: Array, model: Model) -> Array:
         """Values of the term at the points, (c, p), whose largest change of |K| is all of it."""
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
-    def off(self, model: Model) -> Array:
+    def measured_value(self, model: Model) -> Array:
         """The value with which a model meets the measured stiffness at every point, complex, (p,)."""
-        off = [each.measured - each.noise_free(model).measured for each in self.data_sets]
-        return np.concatenate(off) / self.unit(model)
+        differences = [data_set.measured - data_set.noise_free(model).measured for data_set in self.data_sets]
+        return np.concatenate(differences) / self.unit(model)
 
-    def columns(self, values: Array, model: Model, beside: Array | float = 0.0) -> Array:
+    def columns(self, values: Array, model: Model, base_value: Array | float = 0.0) -> Array:
         """What small values of the term at the points, complex (c, p), do to the whitened residuals, (c, n), beside a
         value that it has already, (p,)."""
-        moved, unit = np.zeros((len(values), self.evidence.residual.size)), self.unit(model)
-        change, there = values * unit, beside * unit
-        for each, place in zip(self.data_sets, self.place, strict=True):
-            moved[:, self.evidence.place[each]] = each.moved(change[:, place], model, there[place])
-        return moved
+        residual_changes, unit = np.zeros((len(values), self.evidence.residual.size)), self.unit(model)
+        change, base_stiffness = values * unit, base_value * unit
+        for data_set, place in zip(self.data_sets, self.place, strict=True):
+            residual_changes[:, self.evidence.place[data_set]] = data_set.moved(
+                change[:, place], model, base_stiffness[place]
+            )
+        return residual_changes
 
     def residual(self, value: Array, model: Model) -> Array:
         """Whitened residuals of a model with the term of a value at the points, complex (p,), exact, (n,)."""
-        left, added = residual(model, self.evidence.data_sets), value * self.unit(model)
-        for each, place in zip(self.data_sets, self.place, strict=True):
-            left[self.evidence.place[each]] = each.residual_with(added[place], model)
-        return left
+        residuals, added = residual(model, self.evidence.data_sets), value * self.unit(model)
+        for data_set, place in zip(self.data_sets, self.place, strict=True):
+            residuals[self.evidence.place[data_set]] = data_set.residual_with(added[place], model)
+        return residuals
 
     def jacobian(self, value: Array, model: Model) -> Array:
         """Derivatives of these by fit coordinate of the model, (k, n)."""
@@ -106,7 +116,7 @@ class Terms:
             jacobian(model, self.evidence.data_sets, names),
             Coordinates.of(model, names).slopes(model.values),
         )
-        for each, place in zip(self.data_sets, self.place, strict=True):
-            own = each.jacobian_with(added[place], model, names, as_share=self.measure == "gain")
-            rows[:, self.evidence.place[each]] = slopes[:, None] * own
+        for data_set, place in zip(self.data_sets, self.place, strict=True):
+            derivatives = data_set.jacobian_with(added[place], model, names, as_share=self.measure == "gain")
+            rows[:, self.evidence.place[data_set]] = slopes[:, None] * derivatives
         return rows

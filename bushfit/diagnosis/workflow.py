@@ -46,12 +46,12 @@ def diagnose(data: PreparedCampaign, model: Model | None = None, settings: Setti
     for name in (*settings.adopt, *settings.without):
         get_candidate(name)
     mended = [name for name in settings.adopt if get_mistake(name)]
-    data, said = adopted(data, mended)
-    data, begun, left = _without_wild(data, model, settings)
+    data, messages = adopted(data, mended)
+    data, begun, excluded_points = _without_wild(data, model, settings)
     whole, (data, fewer) = data, condensed(data)
     if fewer:
         begun = _begin(data, model, settings)
-    asked = DiagnosisRequest(
+    request = DiagnosisRequest(
         data,
         begun.evidence,
         lambda mended: _begin(mended, model, settings).evidence,
@@ -59,19 +59,21 @@ def diagnose(data: PreparedCampaign, model: Model | None = None, settings: Setti
         settings.max_effects,
         settings.tolerance,
         begun.start,
-        meetings(left, whole.sweeps, begun.evidence.model),
+        meetings(excluded_points, whole.sweeps, begun.evidence.model),
         begun.held,
         data.bounds,
     )
-    search = Search(asked)
+    search = Search(request)
     hypotheses = search.run()
     found = DiagnosisWriter(search, judged(hypotheses, settings.tolerance), hypotheses, settings.unresolved).diagnosis()
     fewer += _left_out_of_fewer(whole, data, begun.outliers)
     of_loops = outliers_at(found.result.model, data.loops)
-    outliers = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(left, robust=True))
-    notes = (*said, *fewer, *found.notes, *data.assumed, *outliers)
-    warnings = (*said, *found.result.warnings, *outliers)
-    result = replace(found.result, outliers=(*of_loops, *left), warnings=warnings, specimens=data.campaign.specimens)
+    outliers = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(excluded_points, robust=True))
+    notes = (*messages, *fewer, *found.notes, *data.assumed, *outliers)
+    warnings = (*messages, *found.result.warnings, *outliers)
+    result = replace(
+        found.result, outliers=(*of_loops, *excluded_points), warnings=warnings, specimens=data.campaign.specimens
+    )
     return replace(found, notes=notes, result=result)
 
 
@@ -90,16 +92,16 @@ def _without_wild(
 ) -> tuple[PreparedCampaign, InitialFit, tuple[Outlier, ...]]:
     """The campaign with no weight on single points of sweeps that repeats and neighbours speak against, its fit, and
     these points: a row that went wrong is neither physics nor a fault of the rig."""
-    left: tuple[Outlier, ...] = ()
+    excluded_points: tuple[Outlier, ...] = ()
     for _ in range(_MOST_ROUNDS):
         begun = _begin(data, model, settings)
-        known = {(outlier.test, outlier.row) for outlier in left}  # a robust fit finds them anew
+        known_rows = {(outlier.test, outlier.row) for outlier in excluded_points}  # a robust fit finds them anew
         found = (*begun.outliers, *outliers_at(begun.evidence.model, parted(begun.evidence.data_sets)[1]))
-        wild = tuple(outlier for outlier in found if (outlier.test, outlier.row) not in known)
+        wild = tuple(outlier for outlier in found if (outlier.test, outlier.row) not in known_rows)
         if not wild:
             break
-        data, left = data.without(wild), (*left, *wild)
-    return data, begun, left
+        data, excluded_points = data.without(wild), (*excluded_points, *wild)
+    return data, begun, excluded_points
 
 
 class InitialFit(NamedTuple):
@@ -116,21 +118,21 @@ def _begin(data: PreparedCampaign, model: Model | None, settings: Settings) -> I
     so a loop's gain weighs, whether its class is stated or assumed."""
     hint = "add measured tests to the campaign"
     data_sets = data.some(data.data_sets, "there is nothing to diagnose", hint)
-    held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
+    fixed = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
     start = data.start(data_sets, {})
     model = model or data.started(data.effects, data_sets, {})
-    start = {name: value for name, value in start.items() if name in model.values and name not in held}
+    start = {name: value for name, value in start.items() if name in model.values and name not in fixed}
     for name in settings.adopt:
         if get_mistake(name) is None and name not in (model := model.with_twin(name)).effects:
             # at a tenth of its typical size: at its neutral value a fit may not see it
             amount = (effect := get_effect(name)).amount
-            little = {} if effect.replaces else {qualified_name(effect, amount): amount.sized(0.1)}
-            model = model.with_effect(name, little)
+            initial_values = {} if effect.replaces else {qualified_name(effect, amount): amount.sized(0.1)}
+            model = model.with_effect(name, initial_values)
     outliers: tuple[Outlier, ...] = ()
     if data.robust:
-        names = [name for name in model.parameters if name not in held]
+        names = [name for name in model.parameters if name not in fixed]
         robust = estimate(model, data_sets, names, data.bounds, robust=True)
         outliers, data_sets = robust.outliers, robust.data_sets
     data_sets = [data_set.with_weight() for data_set in with_gains(data_sets, weigh=True)]
-    descent = fit_from(model, data_sets, held, data.bounds).finished(EVALUATIONS)
-    return InitialFit(Evidence(descent.solution, tuple(data_sets)), start, held, outliers)
+    descent = fit_from(model, data_sets, fixed, data.bounds).finished(EVALUATIONS)
+    return InitialFit(Evidence(descent.solution, tuple(data_sets)), start, fixed, outliers)

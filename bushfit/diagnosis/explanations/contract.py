@@ -71,8 +71,8 @@ class FaultyPlace(Explanation):
     def distance(self, residual: Array) -> float:
         """How far they lie off, in units of noise: the root mean square along their columns of residuals, (n,)."""
         columns = self.columns
-        left = columns @ residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
-        return float(np.sqrt(np.mean(left**2)))
+        amounts = columns @ residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
+        return float(np.sqrt(np.mean(amounts**2)))
 
 
 def is_pattern(places: Sequence[FaultyPlace]) -> bool:

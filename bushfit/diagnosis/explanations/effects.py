@@ -10,13 +10,13 @@ from bushfit.diagnosis.explanations.contract import MissingEffect
 from bushfit.diagnosis.propose import proposals
 
 
-def effects(evidence: Evidence, excluded: Collection[str], held: Sequence[str]) -> list[MissingEffect]:
+def effects(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str]) -> list[MissingEffect]:
     """Every effect that these tests could show, in one of its shapes; one in place of a branch is told by its refit."""
     share = np.empty(evidence.residual.size)
     for data_set, place in evidence.place.items():
         share[place] = data_set.relative_noise
     found = []
-    for proposal in proposals(evidence, excluded, held):
+    for proposal in proposals(evidence, excluded, fixed):
         group = None
         if not proposal.together:
             unit = np.abs(proposal.columns * share).max(axis=1)

@@ -40,38 +40,42 @@ class Meeting(FaultyPlace):
         return self.apart
 
 
-def meetings(left: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model) -> list[Meeting]:
+def meetings(outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model) -> list[Meeting]:
     """Frequencies that several of the points that were left out have in common."""
-    apart = {(outlier.test, outlier.row): outlier.distance for outlier in left}
+    distances = {(outlier.test, outlier.row): outlier.distance for outlier in outliers}
     found: dict[float, list[_Left]] = defaultdict(list)
     for sweep in sweeps:
         for point, (frequency, row) in enumerate(zip(sweep.frequency.tolist(), sweep.order.tolist(), strict=True)):
-            there = found[frequency]
-            if (sweep.name, row + 1) in apart:
-                there.append((sweep, point, apart[sweep.name, row + 1]))
+            points = found[frequency]
+            if (sweep.name, row + 1) in distances:
+                points.append((sweep, point, distances[sweep.name, row + 1]))
     chance = 1.0 / max(len(found), 1)
-    return [_meeting(at, points, len(left), chance, model) for at, points in found.items() if len(points) > 1]
+    return [
+        _meeting(frequency, points, len(outliers), chance, model)
+        for frequency, points in found.items()
+        if len(points) > 1
+    ]
 
 
 #: A point that was left out: its sweep, its number there, and how far it lies off in units of noise.
 _Left = tuple[MeasuredSweep, int, float]
 
 
-def _meeting(frequency: float, points: Sequence[_Left], left: int, chance: float, model: Model) -> Meeting:
+def _meeting(frequency: float, points: Sequence[_Left], outlier_count: int, chance: float, model: Model) -> Meeting:
     """Points at a frequency, of so many that were left out, each of which might as well lie at any other."""
-    first, *others = dict.fromkeys(str(sweep.direction) for sweep, *_ in points)
-    where = "several directions" if others else first
+    first, *other_directions = dict.fromkeys(str(sweep.direction) for sweep, *_ in points)
+    location = "several directions" if other_directions else first
     amplitudes = [float(sweep.amplitude[point]) for sweep, point, _ in points]
-    by_chance = max(float(bdtrc(len(points) - 2, left - 1, chance)), np.finfo(float).tiny)
+    by_chance = max(float(bdtrc(len(points) - 2, outlier_count - 1, chance)), np.finfo(float).tiny)
     return Meeting(
         "place",
         "frequency",
-        f"{frequency:.4g} Hz in {where} ({len(points)} points left out)",
+        f"{frequency:.4g} Hz in {location} ({len(points)} points left out)",
         None,
         points[0][0].direction,
         (frequency, frequency),
         (min(amplitudes), max(amplitudes)),
-        float(np.sqrt(np.mean(np.square([apart for *_, apart in points])))),
+        float(np.sqrt(np.mean(np.square([distance for *_, distance in points])))),
         max(float(np.linalg.norm(sweep.off(model)[:, point])) for sweep, point, _ in points),
         -log(by_chance),
     )

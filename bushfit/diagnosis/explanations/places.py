@@ -40,7 +40,7 @@ def _loop(evidence: Evidence, loop: MeasuredLoop) -> FaultyPlace:
 
 def _rows(evidence: Evidence, data_sets: Sequence[MeasuredTest]) -> slice:
     """Slice from the first row of some data sets to their last."""
-    places = [evidence.place[each] for each in data_sets]
+    places = [evidence.place[data_set] for data_set in data_sets]
     return slice(min(place.start for place in places), max(place.stop for place in places))
 
 
@@ -79,31 +79,31 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
         for name in levels
     }
     for sweep in sweeps:
-        for held in np.unique(sweep.held):
-            here = sweep.held == held
-            words = sweep.line_words(int(np.argmax(here)))
+        for level in np.unique(sweep.held):
+            mask = sweep.held == level
+            words = sweep.line_words(int(np.argmax(mask)))
             if levels[_direction(sweep)] > 1:  # in this file or in others
-                columns = _off(evidence, [sweep], [here], sloping=True)
-                place = _place(evidence, words, "level", [sweep], [here], columns)
+                columns = _shift_columns(evidence, [sweep], [mask], sloping=True)
+                place = _place(evidence, words, "level", [sweep], [mask], columns)
                 extremes = min(ends[_direction(sweep)]), max(ends[_direction(sweep)])
-                yield replace(place, extreme=levels[_direction(sweep)] > 2 and held in extremes)
-            numbers = np.unique(sweep.repeat[here])
+                yield replace(place, extreme=levels[_direction(sweep)] > 2 and level in extremes)
+            numbers = np.unique(sweep.repeat[mask])
             for number in numbers if numbers.size > 2 else ():
-                mine = here & (sweep.repeat == number)
-                columns = _off(evidence, [sweep], [mine])
+                mine = mask & (sweep.repeat == number)
+                columns = _shift_columns(evidence, [sweep], [mine])
                 yield _place(evidence, f"repeat {number} of {words}", "repeat", [sweep], [mine], columns)
 
 
 def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
     """A repeat as a whole, of one direction or of all."""
-    for _, which, scope in _scopes(sweeps):
+    for _, label, scope in _scopes(sweeps):
         if not all(np.unique(sweep.repeat).size > 1 for sweep in scope):
             continue
-        for number in sorted({int(each) for sweep in scope for each in sweep.repeat}):
+        for number in sorted({int(repeat) for sweep in scope for repeat in sweep.repeat}):
             chosen = [sweep.repeat == number for sweep in scope]
             if all(rows.any() for rows in chosen):
-                columns = _off(evidence, scope, chosen, sloping=True)
-                yield _place(evidence, f"repeat {number} of {which}", "repeat", scope, chosen, columns)
+                columns = _shift_columns(evidence, scope, chosen, sloping=True)
+                yield _place(evidence, f"repeat {number} of {label}", "repeat", scope, chosen, columns)
 
 
 def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
@@ -112,9 +112,9 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterato
     if steps.size < _FEWEST_FREQUENCIES:
         return
     bands = [part[[0, -1]] for part in np.array_split(steps, min(steps.size, _MOST_FREQUENCIES))]
-    for where, _, scope in _scopes(sweeps):
+    for location, _, scope in _scopes(sweeps):
         touched = [[(low <= sweep.frequency) & (sweep.frequency <= high) for sweep in scope] for low, high in bands]
-        columns = [_off(evidence, scope, chosen) for chosen in touched]
+        columns = [_shift_columns(evidence, scope, chosen) for chosen in touched]
         for width in range(1, _WIDEST + 1):
             for first in range(len(bands) - width + 1):
                 window = slice(first, first + width)
@@ -122,7 +122,7 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterato
                     continue
                 low, high = float(bands[first][0]), float(bands[first + width - 1][-1])
                 span = " to ".join(f"{step:.4g}" for step in dict.fromkeys((low, high)))
-                words = f"{span} Hz in {where}, at every amplitude"
+                words = f"{span} Hz in {location}, at every amplitude"
                 rows = [np.any([chosen[place] for chosen in touched[window]], axis=0) for place in range(len(scope))]
                 yield _place(evidence, words, "frequency", scope, rows, np.concatenate(columns[window]))
 
@@ -130,14 +130,14 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterato
 def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequence[MeasuredSweep]]]:
     """Sweeps that may be off together: one alone, those of a direction in several files, and all; where that is, and
     which sweeps these are, in words."""
-    of_directions = [(name, list(own)) for name, own in groupby(sorted(sweeps, key=_direction), _direction)]
-    for name, own in of_directions:
-        several = len(own) > 1
-        for each in own:
-            words = f"the {name} sweep {each.name}"
-            yield words if several else name, words, [each]
+    of_directions = [(name, list(group)) for name, group in groupby(sorted(sweeps, key=_direction), _direction)]
+    for name, members in of_directions:
+        several = len(members) > 1
+        for sweep in members:
+            words = f"the {name} sweep {sweep.name}"
+            yield words if several else name, words, [sweep]
         if several:
-            yield name, f"every {name} sweep", own
+            yield name, f"every {name} sweep", members
     if len(of_directions) > 1:
         yield "all directions", "every sweep", sweeps
 
@@ -146,21 +146,21 @@ def _direction(sweep: MeasuredSweep) -> str:
     return str(sweep.direction)
 
 
-def _off(
+def _shift_columns(
     evidence: Evidence, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], *, sloping: bool = False
 ) -> Array:
     """Residuals of some points of sweeps that are off together: in gain, in phase, and if `sloping` along the step."""
     among = _rows(evidence, sweeps)
     columns = np.zeros((2 + 2 * sloping, among.stop - among.start))
     for sweep, rows in zip(sweeps, chosen, strict=True):
-        values = [rows.astype(float), *([rows * _along(sweep.step)] if sloping else [])]
-        own = evidence.place[sweep]
-        columns[:, own.start - among.start : own.stop - among.start] = [
+        values = [rows.astype(float), *([rows * _centred_log_step(sweep.step)] if sloping else [])]
+        row_slice = evidence.place[sweep]
+        columns[:, row_slice.start - among.start : row_slice.stop - among.start] = [
             column for value in values for column in sweep.moved_together(value)
         ]
     return columns
 
 
-def _along(step: Array) -> Array:
+def _centred_log_step(step: Array) -> Array:
     x = np.log(step)
     return 2.0 * (x - x.mean()) / max(float(np.ptp(x)), 1e-9)

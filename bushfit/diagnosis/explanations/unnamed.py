@@ -27,7 +27,7 @@ _PHASES = 32
 def unnamed(evidence: Evidence) -> list[Explanation]:
     """Processes of one direction or of all, and the harmonics of the loops."""
     loops, sweeps = parted(evidence.data_sets)
-    found = [(f"{how} {where}", group) for how in _LENGTHS for where, group in _processes(evidence, sweeps, how)]
+    found = [(f"{how} {location}", group) for how in _LENGTHS for location, group in _processes(evidence, sweeps, how)]
     if loops:
         groups = alike(loops)
         shapes = block_diag(*[smooth_waves(np.arange(_PHASES) / _PHASES)] * len(groups))
@@ -63,10 +63,12 @@ def _processes(evidence: Evidence, sweeps: Sequence[MeasuredSweep], how: str) ->
         of_row[evidence.place[sweep]] = kinds.index(kind)
         of_point += [kinds.index(kind)] * (last - first)
     for direction in dict.fromkeys(name for name, _ in kinds):
-        own = np.array([kinds.index(kind) for kind in dict.fromkeys(kinds) if kind[0] == direction])[:, None, None]
-        parts = columns * (of_row == own), share * (np.array(of_point) == own)
-        moved, changed = (part.reshape(-1, part.shape[-1]) for part in parts)
-        yield direction, Group(moved, changed, together=True)
+        kind_numbers = np.array([kinds.index(kind) for kind in dict.fromkeys(kinds) if kind[0] == direction])[
+            :, None, None
+        ]
+        parts = columns * (of_row == kind_numbers), share * (np.array(of_point) == kind_numbers)
+        residual_columns, changed = (part.reshape(-1, part.shape[-1]) for part in parts)
+        yield direction, Group(residual_columns, changed, together=True)
     if how == "rough" and len({name for name, _ in kinds}) > 1:  # what is smooth in all is the compound's
         yield "all", Group(columns, share, together=True)
 
@@ -87,5 +89,5 @@ def _features(points: Array) -> Array:
     return (_kernel(distinct, some) @ vectors[:, order] / np.sqrt(values[order])).T[:, place.ravel()]
 
 
-def _kernel(one: Array, other: Array) -> Array:
-    return np.exp(-0.5 * np.sum(np.square(one[:, None] - other), axis=-1))
+def _kernel(points: Array, nodes: Array) -> Array:
+    return np.exp(-0.5 * np.sum(np.square(points[:, None] - nodes), axis=-1))
