@@ -23,7 +23,7 @@ def renewed(page: str) -> str:
 
 
 def _tables() -> Iterator[str]:
-    """Effects; twins; where the law of each comes from and what would prove it; mistakes in the record."""
+    """Effects; twins; mistakes in the record."""
     library = LIBRARY.values()
     twinned = [effect for effect in library if effect.twins]
     yield _table(
@@ -33,9 +33,6 @@ def _tables() -> Iterator[str]:
     yield _table(
         ("named and proposed", "its twins, which no test of this kind tells from it"),
         ((f"`{e.name}`", ", ".join(f"`{twin}` ({get_effect(twin).level})" for twin in e.twins)) for e in twinned),
-    )
-    yield _table(
-        ("name", "source", "cheapest test that would prove it"), ((_link(e), e.source, e.confirmed_by) for e in library)
     )
     yield _table(
         ("mistake", "what would be so", "true value", "in"),

@@ -49,10 +49,11 @@ def blocks(page: Path, language: str) -> list[str]:
 def test_effects_and_commands_are_in_the_tables_of_their_pages(root: Path) -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert renewed(page) == page, "run: python tests/effect_tables.py"
-    readme = (root / "README.md").read_text(encoding="utf-8")
+    commands = (root / "bushfit/manual/commands.md").read_text(encoding="utf-8")
+    examples = commands + (root / "README.md").read_text(encoding="utf-8")
     names = cli.list_commands(click.Context(cli))
-    assert [name for name in names if f"| `bushfit {name} " not in readme] == []
-    assert [name for name in names if not re.search(rf"^\$ bushfit {name} ", readme, re.MULTILINE)] == []
+    assert [name for name in names if f"| `bushfit {name} " not in commands] == []
+    assert [name for name in names if not re.search(rf"^\$ bushfit {name} ", examples, re.MULTILINE)] == []
 
 
 def keys(table: type) -> set[str]:
