@@ -9,7 +9,7 @@ import pandas as pd
 
 from bushfit.diagnosis.record import Diagnosis, level_of
 from bushfit.effects.contract import Array
-from bushfit.errors import ModelError
+from bushfit.errors import ModelError, printable
 from bushfit.fitting.master_curve import Shifted
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Display, Place
@@ -403,7 +403,8 @@ def resonance_table(found: Resonance) -> pd.DataFrame:
 
 
 def shortened(name: str, letters: int) -> str:
-    """A name of at most so many letters, without its middle if it is too long."""
+    """Name of at most so many letters, without its middle if it is too long, and with control characters escaped."""
+    name = printable(name)
     return name if len(name) <= letters else f"{name[: (letters - 1) // 2]}…{name[-(letters // 2) :]}"
 
 

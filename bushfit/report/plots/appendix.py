@@ -1,11 +1,12 @@
 """Figures for the appendix of a report: storage and loss stiffness, Cole-Cole, and confidence ellipses."""
 
-from collections.abc import Sequence
+import math
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from scipy.special import fdtri
 
@@ -24,6 +25,8 @@ from bushfit.units import format_range
 _MOST_LEVELS = 6
 #: Side of a cell of the matrix of ellipses [cm].
 _CELL = 2.3
+#: Half the side of the frame of an ellipse, as a share of its cell.
+_HALF_CELL = 0.4
 #: Correlation from which a pair is marked: only its combination is known well.
 _STRONG = 0.9
 
@@ -85,10 +88,17 @@ def _measured(result: Result, prediction: Prediction, table: pd.DataFrame | None
 
 @style.in_own_style
 def ellipses_figure(result: Result, title: str) -> Figure | None:
-    """95 % confidence ellipses of all pairs of the paper's parameters; None for fewer than two with an error.
+    """95 % confidence ellipses of all pairs of the paper's parameters.
 
     A positive parameter is fitted by its logarithm, in which the region is an ellipse. Axes are in standard errors of
     these coordinates, with the ends of the 95 % intervals as ticks.
+
+    Args:
+        result: fitted model.
+        title: title of the figure.
+
+    Returns:
+        Matrix of ellipses in one panel; None for fewer than two parameters with an error.
 
     Notes:
         The radius is sqrt(2 F), F the 95 % quantile of Fisher's distribution with 2 and the fit's degrees of freedom.
@@ -96,23 +106,41 @@ def ellipses_figure(result: Result, title: str) -> Figure | None:
     rows = [row for row in parameter_rows(result) if row.name in FIVE and row.error and row.interval]
     if len(rows) < 2:
         return None
-    correlations = {frozenset((one, other)): size for one, other, size in result.covariance.correlations()}
-    count = len(rows) - 1
-    figure = style.new_figure(title, _CELL * count)
-    grid = figure.subplots(count, count, squeeze=False)
-    for down, low in enumerate(rows[1:]):
-        for across, left in enumerate(rows[:-1]):
-            axes = grid[down, across]
-            if across > down:
-                axes.set_visible(False)
-                continue
+    covariance = result.covariance
+    correlations = {frozenset(pair): correlation for *pair, correlation in covariance.correlations()}
+    halves = {row.name: covariance.half(row.name) / (covariance.stderr(row.name) or np.inf) for row in rows}
+    angle = np.linspace(0.0, 2.0 * np.pi, 60)
+    corners = _HALF_CELL * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    figure = style.new_figure(title, _CELL * (len(rows) - 1))
+    axes = figure.subplots()
+    axes.grid(visible=False)
+    axes.spines[:].set_visible(False)
+    frames, ellipses = [], []
+    # one panel for all pairs: a panel each takes ten times as long to draw
+    for y, low in enumerate(rows[:0:-1]):
+        for x, left in enumerate(rows[: len(rows) - 1 - y]):
             correlation = correlations.get(frozenset((left.name, low.name)), 0.0)
-            _draw_ellipse(axes, result, (left.name, low.name), correlation)
-            _label(axes, left.interval, low.interval, bottom=down == count - 1, left=across == 0)
-            if down == count - 1:
-                axes.set_xlabel(_name(left), **style.WORDS)
-            if across == 0:
-                axes.set_ylabel(_name(low), **style.WORDS)
+            chosen = np.isin(covariance.names, (left.name, low.name))
+            radius = float(np.sqrt(2.0 * fdtri(2.0, covariance.freedom(chosen).min(), 0.95)))
+            scale = _HALF_CELL / (1.15 * radius)
+            across, up = np.cos(angle), correlation * np.cos(angle) + math.sqrt(1.0 - correlation**2) * np.sin(angle)
+            ellipses.append(np.stack([x + scale * radius * across, y + scale * radius * up], axis=1))
+            frames.append(corners + np.array([x, y]))
+            x_ends, y_ends = (scale * halves[row.name] * np.array([-1.0, 1.0]) for row in (left, low))
+            dashed: dict[str, Any] = {"color": style.GREY, "lw": 0.6, "ls": [(0, (4, 3))]}
+            axes.vlines(x + x_ends, y - _HALF_CELL, y + _HALF_CELL, **dashed)
+            axes.hlines(y + y_ends, x - _HALF_CELL, x + _HALF_CELL, **dashed)
+            strong = {"weight": "bold", "color": "#9b0f18"} if abs(correlation) >= _STRONG else {}
+            text = f"{correlation:+.2f}"
+            axes.text(x, y + _HALF_CELL + 0.02, text, ha="center", va="bottom", **(style.WORDS | strong))
+            if y == 0:
+                _add_ticks(axes.xaxis, x, x_ends, left, "\n")
+            if x == 0:
+                _add_ticks(axes.yaxis, y, y_ends, low)
+    axes.add_collection(PolyCollection(frames, facecolors="none", edgecolors=style.INK, lw=0.8))
+    axes.add_collection(PolyCollection(ellipses, facecolors="#1f4e9c40", edgecolors="#1f4e9c", lw=1.0))
+    axes.tick_params(length=0.0)
+    axes.set(xlim=(-0.5, len(rows) - 1.5), ylim=(-0.5, len(rows) - 1.4))
     return style.explained(
         figure,
         "Ellipses: pairs of values inside are compatible with the tests (95 %). Broken lines: 95 % interval of each "
@@ -121,32 +149,10 @@ def ellipses_figure(result: Result, title: str) -> Figure | None:
     )
 
 
-def _name(row: ParameterRow) -> str:
-    """Name of a parameter, with its unit unless the unit has an exponent."""
-    return row.name if "^" in row.unit else f"{row.name} [{row.unit}]"
-
-
-def _draw_ellipse(axes: Axes, result: Result, pair: Sequence[str], correlation: float) -> None:
-    covariance = result.covariance
-    chosen = np.array(covariance.names)[:, None] == np.array(pair)
-    radius = float(np.sqrt(2.0 * fdtri(2.0, covariance.freedom(chosen).min(), 0.95)))
-    angle = np.linspace(0.0, 2.0 * np.pi, 60)
-    y: Array = correlation * np.cos(angle) + np.sqrt(max(1.0 - correlation**2, 0.0)) * np.sin(angle)
-    axes.fill(radius * np.cos(angle), radius * y, facecolor="#1f4e9c40", edgecolor="#1f4e9c", lw=1.0)
-    x_half, y_half = (covariance.half(name) / (covariance.stderr(name) or np.inf) for name in pair)
-    for line, half in ((axes.axvline, x_half), (axes.axhline, y_half)):
-        for end in (-half, half):
-            line(end, color=style.GREY, lw=0.6, ls=(0, (4, 3)))
-    strong = abs(correlation) >= _STRONG
-    look: dict[str, Any] = {"weight": "bold", "color": "#9b0f18"} if strong else {"color": style.INK}
-    axes.set_title(f"{correlation:+.2f}", fontsize=style.SMALL, pad=2.0, **look)
-    axes.set(xlim=(-1.15 * radius, 1.15 * radius), ylim=(-1.15 * radius, 1.15 * radius))
-    axes.set_xticks([-x_half, x_half])
-    axes.set_yticks([-y_half, y_half])
-
-
-def _label(axes: Axes, x_interval: str, y_interval: str, *, bottom: bool, left: bool) -> None:
-    """Write the ends of the intervals at the outer panels."""
-    axes.set_xticklabels(x_interval.split(" to ") if bottom else ["", ""])
-    axes.set_yticklabels(y_interval.split(" to ") if left else ["", ""])
-    axes.tick_params(labelsize=style.SMALL - 1.0, colors=style.INK, length=2.0)
+def _add_ticks(axis: Axis, center: int, ends: Array, row: ParameterRow, before: str = "") -> None:
+    """Add the name of a parameter and the ends of its interval to the ticks of the matrix of ellipses."""
+    name = row.name if "^" in row.unit else f"{row.name} [{row.unit}]"
+    low, high = row.interval.split(" to ")
+    texts = [text.get_text() for text in axis.get_ticklabels()] if center else []
+    ticks = [*axis.get_ticklocs()] if center else []
+    axis.set_ticks([*ticks, center + ends[0], center, center + ends[1]], labels=[*texts, low, before + name, high])

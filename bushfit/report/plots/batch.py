@@ -218,7 +218,9 @@ def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Ar
     axes.plot(x, np.median(usual, axis=0), color=style.INK, lw=_STROKE, label="median")
     named = dict([*singles.items()][:_MOST_CURVES])
     for look, (name, values) in zip(style.styles(len(named), "loop"), named.items(), strict=True):
-        axes.plot(x, values, color=look.color, marker=look.marker, lw=_STROKE, **style.POINT, label=shortened(name, 24))
+        axes.plot(
+            x, values, color=look.color, marker=look.marker, lw=_STROKE, **style.POINT, label=style.file_name(name, 24)
+        )
     style.label_axes(axes, x_label, f"|K| [{unit}]", x)
     axes.legend(fontsize=style.SMALL, frameon=False)
     names = f" Single curves: {', '.join(named)}." if named else ""

@@ -15,6 +15,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure, SubFigure
 
 from bushfit.effects.contract import Array
+from bushfit.errors import printable
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.report.plots import style
@@ -118,7 +119,7 @@ def _summary(diagnosis: Mapping[str, Any]) -> str:
     text = f"{diagnosis['verdict']}: {diagnosis['summary']}"
     if held_out and None not in held_out.values():
         text += f". Held-out data: {held_out['before']:.2f} × noise before, {held_out['after']:.2f} × noise after"
-    return text
+    return printable(text, lines=True)
 
 
 def _map_rows(group: SweepGroup) -> list[Curve]:
@@ -172,8 +173,8 @@ def _draw_map(axes: Axes, group: SweepGroup, header: str, colors: ScalarMappable
     if logarithmic:
         style.logarithmic(axes, along)
     axes.set_xlim(left, right)
-    axes.tick_params(labelsize=style.SMALL, colors=style.INK)
-    axes.spines[:].set_color(style.GREY)
+    axes.grid(visible=False)
+    axes.spines[:].set(visible=True, color=style.GREY)
 
 
 def _binned(x: Array, values: Array) -> tuple[Array, Array]:

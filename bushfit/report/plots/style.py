@@ -23,11 +23,10 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
-from matplotlib.text import Text
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, ScalarFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from bushfit.effects.contract import Array
-from bushfit.errors import CONTROL, printable
+from bushfit.errors import printable
 from bushfit.model.covariance import Z95
 from bushfit.report.tables import shortened, spread
 
@@ -80,9 +79,22 @@ _TITLE_LETTERS, _NOTE_LETTERS, _LABEL_LETTERS = 64, 112, 27
 _MOST_LETTERS = 600
 #: Fonts for names beyond Latin, Greek and Cyrillic, if they are installed.
 _WIDER_FONTS = {"Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "Microsoft YaHei", "SimHei", "PingFang SC"}
-#: matplotlib's defaults without those that choose a window system.
-_SETTINGS: dict[str, Any] = {
+#: Settings of all figures: matplotlib's defaults without those that choose a window system, and bushfit's own. A
+#: setting costs nothing; the same by a call for every panel makes its ticks anew.
+_SETTINGS: dict[Any, Any] = {
     key: value for key, value in rcParamsDefault.items() if key.partition(".")[0] not in ("backend", "interactive")
+} | {
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#d9d9d9",
+    "grid.linewidth": 0.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.useoffset": False,
+    **{f"{axis}tick.labelsize": SMALL for axis in "xy"},
+    **{f"{axis}tick.color": INK for axis in "xy"},
+    "svg.hashsalt": "bushfit",
+    "pdf.fonttype": 42,
 }
 #: matplotlib's settings belong to the process: one figure at a time changes them.
 _LOCK = RLock()
@@ -92,8 +104,8 @@ _Drawn = TypeVar("_Drawn", bound=Figure | None)
 
 @contextmanager
 def _own_settings(**settings: Any) -> Iterator[None]:
-    own: Any = {**_SETTINGS, "svg.hashsalt": "bushfit", "pdf.fonttype": 42, **settings}
-    with _LOCK, rc_context(own), warnings.catch_warnings():
+    merged: dict[Any, Any] = {**_SETTINGS, **settings}
+    with _LOCK, rc_context(merged), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         yield
 
@@ -132,7 +144,7 @@ def styles(count: int, what: str) -> list[Style]:
 
 def new_figure(title: str, height: float) -> Figure:
     """An empty figure as wide as a page; `height` is the height of its panels [cm], the title any text."""
-    lines = textwrap.wrap(title, _TITLE_LETTERS)
+    lines = textwrap.wrap(printable(title, lines=True), _TITLE_LETTERS)
     height += FRAME + LINE * max(0, len(lines) - 1)
     size = _WIDTH / 2.54, height / 2.54
     figure = Figure(figsize=size, dpi=_DPI, facecolor="white", layout=ConstrainedLayoutEngine(wspace=0.05))
@@ -155,18 +167,13 @@ def label_axes(axes: Axes, x_label: str, y_label: str, x: Array | None = None) -
     """
     axes.set_xlabel(x_label, **NAMES)
     label_left(axes, y_label)
-    axes.tick_params(labelsize=SMALL, colors=INK)
-    axes.grid(color="#d9d9d9", lw=0.5)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))
     if x is not None and x.max() > _LOG_RATIO * x.min():
         logarithmic(axes, x)
 
 
 def label_left(axes: Axes, label: str, **place: Any) -> None:
     """Write the label left of a panel, in several lines if one is longer than the panel is high."""
-    whole = re.sub(r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), label)
+    whole = re.sub(r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), printable(label, lines=True))
     lines = [part for line in whole.splitlines() for part in textwrap.wrap(line, _LABEL_LETTERS)]
     axes.set_ylabel("\n".join(lines), family=fonts(), parse_math=False, **NAMES, **place)
 
@@ -283,7 +290,7 @@ def first_sentences(sentences: Sequence[str]) -> str:
 
 def explained(figure: Figure, *sentences: str) -> Figure:
     """The figure with an explanation of lines, shades and points below its panels."""
-    text = textwrap.fill(" ".join(filter(None, sentences)), _NOTE_LETTERS)
+    text = textwrap.fill(printable(" ".join(filter(None, sentences)), lines=True), _NOTE_LETTERS)
     figure.supxlabel(text, x=0.01, ha="left", fontsize=SMALL, color=GREY, parse_math=False)
     return figure
 
@@ -295,9 +302,6 @@ def to_image(figure: Figure, form: str = "png", *, outlines: bool = True) -> byt
         form: "png", "svg" or "pdf".
         outlines: whether texts of an SVG are outlines, which look the same everywhere, or texts, which are shorter.
     """
-    for text in figure.findobj(Text):
-        if CONTROL.search(text.get_text()):
-            text.set_text(printable(text.get_text(), lines=True))
     buffer = io.BytesIO()
     with _own_settings(**{"svg.fonttype": "path" if outlines else "none"}):
         # `savefig` would draw twice: once to lay out what a single drawing lays out as well

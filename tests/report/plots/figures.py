@@ -22,6 +22,7 @@ from bushfit.prediction.stiffness import predict
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.prediction import prediction_figure
+from bushfit.report.plots.style import in_own_style
 from bushfit.report.tables import gap_table, loops_table, sweeps_table
 
 Swept = Callable[..., MeasuredSweep]
@@ -104,6 +105,7 @@ def note(figure: Figure) -> str:
     return " ".join(figure.get_supxlabel().split())
 
 
+@in_own_style
 def inside(figure: Figure) -> Figure:
     """The figure, once it is seen that nothing leaves it."""
     figure.draw_without_rendering()

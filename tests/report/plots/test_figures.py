@@ -223,8 +223,7 @@ def test_storage_loss_and_ellipses(paper_model: Model, swept: Swept) -> None:
     ellipses = ellipses_figure(result, "mount")
     assert ellipses is not None
     assert to_image(ellipses)
-    assert sum(axes.get_visible() for axes in ellipses.axes) == 10
-    assert {axes.get_title() for axes in ellipses.axes if axes.get_visible()} == {"+0.00"}
+    assert [text.get_text() for text in ellipses.axes[0].texts] == ["+0.00"] * 10
     assert ellipses_figure(Result(paper_model), "not fitted") is None
 
 
@@ -295,7 +294,7 @@ def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, .
     figure = checked(sweeps(paper_model, *data_sets))
     assert figure.axes[2].get_xlabel() == "amplitude [mm]"
     assert figure.axes[2].get_xscale() == "log"
-    assert len(lines(figure.axes[0])) == len(frequencies)
+    assert len(lines(figure.axes[0])) == min(len(frequencies), 24)
     maps = checked(gap(paper_model, paper_model, data_sets))
     assert maps.axes[1].get_xlabel() == "amplitude [mm]"
     assert len(maps.axes[0].get_yticklabels()) == min(len(frequencies), 8), "each, or every third of 24 rows"
