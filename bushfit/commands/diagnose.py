@@ -11,7 +11,7 @@ from bushfit.commands.loading import HasResult, as_result
 from bushfit.commands.provenance import campaign_document, option_words, result_document
 from bushfit.diagnosis import workflow
 from bushfit.diagnosis.document import DiagnosisFile
-from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.errors import FitError, quote_path
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import NEXT
@@ -61,8 +61,8 @@ def diagnose(
     model: Result | HasResult | None = None,
     adopt: Sequence[str] = (),
     without: Sequence[str] = (),
-    max_effects: int = Settings.max_effects,
-    tolerance: float = Settings.tolerance,
+    max_effects: int = DiagnosisSettings.max_effects,
+    tolerance: float = DiagnosisSettings.tolerance,
     joint: FitOutput | None = None,
 ) -> DiagnosisOutput:
     """Find where model and tests disagree, name the missing effect, and add it to the model.
@@ -80,7 +80,9 @@ def diagnose(
         BushfitError: tests or settings that cannot support the diagnosis.
     """
     data, start = prepare_tests(campaign), as_result(model) if model else None
-    settings = Settings(max_effects, tolerance, tuple(adopt), tuple(without), start.unresolved if start else ())
+    settings = DiagnosisSettings(
+        max_effects, tolerance, tuple(adopt), tuple(without), start.unresolved if start else ()
+    )
     _require_free_parameter(data, start.model if start else None, settings)
     diagnosis = _with_plan(workflow.diagnose(data, start.model if start else None, settings), data.campaign)
     if not (diagnosis.changed or start or adopt):  # the model to use is that of fit
@@ -88,7 +90,7 @@ def diagnose(
         plain = replace(plain, warnings=tuple(line.removesuffix(NEXT) for line in plain.warnings))
         diagnosis = replace(diagnosis, result=diagnosis.odds.averaged(plain))
     numbers = {"max_effects": max_effects, "tolerance": tolerance}
-    changed = {key: f"{number:g}" for key, number in numbers.items() if number != getattr(Settings, key)}
+    changed = {key: f"{number:g}" for key, number in numbers.items() if number != getattr(DiagnosisSettings, key)}
     options = option_words(model="MODEL.json" if start else None, adopt=adopt, without=without, **changed)
     document = diagnosis.to_document()
     origin = campaign_document(data, "diagnose", options)
@@ -105,7 +107,7 @@ def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -
     return [gap, figure, table_file("candidates", partial(tables.candidates_table, diagnosis))]
 
 
-def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: Settings) -> None:
+def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> None:
     """Raise a FitError if no parameter is free and no effect is to be added."""
     model = model or Model.with_defaults(data.campaign.bushing, data.effects, {})
     if not (settings.adopt or data.free(tuple(model.parameters))):

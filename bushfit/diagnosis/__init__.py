@@ -1,1 +1,1 @@
-"""The discrepancy workflow: where do model and measurement disagree, what is missing, does adding it close the gap?"""
+"""Diagnosis of a campaign: regions of disagreement, missing effects, and the gap after they are added."""

@@ -1,7 +1,7 @@
-"""Mistakes in the record: would the tests agree if one of them were read in another way?
+"""Mistakes in the record of a campaign, and how well the tests would agree without them.
 
-A mistake has no free parameter, so it costs only the logarithm of how many were looked at; in turn it has to close the
-whole gap, and to beat every effect and every fault. Nothing is mended here unless the user adopts it.
+A mistake has no free parameter, so it costs only the logarithm of the number of mistakes considered. It has to close
+the whole gap, and to be more probable than every effect and every fault. The user decides whether it is mended.
 """
 
 from __future__ import annotations
@@ -40,18 +40,23 @@ _RIDGE = 1e-12
 
 @dataclass(frozen=True)
 class Claim:
-    """One mistake, made alike in some data sets, which are told by their place; in none for [bushing]."""
+    """One mistake, made alike in some tests.
+
+    Args:
+        mistake: the mistake.
+        tests: indices of the tests, loops before sweeps; empty for a mistake in [bushing].
+    """
 
     mistake: Mistake
     tests: tuple[int, ...]
 
     @property
     def single_tests(self) -> list[Claim]:
-        """One claim for each test alone."""
+        """Claims about each of the tests alone."""
         return [Claim(self.mistake, (place,)) for place in self.tests] or [self]
 
     def test(self, data: PreparedCampaign) -> str | None:
-        """The name of its one test; None of [bushing]."""
+        """Name of the only test of the claim; None for [bushing]."""
         return [*data.loops, *data.sweeps][self.tests[0]].name if self.tests else None
 
     def labels(self, data: PreparedCampaign) -> tuple[str, ...]:
@@ -72,7 +77,14 @@ class Claim:
         )
 
     def mended(self, data: PreparedCampaign) -> PreparedCampaign:
-        """The campaign as it was measured if the mistake was made."""
+        """Campaign as it was measured if the mistake was made.
+
+        Args:
+            data: the campaign as it was read.
+
+        Returns:
+            The campaign with the tests, or the bushing, corrected.
+        """
         campaign = data.campaign
         if not self.tests:
             bushing = campaign.bushing and self.mistake.mended_bushing(campaign.bushing)
@@ -91,7 +103,14 @@ class Claim:
 
 
 def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCampaign, list[str]]:
-    """The campaign with mistakes mended that the user adopts, and a sentence on each.
+    """Mend the mistakes that the user adopts.
+
+    Args:
+        data: the campaign as it was read.
+        names: mistakes as --adopt takes them, "mistake:test".
+
+    Returns:
+        The mended campaign, and one sentence for each mistake.
 
     Raises:
         ModelError: a mistake that was not made in the test named, or no such test.
@@ -129,7 +148,15 @@ def _is_possible(mistake: Mistake, data_set: MeasuredTest, data: PreparedCampaig
 
 
 def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
-    """Every mistake that may have been made: in one test, in all of a kind or of a direction, or in all."""
+    """List every mistake that may have been made: in one test, in all of a kind or of a direction, or in all.
+
+    Args:
+        data: the campaign as it was read.
+        without: names of mistakes not to consider, also "mistake:test".
+
+    Returns:
+        Claims without duplicates.
+    """
     data_sets: list[MeasuredTest] = [*data.loops, *data.sweeps]
     found = []
     for mistake in MISTAKES.values():
@@ -153,10 +180,11 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
 
 @dataclass(frozen=True, eq=False)
 class Screen:
-    """How well the plain model could meet the tests under each claim, before any fit.
+    """Misfit of the plain model under each claim, before any fit.
 
-    The stiffness is linear in mu, m and sigma_fmax; alpha and eps_half are tried on a grid. What a test adds to the
-    normal equations depends on that test alone, so that claims about many tests are sums.
+    Notes:
+        The stiffness is linear in mu, m and sigma_fmax; alpha and eps_half are tried on a grid. The normal equations
+        are sums over tests, so that each test is evaluated once for each mistake.
     """
 
     data: PreparedCampaign
@@ -164,14 +192,29 @@ class Screen:
     _responses: dict[tuple[Bushing | None, Place, bytes, bytes], Array] = field(default_factory=dict)
 
     def best(self, found: Sequence[Claim], limit: int) -> list[Claim]:
-        """The claims under which the tests could agree best, as far as these are worth a fit."""
+        """Select the claims with the smallest misfit.
+
+        Args:
+            found: claims to compare.
+            limit: maximum number of claims.
+
+        Returns:
+            Claims that change the misfit and may lower it in a fit, the best first.
+        """
         before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in found])
         changed = np.abs(misfits - before) > _LEAST_CHANGE * before
         order = np.argsort(misfits, kind="stable")
         return [found[place] for place in order if changed[place] and misfits[place] < _WORTH_A_FIT * before][:limit]
 
     def misfit(self, claim: Claim | None) -> float:
-        """Least sum of squares over the grid, in units of a coarse noise; infinite where no model has a response."""
+        """Least sum of squares over the grid of alpha and eps_half.
+
+        Args:
+            claim: the mistake that is mended before; None for the tests as they are.
+
+        Returns:
+            Sum of squares in units of a coarse noise; infinite if no model has a response.
+        """
         bushing = self.data.campaign.bushing
         if claim and not claim.tests and bushing:
             bushing = claim.mistake.mended_bushing(bushing)
@@ -189,7 +232,7 @@ class Screen:
         return max(_paraboloid_minimum((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
 
     def _part(self, place: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None) -> Array:
-        """Products of a test's three columns, and of what they are to meet, at each point of the grid, (g, 4, 4)."""
+        """Inner products of three columns and the target of a test at each point of the grid, (g, 4, 4)."""
         key = (place, mistake.name if mistake else "", bushing)
         if key not in self._known:
             direction, frequency, amplitude, stiffness, error = _points(data_set, mistake)
@@ -201,7 +244,7 @@ class Screen:
         return self._known[key]
 
     def _columns(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
-        """`_columns`, once for all mistakes that leave the operating points as they are."""
+        """Columns of `_columns`, computed once for all mistakes that leave the operating points unchanged."""
         key = (bushing, direction, frequency.tobytes(), amplitude.tobytes())
         if key not in self._responses:
             self._responses[key] = _columns(bushing, direction, frequency, amplitude)
@@ -209,7 +252,7 @@ class Screen:
 
 
 def _paraboloid_minimum(misfit: Array) -> float:
-    """The least value between the points of a grid, by a paraboloid through the least point and its neighbours."""
+    """Minimum between the points of a grid, of a paraboloid through the smallest value and its neighbours."""
     row, column = (
         int(np.clip(i, 1, n - 2))
         for i, n in zip(np.unravel_index(int(np.argmin(misfit)), misfit.shape), misfit.shape, strict=True)

@@ -1,5 +1,4 @@
-"""Long sweeps in means over narrow bands, and of very many levels or loops some: a diagnosis asks for every point of a
-campaign thousands of times, and for every level as often."""
+"""Means over narrow bands of long sweeps, and a selection of very many levels or loops, to limit computing time."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,9 +27,10 @@ class _Means(NamedTuple):
     """Part of a sweep that is diagnosed.
 
     Args:
-        under: what its points were measured under, the rows that are left out among those before.
-        shares: of each line in means, the mean share of a row's variance that is left.
-        words: how it was made.
+        sweep: the means, or the selected points.
+        under: circumstances of the points, which include the effect of rows that are left out.
+        shares: for each line in means, the mean ratio of the variance of a mean to that of a row.
+        words: sentence on how the part was made.
     """
 
     sweep: Sweep
@@ -40,11 +40,17 @@ class _Means(NamedTuple):
 
 
 def condensed(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]]:
-    """The same tests with long runs of sweeps in means over narrow bands, and of very many lines of a sweep, or rows of
-    loops, only some lines or loops; and a sentence on each sweep that this changes, and one on the loops.
+    """Reduce a campaign to the points that are diagnosed.
 
-    Rows without weight are in no mean. The noise from point to point of a line in means is theirs, estimated anew; what
-    runs share stays as it was.
+    Long runs of sweeps become means over narrow bands. If a sweep has very many lines, or the loops very many rows, a
+    selection is diagnosed. Rows without weight are in no mean. The noise from point to point of a line in means is
+    estimated again; errors that runs share stay.
+
+    Args:
+        data: the campaign.
+
+    Returns:
+        The reduced campaign, and one sentence for each sweep that is changed and one for the loops.
     """
     rig, loops, messages = data.campaign.rig, _some(data.loops), tuple[str, ...]()
     if len(loops) < len(data.loops):
@@ -70,10 +76,10 @@ def condensed(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]
 
 
 def _some(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
-    """Of loops with too many rows those that can be looked at, one of each direction at the least.
+    """Select loops up to a number of rows, at least one of each direction.
 
-    Each comes once before any is repeated; of too many that differ some, evenly spread over direction, amplitude and
-    frequency.
+    Different loops are selected before repeats. If they are too many, the selection is evenly spread over direction,
+    amplitude and frequency.
     """
     sizes = np.array([loop.size for loop in loops])
     if sizes.sum() <= _MOST_ROWS:
@@ -145,13 +151,13 @@ def _condensed_sweep(data_set: MeasuredSweep) -> _Means | None:
 
 @dataclass(frozen=True, eq=False)
 class _Groups:
-    """Rows of a sweep that are taken together, in the turn in which they were measured.
+    """Rows of a sweep that are averaged together, in the order of measurement.
 
     Args:
-        rows: of the sweep, (n,).
-        place: number of the group of each, (n,).
-        lead: one row of each group, (g,).
-        counts: rows of each group, (g,).
+        rows: indices of the rows of the sweep, (n,).
+        place: index of the group of each row, (n,).
+        lead: index of one row of each group, (g,).
+        counts: number of rows of each group, (g,).
     """
 
     rows: Array
@@ -161,20 +167,20 @@ class _Groups:
 
     @classmethod
     def from_keys(cls, rows: Array, keys: Array) -> "_Groups":
-        """Means of the values that have the same key."""
+        """Group the rows with equal columns of `keys`, (k, n)."""
         _, first, place, counts = np.unique(keys, axis=1, return_index=True, return_inverse=True, return_counts=True)
         turn = np.argsort(np.bincount(place, rows) / counts, kind="stable")
         return cls(rows, np.argsort(turn)[place], rows[first[turn]], counts[turn])
 
     def mean(self, values: Array | float | None) -> Array | float | None:
-        """Of what there is for each row of the sweep; a number, or None, is for all."""
+        """Mean of each group, (g,); a number, or None, applies to all rows and is returned unchanged."""
         return self._mean(values) if isinstance(values, np.ndarray) else values
 
     def _mean(self, values: Array) -> Array:
         return np.bincount(self.place, values[self.rows]) / self.counts
 
     def _middle(self, values: Array) -> Array:
-        """The geometric mean, as stiffness goes with logarithms; a row of its own to the last digit."""
+        """Geometric mean of each group, (g,); the value itself for groups of one row."""
         return np.where(self.counts > 1, np.exp(self._mean(np.log(values))), values[self.lead])
 
     def sweep(self, sweep: Sweep) -> Sweep:

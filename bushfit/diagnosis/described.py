@@ -1,4 +1,4 @@
-"""Smooth correction of a model for what no effect explains, and the power law that is nearest to it."""
+"""Smooth correction of a model for a gap that no effect explains, and the nearest power law."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import unnamed
 from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
-from bushfit.diagnosis.holdout import HoldOut, Part
+from bushfit.diagnosis.holdout import HoldOut, HoldOutPart
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects.contract import Array
@@ -34,16 +34,16 @@ _NEAR = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class Described:
-    """A gap without a name.
+class GapDescription:
+    """Gap without a name.
 
     Args:
-        after: the model with its correction, and the tests as far as it can answer them.
-        fitted: the parameters beside the correction, as a fit that counts it as an error of the model has them.
-        held: whole runs inside the range, predicted without the correction and with it; tells, and decides nothing.
-        fingerprint: the nearest power law; None where these tests show none.
-        words: how large the gap is and what it is like, for people.
-        evidence: where the correction may be trusted, for people.
+        after: the model with its correction, and the tests in the form that the correction can predict.
+        fitted: fit of the parameters with the correction as an error of the model.
+        held: hold-out of whole runs inside the range, without and with the correction; for information only.
+        fingerprint: nearest power law; None if the tests show none.
+        words: size of the gap and its form.
+        evidence: range in which the correction is valid.
     """
 
     after: Evidence
@@ -55,7 +55,7 @@ class Described:
 
     @property
     def description(self) -> Description | None:
-        """The power law, where the gap is one."""
+        """Power law of the gap; None if the gap does not follow one."""
         found = self.fingerprint
         if found is None or not found.is_power_law or not any(found.determined):
             return None
@@ -64,15 +64,20 @@ class Described:
 
 def describe(
     evidence: Evidence, rig: RigSettings, start: Mapping[str, float], fixed: Sequence[str], bounds: Bounds
-) -> Described | None:
-    """What a fitted model misses as a smooth correction of it, the same error of the model that every fit counts, and
-    the power law that it is like; None where the tests are no likelier with it, or its error is larger than the gap.
+) -> GapDescription | None:
+    """Describe the gap of a fitted model by a smooth correction and the nearest power law.
 
-    Nothing is known of its law in time: each loop stands on its first harmonic.
+    The law of the gap in time is unknown: loops are represented by their first harmonic.
 
     Args:
-        start: values of the model's parameters read off the data, for a model that the gap has bent too far.
-        held, bounds: parameters that do not move, and limits of the others inside their own.
+        evidence: the fitted model and the tests.
+        rig: stated class of the rig.
+        start: starting values read from the data, for a model whose parameters the gap has distorted.
+        fixed: names of parameters that are not fitted.
+        bounds: limits of parameters inside their general limits.
+
+    Returns:
+        The description; None if the correction does not raise the likelihood, or if its error is larger than the gap.
     """
     if NAME in evidence.model.effects:
         return None
@@ -90,12 +95,20 @@ def describe(
     whole = Evidence(fitted.solution.at(model, evidence.data_sets), evidence.data_sets)
     like = fingerprint(base, *weighed(base, rig), start, bounds)
     texts = _words(correction, like), _trusted(correction, whole)
-    return Described(after, fitted, _held_out(evidence, fitted), like, *texts)
+    return GapDescription(after, fitted, _held_out(evidence, fitted), like, *texts)
 
 
 def weighed(fitted: Evidence, rig: RigSettings) -> tuple[Evidence, LinearModel]:
-    """The fit with residuals in units of what scatters from point to point, and what anything smooth beside it is worth
-    at the sizes of the rig's errors that matter."""
+    """Prepare the linear model that weighs smooth curves beside a fitted model.
+
+    Args:
+        fitted: the fitted model and the tests.
+        rig: stated class of the rig.
+
+    Returns:
+        The fit with residuals in units of the scatter from point to point, and the linear model at the probable
+        sizes of the rig's errors.
+    """
     bare = scattering_alone(fitted)
     rows, curves = bare.solution.jacobian, [explanation.group for explanation in unnamed(bare) if explanation.group]
     plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), curves)
@@ -126,7 +139,7 @@ def _held_out(before: Evidence, fitted: WeightedFit) -> HoldOut:
     return HoldOut.from_residuals(residuals)
 
 
-def _inside(data_sets: Sequence[MeasuredTest]) -> Iterator[Part]:
+def _inside(data_sets: Sequence[MeasuredTest]) -> Iterator[HoldOutPart]:
     """Whole runs inside the range: every third frequency of each, the middle level, a repeat."""
     chosen: dict[str, dict[MeasuredTest, Array]] = {}
     for sweep in parted(data_sets)[1]:
@@ -141,13 +154,13 @@ def _inside(data_sets: Sequence[MeasuredTest]) -> Iterator[Part]:
             if points.any():
                 chosen.setdefault(name, {})[sweep] = points
     for name, points_by_sweep in chosen.items():
-        yield Part(
+        yield HoldOutPart(
             name, [points_by_sweep.get(data, np.zeros(data.size // data.parts, dtype=bool)) for data in data_sets]
         )
 
 
 def _words(correction: Unnamed, like: Fingerprint | None) -> str:
-    """How large it is and what it is like."""
+    """Sentence on the size and the form of the gap."""
     largest, band = (number(100.0 * share, 2) for share in (correction.largest, Z95 * correction.uncertainty))
     sentences = [f"up to {largest} % of |K|, known within {band} % of itself"]
     if like is None or not any(like.determined):

@@ -1,6 +1,6 @@
-"""diagnosis.json, key by key: the schema bushfit/diagnosis/3.
+"""Keys of diagnosis.json, in the schema bushfit/diagnosis/3.
 
-Its JSON Schema is made of these types, and the type checker holds to them what `diagnosis.record` writes.
+The JSON Schema is made of these types, and the type checker compares them with `diagnosis.record`.
 """
 
 from dataclasses import dataclass
@@ -99,7 +99,7 @@ class OddsEntry(TypedDict):
 
 
 class UsableEntry(TypedDict):
-    """Within what model.json meets the tests, at the worst of all places: 95 % of the points lie nearer."""
+    """Expected error of model.json at the worst of all places: 95 % of the points are nearer."""
 
     stiffness: Annotated[float, Doc("relative difference of |K|.")]
     loss_factor: Annotated[float, Doc("difference of the loss factor.")]
@@ -109,12 +109,12 @@ class UsableEntry(TypedDict):
 
 @dataclass(frozen=True)
 class Description:
-    """What a gap without a name is like: one term A e^(i phi) f^p X^q beside the model; value, low and high of each.
+    """Power law of a gap without a name, A e^(i phi) f^p X^q beside the model; value and ends of the interval of each.
 
     Args:
         phase_deg: phi [deg].
         frequency_power, amplitude_power: p and q [1].
-        words: the same for people.
+        words: the power law as a sentence.
     """
 
     phase_deg: tuple[float, float, float]
@@ -124,7 +124,7 @@ class Description:
 
 
 class DiagnosisFile(TypedDict):
-    """Where model and tests disagree, and what is missing."""
+    """Content of diagnosis.json."""
 
     schema: Annotated[Literal["bushfit/diagnosis/3"], Doc("of this file.")]
     verdict: Annotated[

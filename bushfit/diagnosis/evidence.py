@@ -62,6 +62,7 @@ class Evidence:
 
     @property
     def parameters(self) -> int:
+        """Number of fitted parameters."""
         return len(self.solution.coordinates.names)
 
     @property
@@ -87,7 +88,7 @@ class Evidence:
         return basis[:, size > 1e-10 * size[0]]
 
     def project_out(self, columns: Array) -> Array:
-        """Columns, (c, n), less what the model's own parameters can absorb."""
+        """Remove from columns, (c, n), the part that the parameters of the model can absorb."""
         return columns - (columns @ self.span) @ self.span.T
 
     @cached_property
@@ -98,7 +99,16 @@ class Evidence:
 
 
 def fit(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Evidence:
-    """Fit every parameter of a model but the held ones, from its own values.
+    """Fit the parameters of a model, from its values.
+
+    Args:
+        model: the model at its starting values.
+        data_sets: the tests.
+        fixed: names of parameters that are not fitted.
+        bounds: limits of parameters inside their general limits.
+
+    Returns:
+        The fitted model with its tests.
 
     Raises:
         FitError: fewer data than parameters, or no finite response.
@@ -117,11 +127,18 @@ def result_of(
     corrected: WeightedFit | None = None,
     rig: RigSettings = UNSTATED,
 ) -> Result:
-    """The model with its uncertainty; a parameter at rest on a bound counts as held there.
+    """Build the result of a fit with its uncertainty; a parameter at a bound is treated as fixed.
 
-    Of effects with a twin of the rig the level is unresolved, but of those that are `told`. Where the model is
-    `lacking` something, a smooth error of it counts, as in every fit; where that stands as its correction, the fit
-    beside it is `corrected`.
+    Args:
+        evidence: the fitted model and the tests.
+        bounds: limits of parameters inside their general limits.
+        resolved: effects with a twin in the rig whose level is known; all others are unresolved.
+        lacking: whether the model lacks something, so that a smooth error of the model is estimated.
+        corrected: fit beside a correction, if the model has one.
+        rig: stated class of the rig.
+
+    Returns:
+        The model with covariance, quality, range, warnings and expected error.
     """
     tests, model, error = evidence.data_sets, evidence.model, None
     found = corrected or evidence.estimate

@@ -1,4 +1,4 @@
-"""Model families on one campaign: the paper's and others in place of its branches, fitted and held out alike."""
+"""Model families on one campaign: the paper's model, and others that replace its branches, fitted and held out."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
@@ -39,18 +39,19 @@ _BEYOND_LINEAR = 1.75
 
 @dataclass(frozen=True, eq=False)
 class FittedFamily:
-    """A model family fitted to a campaign, beside the first one.
+    """A model family fitted to a campaign, compared with the first family.
 
     Args:
-        name: effects that it adds to the first or puts in place of its branches, joined by +; of the first "paper"
-            and those that it has.
-        held: root mean squares of what was held out, before of the first family and after of this one; the same parts.
-        gain: by how much its held-out mean square, in units of noise, is less than that of the first family, over
-            parts that share no point, with the 95 % interval that the noise of these tests leaves; None where nothing
-            is held out.
-        p: probability of so large a gain, or loss, where both are equally near the truth; None as of the gain.
-        log_evidence: of the tests under it, a smooth error of the model counted where they are likelier with it.
-        probability: of all families fitted, each as likely beforehand.
+        name: effects that the family adds, or puts in place of branches, joined by +; of the first family "paper" and
+            its other effects.
+        evidence: the fitted model and the tests.
+        held: root mean squares of the held-out parts, before for the first family and after for this one.
+        gain: reduction of the held-out mean square, in units of noise, over parts without common points, with its 95 %
+            interval; None if nothing is held out.
+        p: probability of a gain or loss this large if both families are equally good; None as for the gain.
+        log_evidence: log marginal likelihood of the tests, with a smooth error of the model if it raises the
+            likelihood.
+        probability: among all families fitted, with equal prior probabilities.
     """
 
     name: str
@@ -63,7 +64,7 @@ class FittedFamily:
 
     @property
     def words(self) -> str:
-        """True if the family predicts the held-out data better than the first family, beyond chance."""
+        """Sentence that compares the held-out error of the family with that of the first family."""
         if self.gain is None or self.p is None or self.held.before is None or self.held.after is None:
             return "nothing can be held out of both"
         figures = f"held out {number(self.held.after, 3)} x noise, the first {number(self.held.before, 3)}"
@@ -77,8 +78,18 @@ class FittedFamily:
 
 
 def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str, ...]:
-    """Each law of rate with each law of amplitude, as far as a model can take them; with the effect of temperature
-    where the tests are apart in it and the model has none. The paper's laws with each other are the model itself."""
+    """List the families that a model can take: each law of rate with each law of amplitude.
+
+    The effect of temperature is added if the tests differ in temperature and the model has none. The combination of
+    both laws of the paper is the model itself and is left out.
+
+    Args:
+        model: the model at the start.
+        data_sets: the tests.
+
+    Returns:
+        Names of families: effects joined by +.
+    """
     warm = ["temperature"] if apart_in_temperature(model, data_sets) else []
     rates, amplitudes = (["", *(name for name in laws if _fits(model, name))] for laws in (_RATE, _AMPLITUDE))
     found = [[*warm, *filter(None, pair)] for pair in product(rates, amplitudes)]
@@ -102,18 +113,21 @@ def fit_families(
     fixed: Sequence[str],
     bounds: Bounds,
 ) -> tuple[list[FittedFamily], dict[str, float]]:
-    """The model as it comes first, and it with each of these families, fitted to the tests and held out alike.
+    """Fit families to the tests and compare their held-out errors with those of the model itself.
 
     Args:
-        names: of effects, several of one family joined by +; all that are known where there are none.
-        held, bounds: parameters that do not move, and limits inside the parameters' own.
+        model: the model at its starting values.
+        data_sets: the tests.
+        names: families, each of effects joined by +; all known families if empty.
+        fixed: names of parameters that are not fitted.
+        bounds: limits of parameters inside their general limits.
 
     Returns:
-        The first and those named, or else the likeliest, held out; and the probability of each family that is left.
+        The first family and those named, or else the most probable, held out; and the probability of each other family.
 
     Raises:
         FitError: data that cannot support the fit of a family that is named.
-        ModelError: an unknown effect, one that the model has already, or one in place of what it has not.
+        ModelError: an unknown effect, one that the model has already, or one that replaces a missing branch.
     """
     first = fit(model, data_sets, fixed, bounds)
     base_name = "+".join(["paper", *(name for name in model.effects if name not in BASE)])
@@ -140,7 +154,7 @@ def fit_families(
 def _chain(
     chains: Mapping[str, list[Evidence]], first: Evidence, name: str, fixed: Sequence[str], bounds: Bounds
 ) -> list[Evidence]:
-    """The fits of a family's effects one after the other, from the longest beginning that was fitted before."""
+    """Fit the effects of a family one after the other, starting from the longest beginning already fitted."""
     before, _, last = name.rpartition("+")
     chain = [first] if not before else chains.get(before) or _chain(chains, first, before, fixed, bounds)
     effect, present = get_effect(last), chain[-1].model.effects
@@ -154,8 +168,7 @@ def _chain(
 
 
 def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bounds) -> float:
-    """The logarithm of the evidence of the last of some models, each with one effect more than that before it; what
-    all families have in common counts nothing."""
+    """Log evidence of the last model of a chain, in which each model has one effect more; without common terms."""
     *before, last = chain
     found = with_model_error(last.estimate, bounds)[0]
     priors = [
@@ -168,12 +181,12 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
 def _gain(
     predictions: Mapping[str, Predicted], data_sets: Sequence[MeasuredTest]
 ) -> tuple[tuple[float, float, float] | None, float | None]:
-    """Fall of the mean squared held-out residual, with its 95 % interval and its probability.
+    """Reduction of the mean square held-out residual, with its 95 % interval and its probability.
 
-    Notes: by the delta method the variance of the gain is the sum, over the rows of all tests, of the squares of its
-    slope by the noise of each, times what the better model leaves of a mean square, at least 1. A row counts where it
-    is held out, and through the parameters where it is not. Models that bend and an estimated noise add to that, see
-    `_BEYOND_LINEAR`.
+    Notes:
+        By the delta method the variance of the gain is the sum, over the rows of all tests, of the squared derivative
+        by the noise of each row, times the smaller mean square, at least 1. A row that is not held out acts through the
+        parameters. Nonlinearity and estimated noise add to that, see `_BEYOND_LINEAR`.
     """
     disjoint = [predictions[name] for name in _disjoint_parts(data_sets, predictions)]
     if not disjoint:
@@ -188,7 +201,7 @@ def _gain(
 
 
 def _disjoint_parts(data_sets: Sequence[MeasuredTest], among: Collection[str]) -> Iterator[str]:
-    """Those of the parts of these names that share no point with one that came before."""
+    """Names of the parts that share no point with an earlier part."""
     used_rows = np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
     for part in parts(data_sets):
         rows = part.rows(data_sets)

@@ -1,10 +1,10 @@
-"""The fingerprint of what has no name: one power law of frequency and amplitude beside all parameters.
+"""Power law of frequency and amplitude nearest to a gap without a name, beside all parameters.
 
 Notes:
     The term is A e^(i phi) (f/f0)^p (X/X0)^q. For each pair of powers on a grid its two parts, in phase and in
-    quadrature, are a group of the currency, around the parameters that the likeliest pair leaves. The evidence of each
-    pair, and of each pair the amounts, are the posterior from which phase and powers are drawn. A smooth process of any
-    form, weighed in the same currency, says whether the gap is a power law at all.
+    quadrature, are a group of columns around the parameters of the most probable pair. The evidence of each pair and
+    its amounts form the posterior from which phase and powers are drawn. A smooth process of any form, weighed in the
+    same way, decides whether the gap is a power law at all.
 """
 
 from __future__ import annotations
@@ -71,12 +71,15 @@ Interval = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Fingerprint:
-    """A e^(i phi) (f/f0)^p (X/X0)^q, with 95 % intervals.
+    """Power law A e^(i phi) (f/f0)^p (X/X0)^q, with 95 % intervals.
 
     Args:
-        measure: what it counts in: the one of most evidence.
-        alike: others that these tests do not tell from it; the intervals hold all by their odds.
-        is_power_law: whether the tests are likelier with it than with a smooth curve of any form.
+        measure: unit of the term with the highest evidence: stiffness, modulus or share of the stiffness.
+        alike: other units that the tests cannot distinguish; the intervals average over all by probability.
+        phase_deg: phi [deg].
+        frequency_power: p.
+        amplitude_power: q.
+        is_power_law: whether the evidence of the power law exceeds that of a smooth curve of any form.
     """
 
     measure: Measure
@@ -96,7 +99,7 @@ class Fingerprint:
 
     @property
     def words(self) -> str:
-        """The term for people: "in quadrature, grows as f^0.8, independent of amplitude: acts like a damper"."""
+        """Text of the term, as "in quadrature, grows as f^0.8, independent of amplitude: acts like a damper"."""
         measures = " or ".join(_IN_WORDS[measure] for measure in (self.measure, *self.alike))
         powers = (
             _power_words(self.frequency_power, "f", "frequency"),
@@ -107,7 +110,7 @@ class Fingerprint:
         return f"{term}: acts like {like}" if like else term
 
     def _like(self) -> str:
-        """The known laws that lie nearest, where that is near enough in phase and powers; else ""."""
+        """Names of the nearest known laws; "" if none is near in phase and powers."""
         found = np.array([self.phase_deg, self.frequency_power, self.amplitude_power])
         middle, errors = found[:, 1:].mean(axis=1), np.maximum(np.ptp(found[:, 1:], axis=1) / 2.0 / Z95, 1e-9)
         distances = {}
@@ -123,13 +126,17 @@ class Fingerprint:
 def fingerprint(
     fitted: Evidence, bare: Evidence, plain: LinearModel, start: Mapping[str, float], bounds: Bounds
 ) -> Fingerprint | None:
-    """The power law that closes most of the gap that a fitted model leaves; None where the tests show none.
+    """Estimate the power law nearest to the gap of a fitted model.
 
     Args:
-        bare: the same fit with residuals in units of what scatters from point to point.
-        plain: of these, with what is smooth without any form as its groups.
-        start: values of parameters read off the data: a gap may have bent those of the fit too far.
-        bounds: limits of parameters inside their own.
+        fitted: the fitted model and the tests.
+        bare: the same fit with residuals in units of the scatter from point to point.
+        plain: linear model of `bare`, with smooth curves of any form as its groups.
+        start: starting values read from the data; the gap may have distorted those of the fit.
+        bounds: limits of parameters inside their general limits.
+
+    Returns:
+        The power law; None if the tests show none.
     """
     begun = fitted.model.with_values(start)
     pairs = [(Terms(fitted, measure), Terms(bare, measure)) for measure in _IN_WORDS]
@@ -159,12 +166,13 @@ def fingerprint(
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """Pairs of powers of frequency and amplitude, and what each is worth.
+    """Pairs of powers of frequency and amplitude with their evidence.
 
     Args:
-        ledger: with a group for each pair.
+        terms: the operating points, in the unit of the term.
+        ledger: linear model with one group for each pair.
         powers: of the pairs, (g, 2).
-        step: of the grid, along each axis; 0 along one on which the tests do not differ, (2,).
+        step: of the grid along each axis; 0 along an axis on which the tests do not differ, (2,).
     """
 
     terms: Terms
@@ -176,8 +184,7 @@ class _Grid:
     def of_the_likeliest(
         cls, fitted: Terms, bare: Terms, plain: LinearModel, model: Model, bounds: Bounds
     ) -> _Grid | None:
-        """The grid that the likeliest pairs fill, around the parameters and the term that go best with one
-        another; None where these do not come to rest from those of a model."""
+        """Grid about the most probable pair of powers, iterated with the parameters; None without convergence."""
         about = bare.points - bare.points.mean(axis=0)
         changes = np.ptp(about, axis=0) > 0.0
         value = bare.measured_value(
@@ -202,7 +209,7 @@ class _Grid:
 
     @cached_property
     def _logs(self) -> Array:
-        """Logarithm of the evidence with each pair."""
+        """Log evidence of each pair, (g,)."""
         return np.array([worth.log_evidence for worth in self.ledger.group_evidence])
 
     @cached_property
@@ -230,15 +237,18 @@ class _Grid:
 
 
 def _linear(terms: Terms, model: Model, value: Array, shapes: Array) -> tuple[Array, Array, Array]:
-    """Around a term of this value: residuals as they would be without it, (n,), derivatives by the parameters, (k, n),
-    and by terms of these shapes, in phase and in quadrature, (c, 2, n)."""
+    """Linearise the residuals around a term.
+
+    Returns: residuals without the term, (n,); derivatives by the parameters, (k, n); and by terms of the given shapes,
+    in phase and in quadrature, (c, 2, n).
+    """
     residual = terms.residual(value, model) - terms.columns(value[None], model, value)[0]
     columns = terms.columns(np.concatenate((shapes, 1j * shapes)), model, value)
     return residual, terms.jacobian(value, model), columns.reshape(2, len(shapes), -1).swapaxes(0, 1)
 
 
 def _stepped(terms: Terms, model: Model, value: Array, shape: Array, bounds: Bounds) -> tuple[Model, Array]:
-    """Parameters beside a term of this shape, and its value, one step farther, damped while that lowers the misfit."""
+    """One damped Gauss-Newton step of the parameters and of the term of a shape."""
     shape = terms.of_size_one(shape, model)
     residual, rows, columns = _linear(terms, model, value, shape)
     design, coordinates = np.concatenate((rows, columns[0])), terms.evidence.solution.coordinates
@@ -257,7 +267,7 @@ def _stepped(terms: Terms, model: Model, value: Array, shape: Array, bounds: Bou
 
 
 def _phase_words(phase: Interval) -> str:
-    """The phase in words, where a quarter of a turn lies in its interval; else its value."""
+    """Phase in words if its interval contains a multiple of 90 deg; else its value."""
     quarters = {0.0: "in phase", 90.0: "in quadrature", 180.0: "in antiphase", -180.0: "in antiphase"}
     quarters[-90.0] = "in negative quadrature"
     if phase[2] - phase[1] > 2.0 * _PHASE_TOLD:

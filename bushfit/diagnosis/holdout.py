@@ -1,7 +1,7 @@
-"""Hold-out: does what was added also close the gap where it was not fitted?
+"""Hold-out: prediction of each part of the tests from the rest, with and without the added effects.
 
 A line (an amplitude level, or a frequency where amplitudes are stepped), the top third of the steps, a direction and a
-loop are held out in turn, and predicted from the rest.
+loop are held out in turn.
 
 Notes:
     Refitting without a part is one Gauss-Newton step from the full fit, which is exact where the model is linear over
@@ -37,18 +37,23 @@ _NAMES: dict[Stepped | None, tuple[str, str]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """Points that are held out together: of each test a mask, (n,); of a loop all or none."""
+class HoldOutPart:
+    """Points that are held out together.
+
+    Args:
+        name: of the part.
+        points: for each test a mask, (n,); loops are held out as a whole.
+    """
 
     name: str
     points: Sequence[Array]
 
     def rows(self, data_sets: Sequence[MeasuredTest]) -> Array:
-        """Mask of the part's residuals among those of all tests, (n,)."""
+        """Mask of the residuals of the part among those of all tests, (n,)."""
         return np.concatenate([np.tile(mask, data.parts) for data, mask in zip(data_sets, self.points, strict=True)])
 
     def rest(self, data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:
-        """The tests without it, with the same noise."""
+        """The tests without the part, with unchanged noise."""
         remaining = [(data, mask) for data, mask in zip(data_sets, self.points, strict=True) if not mask.all()]
         return [data.without(np.flatnonzero(mask)).with_weight() if mask.any() else data for data, mask in remaining]
 
@@ -58,9 +63,10 @@ class HeldOut:
     """Root mean square residual of one part, predicted from the other parts.
 
     Args:
-        part: what was held out, in words.
-        before, after: in units of noise, as it is shown.
-        whitened: before and after in units of noise and of the prediction's own error.
+        part: description of the part.
+        before: without the added effects, in units of noise.
+        after: with the added effects, in units of noise.
+        whitened: before and after, in units of noise and of the error of the prediction.
     """
 
     part: str
@@ -74,9 +80,9 @@ class Skipped:
     """A part that was not held out.
 
     Args:
-        part: what it is, in words.
+        part: description of the part.
         reason: why it was not held out.
-        effects: of the model with what was added, of which the rest says nothing.
+        effects: effects of the model that the other parts do not determine.
     """
 
     part: str
@@ -89,8 +95,10 @@ class HoldOut:
     """All parts held out in turn.
 
     Args:
-        before, after: root mean square over all parts, in units of noise; None where nothing can be held out.
-        whitened: the same in units of noise and of the prediction's own error.
+        parts: that were held out.
+        skipped: parts that were not.
+        before, after: root mean square over all parts, in units of noise; None if nothing can be held out.
+        whitened: the same in units of noise and of the error of the prediction.
     """
 
     parts: tuple[HeldOut, ...] = ()
@@ -101,7 +109,7 @@ class HoldOut:
 
     @classmethod
     def from_residuals(cls, residuals: Mapping[str, Array], skipped: Sequence[Skipped] = ()) -> HoldOut:
-        """The figures of residuals that were predicted, (models, plain and whitened, n), by part."""
+        """Build the figures from predicted residuals by part, (models, plain and whitened, n)."""
         residuals = {name: pair for name, pair in residuals.items() if pair.size}  # one frequency has no top third
         if not residuals:
             return cls((), tuple(skipped))
@@ -114,14 +122,28 @@ def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
     """Compare two models of the same tests on every part that both can predict from the rest.
 
     Args:
-        bounds: of parameters, where a model has to be fitted to the rest.
+        before: fit without the added effects.
+        after: fit with the added effects.
+        bounds: limits of parameters, for a fit to the rest.
+
+    Returns:
+        Root mean square errors of both models by part.
     """
     predictions, skipped = predicted_parts(before, after, bounds)
     return HoldOut.from_residuals({name: prediction.residuals for name, prediction in predictions.items()}, skipped)
 
 
 def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[dict[str, Predicted], list[Skipped]]:
-    """Predictions by two models of each part from the rest, by name, and the parts that one model cannot predict."""
+    """Predict each part from the rest by two models.
+
+    Args:
+        before: fit without the added effects.
+        after: fit with the added effects.
+        bounds: limits of parameters, for a fit to the rest.
+
+    Returns:
+        Predictions by the name of the part, and the parts that one model cannot predict.
+    """
     models = [_Fitted.from_evidence(evidence) for evidence in dict.fromkeys((before, after))]
     predictions, skipped = dict[str, Predicted](), list[Skipped]()
     for part in track("parts held out", list(parts(after.data_sets))):
@@ -142,11 +164,11 @@ def _figures(pair: Array) -> tuple[float, float, tuple[float, float]]:
 
 
 class Predicted(NamedTuple):
-    """Predictions by two models of a part that is held out.
+    """Predictions of a held-out part by two models.
 
     Args:
-        residuals: of each model, plain and whitened by its prediction's error, (2, 2, n).
-        pulls: by how much half the sum of squares of the plain ones moves with the noise of each row of all tests,
+        residuals: of each model, plain and whitened by the error of the prediction, (2, 2, n).
+        pulls: derivative of half the sum of squares of the plain residuals by the noise of each row of all tests,
             (2, all rows).
     """
 
@@ -156,10 +178,12 @@ class Predicted(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Fitted:
-    """A fitted model, ready to be asked what it would be without a part.
+    """A fitted model with its leave-out formulas.
 
     Args:
-        free: numbers of the parameters that rest on no bound.
+        evidence: the fit.
+        free: indices of the parameters that are not at a bound.
+        whole: leave-out formulas of the full fit.
     """
 
     evidence: Evidence
@@ -172,9 +196,13 @@ class _Fitted:
         free = solution.moving
         return cls(evidence, free, LeaveOut.of(solution.jacobian[free], solution.residual))
 
-    def predicted(self, part: Part, bounds: Bounds) -> tuple[Array, Array] | Skipped:
-        """Residuals of a part with the model fitted to the others, plain and whitened by the prediction's error, (2,
-        n), and how half their sum of squares moves with the noise of each row of all, (all rows,)."""
+    def predicted(self, part: HoldOutPart, bounds: Bounds) -> tuple[Array, Array] | Skipped:
+        """Predict a part from the rest.
+
+        Returns: residuals, plain and whitened by the error of the prediction, (2, n); and the derivative of half their
+            sum of
+        squares by the noise of each row of all tests, (all rows,).
+        """
         evidence, names = self.evidence, self.evidence.solution.coordinates.names
         rows, clusters = part.rows(evidence.data_sets), _clusters(evidence.data_sets)
         if left_open := [names[self.free[i]] for i in np.flatnonzero(self.whole.open(rows))]:
@@ -194,8 +222,8 @@ def _with_pull(whole: LeaveOut, rows: Array, clusters: Array, *, stepped: bool) 
     return residuals, whole.pulled(rows, residuals[0])
 
 
-def _refitted(evidence: Evidence, part: Part, bounds: Bounds) -> _Fitted | None:
-    """A model fitted to the tests without a part, asked about all of them; None where the fit comes to no end."""
+def _refitted(evidence: Evidence, part: HoldOutPart, bounds: Bounds) -> _Fitted | None:
+    """Fit a model to the tests without a part; None if the fit does not converge."""
     data_sets, names = evidence.data_sets, evidence.solution.coordinates.names
     fixed = [name for name in evidence.model.parameters if name not in names]
     try:
@@ -208,7 +236,7 @@ def _refitted(evidence: Evidence, part: Part, bounds: Bounds) -> _Fitted | None:
 
 
 def _clusters(data_sets: Sequence[MeasuredTest]) -> Array:
-    """Number of the line of a sweep, or of the loop, that each residual belongs to, (n,)."""
+    """Index of the line of a sweep, or of the loop, of each residual, (n,)."""
     numbers, first = list[Array](), 0
     for data_set in data_sets:
         line = np.zeros(data_set.size // data_set.parts, dtype=int)
@@ -219,11 +247,23 @@ def _clusters(data_sets: Sequence[MeasuredTest]) -> Array:
     return np.concatenate(numbers)
 
 
-def parts(data_sets: Sequence[MeasuredTest]) -> Iterator[Part]:
-    """Each part: lines, the top third of what they step through, directions, loops."""
+def parts(data_sets: Sequence[MeasuredTest]) -> Iterator[HoldOutPart]:
+    """List the parts of the tests: lines, the top third of their steps, directions, loops.
 
-    def part(name: str, chosen: Mapping[MeasuredTest, Array]) -> Part:
-        return Part(name, [chosen.get(data, np.zeros(data.size // data.parts, dtype=bool)) for data in data_sets])
+    Args:
+        data_sets: the tests.
+
+    Yields:
+        One part at a time.
+
+    Returns:
+        An iterator.
+    """
+
+    def part(name: str, chosen: Mapping[MeasuredTest, Array]) -> HoldOutPart:
+        return HoldOutPart(
+            name, [chosen.get(data, np.zeros(data.size // data.parts, dtype=bool)) for data in data_sets]
+        )
 
     loops, sweeps = parted(data_sets)
     for stepped, (line_name, top) in _NAMES.items():

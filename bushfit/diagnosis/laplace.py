@@ -1,4 +1,4 @@
-"""Effects that were refitted, counted by Laplace's method: what the prior of their own coordinates costs."""
+"""Laplace's method for refitted effects: log prior density of their parameters, and their precision."""
 
 from math import log
 
@@ -15,17 +15,21 @@ _FINE, _SHARPEST = 1000, 0.01
 
 
 def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dict[str, float], float]:
-    """Of an effect that was refitted: ln of the prior density of its own coordinates with the factor of Laplace's
-    method, their precision, and what it changes, relative to |K|.
-
-    What an amount changes is log-uniform from the least size on. A shape is uniform over what the tests
-    could show; at rest on an end of that it moves no further, and the fall of the likelihood away from the end tells
-    how much of it counts. Of an effect in place of a branch each parameter beyond the branch's two is uniform over a
-    factor of 20.
+    """Prior of the parameters of a refitted effect, for Laplace's method.
 
     Args:
         name: of the effect.
-        evidence, before: the fits with it and without.
+        evidence: fit with the effect.
+        before: fit without the effect.
+
+    Returns:
+        Log prior density of the effect's coordinates with the factor of Laplace's method; prior precision of each
+        coordinate; and largest relative change of |K| by the effect.
+
+    Notes:
+        The change by an amount is log-uniform from the smallest size. A shape is uniform over the range that the tests
+        could show; at an end of it the fall of the likelihood away from the end sets the effective width. For an effect
+        that replaces a branch each parameter beyond the two of the branch is uniform over a factor of 20.
     """
     solution = evidence.joint or evidence.solution
     effect, names = get_effect(name), solution.coordinates.names
@@ -68,10 +72,10 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
 
 
 def _of_amount(size: float, error: float) -> float:
-    """Logarithm of the mean prior density of an amount, per relative change, over its likelihood.
+    """Log of the mean prior density of an amount, per relative change, over its likelihood.
 
     Args:
-        size: of what it changes as fitted, relative to |K|.
+        size: relative change of |K| by the fitted amount.
         error: standard error of the amount, relative to it.
     """
     times = np.geomspace(SIZES[0], LARGEST, _FINE) / max(size, 1e-12)

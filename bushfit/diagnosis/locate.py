@@ -1,4 +1,4 @@
-"""Regions in which model and measurement disagree: smooth misfit per line and part, ranked, and put into words."""
+"""Regions in which model and measurement disagree: smooth misfit per line and part, ranked, as sentences."""
 
 from collections.abc import Iterator, Sequence
 
@@ -115,7 +115,7 @@ def _crosses(piece: Array, largest: float) -> bool:
 
 
 def _trend(stepped: str, step: Array, misfit: Array) -> str:
-    """How a misfit goes with what is stepped: flat, or as the line over it that leaves the least."""
+    """Sentence on the misfit along a line: flat, or with the axis that gives the highest correlation."""
     if np.var(misfit) < _FLAT * np.mean(np.square(misfit)):
         return f"much the same at every {stepped}"
     shapes = {

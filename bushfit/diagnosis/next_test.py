@@ -1,8 +1,8 @@
-"""The next test of a diagnosis: of the tests a laboratory can make, the one that separates the explanations best.
+"""The next test: the test that separates the explanations of a gap best per hour on the rig.
 
 Candidates are tests of the bushing and tests of the fixture without it: empty, with a reference spring, or with a steel
-dummy. Each is ranked by its information on which explanation is right, per hour, within the limits of the rig; `plan`
-ranks its tests for rivals by the same information.
+dummy. Each is ranked by its information on the right explanation per hour, within the limits of the rig; `plan` ranks
+its tests for rivals by the same information.
 """
 
 from collections.abc import Iterator, Sequence
@@ -113,14 +113,17 @@ def _candidates(data_sets: Sequence[MeasuredTest]) -> Iterator[NextTest]:
 
 
 def within_limits(model: Model, rig: RigSettings, place: Place, frequency: Array, amplitude: Array) -> Array:
-    """Points that a rig can reach, by its limits of force, displacement, velocity and frequency, (n,) bool.
+    """Check operating points against the limits of a rig.
 
     Args:
-        model: whose force is expected.
-        rig: its limits; one that is not stated is none.
+        model: predicts the force.
+        rig: limits of force, displacement, velocity and frequency; a limit that is not stated does not apply.
         place: direction or specimen.
         frequency: [Hz], (n,).
         amplitude: zero-to-peak [m or rad, or strain], (n,).
+
+    Returns:
+        True for each point that the rig can reach, (n,).
     """
     limits = [(frequency, rig.max_frequency)]
     force = np.abs(model.stiffness(place, frequency, amplitude)) * amplitude

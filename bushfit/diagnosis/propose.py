@@ -1,8 +1,8 @@
-"""Which effects might be missing: every effect of the library, ranked by a score test before any refit.
+"""Missing effects: every effect of the library, ranked by a score test before any refit.
 
 Notes:
-    The score is what the effect would take off chi-square if everything were linear: the residuals projected on the
-    effect's sensitivity, less what the model's own parameters can absorb of it.
+    The score is the decrease of chi-square in a linear model: the residuals projected on the effect's sensitivity,
+    less the part that the model's parameters can absorb.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -33,14 +33,15 @@ class Proposal:
     """Expected gain by one effect before any refit.
 
     Args:
-        model: the model with the effect in its best shape and at no amount; an amount that is fitted in its logarithm
-            stands where the score suggests. One that replaces a branch stands where that branch suggests.
-        score: what it would take off chi-square if everything were linear.
-        columns: its sensitivity, whitened, in each shape that was tried, (shapes, n); of one that replaces a branch by
-            each of its parameters, (k, n), which move together.
-        sense: +1 where only positive amounts are physical, 0 where both signs are.
-        visible: whether these tests could show the effect at all, beside the model's own parameters.
-        together: whether the columns move together, or one of them is chosen.
+        name: of the effect.
+        model: model with the effect in its best shape at no amount; at the suggested amount if that is fitted in its
+            logarithm. An effect that replaces a branch has the starting values that the branch suggests.
+        score: decrease of chi-square if the model were linear.
+        columns: whitened sensitivity in each shape tried, (shapes, n); of an effect that replaces a branch by each of
+            its parameters, (k, n).
+        sense: +1 if only positive amounts are physical, else 0.
+        visible: whether these tests could show the effect beside the model's parameters.
+        together: whether the columns move together; else one of them is chosen.
     """
 
     name: str
@@ -53,9 +54,15 @@ class Proposal:
 
 
 def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str]) -> list[Proposal]:
-    """Every effect of the library that the model lacks, with its twins, in its best shape, best score first.
+    """Rank every effect of the library that the model lacks.
 
-    `held` are parameters of the model that do not move.
+    Args:
+        evidence: the fitted model and the tests.
+        excluded: effects not to consider, with their twins.
+        fixed: names of parameters that are not fitted.
+
+    Returns:
+        One proposal for each effect in its best shape, the highest score first.
     """
     missing = missing_effects(evidence.model, [str(data_set.direction) for data_set in evidence.data_sets], excluded)
     answers = {
@@ -84,8 +91,16 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
 
 
 def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
-    """What each column, whitened (c, n), would take off chi-square beside the parameters, were all linear, its amount,
-    and whether these tests show it; 0 of what they do not, (c,) each."""
+    """Score test of columns, beside the parameters of the model.
+
+    Args:
+        evidence: the fitted model and the tests.
+        columns: whitened sensitivities, (c, n).
+
+    Returns:
+        Decrease of chi-square by each column, its amount, and whether the tests show it, (c,) each; 0 for columns that
+        the tests do not show.
+    """
     lengths = np.linalg.norm(columns, axis=1)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
     projected = evidence.project_out(columns / lengths[:, None])
@@ -101,11 +116,15 @@ def has_what_it_uses(effect: Effect, model: Model) -> bool:
 
 
 def missing_effects(model: Model, places: Collection[str], excluded: Collection[str] = ()) -> list[Effect]:
-    """Every effect of the library that a model lacks and tests at these places could show, of twins the bushing's.
+    """List the effects of the library that a model lacks and that tests at some places could show.
 
     Args:
+        model: the model.
         places: directions, or specimens by name.
         excluded: names of effects not to consider, with their twins.
+
+    Returns:
+        Effects; of twins only that of the bushing.
     """
     present = (None, *model.effects)
     excluded_names = {name for member in (*model.effects, *excluded) for name in twins_of(member)}
@@ -122,8 +141,7 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
 
 
 def _replacing(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> Proposal | None:
-    """An effect in place of a branch, as its first step from the best start that the branch suggests would leave it;
-    None where it has no response there."""
+    """Proposal of an effect that replaces a branch, after one linear step; None if the effect has no response."""
     fits = []
     for start in evidence.model.starts(effect):
         with suppress(FitError, ModelError):  # no response from there
@@ -138,17 +156,25 @@ def _replacing(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> Prop
 
 
 def _promised(fit: Descent) -> float:
-    """The chi-square of a fit after its next step, were the model linear."""
+    """Chi-square of a fit after its next step if the model were linear."""
     return fit.chi_square - fit.expected_fall
 
 
 def sensitivity(
     model: Model, data_sets: Sequence[MeasuredTest], effect: Effect
 ) -> tuple[list[dict[str, float]], Array]:
-    """Shapes of an effect on a grid that the tests suggest, and its whitened sensitivity in each, (shapes, n).
+    """Sensitivity of the tests to an effect on a grid of its shapes.
 
-    It is that at next to no amount, per typical amount, against none in the same call, so that what is solved by rounds
-    errs alike in both. Shapes with which there is no finite response, as within free play, are left out.
+    The derivative is a difference between a small amount and none in the same call, so that iterative solutions have
+    the same error in both. Shapes without a finite response, as within free play, are left out.
+
+    Args:
+        model: the fitted model.
+        data_sets: the tests.
+        effect: the missing effect.
+
+    Returns:
+        Shapes, and the whitened sensitivity per typical amount in each, (shapes, n).
     """
     bare, model = model, model.with_effect(effect.name)
     axes = {
@@ -160,7 +186,7 @@ def sensitivity(
     amount = qualified_name(effect, effect.amount)
     none = model.values[amount]
 
-    def answers(shapes: Sequence[Mapping[str, float]]) -> Array:
+    def residuals_of(shapes: Sequence[Mapping[str, float]]) -> Array:
         """Residuals with a little of the effect in each shape, and in the last line with none, whatever its shape."""
         amounts = np.append(np.full(len(shapes), none + _STEP * effect.amount.typical), none)[:, None]
         grids = {name: np.array([[shape[name]] for shape in (*shapes, shapes[-1])]) for name in axes}
@@ -171,8 +197,8 @@ def sensitivity(
         ]
         return np.concatenate([np.broadcast_to(row, (len(amounts), row.shape[-1])) for row in rows], axis=-1)
 
-    rows = answers(shapes)
+    rows = residuals_of(shapes)
     is_finite = np.asarray(np.isfinite(rows).all(axis=1))
     shapes = [shape for shape, finite in zip(shapes, is_finite[:-1], strict=True) if finite]
-    rows = answers(shapes) if shapes and not is_finite[-1] else rows[[*is_finite[:-1], True]]
+    rows = residuals_of(shapes) if shapes and not is_finite[-1] else rows[[*is_finite[:-1], True]]
     return shapes, (rows[:-1] - rows[-1]) / _STEP

@@ -1,4 +1,4 @@
-"""Results of a diagnosis, and their document, diagnosis.json."""
+"""Results of a diagnosis, and their JSON document."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -34,15 +34,15 @@ _LEAST_TOLD = 0.01
 
 
 @dataclass(frozen=True)
-class Settings:
-    """How to diagnose.
+class DiagnosisSettings:
+    """Settings of a diagnosis.
 
     Args:
-        max_effects: effects added in turn at the most.
-        tolerance: gaps below this share of |K| (or of half a loop's force range) do not count.
-        adopt: effects to add by hand, whatever the evidence.
+        max_effects: maximum number of effects added in turn.
+        tolerance: share of |K| (or of half a loop's force range) below which gaps are ignored.
+        adopt: effects to add whatever the evidence.
         without: effects not to consider, with their twins.
-        unresolved: effects of the model to start from that these tests could not tell from a twin of the rig.
+        unresolved: effects of the starting model that earlier tests could not distinguish from a twin of the rig.
     """
 
     max_effects: int = 3
@@ -57,10 +57,13 @@ class Where:
     """One region in which model and measurement disagree.
 
     Args:
+        direction: direction or specimen.
         kind: "sweep" or "loop".
-        frequency, amplitude: lowest and highest [Hz], [m or rad].
+        frequency: lowest and highest [Hz].
+        amplitude: lowest and highest, zero-to-peak [m or rad].
         component: "storage", "loss" or "force".
-        excess: root mean square of the smooth misfit there, in units of its own noise.
+        excess: root mean square of the smooth misfit, in units of its noise.
+        reading: the same as a sentence.
     """
 
     direction: Place
@@ -74,12 +77,14 @@ class Where:
 
 @dataclass(frozen=True)
 class Named:
-    """An effect that was added, or that leads a set of look-alikes.
+    """An effect that was added, or the first of a set of indistinguishable effects.
 
     Args:
-        alternatives: effects these tests cannot tell from it.
-        test: of a mistake in the record, the test in which it was made; None of what is not made in a test.
-        sentence: of a mistake, what would be so; else that of the effect.
+        name: of the effect or mistake.
+        evidence: why it is named.
+        alternatives: effects that these tests cannot distinguish from it.
+        test: for a mistake in the record, its test; None for other entries.
+        sentence: of a mistake, the statement of it; else "" for that of the effect.
         correction: of a mistake, what to write into the campaign.
     """
 
@@ -102,10 +107,10 @@ class Odds:
 
     Args:
         nothing: probability that nothing is missing beyond noise and tolerance.
-        told: explanations in words with their probabilities, if anything is missing; the most probable first.
-        models: of each of these, as far as it was fitted.
-        labels: each of these by the names of its parts, joined by " + ".
-        apart: whether one of these is right and no other, as far as the tests go.
+        told: explanations in words with their probabilities if anything is missing; the most probable first.
+        models: fitted model of each explanation; None if it was not fitted.
+        labels: names of the parts of each explanation, joined by " + ".
+        apart: whether the tests cannot decide between the explanations, so that each is an alternative.
     """
 
     nothing: float
@@ -115,9 +120,15 @@ class Odds:
     apart: bool = False
 
     def averaged(self, result: Result) -> Result:
-        """A result that counts that another explanation may hold: to the covariance each adds the square of how far its
-        parameters lie off, times its probability; of several that the tests cannot tell apart each is an alternative
-        in what is predicted."""
+        """Widen the uncertainty of a result by the probability of other explanations.
+
+        Args:
+            result: the result under one explanation.
+
+        Returns:
+            The result with, for each other explanation, the squared difference of its parameters times its probability
+            added to the covariance; and with the explanations as alternatives if the tests cannot distinguish them.
+        """
         cov = result.covariance
         current_values = np.array([result.model.values[name] for name in cov.names])
         matrix, alternatives = cov.matrix.copy(), list[Alternative]()
@@ -136,7 +147,16 @@ class Odds:
 
 @dataclass(frozen=True)
 class CandidateResult:
-    """One candidate and why it won or lost; its probability is that it is part of what is missing."""
+    """One candidate with its score, refit and probability, and the reason for the decision.
+
+    Args:
+        name: of the effect or mistake.
+        score: decrease of chi-square if the model were linear.
+        gain: decrease of chi-square in a refit; None without a refit.
+        probability: that it is part of the explanation.
+        parameters: fitted values by name.
+        why: reason why it was added or not.
+    """
 
     name: str
     score: float
@@ -148,17 +168,17 @@ class CandidateResult:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """The whole finding.
+    """Result of a diagnosis.
 
     Args:
-        effects: what was added, or the leaders of ambiguous sets.
-        where: regions of disagreement: of the model before where something was added, else of what remains.
-        remainder: regions where the model with its additions still disagrees.
+        effects: effects that were added, or the first of indistinguishable sets.
+        where: regions of disagreement before anything was added, or else those that remain.
+        remainder: regions of disagreement of the model with its additions.
         next_test: the measurement that would decide or confirm, or "".
-        before: the model as it came, refitted to all tests.
-        after: the model with what was added; where a mistake in the record is named, fitted to the mended tests.
-        result: the model to use with its uncertainty: `after`, by jobs the plain fit; `before` of a mistaken record.
-        description: of a gap that has no name; None where there is none, or it is like no such term.
+        before: the starting model, refitted to all tests.
+        after: the model with its additions; for a mistake in the record, fitted to the mended tests.
+        result: the model to use with its uncertainty: `after`, or `before` for a mistake in the record.
+        description: power law of a gap without a name; None if there is no such gap or no such law.
     """
 
     verdict: Verdict
@@ -198,7 +218,11 @@ class Diagnosis:
         return _rms(self.before), _rms(self.after)
 
     def to_document(self) -> DiagnosisFile:
-        """JSON-ready data."""
+        """Convert the diagnosis to the content of diagnosis.json.
+
+        Returns:
+            JSON-compatible data.
+        """
         document: DiagnosisFile = {
             "schema": "bushfit/diagnosis/3",
             "verdict": self.verdict,
@@ -227,7 +251,7 @@ class Diagnosis:
         }
 
     def _usable(self) -> UsableEntry | None:
-        """Within what the model to use meets the tests, at the worst of all places and place by place."""
+        """Expected error of the model to use, at the worst place and by place."""
         places = self.result.usable
         if not places:
             return None
@@ -284,7 +308,14 @@ def format_probability(probability: float) -> str:
 
 
 def odds_in_words(found: Mapping[str, Any]) -> list[str]:
-    """Lines on the probabilities of a diagnosis: what may be missing, the most probable first, and that nothing is."""
+    """Format the probabilities of a diagnosis.
+
+    Args:
+        found: content of diagnosis.json.
+
+    Returns:
+        Lines of text: the explanations, the most probable first, and the probability that nothing is missing.
+    """
     if found["verdict"] == "consistent":
         lines = [f"Probability that nothing is missing: {format_probability(found['nothing'])}."]
         if 1.0 - found["nothing"] > _LEAST_TOLD:
@@ -301,8 +332,7 @@ def odds_in_words(found: Mapping[str, Any]) -> list[str]:
 
 
 def level_of(name: str) -> str:
-    """The level of an effect or mistake that is not in the model yet; "unresolved" where the
-    rig has a twin of it, or it has no name."""
+    """Level of an effect or mistake that is not in the model; "unresolved" if it has a twin in the rig or no name."""
     candidate = get_candidate(name)
     return "unresolved" if candidate.twins or name == UNNAMED else str(candidate.level)
 

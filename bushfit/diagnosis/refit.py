@@ -36,14 +36,18 @@ def refitted(
     bounds: Bounds,
     columns: Array | None = None,
 ) -> dict[str, Evidence]:
-    """Proposals fitted with all parameters, by name; those that cannot come near the best are left out.
+    """Fit proposed effects, each with all parameters of the model.
 
     Args:
         evidence: the fitted model without the effects.
-        start: values of parameters to start from.
-        held, bounds: parameters that do not move, and limits inside the parameters' own.
-        columns: what one standard deviation of each amount makes of the residuals that all tests have in common beside
-            their noise, (c, n); None where they have noise alone.
+        proposed: effects with their starting values.
+        start: further starting values, by parameter.
+        fixed: names of parameters that are not fitted.
+        bounds: limits of parameters inside their general limits.
+        columns: common errors of all tests, as residuals per standard deviation, (c, n); None without such errors.
+
+    Returns:
+        Fits by the name of the effect, without those that cannot come near the best.
     """
     fits: dict[str, Descent] = {}
     tests: Sequence[MeasuredTest] = evidence.data_sets
@@ -87,8 +91,17 @@ def _goes_on(fit: Descent, best: float) -> bool:
 
 
 def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
-    """Limits of the shapes of a model's effects to what the tests can show: a stop that is always met is no stop, and a
-    resonance far above all frequencies is a mass."""
+    """Limit the shapes of effects to the range that the tests can show.
+
+    A stop that is always met is no stop, and a resonance far above all frequencies is a mass.
+
+    Args:
+        model: with the effects.
+        data_sets: the tests.
+
+    Returns:
+        Lower and upper limit by the name of the parameter.
+    """
     shapes = [
         (qualified_name(effect, parameter), parameter)
         for effect in model.records
@@ -102,8 +115,18 @@ def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
 def refit_with_free_columns(
     evidence: Evidence, bare: Evidence, columns: Array, start: Mapping[str, float], bounds: Bounds
 ) -> Evidence:
-    """The fit that the tests ask for where residuals along columns, whitened by scatter alone as in `bare`, are free;
-    the best from the fit without that, and from values to start from."""
+    """Fit a model with free residuals along some columns.
+
+    Args:
+        evidence: the fitted model and the tests.
+        bare: the same fit with residuals in units of the scatter from point to point.
+        columns: whitened as in `bare`, (c, n).
+        start: further starting values, by parameter.
+        bounds: limits of parameters inside their general limits.
+
+    Returns:
+        The better of the fits from the values of `evidence` and from `start`.
+    """
     names = evidence.solution.coordinates.names
     tests = Joined(bare.data_sets, CommonError.of_all(columns))
     start_values = {name: value for name, value in start.items() if name in names}

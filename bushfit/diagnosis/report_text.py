@@ -1,4 +1,4 @@
-"""Texts and figures of a diagnosis: what is missing, how large it is, where it shows, and what to test next."""
+"""Texts and figures of a diagnosis: missing effects, their sizes, regions of disagreement and the next test."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.claims import Claim
-from bushfit.diagnosis.described import Described, describe
+from bushfit.diagnosis.described import GapDescription, describe
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.evidence import Evidence, fit, result_of
 from bushfit.diagnosis.explanations import FaultyPlace
@@ -39,11 +39,13 @@ _ONE_DIRECTION = (
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisWriter:
-    """A finding put into words.
+    """Writer of the texts of a diagnosis.
 
     Args:
-        hypotheses: all that were weighed, the most probable first.
-        unresolved: effects of the model as it came that these tests could not tell from a twin of the rig.
+        search: the search with the data.
+        finding: its verdict.
+        hypotheses: all hypotheses weighed, the most probable first.
+        unresolved: effects of the starting model that earlier tests could not distinguish from a twin of the rig.
     """
 
     search: Search
@@ -64,7 +66,11 @@ class DiagnosisWriter:
         return self.finding.told[0] if self.finding.told else None
 
     def diagnosis(self) -> Diagnosis:
-        """The whole finding."""
+        """Build the diagnosis with all texts.
+
+        Returns:
+            Verdict, effects, regions, hold-out, next test and the model to use.
+        """
         match self.finding.verdict:
             case "consistent":
                 return self._finished("consistent", _NOTHING, self.base)
@@ -144,14 +150,14 @@ class DiagnosisWriter:
         words += f"; the rest: {', '.join([*remainder, *filter(None, [doubt])])}" if remainder or doubt else ""
         return self._finished("partly", words, gap.after if gap else after, entries, places=best, gap=gap)
 
-    def _described(self, evidence: Evidence) -> Described | None:
+    def _described(self, evidence: Evidence) -> GapDescription | None:
         request, rig = self.search.asked, self.data.campaign.rig
         return (
             describe(self._fitted(evidence), rig, request.start, request.held, request.bounds) if request.most else None
         )
 
     def _of_record(self, claim: Claim) -> Diagnosis:
-        """A mistake in the record: the gap shrinks if it was made; the model stays as it was."""
+        """Diagnosis of a mistake in the record; the model stays as it was."""
         assert self.first
         evidence, best = self._of_claim(self.first), self.first.best
         names = _entries(self.data, claim, evidence)
@@ -223,7 +229,7 @@ class DiagnosisWriter:
         return self._finished("unexplained", words, self.base, places=spot, next_test=advice)
 
     def label(self, composition: Composition) -> str:
-        """A composition by the names of its effects, or what else it is."""
+        """Name of a composition: its mistakes, effects, faulty places and other parts, joined by " + "."""
         best = composition.best
         names = [*(best.claim.labels(self.data) if best.claim else ()), *composition.names]
         return " + ".join((*names, *(f"fault: {place.name}" for place in composition.places), *_nameless(composition)))
@@ -241,7 +247,7 @@ class DiagnosisWriter:
         return Odds(self.finding.nothing, tuple(pairs), tuple(models), labels, exclusive)
 
     def _in_words(self, composition: Composition) -> str:
-        """A composition as it is told to people: what each of its parts is, with its name."""
+        """Sentence on a composition, with the name of each part."""
         best = composition.best
         parts = [best.claim.words(self.data)] if best.claim else []
         parts += [f"{get_effect(name).phrase} ({name})" for name in composition.names]
@@ -273,7 +279,7 @@ class DiagnosisWriter:
         *,
         places: Hypothesis | None = None,
         next_test: str = "",
-        gap: Described | None = None,
+        gap: GapDescription | None = None,
     ) -> Diagnosis:
         base, after, bounds = self._fitted(self.base), self._fitted(after), self.search.asked.bounds
         spots = list(places.places) if places else []
@@ -303,7 +309,7 @@ class DiagnosisWriter:
         )
 
     def _fitted(self, evidence: Evidence) -> Evidence:
-        """The same model as a fit has it, in which a loop's gain weighs only where its class is stated."""
+        """Fit of the same model with free gains of loops, unless the class of the gain is stated."""
         loops = parted(evidence.data_sets)[0]
         if self.data.campaign.rig.stiffness_errors[0] is not None or not any(loop.gain_weighs for loop in loops):
             return evidence

@@ -1,4 +1,4 @@
-"""Errors of the rig as columns: what a run, a level or a loop shares, and what wanders along a run."""
+"""Errors of the rig as columns: errors that a run, a level or a loop shares, and drift along a run."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -59,19 +59,19 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class RigErrors:
-    """The rig's errors in some tests, which are the same whatever the model."""
+    """Errors of the rig in some tests; independent of the model."""
 
     blocks: Sequence[Block]
     nodes: Sequence[Node]
 
     @cached_property
     def _combinations(self) -> dict[tuple[float, ...], int]:
-        """Number of each combination of scatter and errors that nodes have."""
+        """Index of each distinct combination of scatter and errors of the nodes."""
         return {sizes: number for number, sizes in enumerate(dict.fromkeys((n.scatter, *n.errors) for n in self.nodes))}
 
     @cached_property
     def combination(self) -> Array:
-        """Number of the combination of scatter and errors of each node, (nodes,)."""
+        """Index of the combination of scatter and errors of each node, (nodes,)."""
         return np.array([self._combinations[node.scatter, *node.errors] for node in self.nodes])
 
     @cached_property
@@ -91,15 +91,17 @@ class RigErrors:
 
     @cached_property
     def width(self) -> int:
-        """Most errors of a block."""
+        """Largest number of errors of a block."""
         return max((len(block.kinds) for block in self.blocks), default=0)
 
     @cached_property
     def roots(self) -> tuple[Array, Array]:
-        """At every combination and block L^-1 D of S = 1 + D W W^T D = L L^T, (combinations, blocks, w, w), and ln|S|,
-        (combinations,).
+        """Factors of the covariance of the errors at every combination.
 
-        Notes: times the products of errors with any rows it is what is to be taken off the products of those rows.
+        Returns: L^-1 D of S = 1 + D W W^T D = L L^T, (combinations, blocks, w, w), and ln|S|, (combinations,).
+
+        Notes: the squared product of the factor with the products of errors and rows is subtracted from the products of
+            rows.
         """
         inner = np.zeros((len(self.blocks), self.width, self.width))
         kinds = np.full(inner.shape[:2], -1)
@@ -116,9 +118,16 @@ class RigErrors:
 
 
 def scattering_alone(evidence: Evidence) -> Evidence:
-    """The same fit with residuals in units of what scatters from point to point: what points share is told apart.
+    """Express the residuals of a fit in units of the scatter from point to point, without errors that points share.
 
-    Of sweeps they are in ln K, whatever is fitted: relative to the measured, noise would shrink where a model is off.
+    Residuals of sweeps are in ln K for every fit: relative to the measurement, noise would shrink where a model is
+    wrong.
+
+    Args:
+        evidence: the fitted model and the tests.
+
+    Returns:
+        The same fit with the new residuals.
     """
     data_sets = tuple(
         replace(data_set, noise=replace(data_set.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), residuals="complex")
@@ -135,7 +144,16 @@ def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:
 
 
 def nodes(evidence: Evidence) -> list[Node]:
-    """Sizes of the rig's errors with their prior weights; the scatter has some of its own where few repeats tell it."""
+    """List sizes of the rig's errors with their prior weights.
+
+    The scatter has several sizes if few repeats determine it.
+
+    Args:
+        evidence: the fitted model and the tests.
+
+    Returns:
+        Nodes whose weights sum to one.
+    """
     sweeps = parted(evidence.data_sets)[1]
     freedom = max((sweep.noise.scatter_freedom for sweep in sweeps), default=0)
     thirds = (np.arange(3) + 0.5) / 3
@@ -152,7 +170,15 @@ def nodes(evidence: Evidence) -> list[Node]:
 
 
 def blocks(evidence: Evidence, rig: RigSettings) -> list[Block]:
-    """Blocks of rows that share errors: gains and phases of each level of a sweep, and repeated loops."""
+    """List blocks of rows that share errors: gains and phases of each level of a sweep, and repeated loops.
+
+    Args:
+        evidence: the fitted model and the tests.
+        rig: stated class of the rig.
+
+    Returns:
+        Blocks that together contain every row once.
+    """
     loops, sweeps = parted(evidence.data_sets)
     gain = of_class(rig, ASSUMED)
     found = [block for sweep in sweeps for block in _of_sweep(evidence, sweep, gain)]
@@ -182,7 +208,7 @@ def _of_sweep(evidence: Evidence, sweep: MeasuredSweep, classes: Sequence[float]
 
 
 def _shared(size: int, runs: Sequence[Array]) -> tuple[Array, Array]:
-    """Columns of the rig's errors in the points of a line, (w, n), and the kind of each."""
+    """Columns of the rig's errors in the points of a line, (w, n), and the kind of each, (w,)."""
     columns, kinds = [np.ones(size)], [_LEVEL]
     for run in runs:
         among = np.zeros(size)

@@ -1,4 +1,4 @@
-"""Terms beside all parameters: what a stiffness that is added over frequency and motion does to the residuals."""
+"""Additional stiffness terms over frequency and amplitude, and their derivatives in the residuals."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,10 +19,11 @@ Measure = Literal["stiffness", "modulus", "gain"]
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """The operating points of all tests that a term acts on: the bushing's and specimens', but no moduli of coupons.
+    """Operating points of the tests that a term acts on: tests of the bushing and specimens, without moduli of coupons.
 
     Args:
-        measure: what the term counts in.
+        evidence: the fitted model and the tests.
+        measure: unit of the term.
     """
 
     evidence: Evidence
@@ -30,7 +31,7 @@ class Terms:
 
     @cached_property
     def data_sets(self) -> list[MeasuredTest]:
-        """The tests that it acts on."""
+        """Tests that the term acts on."""
         return [data_set for data_set in self.evidence.data_sets if data_set.direction.motion is not STRAINING]
 
     @property
@@ -73,7 +74,14 @@ class Terms:
         )
 
     def unit(self, model: Model) -> Array:
-        """Stiffness that one unit of the term adds at each point, (p,) [N/m or N m/rad]."""
+        """Stiffness of one unit of the term at each point.
+
+        Args:
+            model: predicts the stiffness, for a term in shares of it.
+
+        Returns:
+            Stiffness [N/m or N m/rad], (p,).
+        """
         match self.measure:
             case "gain":
                 return self.stiffness(model)
@@ -83,17 +91,25 @@ class Terms:
         return np.ones(len(self.points))
 
     def of_size_one(self, shapes: Array, model: Model) -> Array:
-        """Values of the term at the points, (c, p), whose largest change of |K| is all of it."""
+        """Scale shapes of the term, (c, p), so that the largest change of |K| is 100 %."""
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def measured_value(self, model: Model) -> Array:
-        """The value with which a model meets the measured stiffness at every point, complex, (p,)."""
+        """Value of the term with which a model meets the measured stiffness at every point, complex, (p,)."""
         differences = [data_set.measured - data_set.noise_free(model).measured for data_set in self.data_sets]
         return np.concatenate(differences) / self.unit(model)
 
     def columns(self, values: Array, model: Model, base_value: Array | float = 0.0) -> Array:
-        """What small values of the term at the points, complex (c, p), do to the whitened residuals, (c, n), beside a
-        value that it has already, (p,)."""
+        """Derivatives of the whitened residuals by small values of the term.
+
+        Args:
+            values: of the term at the points, complex (c, p).
+            model: at its parameters.
+            base_value: value that the term has already, (p,).
+
+        Returns:
+            Changes of the residuals, (c, n).
+        """
         residual_changes, unit = np.zeros((len(values), self.evidence.residual.size)), self.unit(model)
         change, base_stiffness = values * unit, base_value * unit
         for data_set, place in zip(self.data_sets, self.place, strict=True):
@@ -110,7 +126,15 @@ class Terms:
         return residuals
 
     def jacobian(self, value: Array, model: Model) -> Array:
-        """Derivatives of these by fit coordinate of the model, (k, n)."""
+        """Derivatives of the residuals with the term by the fit coordinates of the model.
+
+        Args:
+            value: of the term at the points, complex (p,).
+            model: at its parameters.
+
+        Returns:
+            Derivatives, (k, n).
+        """
         names, added = self.evidence.solution.coordinates.names, value * self.unit(model)
         rows, slopes = (
             jacobian(model, self.evidence.data_sets, names),

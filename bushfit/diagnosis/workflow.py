@@ -1,4 +1,4 @@
-"""diagnose: from a campaign to a verdict."""
+"""Diagnose a campaign, from the tests to a verdict."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
 from bushfit.diagnosis.explanations import meetings
 from bushfit.diagnosis.hypotheses import DiagnosisRequest
-from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.report_text import DiagnosisWriter
 from bushfit.diagnosis.verdict import judged
 from bushfit.effects import get_effect, qualified_name
@@ -29,20 +29,25 @@ from bushfit.model.result import Outlier
 _MOST_ROUNDS = 4
 
 
-def diagnose(data: PreparedCampaign, model: Model | None = None, settings: Settings | None = None) -> Diagnosis:
-    """Find where model and measurement disagree, name what is missing, add it, and show the gap shrink.
+def diagnose(
+    data: PreparedCampaign, model: Model | None = None, settings: DiagnosisSettings | None = None
+) -> Diagnosis:
+    """Find regions where model and measurement disagree, and name and add missing effects.
 
     Args:
         data: the campaign; all directions are used.
-        model: where to start; the paper's three branches, and what [fit] adds, unless told. Its effects are kept, its
-            values refitted.
-        settings: limits, and what to adopt or to leave out.
+        model: starting model; by default the paper's three branches and the effects of [fit]. Its effects are kept, its
+            values are refitted.
+        settings: limits, and effects to adopt or to leave out.
+
+    Returns:
+        The verdict with its reasons, the gap before and after, and the model to use.
 
     Raises:
         FitError: no test, or data that cannot support the fit.
         ModelError: an unknown effect or mistake to adopt or to leave out.
     """
-    settings = settings or Settings()
+    settings = settings or DiagnosisSettings()
     for name in (*settings.adopt, *settings.without):
         get_candidate(name)
     mended = [name for name in settings.adopt if get_mistake(name)]
@@ -88,10 +93,12 @@ def _left_out_of_fewer(
 
 
 def _without_wild(
-    data: PreparedCampaign, model: Model | None, settings: Settings
+    data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings
 ) -> tuple[PreparedCampaign, InitialFit, tuple[Outlier, ...]]:
-    """The campaign with no weight on single points of sweeps that repeats and neighbours speak against, its fit, and
-    these points: a row that went wrong is neither physics nor a fault of the rig."""
+    """Remove the weight of single outliers of sweeps, which repeats and neighbours contradict.
+
+    Returns: the campaign, its fit, and the outliers.
+    """
     excluded_points: tuple[Outlier, ...] = ()
     for _ in range(_MOST_ROUNDS):
         begun = _begin(data, model, settings)
@@ -105,7 +112,14 @@ def _without_wild(
 
 
 class InitialFit(NamedTuple):
-    """A model fitted to all tests of a campaign before the search adds anything, and the start of the paper's own."""
+    """Starting model fitted to all tests of a campaign.
+
+    Args:
+        evidence: the fit.
+        start: starting values read from the data.
+        held: names of parameters that are not fitted.
+        outliers: points that a robust fit left out.
+    """
 
     evidence: Evidence
     start: dict[str, float]
@@ -113,9 +127,8 @@ class InitialFit(NamedTuple):
     outliers: tuple[Outlier, ...]
 
 
-def _begin(data: PreparedCampaign, model: Model | None, settings: Settings) -> InitialFit:
-    """Fit the model as it came, with the effects that the user adopts; the rig's errors are part of every explanation,
-    so a loop's gain weighs, whether its class is stated or assumed."""
+def _begin(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> InitialFit:
+    """Fit the starting model with the adopted effects; gains of loops are errors of a stated or assumed class."""
     hint = "add measured tests to the campaign"
     data_sets = data.some(data.data_sets, "there is nothing to diagnose", hint)
     fixed = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]

@@ -68,7 +68,7 @@ Place = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Evidence:
+class NumeralEvidence:
     """What cells tell of the ways in which all their numbers may be written, the plainest first.
 
     `unclear` is place and text of the first that has several values in them, `contrary` of the first written in none.
@@ -86,7 +86,7 @@ def is_like_number(text: str) -> bool:
 
 def weigh(
     cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL_NUMERALS, *, all_cells: bool = False
-) -> Evidence:
+) -> NumeralEvidence:
     """Find the ways in which cells may write their numbers.
 
     A file that parts thousands is taken to do so in all its numbers, unless the user states how it parts them.
@@ -112,7 +112,7 @@ def weigh(
         left = tuple(way for way in ways if way.allows(text))
         if not left:
             if is_like_number(text):
-                return Evidence(ways, contrary=(place, text))
+                return NumeralEvidence(ways, contrary=(place, text))
             continue
         ways = left
         if group := _ONE_GROUP.fullmatch(text):
@@ -125,4 +125,4 @@ def weigh(
     contrary = grouped.get(ways[0].thousands or "") if open_thousands else None
     if contrary and not (ungrouped or contrary[0][1] in columns.get(ways[0].decimal, ())):
         contrary = None
-    return Evidence(ways, unclear, contrary)
+    return NumeralEvidence(ways, unclear, contrary)

@@ -26,7 +26,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.optimize import leastsq
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.diagnosis.record import Settings
+from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, History
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual
@@ -182,7 +182,7 @@ def test_diagnose(
     campaign = simulated.campaign()
 
     def work() -> object:
-        return diagnose(PreparedCampaign.of(campaign), None, Settings(without=without))
+        return diagnose(PreparedCampaign.of(campaign), None, DiagnosisSettings(without=without))
 
     benchmark.pedantic(work, rounds=1)
     if benchmark.enabled:

@@ -12,7 +12,7 @@ from rigged import PLAN, SHARED, Diagnosed, Effects, Fitted, Measured
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.rig_errors import scattering_alone
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, get_effect
@@ -58,7 +58,7 @@ def diagnosed(measured: Measured) -> Diagnosed:
         key = repr((effects, plan, seed, settings))
         if key not in known:
             data = PreparedCampaign.of(measured(effects, plan, seed))
-            known[key] = diagnose(data, None, Settings(**settings))  # type: ignore[arg-type]
+            known[key] = diagnose(data, None, DiagnosisSettings(**settings))  # type: ignore[arg-type]
         return known[key]
 
     return finding

@@ -10,7 +10,7 @@ import numpy as np
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
@@ -104,7 +104,7 @@ TWO = {"delay": {"tau": 1e-4}, "strain_stiffening": {"c3": 20.0}}
 
 
 def asked(campaign: Campaign, model: Model | None = None, **settings: object) -> Diagnosis:
-    diagnosis = diagnose(PreparedCampaign.of(campaign), model, Settings(**settings))  # type: ignore[arg-type]
+    diagnosis = diagnose(PreparedCampaign.of(campaign), model, DiagnosisSettings(**settings))  # type: ignore[arg-type]
     odds = [
         f"{label} {share:.3f}" for label, (_, share) in zip(diagnosis.odds.labels, diagnosis.odds.told, strict=True)
     ]

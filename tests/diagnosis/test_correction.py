@@ -19,7 +19,7 @@ from test_schemas import complaints
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import Residuals, RigSettings
-from bushfit.diagnosis.described import Described, describe, weighed
+from bushfit.diagnosis.described import GapDescription, describe, weighed
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
 from bushfit.diagnosis.terms import Measure, Terms
@@ -53,20 +53,20 @@ def evidence(measured: Measured, fitted: Fitted) -> Evidence:
 
 
 @pytest.fixture(scope="module")
-def described(evidence: Evidence) -> Described:
+def described(evidence: Evidence) -> GapDescription:
     found = describe(evidence, RigSettings(), evidence.model.values, (), {})
     assert found is not None
     return found
 
 
 @pytest.fixture(scope="module")
-def result(described: Described) -> Result:
+def result(described: GapDescription) -> Result:
     strain = tuple(x * described.after.model.unit_strain(Direction.AXIAL) for x in LEVELS)
     measured = Range((5.0, 155.0), (min(strain), max(strain)), ("axial", "radial"))
     return Result(described.after.model, measured=measured)
 
 
-def test_it_stands_where_it_was_not_fitted(described: Described) -> None:
+def test_it_stands_where_it_was_not_fitted(described: GapDescription) -> None:
     """The excess over the noise floor halves in whole runs that were held out, by a band narrower than half the gap."""
     held, correction = described.held, described.after.model.unnamed
     assert correction is not None
@@ -79,7 +79,7 @@ def test_it_stands_where_it_was_not_fitted(described: Described) -> None:
 
 
 def test_the_parameters_beside_it_are_no_longer_bent(
-    measured: Measured, fitted: Fitted, evidence: Evidence, described: Described
+    measured: Measured, fitted: Fitted, evidence: Evidence, described: GapDescription
 ) -> None:
     """They lie nearer to those of the same rig without the gap than the plain fit's do."""
     truth = fitted(replace(measured(), loops=())).model.values

@@ -20,7 +20,7 @@ from tries import some
 from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.commands.diagnose import diagnose as diagnose_campaign
-from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import twins_of
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -125,7 +125,7 @@ def test_sizes(root: Path, truths: Truths, found: Found, name: str) -> None:
         result = found[case].result
         if found[case].verdict == "ambiguous":  # it has its size once the reader says which it is
             campaign = load_campaign(root / "data/practice" / case / "bushing.toml")
-            result = diagnose(PreparedCampaign.of(campaign), settings=Settings(adopt=(effect,))).result
+            result = diagnose(PreparedCampaign.of(campaign), settings=DiagnosisSettings(adopt=(effect,))).result
         assert effect in result.model.effects
         truth = truths[case]["effects"][theirs][key]
         truth = 1.0 / truth if theirs == "rig" else truth

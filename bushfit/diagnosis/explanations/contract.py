@@ -13,13 +13,13 @@ from bushfit.geometry import Place
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """One thing that may be missing.
+    """One explanation of a gap.
 
     Args:
-        kind: "effect", "place", "unnamed" or "record", by which it has odds.
-        family: within which it shares them: an effect without its place, a kind of place.
-        name: its own.
-        group: what it does to the residuals; of an effect that replaces a branch none, its refit tells.
+        kind: "effect", "place", "unnamed" or "record"; each kind has a prior probability.
+        family: group that shares the prior probability: an effect in all places, or a kind of place.
+        name: name of the explanation.
+        group: its columns in the residuals; None for an effect that replaces a branch, which has to be refitted.
     """
 
     kind: str
@@ -30,17 +30,17 @@ class Explanation:
 
 @dataclass(frozen=True, eq=False)
 class MissingEffect(Explanation):
-    """An effect of the library, with what it promises before any refit."""
+    """An effect of the library with its score before any refit."""
 
     proposal: Proposal
 
 
 @dataclass(frozen=True, eq=False)
 class FaultyPlace(Explanation):
-    """Points of the tests that are off together.
+    """Points of the tests that deviate together.
 
     Args:
-        direction: of the first test touched.
+        direction: direction of the first test.
         frequency: lowest and highest [Hz].
         amplitude: lowest and highest, zero-to-peak [m or rad].
         extreme: True for the smallest or largest level of its direction, where a law of amplitude does the same.
@@ -59,7 +59,7 @@ class FaultyPlace(Explanation):
 
     @property
     def freely(self) -> "FaultyPlace":
-        """The place with an independent error of every point, for faults that are no shift and no slope."""
+        """The place with an independent error of every point, for faults other than a shift or a slope."""
         if self.family == "loop":
             return self
         size = np.abs(self.columns).max(axis=0)
@@ -69,7 +69,7 @@ class FaultyPlace(Explanation):
         return replace(self, group=Group(columns, np.eye(rows.size), together=True))
 
     def distance(self, residual: Array) -> float:
-        """How far they lie off, in units of noise: the root mean square along their columns of residuals, (n,)."""
+        """Root mean square deviation along the columns of the place, in units of noise, from residuals (n,)."""
         columns = self.columns
         amounts = columns @ residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
         return float(np.sqrt(np.mean(amounts**2)))

@@ -11,7 +11,16 @@ from bushfit.diagnosis.propose import proposals
 
 
 def effects(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str]) -> list[MissingEffect]:
-    """Every effect that these tests could show, in one of its shapes; one in place of a branch is told by its refit."""
+    """List the effects that the model lacks, as explanations.
+
+    Args:
+        evidence: the fitted model and the tests.
+        excluded: effects not to consider, with their twins.
+        fixed: names of parameters that are not fitted.
+
+    Returns:
+        Every effect that these tests could show. An effect that replaces a branch has no columns and must be refitted.
+    """
     share = np.empty(evidence.residual.size)
     for data_set, place in evidence.place.items():
         share[place] = data_set.relative_noise

@@ -19,17 +19,16 @@ from bushfit.model.result import Outlier
 
 @dataclass(frozen=True, eq=False)
 class Meeting(FaultyPlace):
-    """Points that were left out because they lie farther off than noise explains, all at one frequency.
+    """Points that were left out as outliers, all at one frequency.
 
     Args:
-        apart: how far they lie off, in units of noise, the root mean square.
-        size: the same of the farthest, relative to |K|.
-        log_odds: logarithm of how much more often than rows that go wrong singly a disturbance brings them together.
+        apart: root mean square distance of the points, in units of noise.
+        size: largest distance of a point, relative to |K|.
+        log_odds: log of the odds of a disturbance at the frequency over single rows that meet by chance.
 
     Notes:
-        Rows that go wrong singly meet at a frequency by chance: of n such rows, k lie at the frequency of one of them
-        with the binomial probability of k - 1 or more among the n - 1 others, each with one over the number of
-        frequencies.
+        Single wrong rows meet at a frequency by chance: of n such rows, k lie at the frequency of one of them with the
+        binomial probability of k - 1 or more among the n - 1 others, each with one over the number of frequencies.
     """
 
     apart: float
@@ -41,7 +40,16 @@ class Meeting(FaultyPlace):
 
 
 def meetings(outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model) -> list[Meeting]:
-    """Frequencies that several of the points that were left out have in common."""
+    """Find frequencies at which several outliers lie.
+
+    Args:
+        outliers: points that were left out.
+        sweeps: the sweeps as they were read.
+        model: the fitted model.
+
+    Returns:
+        One explanation for each frequency with two or more outliers.
+    """
     distances = {(outlier.test, outlier.row): outlier.distance for outlier in outliers}
     found: dict[float, list[_Left]] = defaultdict(list)
     for sweep in sweeps:
@@ -62,7 +70,7 @@ _Left = tuple[MeasuredSweep, int, float]
 
 
 def _meeting(frequency: float, points: Sequence[_Left], outlier_count: int, chance: float, model: Model) -> Meeting:
-    """Points at a frequency, of so many that were left out, each of which might as well lie at any other."""
+    """Explanation for the outliers at one frequency; `chance` is the probability of any other frequency."""
     first, *other_directions = dict.fromkeys(str(sweep.direction) for sweep, *_ in points)
     location = "several directions" if other_directions else first
     amplitudes = [float(sweep.amplitude[point]) for sweep, point, _ in points]

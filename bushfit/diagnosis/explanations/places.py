@@ -1,4 +1,4 @@
-"""Places of the tests gone wrong: a frequency, a level, a repeat, or a loop that disagrees with all the others."""
+"""Faulty parts of the tests: a frequency, a level, a repeat, or a loop that disagrees with all others."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -22,9 +22,9 @@ _MOST_FREQUENCIES = 100
 
 
 def places(evidence: Evidence) -> list[FaultyPlace]:
-    """Every place whose points may be off together, in gain and phase; levels and repeats with a slope along them.
+    """List the places whose points may deviate together, in gain and phase; levels and repeats also with a slope.
 
-    What its points share does not depend on the model.
+    The columns do not depend on the model.
     """
     loops, sweeps = parted(evidence.data_sets)
     found = [*_frequencies(evidence, sweeps), *_levels(evidence, sweeps), *_repeats(evidence, sweeps)]
@@ -32,7 +32,7 @@ def places(evidence: Evidence) -> list[FaultyPlace]:
 
 
 def _loop(evidence: Evidence, loop: MeasuredLoop) -> FaultyPlace:
-    """A loop wrong as a whole, in gain or offset."""
+    """A loop that is wrong as a whole, in gain or offset."""
     ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
     group = _group(evidence, [loop], np.array(loop.gain_and_offset()), np.eye(2))
     return FaultyPlace("place", "loop", f"the loop {loop.name}", group, loop.direction, *ends)
@@ -50,8 +50,7 @@ def _group(evidence: Evidence, data_sets: Sequence[MeasuredTest], columns: Array
 
 
 def _changed(columns: int, kind: str) -> Array:
-    """What a unit of gain and of phase changes, and of their slopes at both ends of a line; of a frequency those of
-    each step, (columns, points)."""
+    """Relative change of each point by a unit of gain, of phase and of their slopes, (columns, points)."""
     both = np.array([[1.0], [1.0j]])
     if kind == "frequency":
         return np.asarray(np.kron(np.eye(columns // 2), both))
@@ -128,8 +127,10 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterato
 
 
 def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequence[MeasuredSweep]]]:
-    """Sweeps that may be off together: one alone, those of a direction in several files, and all; where that is, and
-    which sweeps these are, in words."""
+    """Groups of sweeps that may deviate together: one sweep, all sweeps of a direction, and all.
+
+    Yields: the location and the sweeps in words, and the sweeps.
+    """
     of_directions = [(name, list(group)) for name, group in groupby(sorted(sweeps, key=_direction), _direction)]
     for name, members in of_directions:
         several = len(members) > 1
@@ -149,7 +150,7 @@ def _direction(sweep: MeasuredSweep) -> str:
 def _shift_columns(
     evidence: Evidence, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], *, sloping: bool = False
 ) -> Array:
-    """Residuals of some points of sweeps that are off together: in gain, in phase, and if `sloping` along the step."""
+    """Residual columns of a common error of some points of sweeps: gain, phase, and if `sloping` their slopes."""
     among = _rows(evidence, sweeps)
     columns = np.zeros((2 + 2 * sloping, among.stop - among.start))
     for sweep, rows in zip(sweeps, chosen, strict=True):

@@ -1,4 +1,4 @@
-"""Something smooth that has no name: a Gaussian process over frequency and strain, or harmonics of the loops."""
+"""Smooth curves without a name: a Gaussian process over frequency and strain, or harmonics of the loops."""
 
 from collections.abc import Iterator, Sequence
 
@@ -25,7 +25,14 @@ _PHASES = 32
 
 
 def unnamed(evidence: Evidence) -> list[Explanation]:
-    """Processes of one direction or of all, and the harmonics of the loops."""
+    """List smooth curves as explanations.
+
+    Args:
+        evidence: the fitted model and the tests.
+
+    Returns:
+        A smooth and a rough Gaussian process for each direction, a rough one for all, and the harmonics of the loops.
+    """
     loops, sweeps = parted(evidence.data_sets)
     found = [(f"{how} {location}", group) for how in _LENGTHS for location, group in _processes(evidence, sweeps, how)]
     if loops:
@@ -74,7 +81,7 @@ def _processes(evidence: Evidence, sweeps: Sequence[MeasuredSweep], how: str) ->
 
 
 def _degrees(sweep: MeasuredSweep) -> int | None:
-    """The temperature of a sweep in steps of what counts as one; None where it is not known."""
+    """Temperature of a sweep in steps of `SAME_TEMPERATURE`; None if it is not known."""
     kelvin = sweep.sweep.temperature
     return None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from bushfit.diagnosis.record import Settings
+from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.effects import LIBRARY, twins_of
 from cards.hidden import Sealed
 
@@ -95,7 +95,11 @@ class Outcome:
         """Whether there is more to see than the tolerance."""
         if self.task.kind == "mistake":
             return self.matters
-        return self.task.kind not in CLEAN and self.sealed is not None and self.sealed.visible > Settings().tolerance
+        return (
+            self.task.kind not in CLEAN
+            and self.sealed is not None
+            and self.sealed.visible > DiagnosisSettings().tolerance
+        )
 
     @property
     def leader_right(self) -> bool | None:

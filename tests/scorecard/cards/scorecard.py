@@ -23,7 +23,7 @@ from bushfit.commands.diagnose import diagnose as diagnose_campaign
 from bushfit.commands.plan import plan
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.locate import largest_smooth_misfit
-from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import effect_name_of
 from bushfit.effects.mistakes import get_mistake
@@ -166,7 +166,7 @@ def _matters(before: Evidence, truth: Sealed) -> bool:
     """Whether a mistake shows at all, and leaves more than _MATTERS of |K| or of a parameter."""
     gap = largest_smooth_misfit(before)
     off = max(abs(before.model.values[name] / value - 1.0) for name, value in truth.values.items())
-    return gap > Settings().tolerance and max(gap, off) > _MATTERS
+    return gap > DiagnosisSettings().tolerance and max(gap, off) > _MATTERS
 
 
 #: Highest frequency of the rig that makes the session, over that of the tests so far: what `diagnose` asks for at most.
