@@ -1,4 +1,4 @@
-"""`bushfit init`: test files and a geometry -> a campaign; at a terminal it asks for what neither says."""
+"""`bushfit init`: test files and a geometry -> a campaign; at a terminal it asks for missing options."""
 
 from __future__ import annotations
 
@@ -217,7 +217,7 @@ def _inspect_files(
 def _inspect_source(
     source: TestSource, test_options: Mapping[str, Any], *, is_sized: bool, is_asking: bool
 ) -> Inspection:
-    """Inspect a test with these options; raise an error for what is missing, and at a terminal for what may be."""
+    """Inspect a test; raise an error for a missing option, at a terminal also for an optional one."""
     from bushfit.geometry import Specimen
     from bushfit.inspection.opening import BLOCK_KEYS
 

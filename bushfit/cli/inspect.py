@@ -1,4 +1,4 @@
-"""`bushfit inspect`: what test files hold, how they were understood, and what is odd."""
+"""`bushfit inspect`: contents of test files, meaning of their columns, and oddities."""
 
 from __future__ import annotations
 

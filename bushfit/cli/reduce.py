@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,10 +22,6 @@ from bushfit.report.results import figure_file, table_file
 from bushfit.units import format_aligned, number
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from bushfit.geometry import Direction
     from bushfit.reading.measurement import Loop
     from bushfit.reading.table import Table
     from bushfit.reduction.resonance import Resonance
@@ -65,95 +62,77 @@ def command(
 
     Raw histories (time, displacement, force): a FILE may hold many steps of at least five cycles; several files of one
     direction make one sweep. A resonance test (--mass, one FILE): acceleration and phase of the base and of a mass on
-    the mount, or their transmissibility. Each point is told with its error.
+    the mount, or their transmissibility. Each point has its standard error.
 
     Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """
+    from bushfit.reduction.steps import reduce
+    from bushfit.report.tables import reduced_table, resonance_table
+
     folder = output.free_folder(files[0].stem, output.formats.table("sweep"))
     table = _resonance_table(files[0], test_options, shaker)
-    found = (
-        _histories(files, test_options, levels, cycles)
-        if table is None
-        else _resonance(files, table, test_options, shaker, levels)
-    )
-    found.tell(output)
+    document: dict[str, Any] = {}
+    if table is not None:
+        resonance, body, name = _reduce_resonance(files, table, test_options, shaker, levels)
+        frequency, largest = resonance.peak
+        document = {
+            "mass_kg": resonance.mass,
+            "resonance_Hz": frequency,
+            "transmissibility_at_resonance": largest,
+        }
+        points, warnings = resonance_table(resonance), resonance.warnings
+        title = f"{table.file.stem}, {name}: {number(resonance.mass, 4)} kg on a shaker"
+        figure = partial(plots.inspection.resonance_figure, resonance, title)
+        _print_resonance(output, resonance)
+    else:
+        histories = _read(files, test_options)
+        body, direction = "direction", histories[0].direction
+        name = str(direction)
+        stated = parse_grid(levels, "--levels", direction.motion.displacement_unit) or ()
+        reduction = reduce(histories, fewest_cycles=cycles, levels=stated)
+        points, warnings = reduced_table(reduction), reduction.warnings
+        records = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
+        title = f"{records}: {len(reduction.steps)} points, {direction}"
+        figure = partial(plots.inspection.reduction_figure, reduction, histories, title)
+        _print_steps(output, reduction)
     file = output.formats.table("sweep")
-    snippet = f'[[sweeps]]\nfile = "{file}"\n{found.body} = {json.dumps(found.name, ensure_ascii=False)}\n'
-    document = {found.body: found.name, "points": found.points.to_dict(orient="list"), **found.document}
-    document |= {"warnings": list(found.warnings), "campaign": snippet}
-    results = [table_file("sweep", lambda: found.points), figure_file("reduce", found.figure)]
+    snippet = f'[[sweeps]]\nfile = "{file}"\n{body} = {json.dumps(name, ensure_ascii=False)}\n'
+    document = {body: name, "points": points.to_dict(orient="list"), **document}
+    document |= {"warnings": list(warnings), "campaign": snippet}
+    results = [table_file("sweep", lambda: points), figure_file("reduce", figure)]
     output.write(folder, results, document, files)
     output.print(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}")
 
 
-@dataclass(frozen=True)
-class _Reduced:
-    """Result of a reduction: the points as a table, how to show and draw them, and what --json has besides.
-
-    What was tested is told by `body` and `name`, as in a campaign: direction = "axial", or specimen = "mount".
-    """
-
-    body: Literal["direction", "specimen"]
-    name: str
-    points: pd.DataFrame
-    warnings: Sequence[str]
-    tell: Callable[[Output], None]
-    figure: Callable[[], Figure]
-    document: Mapping[str, Any] = field(default_factory=dict)
-
-
-def _histories(files: Sequence[Path], test_options: Mapping[str, Any], levels: str | None, cycles: int) -> _Reduced:
-    """Raw stepped-sine histories, reduced."""
-    from bushfit.reduction.steps import reduce
-    from bushfit.report.tables import reduced_table
-
-    histories = _read(files, test_options)
-    direction = histories[0].direction
-    asked = parse_grid(levels, "--levels", direction.motion.displacement_unit) or ()
-    reduction = reduce(histories, fewest_cycles=cycles, levels=asked)
-
-    names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
-    title = f"{names}: {len(reduction.steps)} points, {direction}"
-    return _Reduced(
-        "direction",
-        str(direction),
-        reduced_table(reduction),
-        reduction.warnings,
-        lambda output: _tell(output, reduction),
-        lambda: plots.inspection.reduction_figure(reduction, histories, title),
-    )
-
-
 def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
-    """The table of a resonance test; None of a file without any of its columns, unless a mass or the like is stated."""
+    """Table of a resonance test; None for other files, unless an option such as the mass states a resonance test."""
     from bushfit.inspection.opening import open_table
     from bushfit.reading.headers import RESONANCE_COLUMNS
     from bushfit.reading.resonance import is_resonance
 
-    said = any(value is not None for value in shaker.values())
+    is_stated = any(value is not None for value in shaker.values())
     try:
         with options_named():
             table = open_table(file, RESONANCE_COLUMNS, test_options)
-    except BushfitError:  # which the reading of a history tells as well
-        if said:
+    except BushfitError:  # the reading of a history raises it as well
+        if is_stated:
             raise
         return None
-    return table if said or is_resonance(table) else None
+    return table if is_stated or is_resonance(table) else None
 
 
-def _resonance(
+def _reduce_resonance(
     files: Sequence[Path],
     table: Table,
     test_options: Mapping[str, Any],
     shaker: Mapping[str, str | None],
     levels: str | None,
-) -> _Reduced:
-    """A resonance test, reduced."""
+) -> tuple[Resonance, str, str]:
+    """Reduce a resonance test. Returns the points, and the campaign key ("direction" or "specimen") and its value."""
     from bushfit.geometry import Direction
     from bushfit.inspection.opening import test_direction
     from bushfit.reading.resonance import read_resonance
     from bushfit.reduction.resonance import reduce_resonance
-    from bushfit.report.tables import resonance_table
 
     if len(files) > 1 or levels is not None:
         raise MeasurementError(
@@ -168,33 +147,11 @@ def _resonance(
         error = direction_error(table.file)
         error.hint = f'{error.hint}; or name the specimen that was tested: --specimen "mount"'
         raise error
-    mass = _mass(table, direction, shaker)
-    base_acceleration = positive(shaker["base_acceleration"], "--base-acceleration", "m/s^2")
-    read_as = direction or Direction.AXIAL  # which translation it is makes no difference to reading
-    with options_named():
-        reduction = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
-
-    title = f"{table.file.stem}, {specimen or direction}: {number(mass, 4)} kg on a shaker"
-    frequency, largest = reduction.peak
-    return _Reduced(
-        "specimen" if specimen else "direction",
-        specimen or str(direction),
-        resonance_table(reduction),
-        reduction.warnings,
-        lambda output: _tell_resonance(output, reduction),
-        lambda: plots.inspection.resonance_figure(reduction, title),
-        {"mass_kg": mass, "resonance_Hz": frequency, "transmissibility_at_resonance": largest},
-    )
-
-
-def _mass(table: Table, direction: Direction | None, shaker: Mapping[str, str | None]) -> float:
-    """The mass that moves [kg]."""
-    mass = positive(shaker["mass"], "--mass", "kg")
     if direction is not None and direction.is_rotation:
         raise MeasurementError(
             "a mass resists no rotation", file=table.file, found=str(direction), expected="a translation"
         )
-    if mass is None:
+    if (mass := positive(shaker["mass"], "--mass", "kg")) is None:
         raise MeasurementError(
             "this is a resonance test, and nothing says how large the mass is",
             file=table.file,
@@ -203,11 +160,16 @@ def _mass(table: Table, direction: Direction | None, shaker: Mapping[str, str | 
             expected="the mass that moves on the mount",
             hint='state it: --mass "0.5 kg"',
         )
-    return mass + (positive(shaker["mass_added"], "--mass-added", "kg") or 0.0)
+    mass += positive(shaker["mass_added"], "--mass-added", "kg") or 0.0
+    base_acceleration = positive(shaker["base_acceleration"], "--base-acceleration", "m/s^2")
+    read_as = direction or Direction.AXIAL  # which translation it is makes no difference to reading
+    with options_named():
+        resonance = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
+    return (resonance, "specimen", specimen) if specimen else (resonance, "direction", str(direction))
 
 
 def _read(files: Sequence[Path], test_options: Mapping[str, Any]) -> list[Loop]:
-    """The histories, of one direction, named by their stems, or by their paths where stems agree."""
+    """Read histories of one direction; their names are their stems, or their paths if two stems are equal."""
     from bushfit.inspection.gathering import TestSource, distribute_options
     from bushfit.inspection.opening import read_history
 
@@ -230,8 +192,8 @@ def _read(files: Sequence[Path], test_options: Mapping[str, Any]) -> list[Loop]:
     return histories
 
 
-def _tell(output: Output, reduction: Reduction) -> None:
-    """A line a level and repeat, with -v a line a point."""
+def _print_steps(output: Output, reduction: Reduction) -> None:
+    """Print one line per level and repeat; with -v one line per point."""
     units = reduction.direction.display
     (unit, length), (stiffness_unit, factor) = units.displacement, units.stiffness
 
@@ -267,37 +229,37 @@ def _tell(output: Output, reduction: Reduction) -> None:
             output.print(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}")
 
 
-def _tell_resonance(output: Output, found: Resonance) -> None:
-    """A line a third of an octave, with -v a line a point."""
+def _print_resonance(output: Output, resonance: Resonance) -> None:
+    """Print one line per third of an octave; with -v one line per point."""
     import numpy as np
 
     from bushfit.geometry import TRANSLATION
     from bushfit.reading.measurement import loss_factor
 
     (unit, length), _, (stiffness_unit, factor) = TRANSLATION.display
-    frequency, largest = found.peak
-    count, cells = found.frequency.size, []
-    lines = range(count) if output.verbose else (_LINES_AN_OCTAVE * np.log2(found.frequency)).round().tolist()
-    for _, group in groupby(range(count), lambda place: lines[place]):
+    frequency, largest = resonance.peak
+    count, cells = resonance.frequency.size, []
+    lines = range(count) if output.verbose else (_LINES_AN_OCTAVE * np.log2(resonance.frequency)).round().tolist()
+    for _, group in groupby(range(count), lambda point: lines[point]):
         rows = list(group)
         amplitudes, ratios = (
             _span(format_aligned(sorted(values[rows].tolist(), reverse=True), 3, minimum_digits=3)[::-1])
-            for values in (length * found.amplitude, np.abs(found.transmissibility))
+            for values in (length * resonance.amplitude, np.abs(resonance.transmissibility))
         )
         figures = (
-            number(factor * float(np.median(np.abs(found.stiffness[rows]))), 4),
-            number(float(np.median(loss_factor(found.stiffness[rows]))), 3),
-            number(100 * float(found.relative_error[rows].max()), 2),
+            number(factor * float(np.median(np.abs(resonance.stiffness[rows]))), 4),
+            number(float(np.median(loss_factor(resonance.stiffness[rows]))), 3),
+            number(100 * float(resonance.relative_error[rows].max()), 2),
         )
-        ends = _span([number(float(end), 4) for end in found.frequency[rows]])
+        ends = _span([number(float(end), 4) for end in resonance.frequency[rows]])
         cells.append((ends, f"{len(rows)}", amplitudes, ratios, *figures))
     title = (
-        f"{count} point{'s' * (count > 1)} of {found.test.frequency.size} rows; resonance at {frequency:.1f} Hz, "
+        f"{count} point{'s' * (count > 1)} of {resonance.test.frequency.size} rows; resonance at {frequency:.1f} Hz, "
         f"|T| {largest:.2f}\nof each line the median of |K| and loss factor, and the largest error"
     )
     heads = ("f [Hz]", "points", f"amplitude [{unit}]", "|T|", f"|K| [{stiffness_unit}]", "loss factor", "error [%]")
     output.print_table(title, heads, cells)
-    output.warn(found.warnings)
+    output.warn(resonance.warnings)
 
 
 def _span(rising: Sequence[str]) -> str:

@@ -1,5 +1,6 @@
-"""The tests among files, the sheets of workbooks, and the files of folders."""
+"""Search for tests in files, sheets of workbooks, and folders."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign.campaign import TEST_FILES
+from bushfit.campaign.copies import group_copies
 from bushfit.errors import BushfitError, NoColumnError, NoTestError, printable
 from bushfit.fitting.preparation import prepare_loops, prepare_sweeps
 from bushfit.geometry import Direction
@@ -25,13 +27,14 @@ from bushfit.reading.parts import parts_of
 
 @dataclass(frozen=True)
 class TestSource:
-    """A file, or a sheet of a workbook with several, that holds a test.
+    """A file, or a sheet of a workbook, that holds a test.
 
     Args:
-        file, sheet: the file, and the sheet; None for a whole file.
-        is_named: whether the user named this very file, and not its folder.
-        stated: keys of [[loops]] and [[sweeps]] that the user states of it.
-        of_book: what the sheets of its workbook without a test say of all its tests.
+        file: test file.
+        sheet: sheet of a workbook with several; None for the whole file.
+        is_named: True if the user named the file itself, False if it was found in a folder.
+        test_options: keys of [[loops]] and [[sweeps]] that the user states for it.
+        of_book: labels in the sheets of its workbook without a test.
     """
 
     file: Path
@@ -96,15 +99,25 @@ def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list
 
 
 def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
-    """Compare inspected files of the same part in the same direction.
+    """Compare inspected files: add an oddity where files hold identical data or contradict each other.
+
+    Contradictions are looked for among tests of one part in one direction.
 
     Args:
         files: inspections, in order.
 
     Returns:
-        The inspections, with one more oddity where another file contradicts the file.
+        The inspections, with the added oddities.
     """
-    contradictions: dict[int, str] = {}
+    loops = [inspection.measured for inspection in files if isinstance(inspection.measured, Loop)]
+    sweeps = [inspection.measured for inspection in files if isinstance(inspection.measured, Sweep)]
+    names = {id(inspection.measured): str(inspection.file.parent / inspection.label) for inspection in files}
+    oddities: defaultdict[int, list[str]] = defaultdict(list)
+    groups: list[list[Loop] | list[Sweep]] = [*group_copies(loops), *group_copies(sweeps)]
+    for copies in groups:
+        for test in copies if len(copies) > 1 else ():
+            same_data = " and ".join(names[id(copy)] for copy in copies if copy is not test)
+            oddities[id(test)].append(f"the same data are in {same_data}: a campaign counts them once")
     placed = [inspection for inspection in files if inspection.direction is not None and inspection.kind != "history"]
     for part in dict.fromkeys(inspection.part for inspection in placed):
         tests = [inspection.measured for inspection in placed if inspection.part == part]
@@ -114,13 +127,9 @@ def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
             *(prepare_loops(loops) if len(loops) > 1 else ()),
             *(prepare_sweeps(sweeps) if len(sweeps) > 1 else ()),
         ]
-        contradictions |= {id(one.test): one.contradiction for one in data_sets if one.contradiction}
-    return [
-        replace(inspection, odd=(*inspection.odd, sentence))
-        if (sentence := contradictions.get(id(inspection.measured)))
-        else inspection
-        for inspection in files
-    ]
+        for data_set in data_sets:
+            oddities[id(data_set.test)] += [data_set.contradiction] if data_set.contradiction else []
+    return [replace(inspection, odd=(*inspection.odd, *oddities[id(inspection.measured)])) for inspection in files]
 
 
 def _tests_by_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
@@ -203,7 +212,7 @@ def _needs_option(file: Path, key: str, role: str, test_options: Mapping[str, An
 
 
 def _list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
-    """Files of a folder, and of the folders in it, that may hold tests, in order of their names, and a sentence on each
+    """List the files of a folder and its subfolders by name. Returns those that may hold tests, and a sentence on each
     of the others."""
     files: list[TestSource] = []
     left_out: list[str] = []
@@ -226,7 +235,7 @@ def _list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
 
 
 def _sheets_of(source: TestSource, test_options: Mapping[str, Any]) -> list[TestSource]:
-    """The sheets of a workbook with several, if no option names one; else the file itself."""
+    """Sheets of a workbook with several, if no option names one; else the file itself."""
     if test_options.get("sheet"):
         return [source]
     try:
@@ -237,7 +246,7 @@ def _sheets_of(source: TestSource, test_options: Mapping[str, Any]) -> list[Test
 
 
 def _keep_tests(parts: Sequence[TestSource]) -> tuple[list[TestSource], list[str]]:
-    """Keep the sheets, or the file, that hold a test or may hold one; with a sentence on each of the others."""
+    """Select the sheets, or the file, that may hold a test. Returns them, and a sentence on each of the others."""
     tests: list[TestSource] = []
     left_out: list[str] = []
     without: set[str | None] = set()

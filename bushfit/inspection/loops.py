@@ -40,15 +40,15 @@ _JUST_BELOW = 2e-3
 #: Standard errors beyond which cycles differ; chosen: noise does not go that far in any of many tests.
 _REAL_CHANGE = 6.0
 #: Share of half the force's range beyond which cycles differ; chosen: less does not matter to a fit.
-_WORTH_TELLING = 2e-3
+_SMALLEST_CHANGE = 2e-3
 #: Share of half its range by which a loop's zero is off; chosen: less does not matter to a fit. A preload is more.
-_OFF_ZERO = 0.02
+_SMALLEST_OFFSET = 0.02
 #: Cycles that are looked at from either end of a loop; chosen: what settles shows in them.
 _MOST_END_CYCLES = 6
 #: Harmonics of a motion, but of a triangle, beyond which a line is a ripple; chosen: rigs' waveforms have fewer.
 _RIPPLE_ORDER = 20
 #: Share of the amplitude, and multiple of the median line, from which on a ripple is told; chosen: below it is noise.
-_LEAST_RIPPLE, _RIPPLE_LINE = 3e-4, 10.0
+_SMALLEST_RIPPLE, _RIPPLE_LINE = 3e-4, 10.0
 #: Rows whose spectrum tells a line from noise.
 _FEWEST_RIPPLE_ROWS = 200
 #: [s] A cycle that takes longer is in doubt; chosen: quasi-static tests take minutes.
@@ -56,7 +56,7 @@ _LONGEST_CYCLE = 3000.0
 
 
 def describe_sampling(history: Loop) -> str:
-    """How the rows of a record lie in time, in words: "even, every 0.01 s"."""
+    """Describe the time steps of a record, such as "even, every 0.01 s"."""
     steps = np.diff(history.time)
     usual = float(np.median(steps))
     if np.ptp(steps) < _EVEN_CLOCK * usual:
@@ -65,7 +65,7 @@ def describe_sampling(history: Loop) -> str:
 
 
 class RecordedChannel(NamedTuple):
-    """A recorded channel: its values in SI, (n,), its unit for people, and the factor from SI to that unit."""
+    """A recorded channel: name, display unit, factor from SI to that unit, and values in SI, (n,)."""
 
     name: str
     unit: str
@@ -73,7 +73,7 @@ class RecordedChannel(NamedTuple):
     values: Floats
 
     def format_row(self, row: int) -> str:
-        """The value of a row, without its unit."""
+        """Value of a row in the display unit, as text."""
         return number(self.factor * self.values[row], 4)
 
 
@@ -117,7 +117,7 @@ def _gaps(motion: RecordedChannel, time: Floats, *, timed: bool) -> Iterator[str
 
 
 def _stuck(motion: RecordedChannel, force: RecordedChannel) -> Iterator[str]:
-    """A sentence on rows in which the recorder stood still though the motion went on."""
+    """Warn of rows in which the recorder repeats its values while the motion goes on."""
     is_still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], is_still.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2]
@@ -133,7 +133,7 @@ def _stuck(motion: RecordedChannel, force: RecordedChannel) -> Iterator[str]:
 
 
 def _cut_off(channel: RecordedChannel) -> Iterator[str]:
-    """A sentence on each end of its range at which a channel is cut off."""
+    """Warn of each end of its range at which a channel is cut off."""
     values, span = channel.values, float(np.ptp(channel.values))
     rounding = 1e-9 * span
     steps = np.abs(np.diff(values))
@@ -151,7 +151,7 @@ def _cut_off(channel: RecordedChannel) -> Iterator[str]:
 
 
 def _outliers(channel: RecordedChannel, time: Floats) -> Iterator[str]:
-    """A sentence on rows that lie alone far off their neighbours."""
+    """Warn of single rows far from their neighbours."""
     rows = np.flatnonzero(lone_outliers(time, channel.values))
     if rows.size:
         listed = ", ".join(
@@ -213,7 +213,7 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
         mistakes = [mistake.in_words(drive.loop) for mistake in MISTAKES.values() if mistake.time < 1.0]
         minutes = number(1.0 / drive.frequency / 60.0, 2)
         odd.append(f"one cycle takes {minutes} min, as hardly any test does, unless {', or '.join(mistakes)}")
-    if _OFF_ZERO * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and drive.datum is not None:
+    if _SMALLEST_OFFSET * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and drive.datum is not None:
         odd.append(
             f"the motion is off zero by {number(to_length * mean_motion, 3)} {length}, "
             f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the loop counts from its own middle"
@@ -301,7 +301,7 @@ def _listed(values: Sequence[float], between: str = ", ") -> str:
 
 
 def _settling(force: Array, error: float, smallest: float, name: str, unit: Unit) -> Iterator[str]:
-    """A sentence where the force amplitude of the end cycles, (k,), changes by `least` or more [N or N m]."""
+    """Warn of a force amplitude [N or N m], (cycles,), that changes by more than `smallest` and chance."""
     change, last_change = force[-1] - force[0], force[-1] - force[-2]
     # the standard error of an amplitude is sqrt(2) `error`, that of a difference of two is 2 `error`
     if abs(change) > max(_REAL_CHANGE * 2.0 * error, smallest):
@@ -316,7 +316,7 @@ def _settling(force: Array, error: float, smallest: float, name: str, unit: Unit
 
 
 def _drifting(mean: Array, smallest: float, name: str, unit: Unit) -> Iterator[str]:
-    """A sentence where the mean of a channel changes over the cycles by more than `least`."""
+    """Warn of a mean that changes over the cycles by more than `smallest`."""
     if abs(mean[-1] - mean[0]) > smallest:
         last, first = format_aligned([unit.factor * mean[-1], unit.factor * mean[0]], 3, minimum_digits=1)
         yield f"the {name} drifts: its mean goes from {first} to {last} {unit.name}"
@@ -343,7 +343,7 @@ def _ripple(drive: Drive) -> Iterator[str]:
     frequency = np.fft.rfftfreq(rest.size, float(np.mean(steps)))
     lines[frequency < _RIPPLE_ORDER * drive.frequency] = 0.0
     line = int(np.argmax(lines))
-    if lines[line] > max(_LEAST_RIPPLE * drive.amplitude, _RIPPLE_LINE * float(np.median(lines))):
+    if lines[line] > max(_SMALLEST_RIPPLE * drive.amplitude, _RIPPLE_LINE * float(np.median(lines))):
         unit, factor = loop.direction.display.displacement
         yield (
             f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
@@ -353,8 +353,10 @@ def _ripple(drive: Drive) -> Iterator[str]:
 
 
 def _changing(drive: Drive) -> Iterator[str]:
-    """Sentences where force amplitude, mean force or mean motion change over the cycles at both ends of a loop; none
-    where it has only one, or too few rows in each."""
+    """Warn of force amplitude, mean force or mean motion that change from the first to the last cycles of a loop.
+
+    Loops of one cycle, or with too few rows in a cycle, are not checked.
+    """
     loop, count = drive.loop, int(drive.cycles + 0.01)
     if count < 2:
         return
@@ -372,9 +374,9 @@ def _changing(drive: Drive) -> Iterator[str]:
     amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
     error = max(drive.noise, *(scatter[0] for *_, scatter in fitted)) * np.sqrt(1.0 / rows)  # of the force [N or N m]
     (motion, force, _), units = loop.direction.motion.words, loop.direction.display
-    smallest = _WORTH_TELLING * np.ptp(loop.force) / 2.0
+    smallest = _SMALLEST_CHANGE * np.ptp(loop.force) / 2.0
     yield from _settling(amplitude, error, smallest, force, units.force)
     yield from _drifting(mean_force, max(_REAL_CHANGE * 1.5 * error, smallest), force, units.force)
     # a time that was made from the motion turns its noise into drift
-    smallest_drift = 2.0 * _WORTH_TELLING * drive.amplitude if loop.timed else least_prominence(loop.displacement)
+    smallest_drift = 2.0 * _SMALLEST_CHANGE * drive.amplitude if loop.timed else least_prominence(loop.displacement)
     yield from _drifting(mean_motion, smallest_drift, motion, units.displacement)

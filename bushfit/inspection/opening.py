@@ -1,4 +1,4 @@
-"""The inspection of a test file: recognised by its columns, on which body or in which direction, and looked at."""
+"""Inspection of a test file: kind of test by its columns, direction or specimen, contents and oddities."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -99,7 +99,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
 
 
 def _refuse_resonance(file: Path, test_options: Mapping[str, Any]) -> None:
-    """Refuse a resonance test, with the way to make a sweep of it."""
+    """Refuse a resonance test; the hint says how to reduce it to a sweep."""
     try:
         table = open_table(file, RESONANCE_COLUMNS, test_options)
     except BushfitError:  # then it is none
@@ -175,9 +175,9 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
 
 
 def _missing(table: Table, *, is_sweep: bool) -> str | None:
-    """The first role that a table lacks to be a test; None where it is one.
+    """First role of a column that a test needs and the table lacks; None if it is complete.
 
-    Of a sweep, frequency or amplitude may be held, and stated outside the table.
+    Frequency or amplitude of a sweep may be constant, and stated outside of the table.
     """
     roles = set(table.roles)
     if not is_sweep:
@@ -202,7 +202,20 @@ def open_table(
     test_options: Mapping[str, Any],
     motion: Motion = TRANSLATION,
 ) -> Table:
-    """The table of a file if it is that of a test whose columns go by `names`, with what the user states of those."""
+    """Open a test file as a table of one kind of test.
+
+    Args:
+        file: test file, or its opened content.
+        names: headers of the columns by role, of one kind of test.
+        test_options: options of the test; those of other columns are ignored.
+        motion: kind of motion that the columns describe.
+
+    Returns:
+        Table with the roles of its columns.
+
+    Raises:
+        MeasurementError, UnitError: columns that are missing or unclear.
+    """
     relevant = {
         key: {role: text for role, text in test_options.get(key, {}).items() if role in names}
         for key in ("columns", "units")
@@ -287,7 +300,7 @@ def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Dir
 def _entry(
     schema: type[LoopFile | SweepFile], test_options: Mapping[str, Any], table: Table, place: Place | None
 ) -> dict[str, Any]:
-    """The stated keys that a file's table in a campaign has, less those that the file makes needless."""
+    """Stated keys for the table of a file in a campaign, without those that the file itself states."""
     roles = LOOP_COLUMNS if schema is LoopFile else SWEEP_COLUMNS
     keys = {field.name for field in fields(schema)} - {"direction"}
     entry = {key: value for key, value in test_options.items() if key in keys and value not in (None, {})}
@@ -316,7 +329,7 @@ def _keywords(
 def _read_loop(
     file: Path, direction: Place, entry: dict[str, Any], table: Table
 ) -> tuple[Loop, dict[str, Any], list[str]]:
-    """A loop, its keys in a campaign, and what is odd: a force that counts the other way is turned."""
+    """Read a loop; a force of reversed sign is turned. Returns the loop, its keys in a campaign, and oddities."""
     try:
         return read_loop(**_keywords(file, direction, entry, LoopFile)), entry, []
     except MeasurementError as error:
@@ -335,7 +348,7 @@ def _read_loop(
 
 
 def _classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findings]:
-    """The kind of a recorded test, a loop, a programme of loops or a history, with its facts and oddities."""
+    """Kind of a recording (loop, programme of loops, or raw history), with its facts and oddities."""
     steps = steady_sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in steps}
     frequencies = [frequency for frequency, *_ in steps] or [0.0]
@@ -357,7 +370,7 @@ def _classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tupl
 
 
 def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
-    """All columns of a file in order, with the range of their values as the file has them."""
+    """Columns of a file in order, with the range of their values in the unit of the file."""
     of_sweeps = {*chain(*PAIRS), "frequency", "amplitude", "temperature", "repeat"}
     ranged = of_sweeps if is_sweep else set(table.roles)
     ranged = {role for role in ranged if role in table.roles and table.holds_numbers(table.roles[role].index)}

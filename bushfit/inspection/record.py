@@ -28,7 +28,7 @@ _TABLES = {"loop": "loops", "sweep": "sweeps"}
 
 
 def format_frequencies(frequencies: Sequence[float] | Array) -> str:
-    """How many frequencies there are, and between which they lie: "16, from 5 to 155 Hz"; [Hz], rising, (n,)."""
+    """Number and range of frequencies [Hz], (n,), increasing, such as "16, from 5 to 155 Hz"."""
     low, high = (f"{end:.4g}" for end in (frequencies[0], frequencies[-1]))
     return f"{len(frequencies)}, {f'at {low}' if low == high else f'from {low} to {high}'} Hz"
 
@@ -82,11 +82,13 @@ class Inspection:
     """A test file that can be used, with all that an inspection finds.
 
     Args:
-        file, kind, measured: the file, what it holds, and its content in SI.
-        direction: of the test; None where neither file nor options say it.
-        written, columns, facts, odd: as `InspectedFile` has them.
-        entry: keys of its table in a campaign besides `file` and `direction`, as TOML has them.
-        counted: whether the header of a sweep says how amplitudes are counted.
+        file: test file.
+        kind: loop, sweep or raw history.
+        direction: direction or specimen of the test; None if neither file nor options state it.
+        written, columns, facts, odd: see `InspectedFile`.
+        entry: further keys of its table in a campaign, as TOML has them.
+        measured: content in SI.
+        counted: True if the header of a sweep states zero-to-peak or peak-to-peak.
     """
 
     file: Path
@@ -123,7 +125,7 @@ class Inspection:
 
     @property
     def assumed(self) -> str | None:
-        """Assumptions, each with the option or key that changes it; None where there are none."""
+        """Assumptions, each with the option or key that changes it; None if nothing was assumed."""
         assumptions = []
         if isinstance(self.direction, Specimen) and self.direction.kind == "modulus":
             meaning, alternative = "the engineering shear strain", "tension"
@@ -140,7 +142,7 @@ class Inspection:
         return "; ".join(assumptions) or None
 
     def to_document(self) -> InspectedFile:
-        """All of it but the content, as JSON has it."""
+        """Document of the inspection for JSON, without the measured data. Returns its entries by key."""
         return {
             "file": str(self.file),
             "sheet": self.entry.get("sheet"),

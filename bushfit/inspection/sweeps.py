@@ -145,7 +145,7 @@ def _outliers(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
     distance = np.nan_to_num(from_repeats)
     for rows in _blocks(sweep):
         distance[rows] -= _complex_median(distance[rows])
-    random = np.array([noise.random[sweep.name, float(held)] for held in sweep.held])
+    random = np.array([noise.random[sweep.name, float(level)] for level in sweep.held])
     parts = np.stack((distance.real, distance.imag), axis=1)
     far = np.any((np.abs(parts) > _FAR * random) & (np.abs(parts) > _SMALLEST_OUTLIER), axis=1)
     curve = _from_curve(sweep)
@@ -203,7 +203,7 @@ def _from_repeats(sweep: Sweep) -> Array:
 
 
 def _blocks(sweep: Sweep) -> list[Array]:
-    """The rows of each block: a repeat of a level over all frequencies."""
+    """Rows of the blocks: repeats of a level over all frequencies."""
     return rows_alike(sweep.repeat.astype(float), sweep.amplitude)
 
 

@@ -1,4 +1,4 @@
-"""Work on long arrays: medians and scatter that few outliers move by much, and chunks on all cores."""
+"""Robust statistics of long arrays, and their evaluation by chunks on all cores."""
 
 import os
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import numpy as np
 
 from bushfit.reading.measurement import Floats
 
-_Answer = TypeVar("_Answer")
+_Chunk = TypeVar("_Chunk")
 #: Standard deviation of normal scatter over the median of its absolute values, 1/Phi^-1(3/4).
 MEDIAN_TO_SIGMA = 1.482602218505602
 #: Entries of a chunk: 2 MiB of float64, which a core's cache holds.
@@ -30,7 +30,7 @@ def median(values: Floats, axis: int = 0) -> Floats:
     return np.asarray((ordered.take(low, axis) + ordered.take(middle, axis)) / 2.0)
 
 
-def by_chunks(work: Callable[[slice], _Answer], size: int, chunk: int = CHUNK) -> list[_Answer]:
+def by_chunks(work: Callable[[slice], _Chunk], size: int, chunk: int = CHUNK) -> list[_Chunk]:
     """Apply a function to the chunks of a long array, on all cores.
 
     NumPy lets other threads run while it works on a chunk. The chunks, and so the numbers, are the same on any

@@ -1,4 +1,4 @@
-"""The cycles of a long motion: where each begins, which of them agree, and which belong to one steady state.
+"""Cycles of a motion: their limits, runs of similar cycles, and the steady part of a run.
 
 They are counted on the displacement, in arrays of all rows or of all cycles at once.
 """
@@ -52,8 +52,16 @@ class Cycles:
     range: Floats
 
     @classmethod
-    def of(cls, time: Floats, motion: Floats) -> "Cycles":
-        """The cycles of a motion, at any frequency and of any amplitude that stands out of the noise."""
+    def count(cls, time: Floats, motion: Floats) -> "Cycles":
+        """Find the cycles of a motion, of any frequency and of any amplitude above the noise.
+
+        Args:
+            time: of each row [s], (n,).
+            motion: displacement [m or rad], (n,).
+
+        Returns:
+            Cycles between upward crossings; none if the motion has fewer than four turning points.
+        """
         turns = motion_turns(time, motion).motion
         if turns.size < 4:
             return cls(time, np.empty(0), np.empty(0, dtype=np.intp), np.empty(0))
@@ -65,7 +73,7 @@ class Cycles:
         return cls(time, edges, np.searchsorted(time, edges).astype(np.intp), peak - trough)
 
     def runs(self) -> list[slice]:
-        """Runs of cycles whose periods and ranges are alike from one to the next, without holes."""
+        """Find runs of cycles with similar periods and ranges, without holes. Returns slices of the cycles."""
         if self.range.size == 0:
             return []
         period = np.diff(self.edges)
@@ -77,7 +85,15 @@ class Cycles:
         return [run for run in stretches(changes) if not hole[run.start]]
 
     def fundamentals(self, run: slice, *channels: Floats) -> Complex:
-        """Complex fundamental of channels, (n,) each, in each cycle of a run, (channels, k), by least squares."""
+        """Fit the fundamental of channels in each cycle of a run by least squares.
+
+        Args:
+            run: slice of the cycles.
+            channels: values of the rows, (n,) each.
+
+        Returns:
+            Complex fundamentals, (channels, k); half the range in cycles with too few rows.
+        """
         edges, first = self.edges[run.start : run.stop + 1], self.first_rows[run.start : run.stop + 1]
         rows, count = slice(first[0], first[-1]), np.diff(first)
         phase = (self.time[rows] - np.repeat(edges[:-1], count)) / np.repeat(np.diff(edges), count)
@@ -89,15 +105,13 @@ class Cycles:
         right = np.array([np.add.reduceat(first_columns * values[rows], starts, axis=-1) for values in channels]).T
         sound = np.abs(np.linalg.det(gram / np.maximum(count, 1)[:, None, None])) > _LEAST_DETERMINANT
         _, cosine, sine = np.linalg.solve(gram[sound], right[sound]).T.swapaxes(0, 1)
-        found = np.tile(
-            (self.range[run] / 2.0).astype(complex), (len(channels), 1)
-        )  # where rows are too few for a point
-        found[:, sound] = cosine + 1j * sine
-        return found
+        fundamentals = np.tile((self.range[run] / 2.0).astype(complex), (len(channels), 1))
+        fundamentals[:, sound] = cosine + 1j * sine
+        return fundamentals
 
 
 def stretches(changes: NDArray[np.bool_]) -> list[slice]:
-    """Slices of entries that are alike, by whether each but the first is other than the one before it, (n - 1,)."""
+    """Split n entries into stretches at changes, a mask of the borders between entries, (n - 1,)."""
     border = np.concatenate(([0], 1 + np.flatnonzero(changes), [changes.size + 1])).tolist()
     return [slice(first, end) for first, end in pairwise(border)]
 
@@ -157,11 +171,14 @@ def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
 
 
 def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
-    """The pieces of a run of cycles between which its frequency or amplitude goes from one steady value to another.
+    """Split a run of cycles into pieces of steady frequency and amplitude.
 
     Args:
         edges: time of the crossings [s], (m + 1,).
         log_amplitude: ln of the amplitude of each cycle, (m,).
+
+    Returns:
+        Slices of the cycles, in order.
 
     Notes:
         The crossings of a steady sine lie on a straight line over their number, and its amplitudes on a level one. A
@@ -174,15 +191,15 @@ def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
     if log_amplitude.size > 1:
         jitter = max(jitter, scatter(np.diff(phase, 2))[1] / 6.0**0.5)
         spread = max(spread, scatter(np.diff(log_amplitude))[1] / 2.0**0.5)
-    found, open_parts = [], [slice(0, log_amplitude.size)]
+    steady_parts, open_parts = [], [slice(0, log_amplitude.size)]
     while open_parts:
         part = open_parts.pop()
         cut = _cut(phase[part.start : part.stop + 1] / jitter, log_amplitude[part] / spread, jitter, spread)
         if cut:
             open_parts += [slice(part.start + cut, part.stop), slice(part.start, part.start + cut)]
         else:
-            found.append(part)
-    return found
+            steady_parts.append(part)
+    return steady_parts
 
 
 def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
@@ -209,7 +226,7 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
 
 
 def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
-    """Number of cycles after which to cut a run; 0 where it is one.
+    """Number of cycles after which to cut a run; 0 if it is steady.
 
     The phase of the crossings, (m + 1,), less that of an even sine, is in units of their `jitter` [periods], and the
     level, ln of the amplitude of each cycle, (m,), in units of its `spread`.
@@ -235,7 +252,7 @@ def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
 
 
 def _line_squares(values: Floats) -> Floats:
-    """Sum of squares that a straight line leaves of the values up to and with each, (n,)."""
+    """Residual sums of squares of straight lines through the first 1, 2, ..., n values, (n,)."""
     n = np.arange(1, values.size + 1, dtype=float)
     x = n - 1.0
     values = values - values.mean()
@@ -246,11 +263,14 @@ def _line_squares(values: Floats) -> Floats:
 
 
 def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
-    """The steady cycles of a step: those left when both ends are cut so that the mean is most certain.
+    """Select the steady cycles of a step: both ends are cut so that the mean is most certain.
 
     Args:
         motion, stiffness: complex, in each cycle [m or rad, N/m or N m/rad], (m,).
-        fewest: cycles that are kept at least.
+        fewest: smallest number of remaining cycles.
+
+    Returns:
+        Slice of the cycles.
 
     Notes:
         The marginal standard error rule (White 1997), over displacement and stiffness together. Up to half of the
@@ -264,7 +284,7 @@ def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
 
 
 def _truncation(series: Complex, most_cut: int) -> int:
-    """Entries of series, (k, m), to cut at the start, up to `most`, so that the means have the least squared error."""
+    """Number of entries to cut at the start of series, (k, m), for the smallest error of the means."""
     if most_cut < 1:
         return 0
     back = (series - series.mean(axis=1, keepdims=True))[:, ::-1]

@@ -1,7 +1,7 @@
-"""The harmonics of displacement and force: Fourier series fitted by least squares to rows anywhere in time.
+"""Harmonics of displacement and force: Fourier series fitted by least squares to rows at any times.
 
 A series of order m has real coefficients (mean, m cosines, m negative sines), (2 m + 1,), or complex ones, mean first,
-(m + 1,): c_k stands for Re c_k exp(2 pi i k phase). Phase counts cycles.
+(m + 1,): c_k is the term Re c_k exp(2 pi i k phase). Phase counts cycles.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from bushfit.reading.measurement import Complex, Floats
 
 #: Rows of a cycle behind each harmonic; two determine one, and more keep noise from being fitted.
 _ROWS_PER_HARMONIC = 5
-#: Harmonics of a step, as far as its rows tell them apart, and of the fits that search for its frequency.
+#: Harmonics of a step at most, and of the fits that search for its frequency.
 _HARMONICS, _FREQUENCY_HARMONICS = 15, 3
 #: Condition number of the scaled normal equations up to which rows tell harmonics apart; chosen: errors grow tenfold.
 _WORST_CONDITION = 100.0
@@ -35,7 +35,16 @@ _WHITE_P = 0.005
 
 
 def basis(phase: Floats, order: int, *drift: Floats) -> Floats:
-    """Columns 1, those of a drift, cos(2 pi k phase) and -sin(2 pi k phase) for k = 1 ... order, (n, columns)."""
+    """Basis of a Fourier series with drift.
+
+    Args:
+        phase: of each row [cycles], (n,).
+        order: number of harmonics.
+        drift: columns of a drift, (n,) each.
+
+    Returns:
+        Columns 1, drift, cos(2 pi k phase) and -sin(2 pi k phase) for k = 1 ... order, (n, 1 + drifts + 2 order).
+    """
     first = 1 + len(drift)
     rows = np.ones((first + 2 * order, phase.size))
     for row, values in zip(rows[1:first], drift, strict=True):
@@ -84,7 +93,7 @@ def resolved_order(rows_per_cycle: float, max_order: int) -> int:
 
 
 def spread_rows(rows: int, max_rows: int) -> NDArray[np.intp]:
-    """Rows that stand for all: every one of few, else `most`, spread by a step that keeps time with no cycle."""
+    """Numbers of up to `max_rows` rows, spread over all of them by a step that is no fraction of a cycle."""
     count = min(rows, max_rows)
     number = np.arange(count)
     golden = 0.6180339887498949  # ratio less 1: its multiples, less whole numbers, spread evenly
@@ -92,13 +101,16 @@ def spread_rows(rows: int, max_rows: int) -> NDArray[np.intp]:
 
 
 def cycle_harmonics(phase: Floats, values: Floats, order: int, drift: int = 0) -> tuple[Floats, Complex, Floats]:
-    """Mean, complex fundamental and scatter of what is left of each column, (k,) each, by least squares over rows.
+    """Fit harmonics to columns of values by least squares.
 
     Args:
         phase: of each row [cycles], (n,).
         values: (n, k).
         order: harmonics that are fitted.
         drift: power of the phase up to which a drift is fitted with them.
+
+    Returns:
+        Mean, complex fundamental, and standard deviation of the residuals of each column, (k,) each.
     """
     columns = basis(phase, order, *(phase**power for power in range(1, drift + 1)))
     solution = np.linalg.lstsq(columns, values, rcond=None)[0]
@@ -128,12 +140,15 @@ class HarmonicFit:
     left_over: Complex
 
     @classmethod
-    def of(cls, time: Floats, displacement: Floats, force: Floats, edges: Floats) -> "HarmonicFit":
-        """The fit with the frequency at which the phase of the displacement does not drift from cycle to cycle.
+    def to_cycles(cls, time: Floats, displacement: Floats, force: Floats, edges: Floats) -> "HarmonicFit":
+        """Fit whole cycles, at the frequency at which the phase of the displacement does not drift between cycles.
 
         Args:
             time, displacement, force: [s], [m or rad] and [N or N m], (n,).
-            edges: where the cycles begin and the last one ends [s], (cycles + 1,).
+            edges: beginnings of the cycles, and end of the last one [s], (cycles + 1,).
+
+        Returns:
+            Fit with up to 15 harmonics.
         """
         time, values = time - (edges[0] + edges[-1]) / 2.0, np.stack((displacement, force))
         count = edges.size - 1
@@ -151,7 +166,7 @@ class HarmonicFit:
 
     @classmethod
     def _fit_at(cls, frequency: float, time: Floats, values: Floats, count: int, order: int) -> "HarmonicFit":
-        """The fit over `count` cycles about time 0, with `order` harmonics or fewer, at a frequency that is given."""
+        """Fit `count` cycles about time 0 with at most `order` harmonics, at a fixed frequency [Hz]."""
         order, solution, covariance = _drift_and_harmonics(time, values, frequency, order)
         squares, sums, rows_in = np.zeros((2, 2)), np.zeros((2, count), dtype=complex), np.zeros(count)
         for rows, columns in _chunks(time, frequency, order):
@@ -171,12 +186,15 @@ class HarmonicFit:
         return cls(frequency, coefficients, chance, freedom, squares, sums)
 
     def errors(self) -> Floats:
-        """Standard errors of |K|, relative to |K|, and of its phase [rad], (2,).
+        """Standard errors of the stiffness K.
+
+        Returns:
+            Error of |K|, relative to |K|, and of its phase [rad], (2,).
 
         Notes:
-            e = f - K x is what the noise of both channels leaves in the force. Where e is white, its scatter over the
-            rows gives the errors. Where the cycles scatter more than white noise would let them (hum, slow wander),
-            their own scatter gives them.
+            e = f - K x is the force residual by the noise of both channels. If e is white, its scatter over the rows
+            gives the errors. If the cycles scatter more than white noise does (hum, slow wander), the scatter of the
+            cycles gives them.
         """
         x, f = self.coefficients[:, 1]
         k = f / x
@@ -201,8 +219,12 @@ class HarmonicFit:
 
 
 def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: int) -> tuple[int, Floats, Floats]:
-    """How many harmonics the rows tell apart, `order` at most, the drift and these of both channels, (p, 2), and the
-    covariance of that for unit variance of the values, (p, p)."""
+    """Fit drift and harmonics to both channels.
+
+    Returns:
+        Number of harmonics that the rows determine, at most `order`; coefficients, (p, 2); and their covariance for
+        values of unit variance, (p, p).
+    """
     max_order = order = max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
     size = _DRIFT_TERMS + 2 * max_order
     gram, moments = np.zeros((size, size)), np.zeros((size, 2))
@@ -222,7 +244,7 @@ def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: 
 
 
 def _chunks(time: Floats, frequency: float, order: int) -> Iterator[tuple[slice, Floats]]:
-    """Rows of each chunk, and there the drift, the cosines and the negative sines, (3 + 2 order, m)."""
+    """Rows of each chunk, and the drift, cosines and negative sines at these rows, (3 + 2 order, m)."""
     half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
     for start in range(0, time.size, _CHUNK_ROWS):
         rows = slice(start, start + _CHUNK_ROWS)

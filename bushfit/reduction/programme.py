@@ -1,7 +1,7 @@
-"""Loop programmes: a record of several amplitudes or rates, one after the other, parted into loops.
+"""Loop programmes: a record of several amplitudes or rates, one after the other, split into loops.
 
-The strokes of the motion, from one turning point to the next, are told apart by their range and by the time between
-the crossings of their middles. A run of alike ones is a part; ramps, pauses and single cycles between are left out.
+The strokes of the motion, from one turning point to the next, are compared by their range and by the time between the
+crossings of their middles. A run of similar strokes is a part; ramps, pauses and single cycles between are left out.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -46,10 +46,10 @@ _TIMED = LoopFile(file="")
 
 @dataclass(frozen=True)
 class _SteadySpan:
-    """A part of a record: crossings of the middle it lies between, and what they settle.
+    """A part of a record with constant amplitude and rate.
 
     Args:
-        begin, end: of its cycles, on the clock of the record.
+        begin, end: limits of its cycles, on the clock of the record.
         period: of its cycles, on that clock.
         range: peak to peak [m or rad].
     """
@@ -71,15 +71,15 @@ class _SteadySpan:
 
 
 def programme(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
-    """The loops of a record in their order: one for each part of constant amplitude and rate.
+    """Split a record into its loops: one for each part of constant amplitude and rate.
 
     Args:
         loop: the whole record.
-        test: what a campaign says of it; rate, frequency and waveform settle the time of a record without it.
+        test: keys of the record in a campaign; rate, frequency and waveform give the time of a record without one.
 
     Returns:
-        The record itself where it has but one amplitude and rate, whatever comes before and after; else its parts,
-        which keep the time of the record. A softening is told of each.
+        The parts in order, with the time of the record and the softening of each. A record with one amplitude and rate
+        is returned whole.
 
     Raises:
         MeasurementError: amplitude or rate change all the time, so that no two cycles are alike.
@@ -88,21 +88,16 @@ def programme(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
         The first part of a record that begins with it keeps all its cycles; of any other the first cycle, which still
         remembers what came before, is left out where two more are left.
     """
-    time, motion = _thinned(loop)
+    step = slice(None, None, -(-loop.displacement.size // ENOUGH_ROWS))
+    time, motion = _clock(loop)[step], loop.displacement[step]
+    sound = ~lone_outliers(time, motion)
+    time, motion = time[sound], motion[sound]
     spans = _spans(loop, time, motion)
     if not spans:
         return (loop,)
     if all(span.is_like(spans[0]) for span in spans[1:]):
         return (replace(loop, softening=_softening(loop, spans[0], from_rest=True)),)
     return tuple(_loops(loop, time, spans, test))
-
-
-def _thinned(loop: Loop) -> tuple[Floats, Floats]:
-    """Time [s], or number of the row where none was recorded, and displacement of rows enough to find the parts."""
-    step = slice(None, None, -(-loop.displacement.size // ENOUGH_ROWS))
-    time, motion = _clock(loop)[step], loop.displacement[step]
-    sound = ~lone_outliers(time, motion)
-    return time[sound], motion[sound]
 
 
 def _clock(loop: Loop) -> Floats:
@@ -185,26 +180,26 @@ def _long_stretches(changes: NDArray[np.bool_]) -> list[slice]:
 
 
 def _to_its_ends(span: _SteadySpan, time: Floats, motion: Floats, before: float, after: float) -> _SteadySpan:
-    """A part with the half cycle that lies beyond its crossings on either side, where that is as a period on.
+    """Extend a part by half a cycle on either side if the motion is periodic there.
 
-    `before` is where the part before it ends, or the record begins; `after` where the next begins, or the record ends.
+    The part is not extended beyond `before`, the end of the previous part, and `after`, the beginning of the next one.
     """
     begin, end = max(span.begin - span.period / 2.0, before), min(span.end + span.period / 2.0, after)
 
-    def repeats(low: float, high: float, shift: float) -> bool:
+    def is_periodic(low: float, high: float, shift: float) -> bool:
         rows = slice(*np.searchsorted(time, [low, high]))
         change = change_after(time, motion, shift, rows)
         return float(np.quantile(change, 0.9)) < SAME_MOTION * span.range if change.size else True
 
-    begin = begin if repeats(begin, span.begin, span.period) else span.begin
-    end = end if repeats(span.end, end, -span.period) else span.end
+    begin = begin if is_periodic(begin, span.begin, span.period) else span.begin
+    end = end if is_periodic(span.end, end, -span.period) else span.end
     near = _AT_END * span.period
     begin = float(time[0]) if begin - time[0] < near else begin
     return replace(span, begin=begin, end=float(time[-1]) if time[-1] - end < near else end)
 
 
 def _loops(loop: Loop, time: Floats, spans: Sequence[_SteadySpan], test: LoopFile) -> Iterator[Loop]:
-    """A loop for each part, with what was left out between them."""
+    """Cut out a loop for each part; the first cycle is left out if two more remain."""
     whole, last_end = _clock(loop), float(time[0])
     for number, span in enumerate(spans, start=1):
         begin = span.begin
@@ -228,7 +223,7 @@ def _loops(loop: Loop, time: Floats, spans: Sequence[_SteadySpan], test: LoopFil
 
 
 def left_out(gaps: Iterable[str], cycles: float) -> str:
-    """A sentence on how much of a record lies before and after its steady cycles, "" for nothing; so many are used."""
+    """Sentence on the gaps before and after the steady cycles, "" for no gap, and on the number of cycles used."""
     parts = [f"{gap} {side} its steady cycles" for gap, side in zip(gaps, ("before", "after"), strict=True) if gap]
     return f"{' and '.join(parts)} are left out; {cycles:.3g} cycles are used"
 
@@ -246,7 +241,7 @@ def _softening(loop: Loop, span: _SteadySpan, *, from_rest: bool) -> float | Non
 
 
 def _stiffness(loop: Loop, begin: float, period: float) -> tuple[complex, float]:
-    """Complex stiffness of the cycle that begins then [N/m or N m/rad], and its relative error."""
+    """Complex stiffness [N/m or N m/rad] of the cycle that starts at `begin`, and its relative error."""
     clock = _clock(loop)
     first, last = np.searchsorted(clock, [begin, begin + period])
     rows = slice(first, last, max(1, (last - first) // 10_000))

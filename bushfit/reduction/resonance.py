@@ -55,8 +55,8 @@ class Resonance:
     @property
     def peak(self) -> tuple[float, float]:
         """Frequency of the largest transmissibility [Hz], and this |T|."""
-        place = int(np.argmax(np.abs(self.test.transmissibility)))
-        return float(self.test.frequency[place]), float(abs(self.test.transmissibility[place]))
+        index = int(np.argmax(np.abs(self.test.transmissibility)))
+        return float(self.test.frequency[index]), float(abs(self.test.transmissibility[index]))
 
     @property
     def transmissibility(self) -> Complex:
@@ -110,16 +110,20 @@ def transmissibility(stiffness: Complex, mass: float, frequency: Floats) -> Comp
 def response(
     stiffness: Callable[[Floats], Complex], mass: float, frequency: Floats, base_amplitude: Floats
 ) -> tuple[Floats, Complex]:
-    """Amplitude X of a mount [m] and its transmissibility [-], (n,) each, where the stiffness depends on X itself.
+    """Response of a mass on a mount whose stiffness depends on its amplitude X.
 
     Args:
         stiffness: complex K [N/m], (n,), at the frequencies for zero-to-peak amplitudes of the mount [m], (n,).
         mass: that moves on the mount [kg].
-        frequency, base_amplitude: [Hz], and displacement of the base, zero-to-peak [m], (n,).
+        frequency: [Hz], (n,).
+        base_amplitude: displacement of the base, zero-to-peak [m], (n,).
+
+    Returns:
+        Amplitude X [m] and complex transmissibility [-], (n,) each.
 
     Notes:
-        Solves X = |T(K(X)) - 1| X_base by halving an interval of ln X. Should a mount be so soft that several X do, as
-        with a jump between two branches of a resonance, this is one of them.
+        Solves X = |T(K(X)) - 1| X_base by halving an interval of ln X. If several X are solutions, as with
+        two branches of a softening resonance, the result is one of them.
     """
     inertia = mass * (2.0 * np.pi * frequency) ** 2
 
@@ -140,22 +144,25 @@ def response(
 
 
 def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
-    """Stiffness over frequency and amplitude reached, from a resonance test.
+    """Reduce a resonance test to stiffness over frequency and the amplitude reached.
 
     Args:
         test: at least a dozen rows.
         mass: that moves on the mount [kg].
 
+    Returns:
+        Points with their standard errors.
+
     Raises:
-        MeasurementError: phases that show no loss whichever way they count, a storage stiffness below zero, or no point
-            of which the error is within LARGEST_ERROR.
+        MeasurementError: phases that show no loss of either sign, a storage stiffness below zero, or no point with an
+            error within LARGEST_ERROR.
 
     Notes:
-        Rows next to each other are averaged to MOST_POINTS points: their flexibility 1/K = (1 - 1/T)/(M omega^2), in
-        which an error of T counts as it is however small |T - 1|. The relative standard error of T is the scatter of
-        these points about a smooth curve (see `_scatter`), so errors that neighbouring rows of a slow sweep share count
-        in full; what all points share, such as the gain of an accelerometer, shows only as far as no smooth stiffness
-        takes it up, and a wrong mass not at all: it is in no error here.
+        Neighbouring rows are averaged to MOST_POINTS points by their flexibility 1/K = (1 - 1/T)/(M omega^2), to which
+        an error of T contributes independently of |T - 1|. The relative standard error of T is the scatter of these
+        points about a smooth curve (see `_scatter`), which includes errors common to neighbouring rows. It includes an
+        error common to all points, such as the gain of an accelerometer, only where no smooth stiffness explains it,
+        and never that of a wrong mass.
     """
     turned = _is_turned(test)
     ratio = np.conj(test.transmissibility) if turned else test.transmissibility
@@ -237,8 +244,8 @@ def _scatter(frequency: Floats, amplitude: Floats, ratio: Complex) -> Floats:
     Notes:
         1/T = 1 - M omega^2/K is linear in the flexibility 1/K. That is fitted over all points by a function linear in
         ln f and quadratic in ln X, by least squares of dT/T with Huber's weights (a point pulls less from two standard
-        deviations on); the scatter is the median of |dT/T| about it over the nearest 15 points. Where the true
-        stiffness bends more, this counts as scatter too.
+        deviations on); the scatter is the median of |dT/T| about it over the nearest 15 points. A true
+        stiffness that bends more adds to the scatter.
     """
     logs = [np.log(values) - np.mean(np.log(values)) for values in (frequency, amplitude)]
     terms = np.stack([np.ones_like(frequency), *logs, logs[1] ** 2], axis=1)

@@ -78,9 +78,13 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class SkippedStretch:
-    """A stretch of a history [s] with cycles that make no operating point, and why.
+    """A stretch of a history that gives no operating point.
 
-    `steady` is whether it has as many cycles as a step needs, and is no mere ramp or pause.
+    Args:
+        name: of the history.
+        start, end: of the stretch [s].
+        why: reason.
+        steady: True if it has enough cycles for a step, and is no ramp or pause.
     """
 
     name: str

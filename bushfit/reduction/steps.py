@@ -40,7 +40,10 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
     Args:
         histories: time, displacement and force, of one direction; steps may be joined by ramps and pauses.
         fewest_cycles: steady cycles that make a point.
-        levels: amplitudes the test was meant to have [m or rad]; without them, amplitudes that lie close make a level.
+        levels: amplitudes the test was meant to have [m or rad]; without them, close amplitudes make a level.
+
+    Returns:
+        Operating points, stretches without one, and the number of outliers.
 
     Raises:
         MeasurementError: no steady sine in any of them, or one far off every level.
@@ -75,7 +78,7 @@ def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
     Returns:
         Frequency [Hz], rough amplitude [m or rad] and number of cycles of each.
     """
-    cycles = Cycles.of(history.time, history.displacement)
+    cycles = Cycles.count(history.time, history.displacement)
     found = []
     for run in cycles.runs():
         edges = cycles.edges[run.start : run.stop + 1]
@@ -89,10 +92,10 @@ def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
 
 
 def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStretch]]:
-    """The steps of a history with `fewest` cycles or more, and the stretches that make none."""
+    """Steps of a history with at least `fewest` cycles, and the stretches without one."""
     found: list[tuple[float, float, Step]] = []
     skipped: list[SkippedStretch] = []
-    cycles = Cycles.of(history.time, history.displacement)
+    cycles = Cycles.count(history.time, history.displacement)
     for run in cycles.runs():
         motion, force = cycles.fundamentals(run, history.displacement, history.force)
         edges = cycles.edges[run.start : run.stop + 1]
@@ -114,10 +117,10 @@ def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStret
 
 
 def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
-    """The steps of a history, each with start and end of its cycles [s], and only the longest part of a broken one.
+    """Join the parts of broken steps: the longest part remains.
 
-    An outlier, or an amplitude that creeps, breaks a step: its sine goes on in phase after a cycle or two. If one of
-    the parts is brief, their frequencies may differ by more.
+    An outlier or a creeping amplitude breaks a step: its sine goes on in phase after a cycle or two. The frequencies of
+    the parts may differ by more if one of them is brief. The steps come with start and end of their cycles [s].
     """
     joined: list[Step] = []
     last_end = -np.inf
@@ -137,7 +140,7 @@ def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
 
 
 def _unusable(cycles: Cycles, inside: slice, fewest: int) -> str:
-    """Why some cycles make no point, as far as that shows without a fit; empty where they may make one."""
+    """Reason why cycles give no point that is known before a fit; empty if they may give one."""
     count = inside.stop - inside.start
     frequency = count / (cycles.edges[inside.stop] - cycles.edges[inside.start])
     if count < fewest:
@@ -149,7 +152,7 @@ def _unusable(cycles: Cycles, inside: slice, fewest: int) -> str:
 
 
 def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: Complex, fewest: int) -> Step | None:
-    """The operating point of one piece of the cycles, less its transient; None where it is not steady.
+    """Operating point of one piece of the cycles, without its transient; None if it is not steady.
 
     Motion and force are the complex fundamental in each cycle of the piece [m or rad, N or N m], (k,).
     """
@@ -164,7 +167,7 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
     if _creeps(np.log(np.diff(starts)), _SETTLING_FREQUENCY) or _creeps(np.log(np.abs(steady_motion)), 0.03):
         return None
     rows = slice(cycles.first_rows[used.start], cycles.first_rows[used.stop])
-    fit = HarmonicFit.of(history.time[rows], history.displacement[rows], history.force[rows], edges)
+    fit = HarmonicFit.to_cycles(history.time[rows], history.displacement[rows], history.force[rows], edges)
     x, f = fit.coefficients[:, 1]
     errors, distortion = fit.errors().tolist(), fit.distortion().tolist()
     return Step(
@@ -232,6 +235,6 @@ def _grouped(steps: Sequence[Step], levels: Sequence[float]) -> list[Step]:
 
 
 def _clusters(values: Floats, gap: float) -> NDArray[np.intp]:
-    """Number of the group of each value, (n,): neighbours in a group lie no further apart than `gap`, groups do."""
+    """Group numbers of values, (n,): sorted neighbours more than `gap` apart are in different groups."""
     order = np.argsort(values)
     return np.concatenate(([0], np.cumsum(np.diff(values[order]) > gap)))[np.argsort(order)]

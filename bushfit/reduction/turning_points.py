@@ -37,7 +37,7 @@ def turning_points(values: Floats, prominence: float) -> Integers:
 
 
 def _reversals(values: Floats, rows: Integers) -> Integers:
-    """Rows, of those given, at which the values turn from one of them to the next, ends included."""
+    """Select the rows at which the values change direction, ends included."""
     direction = np.sign(np.diff(values[rows]))
     inner = 1 + np.flatnonzero(direction[1:] != direction[:-1])
     return np.concatenate((rows[:1], rows[inner], rows[1:][-1:]))
@@ -83,7 +83,7 @@ class MotionTurns(NamedTuple):
 
     Args:
         motion: rows of the turning points of the motion itself, (turns,).
-        ripple: rows of the turning points of the ripple, (ripple turns,); empty where there is none.
+        ripple: rows of the turning points of the ripple, (ripple turns,); empty without a ripple.
         prominence: smallest stroke that is not noise [m or rad].
     """
 
@@ -173,12 +173,18 @@ def middle_crossings(time: Floats, motion: Floats, turns: Integers, middle: Floa
 
 
 def least_prominence(values: Floats) -> float:
-    """How far a turning point of a channel has to stand out to be none of noise, in the units of the values.
+    """Smallest prominence of a turning point that is no noise.
+
+    Args:
+        values: of a channel, (n,).
+
+    Returns:
+        Prominence in the unit of the values.
 
     Notes:
-        By 0.1 % of the range, by ten standard deviations of the noise (which goes half as far in 10^6 rows), and by
-        four steps of the analogue-to-digital converter, which flickers between two. The noise is that of sixth
-        differences, of which a sine of ten rows a cycle leaves 0.2 %, in the windows with the least motion.
+        The largest of 0.1 % of the range, ten standard deviations of the noise (whose extremes in 10^6 rows are half
+        that), and four steps of the analogue-to-digital converter. The noise is estimated from sixth differences in
+        the windows with the least motion; a sine of ten rows per cycle contributes 0.2 % of its amplitude to them.
     """
     change = np.abs(np.diff(values))
     converter_step = float(change[change > 0.0].min(initial=np.inf))
