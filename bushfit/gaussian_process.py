@@ -127,8 +127,8 @@ def patterns(
     chosen = np.arange(len(distinct)) if len(distinct) <= nodes else spread_nodes(distinct, nodes)
     correlation = matern(distinct[chosen], distinct[chosen]) + _JITTER * np.eye(chosen.size)
     variance, vectors = np.linalg.eigh(correlation)  # the largest last
-    kept = (variance > minimum * variance[-1]) & (np.arange(variance.size) >= variance.size - count)
-    shapes = matern(distinct, distinct[chosen]) @ vectors[:, kept] / np.sqrt(variance[kept])
+    significant = (variance > minimum * variance[-1]) & (np.arange(variance.size) >= variance.size - count)
+    shapes = matern(distinct, distinct[chosen]) @ vectors[:, significant] / np.sqrt(variance[significant])
     return first[chosen], shapes.T[:, inverse.ravel()]
 
 
@@ -149,7 +149,7 @@ class RestrictedLikelihood:
     squares: Array
 
     @classmethod
-    def of(cls, columns: Array, residual: Array, span: Array) -> "RestrictedLikelihood":
+    def from_columns(cls, columns: Array, residual: Array, span: Array) -> "RestrictedLikelihood":
         """The likelihood of columns beside parameters.
 
         Args:

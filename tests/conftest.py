@@ -80,7 +80,7 @@ def campaign() -> Campaign:
 @pytest.fixture(scope="session")
 def result(campaign: Campaign) -> Result:
     """The joint fit to its axial tests."""
-    return fit_joint(PreparedCampaign.of(campaign))
+    return fit_joint(PreparedCampaign.from_campaign(campaign))
 
 
 @pytest.fixture(scope="session")

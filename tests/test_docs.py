@@ -157,7 +157,9 @@ def test_what_the_page_on_the_code_names_is_there(root: Path) -> None:
     names = re.findall(r"`([a-z]\w*(?:\.\w+)+)`", re.sub(r"`[\w/]+\.(?:py|json)`", "", text))
     assert len(names) > 30
     assert [name for name in names if not is_there(name)] == []
-    assert not any(map(is_there, ("fitting.prepared_campaign.Data.off", "fitting.date.Data")))
+    assert not any(
+        map(is_there, ("fitting.prepared_campaign.PreparedCampaign.from_campaigns", "fitting.prepare.PreparedCampaign"))
+    )
 
 
 def is_there(name: str) -> bool:

@@ -38,7 +38,7 @@ def off(root: Path) -> Callable[[Campaign], tuple[float, float]]:
     frequency, amplitude, stiffness, loss = known.iloc[:, 1:].to_numpy().T
 
     def worst(campaign: Campaign) -> tuple[float, float]:
-        data = PreparedCampaign.of(campaign)
+        data = PreparedCampaign.from_campaign(campaign)
         assert data.smallest_sweep.amplitude.max() == 1e-4
         found = fit_two_step(data).result.model.stiffness("radial", frequency, amplitude)
         apart = np.abs(found) / stiffness - 1.0, found.imag / found.real - loss
@@ -89,7 +89,9 @@ def campaign(root: Path) -> Campaign:
 @pytest.fixture(scope="module")
 def compound(campaign: Campaign) -> Result:
     return fit_joint(
-        PreparedCampaign.of(campaign), effects=PreparedCampaign.of(campaign).effects, directions=["DMA", "DMA 2"]
+        PreparedCampaign.from_campaign(campaign),
+        effects=PreparedCampaign.from_campaign(campaign).effects,
+        directions=["DMA", "DMA 2"],
     )
 
 
@@ -176,7 +178,7 @@ def test_effects_fitted_to_half_of_the_masses_shrink_the_gap_on_the_other_half(
     root: Path, campaign: Campaign, compound: Result
 ) -> None:
     """No name closes the gap of this rubber; effects that are chosen by hand help where they were not fitted."""
-    half = PreparedCampaign.of(load_campaign(root / "configs/epdm_70_half.toml"))
+    half = PreparedCampaign.from_campaign(load_campaign(root / "configs/epdm_70_half.toml"))
     found = diagnose(half)
     print(found.verdict, found.summary, sep=": ")
     assert found.verdict in ("unexplained", "described")

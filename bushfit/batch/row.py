@@ -156,7 +156,7 @@ def _run_commands(
         return ran.result, ran.diagnosed.diagnosis if ran.diagnosed else None, files
     start = result = load_result(Path(settings.model)) if settings.model else None
     diagnosis, joint, files = None, None, {}
-    data = PreparedCampaign.of(campaign) if set(commands) - {"predict"} else None
+    data = PreparedCampaign.from_campaign(campaign) if set(commands) - {"predict"} else None
     if "fit" in commands and data:
         fitted = fit(data, directions=settings.directions or (), effects=settings.effects or ())
         result, files = fitted.result, encode_all(fitted.files, formats)

@@ -281,8 +281,8 @@ def _fit_families(
 ) -> tuple[list[ComparedResult], list[FittedFamily], list[str]]:
     """Fit model families to a campaign, the model of its [fit] first; all that the library has unless named."""
     data = prepare_tests(campaign)
-    data_sets = [data_set.with_weight() for data_set in data.chosen(directions or None)]
-    model = data.started(data.effects, data_sets, {})
+    data_sets = [data_set.with_weight() for data_set in data.select_tests(directions or None)]
+    model = data.starting_model(data.effects, data_sets, {})
     fixed = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]
     families, unlikely = fit_families(model, data_sets, names, fixed, data.bounds)
     adjusted = iter(holm([family.p for family in families if family.p is not None]))

@@ -133,7 +133,7 @@ def prepare_tests(campaign: Campaign | PreparedCampaign, loss: Loss | None = Non
     """
     if isinstance(campaign, PreparedCampaign):
         return campaign
-    return PreparedCampaign.of(replace(campaign, fit=replace(campaign.fit, loss=loss)) if loss else campaign)
+    return PreparedCampaign.from_campaign(replace(campaign, fit=replace(campaign.fit, loss=loss)) if loss else campaign)
 
 
 def campaign_files(

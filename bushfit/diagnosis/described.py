@@ -21,7 +21,7 @@ from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import with_model_error
-from bushfit.fitting.preparation import MeasuredTest, parted
+from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.fitting.robust import WeightedFit
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
@@ -91,8 +91,8 @@ def describe(
     except FitError:  # too few points are left for the parameters
         return None
     model = replace(fitted.solution.model, effects=(*evidence.model.effects, NAME), unnamed=correction)
-    after = Evidence(fitted.solution.at(model, harmonic), harmonic)
-    whole = Evidence(fitted.solution.at(model, evidence.data_sets), evidence.data_sets)
+    after = Evidence(fitted.solution.moved_to(model, harmonic), harmonic)
+    whole = Evidence(fitted.solution.moved_to(model, evidence.data_sets), evidence.data_sets)
     like = fingerprint(base, *weighed(base, rig), start, bounds)
     texts = _words(correction, like), _trusted(correction, whole)
     return GapDescription(after, fitted, _held_out(evidence, fitted), like, *texts)
@@ -123,8 +123,8 @@ def _held_out(before: Evidence, fitted: WeightedFit) -> HoldOut:
     """Whole runs inside the range, in turn predicted from the others, without the correction and with it."""
     solution = before.solution
     both = (
-        LeaveOut.of(solution.jacobian[solution.moving], solution.residual),
-        LeaveOut.of(fitted.solution.jacobian[fitted.solution.moving], fitted.solution.residual),
+        LeaveOut.from_fit(solution.jacobian[solution.moving], solution.residual),
+        LeaveOut.from_fit(fitted.solution.jacobian[fitted.solution.moving], fitted.solution.residual),
     )
     residuals = dict[str, Array]()
     for part in _inside(before.data_sets):
@@ -142,7 +142,7 @@ def _held_out(before: Evidence, fitted: WeightedFit) -> HoldOut:
 def _inside(data_sets: Sequence[MeasuredTest]) -> Iterator[HoldOutPart]:
     """Whole runs inside the range: every third frequency of each, the middle level, a repeat."""
     chosen: dict[str, dict[MeasuredTest, Array]] = {}
-    for sweep in parted(data_sets)[1]:
+    for sweep in split_by_kind(data_sets)[1]:
         rank = np.unique(sweep.step, return_inverse=True)[1]
         levels, level = np.unique(sweep.held, return_inverse=True)
         several = np.ptp(sweep.repeat) > 0
@@ -183,7 +183,7 @@ def _trusted(correction: Unnamed, whole: Evidence) -> str:
     ]
     misfit = max((region.excess for region in locate(whole) if region.kind == "loop"), default=0.0)
     stays = f" (their form stays off by {number(misfit, 2)} times the noise)" if misfit else ""
-    loops = f", of loops the first harmonic only{stays}" if parted(whole.data_sets)[0] else ""
+    loops = f", of loops the first harmonic only{stays}" if split_by_kind(whole.data_sets)[0] else ""
     return f"to be trusted between these tests alone ({'; '.join(patches)}){loops}, and of this bushing"
 
 

@@ -22,7 +22,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds, jacobian, residual
-from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, parted
+from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, split_by_kind
 from bushfit.progress import track
 from bushfit.reading.measurement import Stepped
 
@@ -194,7 +194,7 @@ class _Fitted:
     def from_evidence(cls, evidence: Evidence) -> _Fitted:
         solution = evidence.solution
         free = solution.moving
-        return cls(evidence, free, LeaveOut.of(solution.jacobian[free], solution.residual))
+        return cls(evidence, free, LeaveOut.from_fit(solution.jacobian[free], solution.residual))
 
     def predicted(self, part: HoldOutPart, bounds: Bounds) -> tuple[Array, Array] | Skipped:
         """Predict a part from the rest.
@@ -265,7 +265,7 @@ def parts(data_sets: Sequence[MeasuredTest]) -> Iterator[HoldOutPart]:
             name, [chosen.get(data, np.zeros(data.size // data.parts, dtype=bool)) for data in data_sets]
         )
 
-    loops, sweeps = parted(data_sets)
+    loops, sweeps = split_by_kind(data_sets)
     for stepped, (line_name, top) in _NAMES.items():
         mine = [sweep for sweep in sweeps if sweep.sweep.stepped == stepped]
         ranks = {sweep: np.unique(sweep.held, return_inverse=True)[1] for sweep in mine}

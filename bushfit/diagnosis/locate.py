@@ -8,7 +8,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Where
 from bushfit.effects.contract import Array
 from bushfit.fitting.measured_sweep import LineMisfit
-from bushfit.fitting.preparation import parted
+from bushfit.fitting.preparation import split_by_kind
 from bushfit.units import number
 
 #: Smooth misfit, in units of the noise of its root mean square, from which a region is worth a line.
@@ -47,7 +47,7 @@ def locate(evidence: Evidence) -> tuple[Where, ...]:
 
 def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
     """Per direction, where the storage and the loss stiffness of its sweeps depart smoothly from the model."""
-    _, sweeps = parted(evidence.data_sets)
+    _, sweeps = split_by_kind(evidence.data_sets)
     lines = [line for sweep in sweeps for line in sweep.lines(evidence.model)]
     for direction, stepped in dict.fromkeys((line.direction, line.stepped) for line in lines):
         mine = [line for line in lines if line.direction == direction and line.stepped == stepped]
@@ -143,7 +143,7 @@ def _way(first: float, last: float) -> str:
 
 def _loop_regions(evidence: Evidence) -> Iterator[Where]:
     """Per loop, the harmonic in which its force departs most from the model."""
-    loops, _ = parted(evidence.data_sets)
+    loops, _ = split_by_kind(evidence.data_sets)
     for data_set in loops:
         columns, amplitude = data_set.contrasts(), data_set.drive.amplitude
         norms = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)

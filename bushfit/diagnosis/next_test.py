@@ -13,7 +13,7 @@ import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array, Level
-from bushfit.fitting.preparation import MeasuredTest, parted
+from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.geometry import TRANSLATION, Direction, Place
 from bushfit.model.model import Model
 
@@ -108,7 +108,7 @@ def _candidates(data_sets: Sequence[MeasuredTest]) -> Iterator[NextTest]:
     places = dict.fromkeys(data_set.direction for data_set in data_sets)
     for place, test in product(places, FIXTURE_TESTS):
         yield replace(test, place=place, sentence=test.sentence.format(place=place))
-    swept = {sweep.direction for sweep in parted(data_sets)[1]}
+    swept = {sweep.direction for sweep in split_by_kind(data_sets)[1]}
     yield from (test for test in BUSHING_TESTS if test.place not in swept)
 
 

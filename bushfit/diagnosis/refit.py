@@ -64,7 +64,7 @@ def refitted(
     if columns is None:
         return {name: Evidence(fit.solution, evidence.data_sets) for name, fit in near.items()}
     return {
-        name: Evidence(fit.solution.at(fit.model, evidence.data_sets), evidence.data_sets, fit.solution)
+        name: Evidence(fit.solution.moved_to(fit.model, evidence.data_sets), evidence.data_sets, fit.solution)
         for name, fit in near.items()
     }
 
@@ -133,4 +133,4 @@ def refit_with_free_columns(
     starts = [evidence.model, *([evidence.model.with_values(start_values)] if start_values else [])]
     fits = [solve(model, tests, names, bounds, strict=False) for model in starts]
     model = min(fits, key=lambda each: each.chi_square).model
-    return replace(evidence, solution=evidence.solution.at(model, evidence.data_sets))
+    return replace(evidence, solution=evidence.solution.moved_to(model, evidence.data_sets))

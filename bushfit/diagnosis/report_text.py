@@ -23,7 +23,7 @@ from bushfit.diagnosis.record import CandidateResult, Diagnosis, Named, Odds, Wh
 from bushfit.diagnosis.verdict import Composition, Finding
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.fitting.preparation import parted, with_gains
+from bushfit.fitting.preparation import split_by_kind, with_gains
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned, number
@@ -310,7 +310,7 @@ class DiagnosisWriter:
 
     def _fitted(self, evidence: Evidence) -> Evidence:
         """Fit of the same model with free gains of loops, unless the class of the gain is stated."""
-        loops = parted(evidence.data_sets)[0]
+        loops = split_by_kind(evidence.data_sets)[0]
         if self.data.campaign.rig.stiffness_errors[0] is not None or not any(loop.gain_weighs for loop in loops):
             return evidence
         if evidence not in self._refitted:

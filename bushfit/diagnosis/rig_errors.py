@@ -13,7 +13,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import COMPOUND, KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, alike, parted, with_gains
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, group_repeats, split_by_kind, with_gains
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
 #: Kinds of errors, by their place in `Node.errors`.
@@ -135,7 +135,7 @@ def scattering_alone(evidence: Evidence) -> Evidence:
         else data_set
         for data_set in with_gains(evidence.data_sets, weigh=False)
     )
-    return Evidence(evidence.solution.at(evidence.model, data_sets), data_sets)
+    return Evidence(evidence.solution.moved_to(evidence.model, data_sets), data_sets)
 
 
 def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:
@@ -154,7 +154,7 @@ def nodes(evidence: Evidence) -> list[Node]:
     Returns:
         Nodes whose weights sum to one.
     """
-    sweeps = parted(evidence.data_sets)[1]
+    sweeps = split_by_kind(evidence.data_sets)[1]
     freedom = max((sweep.noise.scatter_freedom for sweep in sweeps), default=0)
     thirds = (np.arange(3) + 0.5) / 3
     scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < KNOWN else [1.0]
@@ -179,10 +179,10 @@ def blocks(evidence: Evidence, rig: RigSettings) -> list[Block]:
     Returns:
         Blocks that together contain every row once.
     """
-    loops, sweeps = parted(evidence.data_sets)
+    loops, sweeps = split_by_kind(evidence.data_sets)
     gain = of_class(rig, ASSUMED)
     found = [block for sweep in sweeps for block in _of_sweep(evidence, sweep, gain)]
-    for group in alike(loops):
+    for group in group_repeats(loops):
         rows = np.concatenate([np.arange(*_ends(evidence, loop)) for loop in group])
         column = gain[0] * np.concatenate([loop.unit_gain for loop in group])
         found.append(Block(rows, column[None], np.array([_LOOP]), scatters=False))

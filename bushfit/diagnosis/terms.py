@@ -113,7 +113,7 @@ class Terms:
         residual_changes, unit = np.zeros((len(values), self.evidence.residual.size)), self.unit(model)
         change, base_stiffness = values * unit, base_value * unit
         for data_set, place in zip(self.data_sets, self.place, strict=True):
-            residual_changes[:, self.evidence.place[data_set]] = data_set.moved(
+            residual_changes[:, self.evidence.place[data_set]] = data_set.residual_change(
                 change[:, place], model, base_stiffness[place]
             )
         return residual_changes
@@ -138,7 +138,7 @@ class Terms:
         names, added = self.evidence.solution.coordinates.names, value * self.unit(model)
         rows, slopes = (
             jacobian(model, self.evidence.data_sets, names),
-            Coordinates.of(model, names).slopes(model.values),
+            Coordinates.of_parameters(model, names).slopes(model.values),
         )
         for data_set, place in zip(self.data_sets, self.place, strict=True):
             derivatives = data_set.jacobian_with(added[place], model, names, as_share=self.measure == "gain")

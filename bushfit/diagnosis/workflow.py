@@ -19,7 +19,7 @@ from bushfit.diagnosis.verdict import judged
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
 from bushfit.fitting.design import fit_from
-from bushfit.fitting.preparation import parted, with_gains
+from bushfit.fitting.preparation import split_by_kind, with_gains
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.robust import estimate, outlier_warnings, outliers_at
 from bushfit.model.model import Model
@@ -103,7 +103,7 @@ def _without_wild(
     for _ in range(_MOST_ROUNDS):
         begun = _begin(data, model, settings)
         known_rows = {(outlier.test, outlier.row) for outlier in excluded_points}  # a robust fit finds them anew
-        found = (*begun.outliers, *outliers_at(begun.evidence.model, parted(begun.evidence.data_sets)[1]))
+        found = (*begun.outliers, *outliers_at(begun.evidence.model, split_by_kind(begun.evidence.data_sets)[1]))
         wild = tuple(outlier for outlier in found if (outlier.test, outlier.row) not in known_rows)
         if not wild:
             break
@@ -130,10 +130,10 @@ class InitialFit(NamedTuple):
 def _begin(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> InitialFit:
     """Fit the starting model with the adopted effects; gains of loops are errors of a stated or assumed class."""
     hint = "add measured tests to the campaign"
-    data_sets = data.some(data.data_sets, "there is nothing to diagnose", hint)
+    data_sets = data.require_tests(data.data_sets, "there is nothing to diagnose", hint)
     fixed = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
-    start = data.start(data_sets, {})
-    model = model or data.started(data.effects, data_sets, {})
+    start = data.start_values(data_sets, {})
+    model = model or data.starting_model(data.effects, data_sets, {})
     start = {name: value for name, value in start.items() if name in model.values and name not in fixed}
     for name in settings.adopt:
         if get_mistake(name) is None and name not in (model := model.with_twin(name)).effects:

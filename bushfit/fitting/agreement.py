@@ -49,25 +49,25 @@ class LeaveOut:
     Args:
         basis: orthonormal basis of what the parameters can do to the whitened residuals, (n, m).
         back: how far the parameters move, in coordinates, with a unit along the basis, (k, m).
-        along: the residuals along the basis, (m,).
+        components: the residuals along the basis, (m,).
         residual: the whitened residuals, (n,).
     """
 
     basis: Array
     back: Array
-    along: Array
+    components: Array
     residual: Array
 
     @classmethod
-    def of(cls, jacobian: Array, residual: Array) -> "LeaveOut":
+    def from_fit(cls, jacobian: Array, residual: Array) -> "LeaveOut":
         """Build it from the derivatives of the whitened residuals by coordinate, (k, n), and the residuals, (n,).
 
         What all rows together leave open moves no residual, and stays where it is.
         """
         basis, size, directions = np.linalg.svd(jacobian.T, full_matrices=False)
-        seen = size > _LEAST_SEEN * size.max(initial=0.0)
-        basis = basis[:, seen]
-        return cls(basis, directions[seen].T / size[seen], basis.T @ residual, residual)
+        determined = size > _LEAST_SEEN * size.max(initial=0.0)
+        basis = basis[:, determined]
+        return cls(basis, directions[determined].T / size[determined], basis.T @ residual, residual)
 
     def open(self, rows: Array) -> Array:
         """Mask of the parameters that the fit leaves open without these rows, (k,)."""
@@ -83,8 +83,8 @@ class LeaveOut:
         """
         if self.open(rows)[:first].any():
             return None
-        step = (self.back @ self._moved(rows))[:first]
-        return None if np.abs(step).max(initial=0.0) > _LONGEST_STEP else step
+        change = (self.back @ self._basis_step(rows))[:first]
+        return None if np.abs(change).max(initial=0.0) > _LONGEST_STEP else change
 
     def predicted(self, rows: Array, clusters: Array, *, stepped: bool = True) -> tuple[Array, Array]:
         """Residuals of these rows, (n,) each, after that step: in units of noise, and whitened by the error of the
@@ -100,17 +100,17 @@ class LeaveOut:
             rest: A^-1 M A^-1, where M adds what each cluster pulls at the parameters (Liang and Zeger 1986, sandwich).
             Of the noise that the tests are known to have no direction may have less.
         """
-        moved, out = self._moved(rows) * stepped, self.basis[rows]
-        plain = self.residual[rows] + out @ moved
-        left = self.residual + self.basis @ moved
-        left[rows] = 0.0
-        pulls = np.zeros((int(clusters.max()) + 1, moved.size))
-        np.add.at(pulls, clusters, self.basis * left[:, None])
+        step, out = self._basis_step(rows) * stepped, self.basis[rows]
+        plain = self.residual[rows] + out @ step
+        remainder = self.residual + self.basis @ step
+        remainder[rows] = 0.0
+        pulls = np.zeros((int(clusters.max()) + 1, step.size))
+        np.add.at(pulls, clusters, self.basis * remainder[:, None])
         root = np.linalg.inv(np.linalg.cholesky(self._rest(rows)))
         size, vectors = np.linalg.eigh(root @ pulls.T @ pulls @ root.T)
         error = out @ root.T @ vectors * np.sqrt(np.maximum(size, 1.0))
-        along, scale, _ = np.linalg.svd(error, full_matrices=False)
-        return plain, plain - along @ ((1.0 - 1.0 / np.hypot(1.0, scale)) * (along.T @ plain))
+        directions, scale, _ = np.linalg.svd(error, full_matrices=False)
+        return plain, plain - directions @ ((1.0 - 1.0 / np.hypot(1.0, scale)) * (directions.T @ plain))
 
     def pulled(self, rows: Array, predicted: Array) -> Array:
         """Slopes of half the sum of squares of these rows, predicted from the rest, by the noise of each row, (all
@@ -123,16 +123,16 @@ class LeaveOut:
 
     def _rest(self, rows: Array) -> Array:
         """Information of the other rows along the basis, (m, m)."""
-        return np.eye(self.along.size) - self.basis[rows].T @ self.basis[rows]
+        return np.eye(self.components.size) - self.basis[rows].T @ self.basis[rows]
 
-    def _moved(self, rows: Array) -> Array:
+    def _basis_step(self, rows: Array) -> Array:
         """The step along the basis, (m,)."""
-        return -np.linalg.solve(self._rest(rows), self.along - self.basis[rows].T @ self.residual[rows])
+        return -np.linalg.solve(self._rest(rows), self.components - self.basis[rows].T @ self.residual[rows])
 
 
-def misfits(model: Model, fitted: Sequence[MeasuredTest], left: Sequence[MeasuredTest] = ()) -> tuple[Misfit, ...]:
+def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = ()) -> tuple[Misfit, ...]:
     """How well a model meets each test, and each run of those that have several; `left` are tests not fitted."""
-    pairs = [(data_set, True) for data_set in fitted] + [(data_set, False) for data_set in left]
+    pairs = [(data_set, True) for data_set in fitted] + [(data_set, False) for data_set in unfitted]
     return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.with_weight(), was_fitted=was))
 
 
@@ -140,7 +140,7 @@ def _misfits(model: Model, data_set: MeasuredTest, *, was_fitted: bool) -> Itera
     """The figures of a test without points of no weight, and of its runs where there are several."""
     relative, gain = data_set.relative(model), np.abs(data_set.noise_free(model).measured / data_set.measured) - 1.0
     squares = np.square(data_set.residual(model)).reshape(data_set.parts, -1).sum(axis=0)
-    place, every, rows = str(data_set.direction), np.ones(data_set.frequency.size, dtype=bool), relative.size
+    place, all_points, rows = str(data_set.direction), np.ones(data_set.frequency.size, dtype=bool), relative.size
 
     def figures(run: _Run, relative: Array, squares: Array, gain: Array) -> Misfit:
         named = data_set.name, place, was_fitted, run.held, run.value, run.unit
@@ -148,14 +148,14 @@ def _misfits(model: Model, data_set: MeasuredTest, *, was_fitted: bool) -> Itera
         reduced = float(squares.sum()) / (counted * data_set.test.weight)
         return Misfit(*named, relative.size, float(np.sqrt(np.mean(relative**2))), reduced, float(gain.mean()))
 
-    yield figures(_Run(None, None, None, every), relative, squares, gain)
+    yield figures(_Run(None, None, None, all_points), relative, squares, gain)
     runs = list(_runs(data_set))
     for run in runs if len(runs) > 1 else ():
         yield figures(run, *(values[run.points] for values in (relative, squares, gain)))
 
 
 def usable(
-    solution: Solution, data_sets: Sequence[MeasuredTest], left: Sequence[MeasuredTest] = ()
+    solution: Solution, data_sets: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = ()
 ) -> tuple[Usable, ...]:
     """Within what a fitted model meets the measured stiffness and loss factor, 95 % of the points, place by place.
 
@@ -166,7 +166,7 @@ def usable(
     The tests have the weights at which the solution is the least sum of squares; `left` are others.
     """
     free = solution.moving
-    whole, parts = LeaveOut.of(solution.jacobian[free], solution.residual), list[_Part]()
+    whole, parts = LeaveOut.from_fit(solution.jacobian[free], solution.residual), list[_Part]()
     per_coordinate = solution.coordinates.slopes(solution.model.values)[:, None]
     for data_set, rows in zip(data_sets, rows_of(data_sets), strict=True):
         modelled = data_set.noise_free(solution.model).measured
@@ -174,38 +174,42 @@ def usable(
         for run in _runs(data_set):
             points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
             step = whole.step(rows.start + np.flatnonzero(points), len(free))
-            moved = modelled if step is None else modelled * np.exp(step @ slopes)
+            predicted = modelled if step is None else modelled * np.exp(step @ slopes)
             counted = run.points & (data_set.weights > 0.0 if isinstance(data_set, MeasuredSweep) else True)
-            off = _off(moved[counted], data_set.measured[counted])
-            parts.append((str(data_set.direction), off, step is not None))
-    return _by_place([*parts, *_as_modelled(solution.model, left, predicted=True)])
+            difference = _absolute_difference(predicted[counted], data_set.measured[counted])
+            parts.append((str(data_set.direction), difference, step is not None))
+    return _by_place([*parts, *_as_modelled(solution.model, unfitted, predicted=True)])
 
 
-def met_within(model: Model, fitted: Sequence[MeasuredTest], left: Sequence[MeasuredTest]) -> tuple[Usable, ...]:
+def met_within(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest]) -> tuple[Usable, ...]:
     """Usable range of a model whose fit is not at hand: residuals of the fitted tests stand for held-out ones."""
-    return _by_place([*_as_modelled(model, fitted, predicted=False), *_as_modelled(model, left, predicted=True)])
+    return _by_place([*_as_modelled(model, fitted, predicted=False), *_as_modelled(model, unfitted, predicted=True)])
 
 
 def _as_modelled(model: Model, data_sets: Sequence[MeasuredTest], *, predicted: bool) -> Iterator[_Part]:
     for data_set in data_sets:
-        yield str(data_set.direction), _off(data_set.noise_free(model).measured, data_set.measured), predicted
+        yield (
+            str(data_set.direction),
+            _absolute_difference(data_set.noise_free(model).measured, data_set.measured),
+            predicted,
+        )
 
 
 def _by_place(parts: Sequence[_Part]) -> tuple[Usable, ...]:
     """The figures of each place: of its predicted points where these are enough, else of all."""
     found = []
     for place in dict.fromkeys(place for place, _, _ in parts):
-        mine = [(off, predicted) for own, off, predicted in parts if own == place]
-        every = np.concatenate([off for off, _ in mine], axis=1)
-        held_out = np.concatenate([np.empty((2, 0)), *(off for off, predicted in mine if predicted)], axis=1)
-        enough = held_out.shape[1] >= _ENOUGH * every.shape[1]
-        off = held_out if enough else every
-        stiffness, loss = np.quantile(off, _SHARE, axis=1, method="higher").tolist()
-        found.append(Usable(place, stiffness, loss, off.shape[1], enough))
+        mine = [(compared, predicted) for name, compared, predicted in parts if name == place]
+        all_points = np.concatenate([compared for compared, _ in mine], axis=1)
+        held_out = np.concatenate([np.empty((2, 0)), *(compared for compared, predicted in mine if predicted)], axis=1)
+        enough = held_out.shape[1] >= _ENOUGH * all_points.shape[1]
+        compared = held_out if enough else all_points
+        stiffness, loss = np.quantile(compared, _SHARE, axis=1, method="higher").tolist()
+        found.append(Usable(place, stiffness, loss, compared.shape[1], enough))
     return tuple(found)
 
 
-def _off(modelled: Array, measured: Array) -> Array:
+def _absolute_difference(modelled: Array, measured: Array) -> Array:
     """Relative difference of |K|, and difference of the loss factor, without sign, (2, n)."""
     return np.abs([np.abs(modelled / measured) - 1.0, loss_factor(modelled) - loss_factor(measured)])
 
@@ -215,8 +219,8 @@ def _runs(data_set: MeasuredTest) -> Iterator[_Run]:
     if not isinstance(data_set, MeasuredSweep) or data_set.sweep.stepped is None:
         yield _Run(None, None, None, np.ones(data_set.frequency.size, dtype=bool))
         return
-    what: Literal["amplitude", "frequency"] = "amplitude" if data_set.sweep.stepped == "frequency" else "frequency"
-    unit = data_set.direction.motion.displacement_unit if what == "amplitude" else "Hz"
-    held = data_set.sweep.held[data_set.order]
-    for value in np.unique(held):
-        yield _Run(what, float(value), unit, held == value)
+    quantity: Literal["amplitude", "frequency"] = "amplitude" if data_set.sweep.stepped == "frequency" else "frequency"
+    unit = data_set.direction.motion.displacement_unit if quantity == "amplitude" else "Hz"
+    held_value = data_set.sweep.held[data_set.order]
+    for value in np.unique(held_value):
+        yield _Run(quantity, float(value), unit, held_value == value)

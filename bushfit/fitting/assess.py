@@ -14,7 +14,14 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, parted, reached, repeats_of, rows_of
+from bushfit.fitting.preparation import (
+    MeasuredLoop,
+    MeasuredTest,
+    operating_conditions,
+    repeats_of,
+    rows_of,
+    split_by_kind,
+)
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -52,12 +59,14 @@ class Process:
 
     def moves(self, model: Model, data_sets: Sequence[MeasuredTest], influence: Array) -> Array:
         """Covariance of parameters that it makes, (k, k), by the influence of whitened residuals on them, (k, n)."""
-        first, moved = 0, np.zeros((len(influence), len(self.shapes)))
+        first, changes = 0, np.zeros((len(influence), len(self.shapes)))
         for data_set, rows in zip(data_sets, rows_of(data_sets), strict=True):
             shapes = self.shapes[:, first : first + data_set.frequency.size]
             first += data_set.frequency.size
-            moved += influence[:, rows] @ data_set.moved(shapes * data_set.noise_free(model).measured, model).T
-        return np.asarray(moved @ moved.T)
+            changes += (
+                influence[:, rows] @ data_set.residual_change(shapes * data_set.noise_free(model).measured, model).T
+            )
+        return np.asarray(changes @ changes.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +78,7 @@ class FitStage:
     process: Process | None = None
 
 
-def covariance(model: Model, stages: Sequence[FitStage], held: Covariance | None = None) -> Covariance:
+def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | None = None) -> Covariance:
     """Covariance of all parameters that a procedure estimated, each stage holding what the others found.
 
     `held` is that of parameters which all stages held.
@@ -85,30 +94,30 @@ def covariance(model: Model, stages: Sequence[FitStage], held: Covariance | None
         Stacked over the stages it is M d = b, so that cov(d) = (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. Singular values
         of M below 1/_LARGEST_ERROR are lifted to it.
     """
-    held, stages = held or Covariance(), [stage for stage in stages if stage.names]
-    names = (*held.names, *(name for stage in stages for name in stage.names))
-    slopes = Coordinates.of(model, names).slopes(model.values)
+    fixed, stages = fixed or Covariance(), [stage for stage in stages if stage.names]
+    names = (*fixed.names, *(name for stage in stages for name in stage.names))
+    slopes = Coordinates.of_parameters(model, names).slopes(model.values)
     system, root = np.eye(len(names)), np.zeros((len(names), len(names)))
-    begin = len(held.names)
-    root[:begin, :begin] = held.root / slopes[:begin, None]
+    begin = len(fixed.names)
+    root[:begin, :begin] = fixed.root / slopes[:begin, None]
     bases = []
     for stage in stages:
-        own = slice(begin, begin + len(stage.names))
+        equations = slice(begin, begin + len(stage.names))
         slope = jacobian(model, stage.data_sets, names)
-        basis = np.linalg.qr(slope[own].T)[0]
-        system[own] = basis.T @ slope.T
+        basis = np.linalg.qr(slope[equations].T)[0]
+        system[equations] = basis.T @ slope.T
         excess = [1.0] * len(stage.data_sets) if stage.process else _excess(model, stage)
         inflation = np.repeat(excess, [data_set.size for data_set in stage.data_sets])
         share = basis.T * np.sqrt(inflation)
-        root[own, own] = np.linalg.qr(share.T)[1].T
-        bases.append((own, share))
-        begin = own.stop
+        root[equations, equations] = np.linalg.qr(share.T)[1].T
+        bases.append((equations, share))
+        begin = equations.stop
     reaction = _inverse(system)
     answer = reaction @ root
     by_value, reaction = answer * slopes[:, None], reaction * slopes[:, None]
-    carried = reaction[:, : len(held.names)] / slopes[: len(held.names)]
-    spread = [carried @ part @ carried.T for part in held.spread]
-    influences = [reaction[:, own] @ basis for own, basis in bases]
+    carried = reaction[:, : len(fixed.names)] / slopes[: len(fixed.names)]
+    spread = [carried @ part @ carried.T for part in fixed.spread]
+    influences = [reaction[:, equations] @ basis for equations, basis in bases]
     matrix = by_value @ by_value.T
     for stage, influence in zip(stages, influences, strict=True):
         if stage.process:
@@ -118,8 +127,10 @@ def covariance(model: Model, stages: Sequence[FitStage], held: Covariance | None
             spread.append(added * np.sqrt(2.0 / stage.process.freedom))
         else:
             matrix = matrix + _of_gains(stage, influence)
-    known = [not stage.process for stage in stages]  # of the others the noise is the least part
-    counted = [list(compress(each, known)) for each in (stages, influences, [basis for _, basis in bases])]
+    without_process = [not stage.process for stage in stages]  # of the others the noise is the least part
+    counted = [
+        list(compress(values, without_process)) for values in (stages, influences, [basis for _, basis in bases])
+    ]
     for part, lost in _unsure(*counted):
         spread.append(part)
         matrix = matrix + 2.0 * _positive(lost, np.sqrt(np.diag(matrix)))
@@ -131,15 +142,15 @@ def _of_gains(stage: FitStage, influence: Array) -> Array:
     added = np.zeros((len(influence), len(influence)))
     for data_set, rows in zip(stage.data_sets, rows_of(stage.data_sets), strict=True):
         if isinstance(data_set, MeasuredLoop) and not data_set.gain_weighs:
-            moved = data_set.gain_error * (influence[:, rows] @ data_set.gain_and_offset()[0])
-            added += np.outer(moved, moved)
+            change = data_set.gain_error * (influence[:, rows] @ data_set.gain_and_offset()[0])
+            added += np.outer(change, change)
     return added
 
 
 def _excess(model: Model, stage: FitStage) -> list[float]:
     """Factor of each test's variance: reduced chi-square where a test, or all together, exceed the noise; else 1."""
     together = lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0
-    return [max(together, own or 1.0) for own in missed(model, stage.data_sets)]
+    return [max(together, single or 1.0) for single in missed(model, stage.data_sets)]
 
 
 def _positive(matrix: Array, sizes: Array) -> Array:
@@ -151,8 +162,8 @@ def _positive(matrix: Array, sizes: Array) -> Array:
 
 def _inverse(system: Array) -> Array:
     """Inverse of a square matrix, what is open limited to _LARGEST_ERROR."""
-    left, values, right = np.linalg.svd(system)
-    return (right.T / np.maximum(values, 1.0 / _LARGEST_ERROR)) @ left.T
+    left_vectors, values, right_vectors = np.linalg.svd(system)
+    return (right_vectors.T / np.maximum(values, 1.0 / _LARGEST_ERROR)) @ left_vectors.T
 
 
 def linear_errors(slope: Array) -> Array:
@@ -174,16 +185,16 @@ def _unsure(
     """
     parts: dict[Hashable, tuple[Array, Array]] = {}
     for stage, influence, basis in zip(stages, influences, bases, strict=True):
-        unit, moved = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
+        unit, reactions = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
         for data_set, rows in zip(stage.data_sets, rows_of(stage.data_sets), strict=True):
-            taken = influence[:, rows]
-            for variance, move in data_set.unsure(taken).items():
-                products = [move @ taken.T, move @ move.T, move @ unit[:, rows].T]
-                so_far = moved.get(variance, [0.0] * 3)
-                moved[variance] = [one + other for one, other in zip(products, so_far, strict=True)]
-        for variance, (along, squared, absorbed) in moved.items():
+            influence_rows = influence[:, rows]
+            for variance, move in data_set.unsure(influence_rows).items():
+                products = [move @ influence_rows.T, move @ move.T, move @ unit[:, rows].T]
+                so_far = reactions.get(variance, [0.0] * 3)
+                reactions[variance] = [one + previous for one, previous in zip(products, so_far, strict=True)]
+        for variance, (first_order, squared, absorbed) in reactions.items():
             spread, lost = parts.get(variance, (0.0, 0.0))
-            parts[variance] = spread + along, lost + squared - absorbed @ absorbed.T
+            parts[variance] = spread + first_order, lost + squared - absorbed @ absorbed.T
     return list(parts.values())
 
 
@@ -202,7 +213,7 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
     """How well a model meets data sets: NRMSE, reduced chi-square, number of residuals, relative noise."""
     relative = np.concatenate([data_set.relative(model) for data_set in data_sets])
     noise = np.repeat([data_set.relative_noise for data_set in data_sets], [data_set.counted for data_set in data_sets])
-    loops, _ = parted(data_sets)
+    loops, _ = split_by_kind(data_sets)
     repeats = np.count_nonzero(repeats_of(loops), axis=1)
     return Quality(
         nrmse=float(np.sqrt(np.mean(relative**2))),
@@ -218,8 +229,8 @@ def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
     found = [str(data_set.direction) for data_set in data_sets]
     directions = tuple(dict.fromkeys([*(str(direction) for direction in Direction if direction in found), *found]))
     kelvin = [np.ravel(data_set.test.temperature) for data_set in data_sets if data_set.test.temperature is not None]
-    axes = [*reached(model.bushing, data_sets), *([np.concatenate(kelvin)] if kelvin else [])]
-    ends = [(float(each.min()), float(each.max())) for each in axes]
+    axes = [*operating_conditions(model.bushing, data_sets), *([np.concatenate(kelvin)] if kelvin else [])]
+    ends = [(float(axis.min()), float(axis.max())) for axis in axes]
     return Range(ends[0], ends[1], directions, *ends[2:])
 
 
@@ -243,13 +254,16 @@ def misfit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, adv
     """A sentence, with advice, where the model misses all data, or one test, by more than the noise; else none."""
     together = lack_of_fit(model, data_sets, parameters)
     named = zip(data_sets, missed(model, data_sets), strict=True)
-    each = {data_set.name: own for data_set, own in named if own is not None}
-    if together is None and not each:
+    by_test = {data_set.name: chi_square for data_set, chi_square in named if chi_square is not None}
+    if together is None and not by_test:
         return []
-    worst, all_tests = max(each, key=lambda name: each[name], default=""), reduced(model, data_sets, parameters)[0]
-    where = f", {number(each[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
+    worst, all_tests = (
+        max(by_test, key=lambda name: by_test[name], default=""),
+        reduced(model, data_sets, parameters)[0],
+    )
+    worst_words = f", {number(by_test[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
     return [
-        f"the model misses the data by more than their noise (reduced chi-square {number(all_tests, 2)}{where}): "
+        f"the model misses the data by more than their noise (reduced chi-square {number(all_tests, 2)}{worst_words}): "
         f"intervals are invalid, though standard errors are scaled up{advice}"
     ]
 
@@ -264,20 +278,20 @@ def implausible(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> l
     ratio = moduli[hardest] / moduli[softest]
     if ratio > _MOST_STIFFENING:
         return [f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, which no rubber does: {_CHECK}"]
-    said = f"a shear modulus of {format_range('Pa', moduli[hardest])} is that of no rubber: {_CHECK}"
-    return [] if _SOFTEST < moduli[hardest] < _HARDEST else [said]
+    sentence = f"a shear modulus of {format_range('Pa', moduli[hardest])} is that of no rubber: {_CHECK}"
+    return [] if _SOFTEST < moduli[hardest] < _HARDEST else [sentence]
 
 
 def refuse_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> None:
     """Raise a FitError where a test strains its rubber by more than any bears: a unit, or a size, is wrong."""
-    for each in data_sets:
-        largest = float(np.max(each.amplitude))
-        if (strain := largest * unit_strain(bushing, each.direction)) > _MOST_STRAIN:
-            amplitude = format_range(each.direction.motion.displacement_unit, largest)
+    for data_set in data_sets:
+        largest = float(np.max(data_set.amplitude))
+        if (strain := largest * unit_strain(bushing, data_set.direction)) > _MOST_STRAIN:
+            amplitude = format_range(data_set.direction.motion.displacement_unit, largest)
             raise FitError(
                 "no rubber bears the amplitude of this test",
-                place=each.name,
-                found=f"{amplitude}, {each.direction}: a strain of {number(100 * strain, 2)} %",
+                place=data_set.name,
+                found=f"{amplitude}, {data_set.direction}: a strain of {number(100 * strain, 2)} %",
                 expected=f"a strain below {100 * _MOST_STRAIN:g} %",
                 hint=_CHECK,
             )
@@ -286,10 +300,14 @@ def refuse_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) ->
 def apart_in_temperature(model: Model, data_sets: Sequence[MeasuredTest]) -> list[str]:
     """A sentence on tests whose temperatures, where they are known, lie too far apart for one model."""
     degrees = [(data_set.name, data_set.test.temperature) for data_set in data_sets]
-    known = sorted((float(np.mean(kelvin)) - CELSIUS, name) for name, kelvin in degrees if kelvin is not None)
-    if not known or known[-1][0] - known[0][0] <= _ONE_TEMPERATURE or "temperature" in model.effects:
+    temperatures = sorted((float(np.mean(kelvin)) - CELSIUS, name) for name, kelvin in degrees if kelvin is not None)
+    if (
+        not temperatures
+        or temperatures[-1][0] - temperatures[0][0] <= _ONE_TEMPERATURE
+        or "temperature" in model.effects
+    ):
         return []
-    (low, coldest), (high, warmest) = known[0], known[-1]
+    (low, coldest), (high, warmest) = temperatures[0], temperatures[-1]
     tested = f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC"
     return [
         f"{tested}, {number(high - low, 3)} degC apart: this model has no effect of temperature, and another that is "
@@ -324,12 +342,12 @@ def mixed_conditions(data_sets: Sequence[MeasuredTest]) -> list[str]:
 
 def unfitted(model: Model, data_sets: Sequence[MeasuredTest], advice: str) -> list[str]:
     """A sentence on the tests of each place that a model was not fitted to and misses by more than their noise."""
-    off: dict[str, list[tuple[float, float, str]]] = {}
+    misses: dict[str, list[tuple[float, float, str]]] = {}
     for data_set in data_sets:
         if (misfit := lack_of_fit(model, [data_set], 0)) is not None:
             share = 100.0 * quality(model, [data_set], 0).nrmse
-            off.setdefault(str(data_set.direction), []).append((float(np.sqrt(misfit)), share, data_set.name))
-    return [_missed_at(place, found) + advice for place, found in off.items()]
+            misses.setdefault(str(data_set.direction), []).append((float(np.sqrt(misfit)), share, data_set.name))
+    return [_missed_at(place, found) + advice for place, found in misses.items()]
 
 
 def _missed_at(place: str, found: Sequence[tuple[float, float, str]]) -> str:
@@ -338,8 +356,8 @@ def _missed_at(place: str, found: Sequence[tuple[float, float, str]]) -> str:
     times = f"{number(noises, 2)} times its noise"
     if len(found) == 1:
         return f"{worst}, {place}, was not fitted, and the model misses it by {number(share, 2)} % (NRMSE), {times}"
-    least, most = (number(end(share for _, share, _ in found), 2) for end in (min, max))
+    smallest, largest = (number(end(share for _, share, _ in found), 2) for end in (min, max))
     return (
-        f"{len(found)} tests, {place}, were not fitted, and the model misses them by {least} to {most} % (NRMSE), "
-        f"{worst} by {times}"
+        f"{len(found)} tests, {place}, were not fitted, and the model misses them by {smallest} to {largest} % "
+        f"(NRMSE), {worst} by {times}"
     )

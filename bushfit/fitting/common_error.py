@@ -29,27 +29,31 @@ class ErrorSubspace:
 
     parts: Sequence[tuple[slice, Array | None]]
 
-    def of(self, rows: Array) -> Array:
+    def project(self, rows: Array) -> Array:
         """Residuals, (..., n), along the directions, (..., d)."""
-        return np.concatenate([self.of_part(i, rows[..., own]) for i, (own, _) in enumerate(self.parts)], axis=-1)
+        return np.concatenate(
+            [self.project_part(i, rows[..., block]) for i, (block, _) in enumerate(self.parts)], axis=-1
+        )
 
-    def of_part(self, number: int, rows: Array) -> Array:
+    def project_part(self, number: int, rows: Array) -> Array:
         """Components of the rows of one part."""
-        along = self.parts[number][1]
-        return rows if along is None else rows @ along
+        directions = self.parts[number][1]
+        return rows if directions is None else rows @ directions
 
-    def back(self, values: Array) -> Array:
+    def expand(self, values: Array) -> Array:
         """Residuals, (..., n), that have values along the directions, (..., d), and nothing else."""
         found = [
-            values[..., own] if along is None else values[..., own] @ along.T
-            for own, (_, along) in zip(self.places, self.parts, strict=True)
+            values[..., block] if directions is None else values[..., block] @ directions.T
+            for block, (_, directions) in zip(self.places, self.parts, strict=True)
         ]
         return np.concatenate(found, axis=-1)
 
     @cached_property
     def places(self) -> list[slice]:
         """Slices of the directions of each part."""
-        sizes = [own.stop - own.start if along is None else along.shape[1] for own, along in self.parts]
+        sizes = [
+            block.stop - block.start if directions is None else directions.shape[1] for block, directions in self.parts
+        ]
         ends = np.cumsum([0, *sizes]).tolist()
         return [slice(*pair) for pair in itertools.pairwise(ends)]
 
@@ -61,14 +65,14 @@ class CommonError:
     Args:
         columns: what one standard deviation of each amount makes of residuals in units of noise, as they are seen,
             (q, d).
-        seen: which of the residuals these are.
+        subspace: which of the residuals these are.
 
     Notes:
         The covariance of the residuals is S = 1 + U^T U, U the columns. S^(-1/2) whitens them.
     """
 
     columns: Array
-    seen: ErrorSubspace
+    subspace: ErrorSubspace
 
     @classmethod
     def of_all(cls, columns: Array) -> CommonError:
@@ -76,22 +80,24 @@ class CommonError:
         return cls(columns, ErrorSubspace([(slice(0, columns.shape[1]), None)]))
 
     @cached_property
-    def along(self) -> tuple[Array, Array]:
+    def principal_errors(self) -> tuple[Array, Array]:
         """Orthonormal directions that the error takes, (d, q), and its standard deviation along each, (q,)."""
         variance, mixed = np.linalg.eigh(self.columns @ self.columns.T)
-        kept = variance > _ROUNDING * variance.max(initial=0.0)
-        size = np.sqrt(variance[kept])
-        return self.columns.T @ (mixed[:, kept] / size), size
+        significant = variance > _ROUNDING * variance.max(initial=0.0)
+        size = np.sqrt(variance[significant])
+        return self.columns.T @ (mixed[:, significant] / size), size
 
     @property
     def log_size(self) -> float:
         """ln|S|."""
-        return float(np.sum(np.log1p(np.square(self.along[1]))))
+        return float(np.sum(np.log1p(np.square(self.principal_errors[1]))))
 
     def whiten(self, rows: Array) -> Array:
         """Residuals in units of noise, (..., n), as independent numbers of unit variance."""
-        vectors, size = self.along
-        return rows - self.seen.back((self.seen.of(rows) @ vectors * (1.0 - 1.0 / np.hypot(1.0, size))) @ vectors.T)
+        vectors, size = self.principal_errors
+        return rows - self.subspace.expand(
+            (self.subspace.project(rows) @ vectors * (1.0 - 1.0 / np.hypot(1.0, size))) @ vectors.T
+        )
 
 
 class ErrorProducts(NamedTuple):
@@ -99,18 +105,19 @@ class ErrorProducts(NamedTuple):
 
     Args:
         products: of the rows in noise, (m, m).
-        along: components of the rows along independent amounts of the error, (m, c).
+        components: components of the rows along independent amounts of the error, (m, c).
         variance: by a unit of the error in each, (c,).
     """
 
     products: Array
-    along: Array
+    components: Array
     variance: Array
 
-    def beside(self, size: float) -> tuple[Array, float]:
+    def with_size(self, size: float) -> tuple[Array, float]:
         """Inner products beside the error of a size, (m, m), and the log determinant of the covariance, over noise."""
         grown = 1.0 + size**2 * self.variance
-        return self.products - self.along * (size**2 / grown) @ self.along.T, float(np.sum(np.log(grown)))
+        products = self.products - self.components * (size**2 / grown) @ self.components.T
+        return products, float(np.sum(np.log(grown)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ class Coordinates:
     parameters: tuple[Parameter, ...]
 
     @classmethod
-    def of(cls, model: Model, names: Sequence[str]) -> Coordinates:
+    def of_parameters(cls, model: Model, names: Sequence[str]) -> Coordinates:
         return cls(tuple(names), tuple(model.parameters[name] for name in names))
 
     def forward(self, name: str, value: float) -> float:
@@ -91,14 +91,14 @@ class Solution:
     def chi_square(self) -> float:
         return float(self.residual @ self.residual)
 
-    def gain(self, beside: Collection[str]) -> float:
+    def gain(self, fixed: Collection[str]) -> float:
         """Fall of chi-square by one Gauss-Newton step, the parameters `beside` held."""
-        free = [i for i, name in enumerate(self.coordinates.names) if name not in beside]
-        left, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
-        seen = values > ROUNDING * values.max(initial=0.0)
-        return float(np.sum(np.square(left[:, seen].T @ self.residual)))
+        free = [i for i, name in enumerate(self.coordinates.names) if name not in fixed]
+        left_vectors, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
+        significant = values > ROUNDING * values.max(initial=0.0)
+        return float(np.sum(np.square(left_vectors[:, significant].T @ self.residual)))
 
-    def at(self, model: Model, data_sets: Sequence[MeasuredTest]) -> Solution:
+    def moved_to(self, model: Model, data_sets: Sequence[MeasuredTest]) -> Solution:
         """Move the parameters of the fit to the values of a model, with the residuals of these tests."""
         rows = jacobian(model, data_sets, self.coordinates.names)
         return replace(self, model=model, residual=residual(model, data_sets), jacobian=rows)
@@ -121,7 +121,7 @@ def residual(model: Model, data_sets: Sequence[MeasuredTest]) -> Array:
 
 def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> Array:
     """Derivatives of `residual` by parameter coordinate, (len(names), n)."""
-    slopes = Coordinates.of(model, names).slopes(model.values)
+    slopes = Coordinates.of_parameters(model, names).slopes(model.values)
     by_value = np.concatenate([data_set.jacobian(model, names) for data_set in data_sets], axis=-1)
     return together(data_sets, by_value * slopes[:, None])
 
@@ -141,9 +141,9 @@ def starting_point(
     points = sum(data_set.size for data_set in data_sets)
     if points <= len(names):
         raise FitError("too few points for the fit", found=f"{points} points for {len(names)} parameters")
-    coordinates = Coordinates.of(model, names)
-    least = {name: parameter.bounds[0] for name, parameter in model.parameters.items() if parameter.log}
-    lifted = {name: value or least.get(name, 0.0) for name, value in model.values.items()}
+    coordinates = Coordinates.of_parameters(model, names)
+    lower = {name: parameter.bounds[0] for name, parameter in model.parameters.items() if parameter.log}
+    lifted = {name: value or lower.get(name, 0.0) for name, value in model.values.items()}
     return coordinates, coordinates.point(lifted), *coordinate_bounds(coordinates, bounds)
 
 
@@ -152,7 +152,12 @@ def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, 
     ends = []
     for name, parameter in zip(coordinates.names, coordinates.parameters, strict=True):
         limits = zip(parameter.bounds, bounds.get(name, (None, None)), strict=True)
-        ends.append(sorted(coordinates.forward(name, limit if own is None else own) for limit, own in limits))
+        ends.append(
+            sorted(
+                coordinates.forward(name, limit if limit_given is None else limit_given)
+                for limit, limit_given in limits
+            )
+        )
     low, high = np.array(ends).T
     return low, high
 
@@ -164,12 +169,12 @@ def at_bound(names: Sequence[str], point: Array, low: Array, high: Array) -> dic
     return {name: end for end, room in rooms.items() for name, met in zip(names, room < near, strict=True) if met}
 
 
-def anderson(asked: Sequence[Array], answered: Sequence[Array]) -> Array:
+def anderson(inputs: Sequence[Array], outputs: Sequence[Array]) -> Array:
     """Next point of a fixed-point iteration, from the last two of its points and images (Anderson 1965).
 
     Plain passes gain little each where what is asked and what answers know little of each other, or swing to and fro.
     """
-    points, images = np.array(asked[-2:]), np.array(answered[-2:])
+    points, images = np.array(inputs[-2:]), np.array(outputs[-2:])
     if len(points) < 2:
         return images[-1]
     before, gap = images - points

@@ -141,8 +141,8 @@ class Descent:
         """The fit one evaluation on: at a lower chi-square with less damping, or where it was with more."""
         damping = self.damping
         step, expected = self._step(damping)
-        least = _LEAST_FALL if self.tolerance is None else self.tolerance * self.chi_square
-        evaluations, converged = self.evaluations + 1, 0.0 <= expected < least
+        smallest_fall = _LEAST_FALL if self.tolerance is None else self.tolerance * self.chi_square
+        evaluations, converged = self.evaluations + 1, 0.0 <= expected < smallest_fall
         bend = self._bend(step, damping)
         # so far out between the bounds, or on a way that bends so much, that only caution leads down
         while expected < 0.0 or self._length(bend) > _MOST_BENT * self._length(step):
@@ -150,7 +150,7 @@ class Descent:
             step, expected = self._step(damping)
             bend = self._bend(step, damping)
         point = np.clip(self.point + step + bend, *self._reach)
-        taken = point - self.point
+        change = point - self.point
         cautious = replace(
             self, evaluations=evaluations, converged=converged, damping=damping * self.growth, growth=2.0 * self.growth
         )
@@ -181,15 +181,15 @@ class Descent:
             converged=converged,
             damping=damping * max(_LEAST_DAMPING_RATIO, 1.0 - (2.0 * fall / expected - 1.0) ** 3),
             growth=_FIRST_GROWTH,
-            last=(taken, taken @ (slopes - self.jacobian)),
+            last=(change, change @ (slopes - self.jacobian)),
         )
 
     def finished(self, evaluations: int) -> "Descent":
         """The fit at its end, or after so many evaluations of the model."""
-        here = self
-        while not here.converged and here.evaluations < evaluations:
-            here = here.stepped()
-        return here
+        current = self
+        while not current.converged and current.evaluations < evaluations:
+            current = current.stepped()
+        return current
 
     @cached_property
     def _normal(self) -> tuple[Array, Array]:
@@ -199,7 +199,7 @@ class Descent:
     @cached_property
     def _reach(self) -> tuple[Array, Array]:
         """Least and largest coordinates that one step may reach, (k,) each."""
-        longest = np.array([_LONGEST_STEP if each.log else np.inf for each in self.coordinates.parameters])
+        longest = np.array([_LONGEST_STEP if parameter.log else np.inf for parameter in self.coordinates.parameters])
         return np.maximum(self.low, self.point - longest), np.minimum(self.high, self.point + longest)
 
     def _step(self, damping: float) -> tuple[Array, float]:
@@ -217,11 +217,11 @@ class Descent:
         while free.any():
             step[free] = -_solved(damped, slope + damped[:, ~free] @ step[~free], free)
             aim = self.point + step
-            beyond = free & ((aim < low) | (aim > high))
-            if not beyond.any():
+            outside = free & ((aim < low) | (aim > high))
+            if not outside.any():
                 break
-            step[beyond] = (np.clip(aim, low, high) - self.point)[beyond]
-            free &= ~beyond
+            step[outside] = (np.clip(aim, low, high) - self.point)[outside]
+            free &= ~outside
         return step, float(-(2.0 * slope + curvature @ step) @ step)
 
     def _bend(self, step: Array, damping: float) -> Array:
@@ -247,5 +247,5 @@ class Descent:
 def _solved(curvature: Array, pull: Array, free: Array) -> Array:
     """The free parameters at which a curvature, (k, k), meets a pull, (k,), none along what rounding decides."""
     scale = np.sqrt(np.diag(curvature)[free])
-    own = curvature[np.ix_(free, free)] / np.outer(scale, scale)
-    return np.linalg.lstsq(own, pull[free] / scale, rcond=ROUNDING)[0] / scale
+    scaled = curvature[np.ix_(free, free)] / np.outer(scale, scale)
+    return np.linalg.lstsq(scaled, pull[free] / scale, rcond=ROUNDING)[0] / scale

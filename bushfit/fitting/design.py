@@ -10,7 +10,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import Bounds, Solution
 from bushfit.fitting.descent import Descent
-from bushfit.fitting.preparation import MeasuredTest, parted, reached
+from bushfit.fitting.preparation import MeasuredTest, operating_conditions, split_by_kind
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 
@@ -34,7 +34,7 @@ _MOST = 200
 
 
 def designed(
-    model: Model, plain: Model, data_sets: Sequence[MeasuredTest], held: Sequence[str], bounds: Bounds
+    model: Model, plain: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds
 ) -> Model:
     """A model to start a fit from, effects added in turn to the best fit of those before.
 
@@ -45,10 +45,10 @@ def designed(
     added = [get_effect(name) for name in model.effects if name not in plain.effects]
     ends = []
     with suppress(FitError, ModelError):  # no response, or too few points; the fit then says what is wrong
-        ends.append(fit_from(model, data_sets, held, bounds).finished(_MOST).solution)
-        solution = solve(plain, data_sets, _free(plain, held), bounds, evaluations=_MOST, strict=False)
+        ends.append(fit_from(model, data_sets, fixed, bounds).finished(_MOST).solution)
+        solution = solve(plain, data_sets, _free(plain, fixed), bounds, evaluations=_MOST, strict=False)
         for effect in added:
-            solution = with_effect(solution, data_sets, effect, held, bounds)
+            solution = with_effect(solution, data_sets, effect, fixed, bounds)
         ends.append(solution)
     if len(ends) < 2 or ends[1].chi_square > ends[0].chi_square - _LOWER:  # alike: two of one law may change names
         return model
@@ -56,7 +56,7 @@ def designed(
 
 
 def with_effect(
-    solution: Solution, data_sets: Sequence[MeasuredTest], effect: Effect, held: Sequence[str], bounds: Bounds
+    solution: Solution, data_sets: Sequence[MeasuredTest], effect: Effect, fixed: Sequence[str], bounds: Bounds
 ) -> Solution:
     """A fitted model with one effect more, or one in place of a branch: the best fit of several starts.
 
@@ -66,20 +66,20 @@ def with_effect(
     fits = []
     for start in _starts(solution.model, data_sets, effect):
         with suppress(FitError, ModelError):  # no response from this start
-            fits.append(fit_from(start, data_sets, held, bounds).finished(_FIRST))
+            fits.append(fit_from(start, data_sets, fixed, bounds).finished(_FIRST))
     if not fits:
         raise FitError("the model has no finite response to these tests", found=effect.name)
-    best = sorted(fits, key=lambda each: each.chi_square)[:_BEST]
-    return min((each.finished(_MOST) for each in best), key=lambda each: each.chi_square).solution
+    best = sorted(fits, key=lambda descent: descent.chi_square)[:_BEST]
+    return min((descent.finished(_MOST) for descent in best), key=lambda descent: descent.chi_square).solution
 
 
-def fit_from(model: Model, data_sets: Sequence[MeasuredTest], held: Sequence[str], bounds: Bounds) -> Descent:
+def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Descent:
     """A fit of every parameter of a model but the held ones, from its own values, before its first step."""
-    return Descent.start(model, data_sets, _free(model, held), bounds)
+    return Descent.start(model, data_sets, _free(model, fixed), bounds)
 
 
-def _free(model: Model, held: Sequence[str]) -> list[str]:
-    return [name for name in model.parameters if name not in held]
+def _free(model: Model, fixed: Sequence[str]) -> list[str]:
+    return [name for name in model.parameters if name not in fixed]
 
 
 def _starts(fitted: Model, data_sets: Sequence[MeasuredTest], effect: Effect) -> Iterator[Model]:
@@ -88,9 +88,9 @@ def _starts(fitted: Model, data_sets: Sequence[MeasuredTest], effect: Effect) ->
     What has a neutral amount starts at a tenth of its typical one: at its neutral value a fit may not see its shape.
     """
     amount = effect.amount
-    little = {} if effect.replaces else {qualified_name(effect, amount): amount.sized(0.1)}
-    model, *others = [fitted.with_effect(effect.name, little | start) for start in fitted.starts(effect)]
-    yield from (model, *others)
+    small_amount = {} if effect.replaces else {qualified_name(effect, amount): amount.sized(0.1)}
+    model, *alternatives = [fitted.with_effect(effect.name, small_amount | start) for start in fitted.starts(effect)]
+    yield from (model, *alternatives)
     for parameter in effect.parameters:
         if parameter.neutral is None:
             name = qualified_name(effect, parameter)
@@ -102,10 +102,10 @@ def _starts(fitted: Model, data_sets: Sequence[MeasuredTest], effect: Effect) ->
 
 def probes(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter) -> Array:
     """Values of a shape parameter that these tests could show, by what it is measured against."""
-    frequencies, strains = reached(model.bushing, data_sets)
+    frequencies, strains = operating_conditions(model.bushing, data_sets)
     match parameter.scale:
         case "period":
-            swept = np.concatenate([sweep.frequency for sweep in parted(data_sets)[1]] or [frequencies])
+            swept = np.concatenate([sweep.frequency for sweep in split_by_kind(data_sets)[1]] or [frequencies])
             low, high = 0.1 / (2.0 * np.pi * swept.max()), 1.0 / (2.0 * np.pi * swept.min())
         case "frequency":
             low, high = 0.7 * frequencies.max(), 4.0 * frequencies.max()
@@ -115,8 +115,8 @@ def probes(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter
             low = 0.03 * strains.min()
             high = max(0.5 * model.values.get("eps_half", strains.max()), low)
         case "force":
-            along = [sweep for sweep in parted(data_sets)[1] if not sweep.direction.is_rotation]
-            high = max((float(np.max(np.abs(each.measured) * each.amplitude)) for each in along), default=1.0)
+            translations = [sweep for sweep in split_by_kind(data_sets)[1] if not sweep.direction.is_rotation]
+            high = max((float(np.max(np.abs(sweep.measured) * sweep.amplitude)) for sweep in translations), default=1.0)
             low, high = 0.3 * high, 0.95 * high
         case "order":
             low, high = _ORDERS  # steeper than the first, which without it lies between the two

@@ -19,7 +19,7 @@ from bushfit.effects.temperature import REFERENCE
 from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.fitting.common_error import ErrorSubspace
 from bushfit.fitting.coordinates import ROUNDING, Solution
-from bushfit.fitting.preparation import MeasuredTest, log_slopes, reached, rows_of
+from bushfit.fitting.preparation import MeasuredTest, log_slopes, operating_conditions, rows_of
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood, coordinates, in_lengths, patterns
 from bushfit.model.covariance import Z95
 
@@ -59,12 +59,14 @@ class FittedTests:
     def conditions(self) -> list[Array]:
         """Frequency [Hz], equivalent strain and, if the model knows of it, temperature [K] of each point, (p,) each."""
         model = self.solution.model
-        axes = [*reached(model.bushing, self.data_sets)]
+        axes = [*operating_conditions(model.bushing, self.data_sets)]
         if model.knows_temperature:
             kelvin = list[Array]()
             for data_set in self.data_sets:
-                known = data_set.circumstances.temperature
-                kelvin.append(np.broadcast_to(REFERENCE if known is None else known, data_set.frequency.shape))
+                temperature = data_set.circumstances.temperature
+                kelvin.append(
+                    np.broadcast_to(REFERENCE if temperature is None else temperature, data_set.frequency.shape)
+                )
             axes.append(np.concatenate(kelvin))
         return axes
 
@@ -82,7 +84,7 @@ class FittedTests:
         return slopes * fitted.slopes(model.values)[self.solution.moving, None]
 
     @cached_property
-    def seen(self) -> ErrorSubspace:
+    def subspace(self) -> ErrorSubspace:
         """Residuals that changes of the stiffness can move: all of a sweep, two combinations of a loop."""
         pairs = zip(rows_of(self.data_sets), self._loops, strict=True)
         return ErrorSubspace([(rows, None if loop is None else loop[0]) for rows, loop in pairs])
@@ -93,7 +95,7 @@ class FittedTests:
         for data_set, loop in zip(self.data_sets, self._loops, strict=True):
             change = changes[:, first : first + data_set.frequency.size]
             parts = np.concatenate((change.real, change.imag), axis=-1)
-            columns.append(data_set.moved(change, self.solution.model) if loop is None else parts @ loop[1])
+            columns.append(data_set.residual_change(change, self.solution.model) if loop is None else parts @ loop[1])
             first += data_set.frequency.size
         return np.concatenate(columns, axis=-1)
 
@@ -109,7 +111,7 @@ class FittedTests:
         units, loops = np.array([[1.0], [1.0j]]), list[tuple[Array, Array] | None]()
         for data_set in self.data_sets:
             if data_set.kind == "loop":
-                directions, components = np.linalg.qr(data_set.moved(units, self.solution.model).T)
+                directions, components = np.linalg.qr(data_set.residual_change(units, self.solution.model).T)
                 loops.append((directions, components.T))
             else:
                 loops.append(None)
@@ -126,12 +128,14 @@ class FittedTests:
         information = np.block([[rows @ rows.T, across], [across.T, among + np.eye(len(among))]])
         scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         size, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-        known = size > ROUNDING * size.max(initial=0.0)
-        mixed = (vectors[:, known] / np.sqrt(size[known])).T / scale
-        seen = block_diag(*(self.seen.of_part(i, errors) for i, errors in enumerate(self.rig_errors)))
-        span = mixed @ np.concatenate((self.seen.of(rows), seen))
-        along = [rows @ residual, *(errors @ residual[block] for block, errors in pairs)]
-        return span, self.seen.of(residual) - (mixed @ np.concatenate(along)) @ span
+        determined = size > ROUNDING * size.max(initial=0.0)
+        mixed = (vectors[:, determined] / np.sqrt(size[determined])).T / scale
+        rig_components = block_diag(
+            *(self.subspace.project_part(i, errors) for i, errors in enumerate(self.rig_errors))
+        )
+        span = mixed @ np.concatenate((self.subspace.project(rows), rig_components))
+        slopes = [rows @ residual, *(errors @ residual[block] for block, errors in pairs)]
+        return span, self.subspace.project(residual) - (mixed @ np.concatenate(slopes)) @ span
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,12 +158,14 @@ class Discrepancy:
     sizes: Array
 
     @classmethod
-    def over(cls, tests: FittedTests, groups: Groups, lengths: tuple[float, float], most: int) -> Discrepancy:
+    def over_tests(
+        cls, tests: FittedTests, groups: Groups, lengths: tuple[float, float], maximum_nodes: int
+    ) -> Discrepancy:
         """The process over the points of some tests, with a number of nodes at most in each group."""
         nodes, shapes = [], []
         for group in groups:
             inside = np.flatnonzero(np.isin(tests.directions, group))
-            chosen, near = patterns(in_lengths(coordinates(*tests.conditions)[inside], lengths), most)
+            chosen, near = patterns(in_lengths(coordinates(*tests.conditions)[inside], lengths), maximum_nodes)
             nodes.append(inside[chosen])
             shapes.append(np.zeros((len(near), tests.directions.size)))
             shapes[-1][:, inside] = near
@@ -173,8 +179,8 @@ class Discrepancy:
     @cached_property
     def likelihood(self) -> RestrictedLikelihood:
         """Restricted likelihood of its size."""
-        span, left = self.tests.remainder
-        return RestrictedLikelihood.of(self.tests.columns(self.complex_shapes), left, span)
+        span, remainder = self.tests.remainder
+        return RestrictedLikelihood.from_columns(self.tests.columns(self.complex_shapes), remainder, span)
 
     @cached_property
     def best(self) -> tuple[float, float]:
@@ -191,14 +197,14 @@ class Discrepancy:
         """
         size, columns, rows = self.best[1], self.tests.columns(self.complex_shapes), self.tests.moving
         inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
-        mean = (-inverse @ columns @ self.tests.seen.of(self.tests.solution.residual)) @ self.complex_shapes
-        both = np.concatenate((columns, self.tests.seen.of(rows)))
+        mean = (-inverse @ columns @ self.tests.subspace.project(self.tests.solution.residual)) @ self.complex_shapes
+        both = np.concatenate((columns, self.tests.subspace.project(rows)))
         information = both @ both.T
         information[len(columns) :, len(columns) :] = rows @ rows.T  # loops tell more than by a change of stiffness
         information[np.diag_indices(len(columns))] += 1.0 / size**2
         scale = 1.0 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
-        known, vectors = np.linalg.eigh(information * np.outer(scale, scale))
-        root = (vectors / np.sqrt(np.maximum(known, ROUNDING))).T * scale
+        information_values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
+        root = (vectors / np.sqrt(np.maximum(information_values, ROUNDING))).T * scale
         whole = root @ np.concatenate((self.complex_shapes, self.tests.slopes))
         return mean, np.array([np.linalg.norm(whole.real, axis=0), np.linalg.norm(whole.imag, axis=0)])
 
@@ -218,8 +224,8 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
     wider = float(stdtrit(max(freedom, _MINIMUM_FREEDOM), 0.975)) / Z95
     means, errors = zip(*(processes[i].conditioned() for i in counted), strict=True)
     mean = share @ np.array(means)
-    apart = np.array([[np.square((one - mean).real), np.square((one - mean).imag)] for one in means])
-    error = wider * np.sqrt(np.tensordot(share, np.square(errors) + apart, 1))
+    deviations = np.array([[np.square((one - mean).real), np.square((one - mean).imag)] for one in means])
+    error = wider * np.sqrt(np.tensordot(share, np.square(errors) + deviations, 1))
     lengths = np.exp(share @ np.log([processes[i].lengths for i in counted]))
     size = wider * float(np.exp(share @ np.log([processes[i].best[1] for i in counted])))
     best, patches = processes[int(gains.argmax())], []
@@ -235,4 +241,4 @@ def discrepancies(tests: FittedTests) -> list[Discrepancy]:
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     shared = dict.fromkeys([(names,), tuple((name,) for name in names)])
     pairs = product(shared, product(OVER_FREQUENCY, OVER_STRAIN))
-    return [Discrepancy.over(tests, groups, lengths, MAXIMUM_NODES) for groups, lengths in pairs]
+    return [Discrepancy.over_tests(tests, groups, lengths, MAXIMUM_NODES) for groups, lengths in pairs]

@@ -254,17 +254,17 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
         harmonics = as_complex(least_squares(basis(phase, harmonics.size - 1), force, weight))
     if cycles == 1:
         harmonics = np.where(of_a_lone_cycle(np.arange(harmonics.size)), 0.0, harmonics)
-    off = force - series(harmonics, phase)
-    if np.std(off) < FLOOR * drive.half_range:
+    misfit = force - series(harmonics, phase)
+    if np.std(misfit) < FLOOR * drive.half_range:
         return drive
     if not weight.all():
-        off = np.interp(phase, phase[weight > 0.0], off[weight > 0.0])
+        misfit = np.interp(phase, phase[weight > 0.0], misfit[weight > 0.0])
     scale = np.sqrt(weight) if binned else 1.0
-    model, size = row_noise(off * scale, less_slow(phase, off)[0] * scale, cycles)
+    model, size = row_noise(misfit * scale, less_slow(phase, misfit)[0] * scale, cycles)
     if binned and model.order:
         drive = replace(drive, weight=_evened(drive.weight, turn))
         scale = np.sqrt(drive.weight[rows])
-        model, size = row_noise(off * scale, less_slow(phase, off)[0] * scale, cycles)
+        model, size = row_noise(misfit * scale, less_slow(phase, misfit)[0] * scale, cycles)
     if binned:
         breaks = () if drive.from_rest else tuple((np.flatnonzero(np.diff(turn)) + 1).tolist())
         return replace(drive, row_noise=replace(model, size=max(size / found.force_noise, 1.0), breaks=breaks))
@@ -278,10 +278,10 @@ def _evened(weight: Array, turn: Array) -> Array:
     """Average the weights of bins of rows that depend on one another, one weight for each turn: a row more or less in a
     bin tells nothing.
     """
-    held = weight > 0.0
-    count = np.bincount(turn[held], minlength=turn.max() + 1)
-    mean = np.bincount(turn[held], weight[held], minlength=count.size) / np.maximum(count, 1)
-    return np.where(held, mean[turn], 0.0)
+    weighted = weight > 0.0
+    count = np.bincount(turn[weighted], minlength=turn.max() + 1)
+    mean = np.bincount(turn[weighted], weight[weighted], minlength=count.size) / np.maximum(count, 1)
+    return np.where(weighted, mean[turn], 0.0)
 
 
 def _points(
@@ -331,8 +331,8 @@ def _change(loop: Loop, frequency: float, noise: float, half_force: float) -> fl
     """By how much the force at the start is another a cycle later [N or N m]; 0 where that may be chance."""
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
-    known = np.searchsorted(clock, clock[-1] - 1.0 / frequency, side="right")  # a cycle later
-    first = clock[: max(min(int(np.searchsorted(clock, 0.02 / frequency)), int(known)), 1)]
+    comparable = np.searchsorted(clock, clock[-1] - 1.0 / frequency, side="right")  # a cycle later
+    first = clock[: max(min(int(np.searchsorted(clock, 0.02 / frequency)), int(comparable)), 1)]
     change = abs(float(np.median(np.interp(first + 1.0 / frequency, clock, force) - force[: first.size])))
     # of a difference, and of a median, whose standard error is sqrt(pi/2) of that of a mean
     chance = 1.25 * _CERTAIN * noise * np.sqrt(2.0 / first.size)

@@ -14,7 +14,7 @@ from bushfit.effects import effect_name_of
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.information import FisherInformation, further_test, percent, relative_sizes
-from bushfit.fitting.preparation import MeasuredTest, parted
+from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
 from bushfit.units import format_range
@@ -97,15 +97,15 @@ def left_open(
     """
     if not names:
         return []
-    known = FisherInformation.of(model, data_sets, names)
-    slopes = Coordinates.of(model, names).slopes(model.values) * relative_sizes(model, names)
+    information = FisherInformation.from_tests(model, data_sets, names)
+    slopes = Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names)
     stderr = np.array([covariance.stderr(name) or 0.0 for name in names])
-    each = dict(zip(names, stderr / np.abs(slopes), strict=True))
-    groups = _groups(known)
+    relative_errors = dict(zip(names, stderr / np.abs(slopes), strict=True))
+    groups = _groups(information)
     zero = [name for group in groups for name in group if _is_zero(model, name, covariance)]
     amounts = [name for name in names if model.parameters[name].neutral is not None]
-    shown = {effect_name_of(name) for name in amounts if not _is_zero(model, name, covariance)}
-    idle = {effect_name_of(name) for name in zero} - shown
+    visible = {effect_name_of(name) for name in amounts if not _is_zero(model, name, covariance)}
+    idle = {effect_name_of(name) for name in zero} - visible
     unseen = {
         name: f": these tests do not show {effect_name_of(name)}" for name in zero if effect_name_of(name) in idle
     }
@@ -114,36 +114,36 @@ def left_open(
         rest = [name for name in names if name not in zero and effect_name_of(name) not in idle]
         if not rest:
             return lines
-        known = FisherInformation.of(model, data_sets, rest)
-        groups = _groups(known)
+        information = FisherInformation.from_tests(model, data_sets, rest)
+        groups = _groups(information)
     if not groups:
         return []
     combinations: dict[str, None] = {}
     for group in groups:
-        errors = ", ".join(f"{name} {percent(float(each[name]))}" for name in group)
+        errors = ", ".join(f"{name} {percent(float(relative_errors[name]))}" for name in group)
         reasons = "; ".join(_reasons(model, data_sets, group)) or "these tests do not tell"
-        lines.append(f"{reasons}: {_meaning(known, group)} (standard errors: {errors})")
-        combinations |= dict.fromkeys(_combinations(model, data_sets, known, group))
+        lines.append(f"{reasons}: {_meaning(information, group)} (standard errors: {errors})")
+        combinations |= dict.fromkeys(_combinations(model, data_sets, information, group))
     if combinations:
         lines.append("what is known all the same: " + "; ".join(combinations))
     # what another test would tell beside an error of the model depends on what that error is
     missed = any(data_set.model_error for data_set in data_sets)
-    return lines if missed else [*lines, *further_test(model, data_sets, known)]
+    return lines if missed else [*lines, *further_test(model, data_sets, information)]
 
 
-def _groups(known: FisherInformation) -> list[list[str]]:
+def _groups(information: FisherInformation) -> list[list[str]]:
     """Parameters of each open direction; directions that share one are one group."""
-    errors, vectors = known.directions()
+    errors, vectors = information.directions()
     groups: list[set[str]] = []
     for j in np.flatnonzero(errors > _OPEN):
         parts = np.abs(vectors[:, j]) * errors[j]
-        least = min(_OPEN, _PARTNER * float(parts.max()))
-        group = {name for name, part in zip(known.names, parts, strict=True) if part > least}
-        for other in [other for other in groups if other & group]:
-            groups.remove(other)
-            group |= other
+        threshold = min(_OPEN, _PARTNER * float(parts.max()))
+        group = {name for name, part in zip(information.names, parts, strict=True) if part > threshold}
+        for overlapping in [overlapping for overlapping in groups if overlapping & group]:
+            groups.remove(overlapping)
+            group |= overlapping
         groups.append(group)
-    return [[name for name in known.names if name in group] for group in groups]
+    return [[name for name in information.names if name in group] for group in groups]
 
 
 def _is_zero(model: Model, name: str, covariance: Covariance) -> bool:
@@ -152,9 +152,9 @@ def _is_zero(model: Model, name: str, covariance: Covariance) -> bool:
     return "." in name and neutral is not None and abs(model.values[name] - neutral) < noise
 
 
-def _meaning(known: FisherInformation, group: Sequence[str]) -> str:
+def _meaning(information: FisherInformation, group: Sequence[str]) -> str:
     """Sentence on the combination of a group of parameters that is not known."""
-    if set(group) == set(_FRICTION) and known.error(dict(zip(_FRICTION, (1.0, -1.0), strict=True))) < _KNOWN:
+    if set(group) == set(_FRICTION) and information.error(dict(zip(_FRICTION, (1.0, -1.0), strict=True))) < _KNOWN:
         return "sigma_fmax and eps_half are known only as a ratio"
     if len(group) > 1:
         return f"{', '.join(group[:-1])} and {group[-1]} cannot be told from one another"
@@ -165,7 +165,7 @@ def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence
     """Reasons why tests leave parameters open: conditions that the tests lack."""
     reach = measured_range(model, data_sets)
     (slow, fast), (small, large) = reach.frequency, reach.strain
-    loops, _ = parted(data_sets)
+    loops, _ = split_by_kind(data_sets)
     if set(involved) & set(_FRICTION) and "eps_half" in model.values:
         first, last = (strain / model.values["eps_half"] for strain in (small, large))
         if last < 1.0:
@@ -186,18 +186,18 @@ def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence
 
 
 def _combinations(
-    model: Model, data_sets: Sequence[MeasuredTest], known: FisherInformation, involved: Sequence[str]
+    model: Model, data_sets: Sequence[MeasuredTest], information: FisherInformation, involved: Sequence[str]
 ) -> Iterator[str]:
     """Combinations of what is open that are known well, with their errors."""
-    errors = dict(zip(known.names, known.errors(), strict=True))
+    errors = dict(zip(information.names, information.errors(), strict=True))
     enough = min(_KNOWN, _BETTER * min(float(errors[name]) for name in involved))
     slow = measured_range(model, data_sets).frequency[0]
     values = {**model.values, "omega": 2.0 * np.pi * slow}
     for combination in _COMBINATIONS:
-        if not (set(combination.names) <= set(known.names) and set(combination.open_with) & set(involved)):
+        if not (set(combination.names) <= set(information.names) and set(combination.open_with) & set(involved)):
             continue
-        error = known.error(combination.weights(values))
+        error = information.error(combination.weights(values))
         if error < enough:
-            at = f" at {slow:.3g} Hz" if "omega" in combination.formula else ""
+            condition = f" at {slow:.3g} Hz" if "omega" in combination.formula else ""
             value = format_range("Pa", combination.value(values), digits=4)
-            yield f"{combination.formula}{at} = {value} to {percent(error)}{combination.remark}"
+            yield f"{combination.formula}{condition} = {value} to {percent(error)}{combination.remark}"

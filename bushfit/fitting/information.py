@@ -12,7 +12,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.coordinates import jacobian
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, new_loop, new_sweep, parted
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, new_loop, new_sweep, split_by_kind
 from bushfit.fitting.rig_class import ASSUMED
 from bushfit.model.model import Model
 
@@ -50,14 +50,14 @@ class FisherInformation:
     matrix: Array
 
     @classmethod
-    def of(cls, model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> "FisherInformation":
+    def from_tests(cls, model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> "FisherInformation":
         """Information of data sets on the named parameters of a model at its values."""
         slope = jacobian(model, data_sets, names) * relative_sizes(model, names)[:, None]
         return cls(tuple(names), slope @ slope.T)
 
     def with_more(self, model: Model, data_sets: Sequence[MeasuredTest]) -> "FisherInformation":
         """Information with that of further data sets added."""
-        return replace(self, matrix=self.matrix + FisherInformation.of(model, data_sets, self.names).matrix)
+        return replace(self, matrix=self.matrix + FisherInformation.from_tests(model, data_sets, self.names).matrix)
 
     def directions(self) -> tuple[Array, Array]:
         """Relative standard errors, (k,), of the eigenvectors of the information, and these, (k, k) by column."""
@@ -79,7 +79,9 @@ class FisherInformation:
 def relative_sizes(model: Model, names: Sequence[str]) -> Array:
     """Change of each coordinate of a fit per relative change of its parameter, (k,)."""
     pairs = [(model.parameters[name], abs(model.values[name])) for name in names]
-    return np.array([1.0 if each.log else max(value / each.typical, _LEAST_SIZE) for each, value in pairs])
+    return np.array(
+        [1.0 if parameter.log else max(value / parameter.typical, _LEAST_SIZE) for parameter, value in pairs]
+    )
 
 
 def percent(error: float) -> str:
@@ -87,13 +89,13 @@ def percent(error: float) -> str:
     return f"{float(f'{100.0 * error:.2g}'):g} %" if error < _BEYOND else "beyond 1000 %"
 
 
-def further_test(model: Model, data_sets: Sequence[MeasuredTest], known: FisherInformation) -> list[str]:
+def further_test(model: Model, data_sets: Sequence[MeasuredTest], information: FisherInformation) -> list[str]:
     """A sentence on the test that shrinks the worst standard error most, and to what; none where none helps."""
-    before = known.errors()
+    before = information.errors()
     worst = int(np.argmax(before))
     bearable = max(_BEARABLE, measured_range(model, data_sets).strain[1])
     after = {
-        words: known.with_more(model, more).errors()
+        words: information.with_more(model, more).errors()
         for words, more in _tests(model, data_sets)
         if measured_range(model, more).strain[1] <= bearable
     }
@@ -101,14 +103,14 @@ def further_test(model: Model, data_sets: Sequence[MeasuredTest], known: FisherI
     if after[best].max() > min(_LEAST_GAIN_RATIO * before[worst], _HOPELESS):
         return []
     return [
-        f"the further test that would help most: {best}; the standard error of {known.names[worst]} would fall from "
-        f"{percent(float(before[worst]))} to {percent(float(after[best][worst]))}"
+        f"the further test that would help most: {best}; the standard error of {information.names[worst]} would fall "
+        f"from {percent(float(before[worst]))} to {percent(float(after[best][worst]))}"
     ]
 
 
 def _tests(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tuple[str, list[MeasuredTest]]]:
     """Tests that a lab could add: in words, and as the data sets that they would make."""
-    loops, sweeps = parted(data_sets)
+    loops, sweeps = split_by_kind(data_sets)
     yield "every test once more", list(data_sets)
     for words, loop in _repeated_loops(model, loops) if loops else _new_loops(model, data_sets):
         yield words, [loop]
@@ -138,8 +140,8 @@ def _new_loops(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tupl
 def _changed(loop: MeasuredLoop, model: Model, *, amplitude: float = 1.0, rate: float = 1.0) -> MeasuredLoop:
     """A loop of so many times the amplitude and rate, as the model would have it, with the same relative noise."""
     drive = loop.drive
-    moved = replace(drive, coefficients=drive.coefficients * amplitude, frequency=drive.frequency * rate)
-    return replace(loop, drive=moved).noise_free(model).with_noise(loop.relative_noise)
+    changed = replace(drive, coefficients=drive.coefficients * amplitude, frequency=drive.frequency * rate)
+    return replace(loop, drive=changed).noise_free(model).with_noise(loop.relative_noise)
 
 
 def _new_sweeps(
@@ -151,15 +153,15 @@ def _new_sweeps(
     small, large = (strain / unit_strain for strain in reach.strain)
     slow, fast = reach.frequency
     low, high = band = _NEW_BAND if fast < _SLOW else (slow, fast)
-    beyond = [
+    extensions = [
         (f"a sweep to {2.0 * fast:.3g} Hz", (fast, 2.0 * fast), (small, large)),
         (f"a sweep down to {slow / 10.0:.3g} Hz", (slow / 10.0, slow), (small, large)),
     ]
-    within = f"a sweep from {low:.3g} to {high:.3g} Hz at" if low < high else f"a sweep at {low:.3g} Hz and"
+    prefix = f"a sweep from {low:.3g} to {high:.3g} Hz at" if low < high else f"a sweep at {low:.3g} Hz and"
     for words, ends, amplitudes in (
-        *(beyond if sweeps else ()),
-        (f"{within} a tenth and all of the largest amplitude", band, (0.1 * large, large)),
-        (f"{within} three times the largest amplitude", band, (3.0 * large,)),
+        *(extensions if sweeps else ()),
+        (f"{prefix} a tenth and all of the largest amplitude", band, (0.1 * large, large)),
+        (f"{prefix} three times the largest amplitude", band, (3.0 * large,)),
     ):
         yield words, _sweep(model, sweeps, data_sets[-1], ends, amplitudes)
 

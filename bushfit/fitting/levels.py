@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, parted, rows_of
+from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, rows_of, split_by_kind
 
 #: Relative change of the variances at which the scoring ends: far below their standard error.
 _SETTLED = 1e-3
@@ -36,7 +36,7 @@ class LevelErrors(NamedTuple):
 
 
 def level_errors(
-    data_sets: Sequence[MeasuredTest], residual: Array, absorbed: Array, most: tuple[float, float]
+    data_sets: Sequence[MeasuredTest], residual: Array, absorbed: Array, maximum: tuple[float, float]
 ) -> LevelErrors:
     """Errors of the levels of sweeps by restricted maximum likelihood, never below 0 and never beyond `most`.
 
@@ -49,44 +49,44 @@ def level_errors(
         level's unit error, whitened. What the fit absorbs is projected out (Patterson and Thompson, 1971). The scoring
         is Fisher's, in the space of the levels.
     """
-    columns, which, before = level_columns(data_sets)
+    columns, kinds, before = level_columns(data_sets)
     nothing = LevelErrors(before, 0, 0.0, matters=False)
     if not columns.size:
         return nothing
     span, size, _ = np.linalg.svd(absorbed.T, full_matrices=False)
     span = span[:, size > _LEFT * size.max(initial=0.0)]
-    left = columns - (columns @ span) @ span.T
-    values, vectors = np.linalg.eigh(left @ left.T)
-    seen = values > _LEFT * np.square(np.linalg.norm(columns, axis=1)).max()
-    root = np.sqrt(values[seen, None]) * vectors[:, seen].T
-    along = (vectors[:, seen].T @ (left @ residual)) / np.sqrt(values[seen])
-    parts = np.array([root[:, which == kind] @ root[:, which == kind].T for kind in (0, 1)])
-    scale = np.array([np.mean(np.square(columns[which == kind]).sum(axis=1)) for kind in (0, 1)])
+    remainder = columns - (columns @ span) @ span.T
+    values, vectors = np.linalg.eigh(remainder @ remainder.T)
+    determined = values > _LEFT * np.square(np.linalg.norm(columns, axis=1)).max()
+    root = np.sqrt(values[determined, None]) * vectors[:, determined].T
+    components = (vectors[:, determined].T @ (remainder @ residual)) / np.sqrt(values[determined])
+    parts = np.array([root[:, kinds == kind] @ root[:, kinds == kind].T for kind in (0, 1)])
+    scale = np.array([np.mean(np.square(columns[kinds == kind]).sum(axis=1)) for kind in (0, 1)])
     counted = np.square(before)
-    added, most_added = np.zeros(2), np.maximum(np.square(most) - counted, 0.0)
+    added, most_added = np.zeros(2), np.maximum(np.square(maximum) - counted, 0.0)
 
-    def at(added: Array) -> tuple[Array, Array, float]:
+    def likelihood(added: Array) -> tuple[Array, Array, float]:
         """Slope and curvature of the logarithm of the likelihood, and minus twice itself."""
-        covariance = np.eye(along.size) + np.tensordot(added, parts, 1)
+        covariance = np.eye(components.size) + np.tensordot(added, parts, 1)
         solved = np.linalg.solve(covariance, parts)
-        white = np.linalg.solve(covariance, along)
+        white = np.linalg.solve(covariance, components)
         slope = 0.5 * (np.einsum("i,kij,j->k", white, parts, white) - np.trace(solved, axis1=1, axis2=2))
         curvature = 0.5 * np.einsum("kij,lji->kl", solved, solved)
-        return slope, curvature, float(np.linalg.slogdet(covariance)[1] + along @ white)
+        return slope, curvature, float(np.linalg.slogdet(covariance)[1] + components @ white)
 
     for _ in range(40):  # of Fisher scoring; chosen: more than it takes
-        slope, curvature, _ = at(added)
+        slope, curvature, _ = likelihood(added)
         step = slope / np.maximum(np.diag(curvature), np.finfo(float).tiny)
-        moved = np.clip(added + step, 0.0, most_added)
-        if np.all(np.abs(moved - added) <= _SETTLED * (added + 1.0 / scale)):
+        clipped = np.clip(added + step, 0.0, most_added)
+        if np.all(np.abs(clipped - added) <= _SETTLED * (added + 1.0 / scale)):
             break
-        added = moved
-    _, curvature, least = at(added)
+        added = clipped
+    _, curvature, minimum = likelihood(added)
     freedoms = (2.0 * np.diag(curvature) * np.square(added + 1.0 / scale))[added < most_added]
     if freedoms.min(initial=np.inf) < 1.0:
         return nothing
-    measured = any(sweep.noise.freedom for sweep in parted(data_sets)[1])
-    fall = at(np.zeros(2))[2] - least
+    measured = any(sweep.noise.freedom for sweep in split_by_kind(data_sets)[1])
+    fall = likelihood(np.zeros(2))[2] - minimum
     matters = fall > (_MATTERS if measured else _MATTERS_UNREPEATED)
     gain, phase = np.sqrt(counted + added).tolist()
     return LevelErrors((gain, phase), int(freedoms.min()) if freedoms.size else 0, fall, matters)
@@ -95,17 +95,19 @@ def level_errors(
 def level_columns(data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, tuple[float, float]]:
     """Whitened unit error of each level in gain and in phase, (c, n), which of the two it is, (c,), and the error that
     is counted already."""
-    rows, which, before = [], [], (0.0, 0.0)
+    rows, kinds, before = [], [], (0.0, 0.0)
     size = sum(data_set.size for data_set in data_sets)
-    for sweep, own in zip(data_sets, rows_of(data_sets), strict=True):
+    for sweep, block in zip(data_sets, rows_of(data_sets), strict=True):
         if isinstance(sweep, MeasuredSweep):
             before, columns = sweep.noise.level, level_errors_of(sweep)
             rows.append(np.zeros((len(columns), size)))
-            rows[-1][:, own] = columns
-            which += [0, 1] * (len(columns) // 2)
-    return np.concatenate(rows or [np.empty((0, size))]), np.array(which), before
+            rows[-1][:, block] = columns
+            kinds += [0, 1] * (len(columns) // 2)
+    return np.concatenate(rows or [np.empty((0, size))]), np.array(kinds), before
 
 
 def level_errors_of(sweep: MeasuredSweep) -> Array:
     """Whitened unit error of each level of a sweep, in gain and then in phase, (2 levels, n)."""
-    return np.array([column for held in np.unique(sweep.held) for column in sweep.moved_together(sweep.held == held)])
+    return np.array(
+        [column for held_value in np.unique(sweep.held) for column in sweep.moved_together(sweep.held == held_value)]
+    )

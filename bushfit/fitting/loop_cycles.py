@@ -78,8 +78,8 @@ def steady_cycles(loop: Loop) -> SteadyCycles:
 
 def _thinned(loop: Loop) -> tuple[Array, Array]:
     """Time [s] and displacement [m or rad] of rows that are enough to find the cycles, gross outliers left out."""
-    every = slice(None, None, -(-loop.time.size // ENOUGH_ROWS))
-    time, motion = loop.time[every], loop.displacement[every]
+    selection = slice(None, None, -(-loop.time.size // ENOUGH_ROWS))
+    time, motion = loop.time[selection], loop.displacement[selection]
     rows = gross_rows(motion)
     return np.delete(time, rows), np.delete(motion, rows)
 
@@ -121,8 +121,8 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
         first, last = max(zip(starts, ends, strict=True), key=lambda part: part[1] - part[0])
         whole = _cut(loop, first, last)
         part, note = _steady_part(whole, *_thinned(whole))
-        said = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
-        return part, said if note is None else f"{said}, and of these {note}"
+        sentence = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
+        return part, sentence if note is None else f"{sentence}, and of these {note}"
     steady = _steady_ends(time, motion, period)
     if steady is None:
         return loop, None
@@ -135,21 +135,21 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
 def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, float, bool] | None:
     """First and last time of the steady cycles [s], and whether anything follows; None where all or none are steady."""
     clock = time[time + period <= time[-1]]
-    off = change_after(time, motion, period, slice(0, clock.size))
-    alike = off < SAME_MOTION * np.ptp(motion)
-    breaks = np.flatnonzero(np.diff(alike, prepend=True, append=True)).reshape(-1, 2)
+    difference = change_after(time, motion, period, slice(0, clock.size))
+    steady = difference < SAME_MOTION * np.ptp(motion)
+    breaks = np.flatnonzero(np.diff(steady, prepend=True, append=True)).reshape(-1, 2)
     breaks = breaks[clock[breaks[:, 1] - 1] - clock[breaks[:, 0]] > _BRIEF * period]
-    stretches = np.concatenate(([0], breaks.ravel(), [alike.size])).reshape(-1, 2)  # between breaks that count
+    stretches = np.concatenate(([0], breaks.ravel(), [steady.size])).reshape(-1, 2)  # between breaks that count
     start, end = stretches[np.argmax(np.diff(stretches))]
-    before, after = start > 0, end < off.size
+    before, after = start > 0, end < difference.size
     if start == end or not (before or after):
         return None
-    most_off = _MOST_OFF * np.median(off[start:end]) + _LEAST_OFF * np.ptp(motion)
-    other = np.flatnonzero(off[start:end] > most_off) + start
+    most_off = _MOST_OFF * np.median(difference[start:end]) + _LEAST_OFF * np.ptp(motion)
+    unsteady = np.flatnonzero(difference[start:end] > most_off) + start
     if before:
-        start = max(other[clock[other] < clock[start] + _EDGE * period], default=start - 1) + 1
+        start = max(unsteady[clock[unsteady] < clock[start] + _EDGE * period], default=start - 1) + 1
     if after:
-        end = min(other[clock[other] > clock[end - 1] - _EDGE * period], default=end)
+        end = min(unsteady[clock[unsteady] > clock[end - 1] - _EDGE * period], default=end)
     first, last = float(time[start]), float(time[end - 1]) + period
     if before and last - first > THREE_CYCLES * period:
         first += period  # after a run-in the first cycle still remembers it
@@ -158,8 +158,8 @@ def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, floa
 
 def _cut(loop: Loop, first: float, last: float) -> Loop:
     """The rows between two times [s], both counted in."""
-    kept = slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right"))
-    return loop.at(kept)
+    rows = slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right"))
+    return loop.at(rows)
 
 
 def _period(time: Array, motion: Array) -> float | None:
@@ -203,19 +203,19 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[fl
     rows, motion = loop.time.size, loop.displacement
     duration = float(loop.time[-1] - loop.time[0])
     closed = duration * rows / (rows - 1)
-    apart = abs(motion[-1] - motion[0])
+    gap = abs(motion[-1] - motion[0])
     stride = np.abs(np.diff(motion[[0, 1, -2, -1]]))[[0, 2]].mean()
-    whole = duration if apart < 0.5 * stride else closed
+    whole = duration if gap < 0.5 * stride else closed
     period = _period_by_ends(clock, x, duration, whole)
     if period is not None:
         return 1.0 / period, closed / period
     stroke = float(across[1] - across[0]) if across.size == 2 else np.inf
-    meets = apart < _CLOSED * np.ptp(x) / 2.0 + 1.5 * stride
+    meets = gap < _CLOSED * np.ptp(x) / 2.0 + 1.5 * stride
     if closed > (_MORE_THAN_ONE_THAT_MEETS if meets else _MORE_THAN_ONE) * 2.0 * stroke:
         frequency = _refined(clock, x, 0.5 / stroke, rows)
         if closed * frequency > 1.0 and _repeats(clock, x, 1.0 / frequency):
             return frequency, closed * frequency
-    if apart > _OPEN * np.ptp(x):
+    if gap > _OPEN * np.ptp(x):
         raise FitError(
             "the loop does not hold a whole cycle",
             file=loop.source.file if loop.source else None,
@@ -260,10 +260,10 @@ def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) ->
     solution = least_squares(columns, motion)
     for _ in range(10):  # of Gauss-Newton; chosen: nearly all frequencies take three to six
         residual = motion - columns @ solution
-        kept = np.abs(residual) <= residual_limit(solution, residual, residual.size)
+        inliers = np.abs(residual) <= residual_limit(solution, residual, residual.size)
         by_phase = np.concatenate(([0.0], -number * solution[order + 1 :], number * solution[1 : order + 1]))
         by_frequency = 2.0 * np.pi * time * (columns @ by_phase)
-        found = least_squares(np.column_stack((columns, by_frequency)), motion, kept)
+        found = least_squares(np.column_stack((columns, by_frequency)), motion, inliers)
         step = float(np.clip(found[-1], -_LARGEST_STEP * frequency, _LARGEST_STEP * frequency))
         frequency += step
         if abs(step) < _SETTLED * frequency:
@@ -277,9 +277,9 @@ def _repeats(clock: Array, x: Array, period: float) -> bool:
     begin = int(np.searchsorted(clock, period))
     if x.size - begin < 2:
         return True
-    off = change_after(clock, x, -period, slice(begin, None))
+    difference = change_after(clock, x, -period, slice(begin, None))
     scatter = np.median(np.abs(np.diff(x, 2))) if x.size > 4 else 0.0
-    return float(np.sqrt(np.mean(np.square(off)))) < max(_REPEATS * np.ptp(x) / 2.0, _REPEATS_SCATTER * scatter)
+    return float(np.sqrt(np.mean(np.square(difference)))) < max(_REPEATS * np.ptp(x) / 2.0, _REPEATS_SCATTER * scatter)
 
 
 def waveform(coefficients: Array) -> str:
@@ -298,11 +298,11 @@ def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
     half = np.ptp(motion) / 2.0
     outer = float(np.mean(np.abs(motion - motion.min() - half) > _OUTER * half))
     # evenly in time a triangle has 10 % there, a sine 29 %
-    like, other = ("a sine", "a triangle") if outer > 0.2 else ("a triangle", "a sine")
-    if waveform(coefficients) != other:
+    like, opposite = ("a sine", "a triangle") if outer > 0.2 else ("a triangle", "a sine")
+    if waveform(coefficients) != opposite:
         return None
     return (
         f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, as those of {like} recorded evenly "
-        f"in time, but the {loop.direction.motion.words[0]} over time is {other}: where a file has no time, rate means "
-        'a triangle, and frequency with waveform = "sine" a sine'
+        f"in time, but the {loop.direction.motion.words[0]} over time is {opposite}: where a file has no time, rate "
+        'means a triangle, and frequency with waveform = "sine" a sine'
     )

@@ -77,20 +77,22 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
     recorded = {"displacement": loop.displacement, "force": loop.force}
     values = np.column_stack([column[chosen] for column in recorded.values()])
     solution, inliers, outliers = least_squares(columns, values), np.empty(values.shape, dtype=bool), {}
-    for which, (name, column) in enumerate(recorded.items()):
-        solution[:, which], inliers[:, which] = _fit_without_outliers(columns, values[:, which], solution[:, which])
-        residual = values[:, which] - columns @ solution[:, which]
+    for column_number, (name, column) in enumerate(recorded.items()):
+        solution[:, column_number], inliers[:, column_number] = _fit_without_outliers(
+            columns, values[:, column_number], solution[:, column_number]
+        )
+        residual = values[:, column_number] - columns @ solution[:, column_number]
         outliers[name] = (
-            _column_outliers(loop, frequency, column, solution[:, which], residual)
-            if column.size <= _MOST_ROWS_CHECKED or not inliers[:, which].all()
+            _column_outliers(loop, frequency, column, solution[:, column_number], residual)
+            if column.size <= _MOST_ROWS_CHECKED or not inliers[:, column_number].all()
             else _NO_OUTLIERS
         )
-    left = values - columns @ solution
+    remainder = values - columns @ solution
     of_motion, of_force = inliers.T
     freedom = np.maximum(np.count_nonzero(inliers, axis=0) - 2 * order - 1, 1)
-    motion_noise = float(np.sqrt(np.sum(np.square(left[of_motion, 0])) / freedom[0]))
+    motion_noise = float(np.sqrt(np.sum(np.square(remainder[of_motion, 0])) / freedom[0]))
     motion = _cleared(as_complex(solution[:, 0]), motion_noise, phase, values[:, 0], of_motion)
-    settled, unknowns = less_slow(phase[of_force], left[of_force, 1])
+    settled, unknowns = less_slow(phase[of_force], remainder[of_force, 1])
     force_noise = float(np.sqrt(np.sum(np.square(settled)) / max(freedom[1] - unknowns, 1)))
     return LoopHarmonics(motion, as_complex(solution[:, 1]), force_noise, outliers)
 
@@ -99,11 +101,11 @@ def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Arra
     """The harmonics of a motion without those that noise explains; those of a triangle where its rows, (n,), agree
     with one as well, but for noise, as with its own."""
     triangle = _triangle(coefficients[0], coefficients[1])
-    other = coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= 3.0 * noise
-    if not other and np.std((displacement - series(triangle, phase))[inliers]) < _TRIANGLE_RATIO * noise:
+    different = coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= 3.0 * noise
+    if not different and np.std((displacement - series(triangle, phase))[inliers]) < _TRIANGLE_RATIO * noise:
         return triangle
-    least = 4.0 * noise * np.sqrt(2.0 / phase.size)  # standard errors
-    keep = (np.abs(coefficients) > least) | (np.arange(coefficients.size) < 2)
+    threshold = 4.0 * noise * np.sqrt(2.0 / phase.size)  # standard errors
+    keep = (np.abs(coefficients) > threshold) | (np.arange(coefficients.size) < 2)
     return np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
 
 
@@ -121,14 +123,14 @@ def less_slow(phase: Array, residual: Array) -> tuple[Array, int]:
     """Residuals of the force less the slow part of each cycle's own, (n,), and how many unknowns that took."""
     number = np.floor(phase).astype(np.intp)
     size, unknowns = 2 * _SLOW_HARMONICS + 1, 0
-    left = residual.copy()
+    remainder = residual.copy()
     for cycle in np.unique(number):
         rows = np.flatnonzero(number == cycle)
         if rows.size > 4 * size:  # fewer leave a cycle as it is
             slow = basis(phase[rows], _SLOW_HARMONICS)
-            left[rows] -= slow @ np.linalg.lstsq(slow, left[rows], rcond=None)[0]
+            remainder[rows] -= slow @ np.linalg.lstsq(slow, remainder[rows], rcond=None)[0]
             unknowns += size
-    return left, unknowns
+    return remainder, unknowns
 
 
 def residual_limit(solution: Array, residual: Array, rows: int) -> float:
@@ -165,10 +167,10 @@ def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Arra
     """Outliers among all rows of a column, whose harmonics and residual are of rows that stand for all."""
     grid = np.arange(GRID + 1) / GRID
     cycle = basis(grid, solution.size // 2) @ solution
-    off = column - np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, cycle)
+    distance = column - np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, cycle)
     limit = residual_limit(solution, residual, column.size)
-    rows = np.flatnonzero(are_outliers(off, column, limit) | are_stuck(column))
-    return OutlierRows(rows, np.abs(off[rows]) / _noise(solution, residual))
+    rows = np.flatnonzero(are_outliers(distance, column, limit) | are_stuck(column))
+    return OutlierRows(rows, np.abs(distance[rows]) / _noise(solution, residual))
 
 
 def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Array:
@@ -196,9 +198,12 @@ def phase_bins(
     groups, unless `each_cycle` has its own. The clock [s], (n,), rises from the first row.
     """
     number = np.arange(int(cycles) + 2)
-    own, growth = 4, 1.5  # cycles over which a loop settles have bins of their own; later it does ever more slowly
-    later = own * growth ** np.arange(np.log(number.size / own) / np.log(growth))
-    starts = number if each_cycle else np.union1d(np.arange(own), later.astype(np.intp))
+    separate_cycles, growth = (
+        4,
+        1.5,
+    )  # cycles over which a loop settles have bins of their own; later it does ever more slowly
+    later = separate_cycles * growth ** np.arange(np.log(number.size / separate_cycles) / np.log(growth))
+    starts = number if each_cycle else np.union1d(np.arange(separate_cycles), later.astype(np.intp))
     group = np.searchsorted(starts, number, side="right") - 1
     middle = np.round(np.bincount(group, weights=number) / np.bincount(group))
     edges = np.append(np.arange(int(cycles * GRID) + 1) / (frequency * GRID), np.inf)

@@ -59,8 +59,8 @@ def law(result: Result, temperature: Array) -> tuple[Array, Array]:
     value, error = result.model.values[SHIFT], result.covariance.stderr(SHIFT)
     step = _APART * (error or np.nan)
 
-    def shift(of: float) -> Array:
-        return np.log(result.model.with_values({SHIFT: of}).shift_factor(Circumstances(temperature)))
+    def shift(shift_value: float) -> Array:
+        return np.log(result.model.with_values({SHIFT: shift_value}).shift_factor(Circumstances(temperature)))
 
     slope = (shift(value + step) - shift(value - step)) / (2.0 * step) if error else np.full(temperature.shape, np.nan)
     return shift(value), np.abs(slope) * (error or np.nan)
@@ -86,13 +86,15 @@ def _more(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:
     """
     more, place, under = 0.0, sweep.direction, sweep.circumstances
 
-    def over_measured(by: float) -> Array:
-        return model.stiffness(place, sweep.frequency * np.exp(by), sweep.amplitude, under=under) / sweep.measured
+    def over_measured(log_factor: float) -> Array:
+        return (
+            model.stiffness(place, sweep.frequency * np.exp(log_factor), sweep.amplitude, under=under) / sweep.measured
+        )
 
     for _ in range(_STEPS):
         slope = (over_measured(more + _APART) - over_measured(more - _APART)) / (2.0 * _APART)
-        left, size = over_measured(more) - 1.0, float(np.linalg.norm(slope))
+        remainder, size = over_measured(more) - 1.0, float(np.linalg.norm(slope))
         if not size:
             return np.nan, np.nan
-        more -= float(np.clip(np.vdot(slope, left).real / size**2, -_LARGEST, _LARGEST))
-    return more, float(np.linalg.norm(left) / np.sqrt(max(2 * left.size - 1, 1)) / size)
+        more -= float(np.clip(np.vdot(slope, remainder).real / size**2, -_LARGEST, _LARGEST))
+    return more, float(np.linalg.norm(remainder) / np.sqrt(max(2 * remainder.size - 1, 1)) / size)

@@ -11,7 +11,7 @@ from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.effects.history import History
 from bushfit.fitting.common_error import CommonError, ErrorProducts
 from bushfit.fitting.drive import Drive
-from bushfit.fitting.measured_test import MeasuredBase, keep, kept
+from bushfit.fitting.measured_test import MeasuredBase, cache_last, store_last
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
@@ -120,7 +120,7 @@ class MeasuredLoop(MeasuredBase):
         """Standard deviation of one point, relative to half the force range, or of a sweep to |K|."""
         return self.drive.noise / self.drive.half_range
 
-    @kept
+    @cache_last
     def force(self, model: Model, values: Values | None = None) -> Array:
         """Model force at the rows [N or N m], (..., n)."""
         return self._at_rows(
@@ -135,14 +135,14 @@ class MeasuredLoop(MeasuredBase):
         """Whitened residuals, (..., size); `values` in place of the model's own add leading axes."""
         return self._whitened((self.force(model, values) - self.drive.force) * self._per_noise)
 
-    @kept
+    @cache_last
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the whitened residuals by parameter, (len(names), size)."""
         force, slopes = force_and_slopes(model, self.direction, self._history(model), names, self.under)
-        keep(self, "force", model, self._at_rows(force))
+        store_last(self, "force", model, self._at_rows(force))
         return self._whitened(self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise)
 
-    def moved(self, change: Array, model: Model, beside: Array | float = 0.0) -> Array:
+    def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
         """Change of the whitened residuals, (..., size), by a small change of the model's stiffness at the operating
         points, complex (..., n) [N/m or N m/rad], with another stiffness beside the model's; a loop changes by its
         first harmonic.
@@ -151,7 +151,7 @@ class MeasuredLoop(MeasuredBase):
 
     def residual_with(self, added: Array, model: Model) -> Array:
         """Whitened residuals with a stiffness of any size added, complex (n,), (size,); as `moved`, but exact."""
-        return self.residual(model) + self.moved(added, model)
+        return self.residual(model) + self.residual_change(added, model)
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
         """Derivatives of `residual_with` by parameter: what is added stays as it is, or stays the same share of the
@@ -161,7 +161,7 @@ class MeasuredLoop(MeasuredBase):
         if as_share:
             test = self.direction, self.frequency, self.amplitude
             stiffness, of_stiffness = stiffness_and_slopes(model, *test, names, "loop", self.under)
-            slopes = slopes + self.moved(added / stiffness * of_stiffness, model)
+            slopes = slopes + self.residual_change(added / stiffness * of_stiffness, model)
         return slopes
 
     def _history(self, model: Model) -> History:
@@ -180,7 +180,7 @@ class MeasuredLoop(MeasuredBase):
         """Loop with another standard deviation of one row, relative to half the force range."""
         return replace(self, drive=replace(self.drive, noise=relative * self.drive.half_range))
 
-    def off(self, model: Model) -> Array:
+    def relative_difference(self, model: Model) -> Array:
         return ((self.force(model) - self.drive.force) / self.drive.half_range)[None]
 
     def distance(self, model: Model) -> Array:
@@ -191,10 +191,10 @@ class MeasuredLoop(MeasuredBase):
         """Residuals, (size,), each row of a loop in units of its noise, whatever the rows before it tell."""
         return (self.force(model) - self.drive.force) * self._per_noise
 
-    def shown(self, model: Model) -> Array:
+    def displayed_residual(self, model: Model) -> Array:
         """Residuals as `misfit`, and distances of points without weight, in units of noise, (size,)."""
-        off = (self.force(model) - self.drive.force) / self.drive.noise
-        return np.where(self.weights > 0.0, self.misfit(model), off)
+        distance = (self.force(model) - self.drive.force) / self.drive.noise
+        return np.where(self.weights > 0.0, self.misfit(model), distance)
 
     def weighted(self, weight: Array) -> Self:
         """Test with the weight of each point, (n,), times a share."""
@@ -220,8 +220,8 @@ class MeasuredLoop(MeasuredBase):
         file = str(self.source.file) if self.source else None
         before = self.drive.first_row + (self.test.part.first_row if self.test.part else 0)
         for column, (rows, distance) in self.drive.outliers.items():
-            for row, off in zip(rows.tolist(), distance.tolist(), strict=True):
-                yield Outlier(self.name, file, row + before + 1, column, off)
+            for row, noise_units in zip(rows.tolist(), distance.tolist(), strict=True):
+                yield Outlier(self.name, file, row + before + 1, column, noise_units)
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
         """How an estimator reacts to each variance of the noise that was itself estimated.
@@ -233,12 +233,12 @@ class MeasuredLoop(MeasuredBase):
             Per variance, (k, size): the influence times the whitened derivative of the residuals' covariance by that
             variance, times its standard error.
         """
-        own = self._less_common(influence)
-        whole = own @ self._fundamental.T if self.fundamental_only else own
+        reaction = self._less_common(influence)
+        whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
         by_noise = [self._less_common(self._counted(part)) for part in self.drive.row_noise.unsure(whole)]
         if not by_noise and self.test.noise is None:
-            by_noise = [np.sqrt(2.0 / self._rows) * self._less_common(own)]
-        return {(self.name, which): part for which, part in enumerate(by_noise)}
+            by_noise = [np.sqrt(2.0 / self._rows) * self._less_common(reaction)]
+        return {(self.name, index): part for index, part in enumerate(by_noise)}
 
     def contrasts(self) -> Array:
         """A constant force, and the cosine and sine of each harmonic, as whitened residuals, (11, n); 0 of those that
@@ -299,7 +299,7 @@ class MeasuredLoop(MeasuredBase):
     @cached_property
     def _error_directions(self) -> tuple[Array, Array]:
         """Orthonormal directions that a model error of 100 % takes in units of noise, (n, c), and its sizes, (c,)."""
-        return CommonError.of_all(self._counted(self._error_waves)[2 * (self.first_error - 1) :]).along
+        return CommonError.of_all(self._counted(self._error_waves)[2 * (self.first_error - 1) :]).principal_errors
 
     @cached_property
     def _error_waves(self) -> Array:
@@ -328,8 +328,8 @@ class MeasuredLoop(MeasuredBase):
             names: of the parameters.
         """
         slopes = force_and_slopes(model, self.direction, self._history(model), names, self.under)[1]
-        left = (self.force(model) - self.drive.force)[None]
-        rows = np.concatenate((left, self.drive.at_rows(self.drive.from_datum(slopes)))) * self._per_noise
+        misfit = (self.force(model) - self.drive.force)[None]
+        rows = np.concatenate((misfit, self.drive.at_rows(self.drive.from_datum(slopes)))) * self._per_noise
         white = self._counted(self.drive.row_noise.whiten(rows) * self._counting)
         directions, size = self._error_directions
         return ErrorProducts(white @ white.T, white @ directions * size, np.square(size))

@@ -10,7 +10,7 @@ import numpy as np
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.fitting.common_error import ErrorProducts
-from bushfit.fitting.measured_test import MeasuredBase, keep, kept, shown_amplitude
+from bushfit.fitting.measured_test import MeasuredBase, cache_last, shown_amplitude, store_last
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import contradictions, outlying_points
 from bushfit.fitting.repeats import FLOOR, unit
@@ -106,18 +106,18 @@ class MeasuredSweep(MeasuredBase):
     @cached_property
     def notes(self) -> list[str]:
         place = np.unique([self.frequency, self.amplitude], axis=1, return_inverse=True)[1]
-        apart = contradictions(self.measured, place)
-        rows = [f"{one} and {other}" for _, *pair in apart for one, other in [sorted(self.order[pair] + 1)]]
-        told = [
+        pairs = contradictions(self.measured, place)
+        rows = [f"{one} and {second}" for _, *pair in pairs for one, second in [sorted(self.order[pair] + 1)]]
+        sentences = [
             f"{self.source.file if self.source else self.name}: points that repeat each other lie up to "
             f"{number(100.0 * share, 2)} % apart, rows {', '.join(rows[:_MOST_LISTED])}"
             + f" and {len(rows) - _MOST_LISTED} more pairs"
             * (len(rows) > _MOST_LISTED)
-            for share, *_ in apart[:1]
+            for share, *_ in pairs[:1]
         ]
         recorded = self.source.notes if self.source else ()
-        beyond = (words for name, words in self.noise.beyond.items() if name == self.name)
-        return [*recorded, *told, *filter(None, [self.contradiction, self._rounded]), *beyond]
+        excesses = (words for name, words in self.noise.beyond.items() if name == self.name)
+        return [*recorded, *sentences, *filter(None, [self.contradiction, self._rounded]), *excesses]
 
     @property
     def _rounded(self) -> str | None:
@@ -126,9 +126,9 @@ class MeasuredSweep(MeasuredBase):
         points = self.measured.size
         if not 3 <= sizes.size <= _FEW_SIZES * points or (step := float(np.median(np.diff(sizes)))) < _COARSE:
             return None
-        many, apart = f"{sizes.size} magnitudes at {points} points", f"{number(100.0 * step, 2)} % apart"
+        many, spacing = f"{sizes.size} magnitudes at {points} points", f"{number(100.0 * step, 2)} % apart"
         file = self.source.file if self.source else self.name
-        return f"{file}: {many}, {apart}: they are rounded, and the error of it counts as noise; save more digits"
+        return f"{file}: {many}, {spacing}: they are rounded, and the error of it counts as noise; save more digits"
 
     @property
     def temperature(self) -> Array:
@@ -160,9 +160,9 @@ class MeasuredSweep(MeasuredBase):
         counted = self.weights > 0.0
         return self if counted.all() else self._part(counted)
 
-    def thinned(self, most: int) -> Self:
+    def thinned(self, maximum: int) -> Self:
         """The part of the sweep of evenly chosen points, a number of them at most."""
-        step = -(-self.order.size // most)
+        step = -(-self.order.size // maximum)
         return self if step == 1 else self._part(np.arange(self.order.size) % step == 0)
 
     def fundamental(self) -> Self:
@@ -226,13 +226,13 @@ class MeasuredSweep(MeasuredBase):
         label = np.stack((self.held, self.repeat.astype(float)))
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
-    @kept
+    @cache_last
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
         """Model stiffness at the points, (..., n); what repeats is computed once."""
-        frequency, amplitude, under, place = self._asked(model)
+        frequency, amplitude, under, place = self._operating_points(model)
         return model.stiffness(self.direction, frequency, amplitude, values=values, under=under)[..., place]
 
-    def _asked(self, model: Model) -> tuple[Array, Array, Circumstances, Array | slice]:
+    def _operating_points(self, model: Model) -> tuple[Array, Array, Circumstances, Array | slice]:
         """Frequency, reached amplitude and circumstances that a model is asked at, and the place of each point there:
         the distinct points, or all of them where the model depends on when each was measured."""
         if model.knows_circumstances:
@@ -248,31 +248,31 @@ class MeasuredSweep(MeasuredBase):
         distinct, place = np.unique(points, return_inverse=True)
         return distinct.real, distinct.imag, place
 
-    def off(self, model: Model) -> Array:
-        off = (self.stiffness(model) - self.measured) / np.abs(self.measured)
-        return np.stack((off.real, off.imag))
+    def relative_difference(self, model: Model) -> Array:
+        relative_difference = (self.stiffness(model) - self.measured) / np.abs(self.measured)
+        return np.stack((relative_difference.real, relative_difference.imag))
 
     def distance(self, model: Model) -> Array:
         """Less what its block shares; of gain and phase the root mean square."""
-        return self.apart(self.deviation(model)) / np.sqrt(2.0)
+        return self.scaled_distance(self.deviation(model)) / np.sqrt(2.0)
 
-    def apart(self, deviation: Array, *, shared: bool = True) -> Array:
+    def scaled_distance(self, deviation: Array, *, shared: bool = True) -> Array:
         """Length of deviations, (n,), in units of the random noise, less the likeliest error that a block shares."""
-        return np.hypot(*self._whitening.own(deviation, shared=shared))
+        return np.hypot(*self._whitening.scaled(deviation, shared=shared))
 
     def misfit(self, model: Model) -> Array:
         return self.residual(model)
 
-    def shown(self, model: Model) -> Array:
+    def displayed_residual(self, model: Model) -> Array:
         deviation = self.deviation(model)
-        own = self._whitening.own(deviation).ravel()
-        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), own)
+        distances = self._whitening.scaled(deviation).ravel()
+        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), distances)
 
     def deviation(self, model: Model, values: Values | None = None) -> Array:
         """Residual before whitening: gain in the real, phase (or loss factor) in the imaginary part, (..., n)."""
-        return self._off(self.stiffness(model, values))
+        return self._deviation_of(self.stiffness(model, values))
 
-    def _off(self, stiffness: Array) -> Array:
+    def _deviation_of(self, stiffness: Array) -> Array:
         """The deviation of a stiffness at the points, (..., n)."""
         if self.residuals == "complex":
             return np.log(stiffness / self.measured)
@@ -280,14 +280,14 @@ class MeasuredSweep(MeasuredBase):
         loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
         return gain + 1j * loss * self._loss_scale
 
-    @kept
+    @cache_last
     def residual(self, model: Model, values: Values | None = None) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
             return self.whiten(self.deviation(model, values))
 
-    @kept
+    @cache_last
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        return self.moved(self._slopes(model, names), model)
+        return self.residual_change(self._slopes(model, names), model)
 
     def with_model_error(self, size: float) -> Self:
         return replace(self, model_error=size)
@@ -298,20 +298,20 @@ class MeasuredSweep(MeasuredBase):
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the stiffness at the points by fit coordinate, (len(names), n); the stiffness is kept."""
-        frequency, amplitude, under, place = self._asked(model)
+        frequency, amplitude, under, place = self._operating_points(model)
         stiffness, slopes = stiffness_and_slopes(model, self.direction, frequency, amplitude, names, under=under)
-        keep(self, "stiffness", model, stiffness[place])
+        store_last(self, "stiffness", model, stiffness[place])
         return slopes[:, place]
 
     def residual_with(self, added: Array, model: Model) -> Array:
-        return self.whiten(self._off(self.stiffness(model) + added))
+        return self.whiten(self._deviation_of(self.stiffness(model) + added))
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
         grown = 1.0 + added / self.stiffness(model) if as_share else 1.0
-        return self.moved(grown * self._slopes(model, names), model, added)
+        return self.residual_change(grown * self._slopes(model, names), model, added)
 
-    def moved(self, change: Array, model: Model, beside: Array | float = 0.0) -> Array:
-        return self.whiten(self._relative(change, self.stiffness(model) + beside))
+    def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
+        return self.whiten(self._relative(change, self.stiffness(model) + added))
 
     def _relative(self, change: Array, stiffness: Array) -> Array:
         """Change of the deviation, (..., n), by small changes of a stiffness at the points, (..., n) each."""
@@ -356,24 +356,24 @@ class MeasuredSweep(MeasuredBase):
 
     def outlying(self, model: Model) -> Array:
         points, freedom = np.stack((self.frequency, self.amplitude)), self.noise.scatter_freedom or np.inf
-        return outlying_points(self.deviation(model), self.apart, self.block_starts, points, freedom)
+        return outlying_points(self.deviation(model), self.scaled_distance, self.block_starts, points, freedom)
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
         file = str(self.source.file) if self.source else None
         distance = self.distance(model)[points].tolist()
-        for row, off in sorted(zip((self.order[points] + 1).tolist(), distance, strict=True)):
-            yield Outlier(self.name, file, row, "stiffness", off)
+        for row, noise_units in sorted(zip((self.order[points] + 1).tolist(), distance, strict=True)):
+            yield Outlier(self.name, file, row, "stiffness", noise_units)
 
     def lines(self, model: Model) -> list[LineMisfit]:
         """Mean misfit of each line over its repeats."""
         ratio, lines = self.measured / self.stiffness(model) - 1.0, []
-        for held in np.unique(self.held):
-            chosen = self.held == held
+        for held_value in np.unique(self.held):
+            chosen = self.held == held_value
             _, first, place, counts = np.unique(
                 self.step[chosen], return_index=True, return_inverse=True, return_counts=True
             )
             mean = np.bincount(place, ratio[chosen].real) + 1j * np.bincount(place, ratio[chosen].imag)
-            of_one = np.square(self.noise.random[self.name, float(held)]) + np.square(self.noise.shared)
+            of_one = np.square(self.noise.random[self.name, float(held_value)]) + np.square(self.noise.shared)
             frequency, amplitude = (values[chosen][first] for values in (self.frequency, self.amplitude))
             noise = np.sqrt(of_one / np.median(counts) + np.square(self.noise.level))
             line = LineMisfit(self.name, self.direction, self.sweep.stepped, frequency, amplitude, mean / counts, noise)

@@ -39,7 +39,7 @@ class MeasuredBase(ABC):
         """Share of its weight that each point has, (n,); of a long loop the rows behind it."""
 
     @abstractmethod
-    def off(self, model: Model) -> Array:
+    def relative_difference(self, model: Model) -> Array:
         """Model less measured of every point, relative to |K| or to half a loop's force range, (parts, n)."""
 
     @property
@@ -62,33 +62,40 @@ class MeasuredBase(ABC):
 
     def relative(self, model: Model) -> Array:
         """Size of the misfit of the points that carry weight, relative as `off`, for NRMSE."""
-        return np.linalg.norm(self.off(model)[:, self.weights > 0.0], axis=0)
+        return np.linalg.norm(self.relative_difference(model)[:, self.weights > 0.0], axis=0)
 
-    def change(self, one: Model, other: Model) -> float:
+    def change(self, one: Model, reference: Model) -> float:
         """Largest difference between two models, relative as `off`."""
-        return float(np.linalg.norm(self.off(one) - self.off(other), axis=0).max())
+        return float(np.linalg.norm(self.relative_difference(one) - self.relative_difference(reference), axis=0).max())
 
 
-def kept(answer: Callable[..., Array]) -> Callable[..., Array]:
+def cache_last(answer: Callable[..., Array]) -> Callable[..., Array]:
     """Keeps what a data set answered to the last model; of values in place of the model's own nothing is kept."""
     place = f"_last_{answer.__name__}"
 
     @wraps(answer)
-    def asked(data_set: Any, model: Model, beside: Sequence[str] | Values | None = None) -> Array:
-        if isinstance(beside, Mapping):
-            return answer(data_set, model, beside)
-        question = () if beside is None else (tuple(beside),)
+    def cached(data_set: Any, model: Model, argument: Sequence[str] | Values | None = None) -> Array:
+        if isinstance(argument, Mapping):
+            return answer(data_set, model, argument)
+        question = () if argument is None else (tuple(argument),)
         last = data_set.__dict__.get(place)
         if last is None or last[0] is not model or last[1] != question:
             last = data_set.__dict__[place] = (model, question, answer(data_set, model, *question))
             last[2].flags.writeable = False
         return last[2]
 
-    return asked
+    return cached
 
 
-def keep(data_set: MeasuredBase, answer: str, model: Model, found: Array) -> None:
-    """Let a data set know an answer to a model that came with another one; `answer` is a method that is `kept`."""
+def store_last(data_set: MeasuredBase, answer: str, model: Model, found: Array) -> None:
+    """Store a result that came with another one, for a method decorated with `cache_last`.
+
+    Args:
+        data_set: test whose cache is filled.
+        answer: name of the method.
+        model: model that the result belongs to.
+        found: the result; it becomes read-only.
+    """
     data_set.__dict__[f"_last_{answer}"] = model, (), found
     found.flags.writeable = False
 

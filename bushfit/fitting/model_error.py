@@ -94,7 +94,7 @@ def with_model_error(
     minimised, weighed = (
         tuple(data_set.with_model_error(size) for data_set in part) for part in (found.minimised, found.weighed)
     )
-    whole = Discrepancy.over(_in_noise(solution, weighed), discrepancy.groups, discrepancy.lengths, MAXIMUM_NODES)
+    whole = Discrepancy.over_tests(_in_noise(solution, weighed), discrepancy.groups, discrepancy.lengths, MAXIMUM_NODES)
     process = Process(discrepancy.best[1] * whole.complex_shapes, discrepancy.likelihood.freedom(discrepancy.best[1]))
     error = averaged(processes)
     if error.typical >= SIZES[-1]:
@@ -131,17 +131,17 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
         The logarithm is -(ln|S| + r^T P r + ln|J S^-1 J^T|)/2 with S the covariance of noise and model error, J the
         derivatives, (k, n), and P = S^-1 - S^-1 J^T (J S^-1 J^T)^-1 J S^-1.
     """
-    known = [data_set.error_products(model, names) for data_set in data_sets]
-    scale = np.append(1.0, Coordinates.of(model, names).slopes(model.values))
+    products_by_test = [data_set.error_products(model, names) for data_set in data_sets]
+    scale = np.append(1.0, Coordinates.of_parameters(model, names).slopes(model.values))
 
     def cost(log_size: float) -> float:
-        products, log_sizes = zip(*(test.beside(float(np.exp(log_size))) for test in known), strict=True)
+        products, log_sizes = zip(*(test.with_size(float(np.exp(log_size))) for test in products_by_test), strict=True)
         both = np.sum(products, axis=0) * np.outer(scale, scale)
         units = np.sqrt(np.maximum(np.diag(both)[1:], np.finfo(float).tiny))
         size, vectors = np.linalg.eigh(both[1:, 1:] / np.outer(units, units))
-        kept = size > ROUNDING * size.max(initial=0.0)
-        absorbed = np.square(both[0, 1:] / units @ vectors[:, kept]) / size[kept]
-        information = np.sum(np.log(size[kept])) + 2.0 * np.sum(np.log(units))
+        significant = size > ROUNDING * size.max(initial=0.0)
+        absorbed = np.square(both[0, 1:] / units @ vectors[:, significant]) / size[significant]
+        information = np.sum(np.log(size[significant])) + 2.0 * np.sum(np.log(units))
         return float(sum(log_sizes) + both[0, 0] - absorbed.sum() + information)
 
     low, high = np.log(SIZES[[0, -1]]).tolist()
@@ -149,7 +149,7 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
     return float(np.exp(found.x))
 
 
-def log_likelihood(found: WeightedFit, known: Mapping[str, float]) -> float:
+def log_likelihood(found: WeightedFit, prior_precision: Mapping[str, float]) -> float:
     """Logarithm of the restricted likelihood of a fit, the parameters that rest on no bound integrated.
 
     Where the model misses the tests, a process stands beside the noise, its sizes and lengths integrated.
@@ -164,16 +164,18 @@ def log_likelihood(found: WeightedFit, known: Mapping[str, float]) -> float:
     rows, residual = tests.moving, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
     if size:
-        seen, processes = tests.seen.of(residual), discrepancies(tests)
+        components, processes = tests.subspace.project(residual), discrepancies(tests)
         columns = [process.tests.columns(process.complex_shapes) for process in processes]
-        beside = [RestrictedLikelihood.of(rows, seen, np.empty((0, seen.size))) for rows in columns]
-        evidence = np.array([likelihood.log_evidence(SIZES) for likelihood in beside])
+        likelihoods = [
+            RestrictedLikelihood.from_columns(rows, components, np.empty((0, components.size))) for rows in columns
+        ]
+        evidence = np.array([likelihood.log_evidence(SIZES) for likelihood in likelihoods])
         gain = float(np.logaddexp.reduce(evidence)) - np.log(evidence.size)
         best = int(evidence.argmax())
-        shares = columns[best] * SIZES[beside[best].gains(SIZES).argmax()]
-        across = shares @ tests.seen.of(tests.moving).T
+        shares = columns[best] * SIZES[likelihoods[best].gains(SIZES).argmax()]
+        across = shares @ tests.subspace.project(tests.moving).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
-    prior = np.diag([known.get(names[i], 0.0) for i in found.solution.moving])
+    prior = np.diag([prior_precision.get(names[i], 0.0) for i in found.solution.moving])
     log_size = sum(test.log_size for test in tests.data_sets) + float(np.linalg.slogdet(information + prior)[1])
     return gain - 0.5 * (float(residual @ residual) + log_size)
 
@@ -203,12 +205,12 @@ def _exceeds_noise(found: WeightedFit, rig: RigSettings) -> bool:
 def _is_smooth(found: WeightedFit, rig: RigSettings) -> bool:
     """True if the tests are likelier with something smooth beside noise and a rig of the class, prior odds counted."""
     thinned = _thinned(found.minimised)
-    solution = found.solution.at(found.solution.model, thinned)
+    solution = found.solution.moved_to(found.solution.model, thinned)
     tests = FittedTests(solution, thinned, [_errors_of_class(data_set, rig) for data_set in thinned])
     names = tuple(dict.fromkeys(tests.directions.tolist()))
-    quick = [Discrepancy.over(tests, (names,), _MIDDLING, _FEW)]
+    quick = [Discrepancy.over_tests(tests, (names,), _MIDDLING, _FEW)]
     if tests.directions.size > _DENSE:
-        quick.append(Discrepancy.over(tests, (names,), (OVER_FREQUENCY[0], OVER_STRAIN[-1]), MAXIMUM_NODES))
+        quick.append(Discrepancy.over_tests(tests, (names,), (OVER_FREQUENCY[0], OVER_STRAIN[-1]), MAXIMUM_NODES))
     if max(process.best[0] for process in quick) <= _SHOWS:
         return False
     processes = discrepancies(tests)
@@ -218,13 +220,13 @@ def _is_smooth(found: WeightedFit, rig: RigSettings) -> bool:
 
 def _restarted(solution: Solution, data_sets: Sequence[MeasuredTest]) -> list[Model]:
     """A model with its branches as read off the tests: a fit bent by noise may have lost one for good."""
-    model, moved = solution.model, solution.coordinates.names
-    known = {name: value for name, value in model.values.items() if name not in moved}
+    model, names = solution.model, solution.coordinates.names
+    fixed = {name: value for name, value in model.values.items() if name not in names}
     with suppress(FitError):  # tests that no rubber gives
-        paper = Model.with_defaults(model.bushing, BASE, start_values(model.bushing, data_sets, known))
-        others = [paper.starts(effect)[0].items() for effect in model.records]
-        values = {**paper.values, **dict(chain.from_iterable(others))}
-        return [model.with_values({name: values[name] for name in moved if name in values})]
+        paper = Model.with_defaults(model.bushing, BASE, start_values(model.bushing, data_sets, fixed))
+        starts = [paper.starts(effect)[0].items() for effect in model.records]
+        values = {**paper.values, **dict(chain.from_iterable(starts))}
+        return [model.with_values({name: values[name] for name in names if name in values})]
     return []
 
 
@@ -234,15 +236,15 @@ def _errors_of_class(data_set: MeasuredTest, rig: RigSettings) -> Array:
     if isinstance(data_set, MeasuredLoop):
         gain = data_set.gain_error * data_set.unit_gain[None]
         return gain[:0] if data_set.gain_weighs else gain
-    beyond = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(data_set.noise.level), 0.0))
+    uncounted = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(data_set.noise.level), 0.0))
     columns = level_errors_of(data_set)
-    return columns * np.tile(beyond, len(columns) // 2)[:, None]
+    return columns * np.tile(uncounted, len(columns) // 2)[:, None]
 
 
 def _in_noise(solution: Solution, data_sets: Sequence[MeasuredTest]) -> FittedTests:
     """The model of a fit with other weights, beside no errors of the rig."""
     none = [np.empty((0, data_set.size)) for data_set in data_sets]
-    return FittedTests(solution.at(solution.model, data_sets), data_sets, none)
+    return FittedTests(solution.moved_to(solution.model, data_sets), data_sets, none)
 
 
 def _thinned(data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:

@@ -67,11 +67,11 @@ class SweepNoise:
     level_freedom: int = 0
     beyond: Mapping[str, str] = field(default_factory=dict)
 
-    def scatter(self, name: str, held: Array, step: Array) -> Array:
+    def scatter(self, name: str, held_values: Array, step: Array) -> Array:
         """Standard deviation from point to point of gain and phase at points of a sweep, (2, n)."""
-        of_lines = {line: self.random[name, float(line)] for line in np.unique(held)}
-        exponent, at = self.slopes.get(name, (0.0, 1.0))
-        return np.array([of_lines[line] for line in held]).T * (step / at) ** exponent
+        of_lines = {line: self.random[name, float(line)] for line in np.unique(held_values)}
+        exponent, reference = self.slopes.get(name, (0.0, 1.0))
+        return np.array([of_lines[line] for line in held_values]).T * (step / reference) ** exponent
 
     def describe(self) -> str:
         """One line for reports."""
@@ -100,43 +100,43 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
 
     def of_lines(without: Collection[float]) -> dict[LineKey, LineNoise]:
         return {
-            (sweep.name, float(held)): line_noise(sweep, log_stiffness, held, without)
+            (sweep.name, float(held_value)): line_noise(sweep, log_stiffness, held_value, without)
             for sweep, log_stiffness in at_levels
-            for held in np.unique(sweep.held)
+            for held_value in np.unique(sweep.held)
         }
 
     lines = of_lines(())
-    if apart := disturbed(lines.values()):
-        lines = of_lines(apart)
+    if disturbed_steps := disturbed(lines.values()):
+        lines = of_lines(disturbed_steps)
     slopes = _slopes(sweeps, lines)
     for key, line in lines.items():
         if key[0] in slopes and line.steps.size:
-            exponent, at = slopes[key[0]]
-            lines[key] = replace(line, scatter=line.scatter / ((line.steps / at) ** exponent)[:, None])
+            exponent, reference = slopes[key[0]]
+            lines[key] = replace(line, scatter=line.scatter / ((line.steps / reference) ** exponent)[:, None])
     repeated = [line for line in lines.values() if line.shared_freedom]
     measured = repeated or [line for line in lines.values() if line.calmer is not None]
     variances, scatter_freedom = _pooled(lines, measured)
-    stated = {sweep.name: noise for sweep in sweeps if (noise := _stated(sweep)) is not None}
-    if stated:
+    stated_noise = {sweep.name: noise for sweep in sweeps if (noise := _stated_noise(sweep)) is not None}
+    if stated_noise:
         scatter_freedom, slopes = 0, {}
     random = {
-        key: _pair(np.maximum(np.broadcast_to(stated.get(key[0], np.sqrt(variance)), 2), FLOOR))
+        key: _pair(np.maximum(np.broadcast_to(stated_noise.get(key[0], np.sqrt(variance)), 2), FLOOR))
         for key, variance in variances.items()
     }
     if repeated:
         level, freedom = of_class(rig, (0.0, 0.0)), max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH)
-        of_each = {key[0]: [line for own, line in lines.items() if own[0] == key[0]] for key in lines}
-        shared_by = {name: _shared(own, rig) for name, own in of_each.items()}
-        most = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states what repeats share
-        beyond = {name: _beyond(error, rig) for name, error in shared_by.items() if np.any(error > most)}
+        of_each = {key[0]: [line for line_set, line in lines.items() if line_set[0] == key[0]] for key in lines}
+        shared_by = {name: _shared(line_set, rig) for name, line_set in of_each.items()}
+        largest = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states what repeats share
+        excesses = {name: _excess_sentence(error, rig) for name, error in shared_by.items() if np.any(error > largest)}
         shared = _pair(_shared(repeated, rig))
-        return SweepNoise(random, shared, "repeats", freedom, scatter_freedom, slopes, level, beyond=beyond)
+        return SweepNoise(random, shared, "repeats", freedom, scatter_freedom, slopes, level, beyond=excesses)
     if all(sweep.noise is not None for sweep in sweeps):
         return SweepNoise(random, of_class(rig, (0.0, 0.0)), "stated", 0, scatter_freedom)
     return SweepNoise(random, of_class(rig), "assumed", 0, scatter_freedom)
 
 
-def _stated(sweep: Sweep) -> float | None:
+def _stated_noise(sweep: Sweep) -> float | None:
     """The noise that the campaign states of a sweep, or the root mean square of what its file states of each point."""
     if sweep.noise is not None or sweep.relative_error is None:
         return sweep.noise
@@ -147,9 +147,9 @@ def _slopes(sweeps: Sequence[Sweep], lines: Mapping[LineKey, LineNoise]) -> dict
     """How the scatter of a rig goes with what is stepped, see `_slope`: one law for all sweeps that step the same."""
     found = dict[str, tuple[float, float]]()
     for stepped in {sweep.stepped for sweep in sweeps}:
-        alike = {sweep.name for sweep in sweeps if sweep.stepped == stepped}
-        if slope := _slope([line for key, line in lines.items() if key[0] in alike and line.steps.size]):
-            found |= dict.fromkeys(alike, slope)
+        names = {sweep.name for sweep in sweeps if sweep.stepped == stepped}
+        if slope := _slope([line for key, line in lines.items() if key[0] in names and line.steps.size]):
+            found |= dict.fromkeys(names, slope)
     return found
 
 
@@ -174,8 +174,8 @@ def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
     centred = np.concatenate([log - log.mean() for log in logs])
     ratio = np.concatenate(squares)
     scale = float(np.var(ratio)) * centred.size / free_of(centred.size)
-    along = float(centred @ (ratio - 1.0)) ** 2 / max(float(centred @ centred) * scale, FLOOR**2)
-    if chdtrc(1, along) > _BY_CHANCE:
+    statistic = float(centred @ (ratio - 1.0)) ** 2 / max(float(centred @ centred) * scale, FLOOR**2)
+    if chdtrc(1, statistic) > _BY_CHANCE:
         return None
 
     from scipy.optimize import minimize_scalar
@@ -195,22 +195,22 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
     """
     if not measured:
         return {key: line.variance for key, line in lines.items()}, round(min(line.freedom for line in lines.values()))
-    told = [line for line in measured if line.freedom >= _OWN_SCATTER]
-    alike = _of_equal_noise(told or measured)
-    few = [line for line in measured if told and line.freedom < _OWN_SCATTER]
-    counted = [*alike, *few] if alike else measured
+    well_known = [line for line in measured if line.freedom >= _OWN_SCATTER]
+    equal = _of_equal_noise(well_known or measured)
+    few = [line for line in measured if well_known and line.freedom < _OWN_SCATTER]
+    counted = [*equal, *few] if equal else measured
     freedoms = [line.freedom for line in counted]
     pooled, freedom = np.average([line.variance for line in counted], axis=0, weights=freedoms), sum(freedoms)
     unequal = 2.0 * fdtrc(freedom, freedom, pooled.max() / max(pooled.min(), FLOOR**2)) < _BY_CHANCE
     if freedom < _OWN_SCATTER and not unequal:
         pooled = np.full(2, pooled.mean())
-    if alike or not told:
+    if equal or not well_known:
         return dict.fromkeys(lines, pooled), round(freedom)
-    own = {key: line.variance if line.freedom >= _OWN_SCATTER else pooled for key, line in lines.items()}
-    return own, round(min(line.freedom for line in told))
+    by_line = {key: line.variance if line.freedom >= _OWN_SCATTER else pooled for key, line in lines.items()}
+    return by_line, round(min(line.freedom for line in well_known))
 
 
-def _beyond(error: Array, rig: RigSettings) -> str:
+def _excess_sentence(error: Array, rig: RigSettings) -> str:
     words = f"more than a rig of this class makes ({class_words(rig)}): measure again, or state the class under [rig]"
     return f"repeats differ as a whole by an error of {words_of(_pair(error))}, {words}"
 
@@ -236,11 +236,11 @@ def _pair(values: Array) -> tuple[float, float]:
 
 def _of_equal_noise(lines: Sequence[LineNoise]) -> list[LineNoise]:
     """Lines of equal noise, those that a single outlier sets apart without it; none where they are unequal."""
-    alike = sorted(lines, key=lambda line: -float(line.variance.sum()))
-    for place, line in enumerate(alike):
-        if line.calmer is not None and line.calmer.size and _unequal(alike):
-            alike[place] = replace(line, scatter=line.calmer, freedom=len(line.calmer))
-    return [] if _unequal(alike) else alike
+    ordered = sorted(lines, key=lambda line: -float(line.variance.sum()))
+    for place, line in enumerate(ordered):
+        if line.calmer is not None and line.calmer.size and _unequal(ordered):
+            ordered[place] = replace(line, scatter=line.calmer, freedom=len(line.calmer))
+    return [] if _unequal(ordered) else ordered
 
 
 def _unequal(lines: Sequence[LineNoise]) -> bool:

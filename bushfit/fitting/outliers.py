@@ -94,9 +94,9 @@ def gross_rows(values: Array) -> Array:
 
     for width in (NEIGHBOURS, _FEW_NEIGHBOURS):
         level = median_filter(values, width, mode="nearest")
-        off = np.abs(values - level) > _GROSS / 2.0 * float(np.ptp(level))
-        if np.mean(off) < _MOST_GROSS:
-            return np.flatnonzero(off)
+        outlying = np.abs(values - level) > _GROSS / 2.0 * float(np.ptp(level))
+        if np.mean(outlying) < _MOST_GROSS:
+            return np.flatnonzero(outlying)
     return np.empty(0, dtype=np.intp)
 
 
@@ -106,8 +106,8 @@ def _in_burst(residual: Array, far: Array, limit: float) -> Array:
     if not near.size:
         return np.zeros(far.size, dtype=bool)
     after = np.searchsorted(near, np.arange(far.size))
-    beside = residual[near[np.clip((after - 1, after), 0, near.size - 1)]]
-    return far & (_run_lengths(far) <= _LONGEST_BURST) & (np.abs(residual - beside).min(axis=0) > limit)
+    neighbours = residual[near[np.clip((after - 1, after), 0, near.size - 1)]]
+    return far & (_run_lengths(far) <= _LONGEST_BURST) & (np.abs(residual - neighbours).min(axis=0) > limit)
 
 
 def _run_lengths(mask: Array) -> Array:
@@ -117,7 +117,7 @@ def _run_lengths(mask: Array) -> Array:
 
 
 def outlying_points(
-    deviation: Array, apart: Callable[..., Array], starts: Array, points: Array, freedom: float
+    deviation: Array, distance_of: Callable[..., Array], starts: Array, points: Array, freedom: float
 ) -> Array:
     """Points that lie farther off the model than noise reaches, and as far off their neighbours, by number, (k,).
 
@@ -132,17 +132,19 @@ def outlying_points(
         points: frequency and amplitude, (2, n); where both agree, points are repeats.
         freedom: degrees of freedom behind the noise; inf where it is known.
     """
-    distance = apart(deviation)
+    distance = distance_of(deviation)
     by_noise = outlier_limit(deviation.size, 2, freedom)
     limit = by_noise * misfit_scale(distance, 2)
     far = distance > limit
     local = _from_neighbours(deviation, starts, _FEW_NEIGHBOURS)
     _, place = np.unique(points, axis=1, return_inverse=True)
-    repeats, beside = _from_repeats(local, place)
-    alone = np.minimum(apart(local, shared=False), np.where(repeats > 0, apart(beside, shared=False), np.inf))
+    repeats, from_repeats = _from_repeats(local, place)
+    alone = np.minimum(
+        distance_of(local, shared=False), np.where(repeats > 0, distance_of(from_repeats, shared=False), np.inf)
+    )
     against = _from_neighbours(_from_repeats(deviation, place)[1], starts, NEIGHBOURS)
     # the median of n repeats has pi/(2 n) of the variance of one
-    agreed = apart(against, shared=False) / np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))
+    agreed = distance_of(against, shared=False) / np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))
     farthest = np.zeros(place.max() + 1)
     np.maximum.at(farthest, place, agreed)
     apart_from_repeats = agreed > by_noise * misfit_scale(agreed[repeats > 1], 2)
@@ -154,15 +156,15 @@ def outlying_points(
 def contradictions(stiffness: Array, place: Array) -> list[tuple[float, int, int]]:
     """The two points of each place, (n,), that lie farthest apart in |K| or in phase, the worst first: how far, as a
     share of |K|, from _UNLIKE on, and their numbers. Points of one `place` repeat each other."""
-    value, ends, found = np.log(stiffness), np.cumsum(np.bincount(place)), dict[int, tuple[float, int, int]]()
+    value, ends, worst = np.log(stiffness), np.cumsum(np.bincount(place)), dict[int, tuple[float, int, int]]()
     for part in (value.real, value.imag):
         order = np.lexsort((part, place))
         first, last = order[np.append(0, ends[:-1])], order[ends - 1]
-        apart = np.abs(stiffness[last] - stiffness[first]) / np.minimum(*np.abs(stiffness[[first, last]]))
-        for at in np.flatnonzero(apart >= _UNLIKE).tolist():
-            one, other = sorted((int(first[at]), int(last[at])))
-            found[at] = max(found.get(at, (0.0, 0, 0)), (float(apart[at]), one, other))
-    return sorted(found.values(), reverse=True)
+        separation = np.abs(stiffness[last] - stiffness[first]) / np.minimum(*np.abs(stiffness[[first, last]]))
+        for location in np.flatnonzero(separation >= _UNLIKE).tolist():
+            one, second = sorted((int(first[location]), int(last[location])))
+            worst[location] = max(worst.get(location, (0.0, 0, 0)), (float(separation[location]), one, second))
+    return sorted(worst.values(), reverse=True)
 
 
 def misfit_scale(distance: Array, parts: int) -> float:
@@ -206,7 +208,7 @@ def _median_of_others(values: Array, place: Array, counts: Array) -> Array:
     return medians
 
 
-def least_absolute(basis: Array, values: Array, least: float) -> Array:
+def least_absolute(basis: Array, values: Array, smallest: float) -> Array:
     """Coefficients of a curve, (n, k), with the least sum of distances to points, (n, m) -> (k, m).
 
     It hardly follows outliers. Distances of less than the relative one of the median and `least` count alike.
@@ -215,5 +217,5 @@ def least_absolute(basis: Array, values: Array, least: float) -> Array:
     for _ in range(25):  # chosen: nine of ten curves have then come within a third of the noise of where they end
         solution = np.linalg.lstsq(basis * root_weight, values * root_weight, rcond=None)[0]
         distance = np.linalg.norm(values - basis @ solution, axis=1, keepdims=True)
-        root_weight = np.sqrt(1.0 / np.maximum(distance, _LEAST_DISTANCE * np.median(distance) + least))
+        root_weight = np.sqrt(1.0 / np.maximum(distance, _LEAST_DISTANCE * np.median(distance) + smallest))
     return np.asarray(solution)

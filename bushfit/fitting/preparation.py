@@ -21,7 +21,15 @@ from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.units import number
 
-__all__ = ["MeasuredLoop", "MeasuredSweep", "MeasuredTest", "parted", "prepare_loops", "prepare_sweeps", "sources"]
+__all__ = [
+    "MeasuredLoop",
+    "MeasuredSweep",
+    "MeasuredTest",
+    "prepare_loops",
+    "prepare_sweeps",
+    "sources",
+    "split_by_kind",
+]
 
 #: Relative difference of two loops' amplitudes, or frequencies, up to which one repeats the other; chosen: rigs come
 #: back to an amplitude within it.
@@ -36,38 +44,41 @@ _Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep)
 
 
 def prepare_loops(
-    loops: Sequence[Loop], stated: RigSettings = UNSTATED, *, without_outliers: bool = False
+    loops: Sequence[Loop], rig: RigSettings = UNSTATED, *, without_outliers: bool = False
 ) -> list[MeasuredLoop]:
     """One data set per loop; rows that are outliers carry no weight where they are to be left out."""
     drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
     found = [MeasuredLoop(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
-    return with_gain_errors(with_contradictions(found, [_first_alike(found)]), stated)
+    return with_gain_errors(with_contradictions(found, [_first_alike(found)]), rig)
 
 
-def with_gain_errors(loops: Sequence[MeasuredLoop], stated: RigSettings) -> list[MeasuredLoop]:
+def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[MeasuredLoop]:
     """Loops with the gain error that a rig of the class makes, stated or assumed.
 
     Notes:
         All repeats of a loop share it. Independent errors larger by the root of their number leave the mean of the
         repeats, all that tells of the bushing, just as unsure.
     """
-    errors = of_class(stated)[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
-    weighs = stated.stiffness_errors[0] is not None
+    errors = of_class(rig)[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
+    weighs = rig.stiffness_errors[0] is not None
     return [
-        replace(loop, gain_error=each, gain_weighs=weighs) for loop, each in zip(loops, errors.tolist(), strict=True)
+        replace(loop, gain_error=error, gain_weighs=weighs) for loop, error in zip(loops, errors.tolist(), strict=True)
     ]
 
 
 def with_gains(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
     """Tests whose loops' gain errors are part of their noise, or not."""
-    return [replace(each, gain_weighs=weigh) if isinstance(each, MeasuredLoop) else each for each in data_sets]
+    return [
+        replace(data_set, gain_weighs=weigh) if isinstance(data_set, MeasuredLoop) else data_set
+        for data_set in data_sets
+    ]
 
 
 def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
     """Mask of the loops that repeat one another, themselves among them, (n, n)."""
-    at = np.log([(loop.drive.amplitude, loop.drive.frequency) for loop in loops]).reshape(-1, 2)
+    conditions = np.log([(loop.drive.amplitude, loop.drive.frequency) for loop in loops]).reshape(-1, 2)
     place = np.array([str(loop.direction) for loop in loops])
-    return np.all(np.abs(at[:, None] - at) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
+    return np.all(np.abs(conditions[:, None] - conditions) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
 
 
 def _first_alike(loops: Sequence[MeasuredLoop]) -> Array:
@@ -75,52 +86,60 @@ def _first_alike(loops: Sequence[MeasuredLoop]) -> Array:
     return np.argmax(repeats_of(loops), axis=1) if loops else np.empty(0, dtype=np.intp)
 
 
-def alike(loops: Sequence[MeasuredLoop]) -> list[list[MeasuredLoop]]:
+def group_repeats(loops: Sequence[MeasuredLoop]) -> list[list[MeasuredLoop]]:
     """Loops in groups that repeat one another; each is in one, that of the first that it repeats."""
     first = _first_alike(loops)
     return [[loops[place] for place in np.flatnonzero(first == lead).tolist()] for lead in np.unique(first).tolist()]
 
 
 def prepare_sweeps(
-    sweeps: Sequence[Sweep], residuals: Residuals = "complex", stated: RigSettings = UNSTATED
+    sweeps: Sequence[Sweep], residuals: Residuals = "complex", rig: RigSettings = UNSTATED
 ) -> list[MeasuredSweep]:
     """One data set per sweep; the noise of those of one rig, the bushing's or a specimen's, is estimated together."""
     rigs = [sweep.direction if isinstance(sweep.direction, Specimen) else None for sweep in sweeps]
     noises = {
-        rig: sweep_noise([sweep for sweep, own in zip(sweeps, rigs, strict=True) if own == rig], stated)
-        for rig in dict.fromkeys(rigs)
+        direction: sweep_noise(
+            [sweep for sweep, rig_direction in zip(sweeps, rigs, strict=True) if rig_direction == direction], rig
+        )
+        for direction in dict.fromkeys(rigs)
     }
-    data_sets = [MeasuredSweep(sweep, noises[rig], residuals) for sweep, rig in zip(sweeps, rigs, strict=True)]
+    data_sets = [
+        MeasuredSweep(sweep, noises[direction], residuals) for sweep, direction in zip(sweeps, rigs, strict=True)
+    ]
     found = [data_set.weighted(np.array(data_set.sweep.weight)) for data_set in data_sets]
     names = [str(one.direction) for one in found]
     places = [np.full(one.measured.size, names.index(name)) for one, name in zip(found, names, strict=True)]
-    at = (places, [one.frequency for one in found], [one.amplitude for one in found])
-    return with_contradictions(found, [np.concatenate([np.empty(0), *each]) for each in at])
+    conditions = (places, [one.frequency for one in found], [one.amplitude for one in found])
+    return with_contradictions(found, [np.concatenate([np.empty(0), *values]) for values in conditions])
 
 
-def with_contradictions(found: Sequence[_Kind], at: Sequence[Array]) -> list[_Kind]:
+def with_contradictions(found: Sequence[_Kind], conditions: Sequence[Array]) -> list[_Kind]:
     """Loops, or sweeps, each with a sentence on the earlier one whose points it repeats and lies farthest from; points
     repeat one another where all of `at`, (n,) each, and their temperatures are the same."""
     if len(found) < 2:
         return list(found)
     owner = np.repeat(np.arange(len(found)), [one.measured.size for one in found])
-    points = np.stack([*at, _sessions(np.hstack([one.temperature for one in found]))])
+    points = np.stack([*conditions, _sessions(np.hstack([one.temperature for one in found]))])
     stiffness = np.concatenate([one.measured for one in found])
     marked = list(found)
-    for apart, one, other in reversed(contradictions(stiffness, np.unique(points, axis=1, return_inverse=True)[1])):
-        first, later = sorted((int(owner[one]), int(owner[other])))
+    for separation, one, second in reversed(
+        contradictions(stiffness, np.unique(points, axis=1, return_inverse=True)[1])
+    ):
+        first, later = sorted((int(owner[one]), int(owner[second])))
         if first != later:  # a file that contradicts itself tells so
-            said = f"it repeats {found[first].name}, and their stiffness lies {number(100.0 * apart, 2)} % apart"
-            marked[later] = replace(found[later], contradiction=said)
+            sentence = (
+                f"it repeats {found[first].name}, and their stiffness lies {number(100.0 * separation, 2)} % apart"
+            )
+            marked[later] = replace(found[later], contradiction=sentence)
     return marked
 
 
 def _sessions(temperature: Array) -> Array:
     """A number for each group of temperatures [K], (n,), that count as one; those that are not known are a group."""
-    known = np.nan_to_num(temperature)
-    order = np.argsort(known)
-    groups = np.empty(known.size, dtype=np.intp)
-    groups[order] = np.cumsum(np.diff(known[order], prepend=known[order[0]]) > _SAME_KELVIN)
+    kelvin = np.nan_to_num(temperature)
+    order = np.argsort(kelvin)
+    groups = np.empty(kelvin.size, dtype=np.intp)
+    groups[order] = np.cumsum(np.diff(kelvin[order], prepend=kelvin[order[0]]) > _SAME_KELVIN)
     return groups
 
 
@@ -134,11 +153,11 @@ def with_level_errors(
     return tuple(replace(sweep, noise=noises[id(sweep.noise)]) for sweep in sweeps)
 
 
-def parted(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop], list[MeasuredSweep]]:
+def split_by_kind(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop], list[MeasuredSweep]]:
     """The loops and the sweeps among some data sets, for what is said of all of a kind together."""
-    every = list(data_sets)
-    loops = [data_set for data_set in every if isinstance(data_set, MeasuredLoop)]
-    return loops, [data_set for data_set in every if isinstance(data_set, MeasuredSweep)]
+    tests = list(data_sets)
+    loops = [data_set for data_set in tests if isinstance(data_set, MeasuredLoop)]
+    return loops, [data_set for data_set in tests if isinstance(data_set, MeasuredSweep)]
 
 
 def rows_of(data_sets: Iterable[MeasuredTest]) -> list[slice]:
@@ -147,11 +166,11 @@ def rows_of(data_sets: Iterable[MeasuredTest]) -> list[slice]:
     return [slice(*pair) for pair in pairwise(ends)]
 
 
-def reached(bushing: Bushing | None, data_sets: Iterable[MeasuredTest]) -> tuple[Array, Array]:
+def operating_conditions(bushing: Bushing | None, data_sets: Iterable[MeasuredTest]) -> tuple[Array, Array]:
     """Frequencies [Hz] and equivalent strains of all operating points, loops included, (n,) each."""
-    every = list(data_sets)
-    strains = [data_set.amplitude * unit_strain(bushing, data_set.direction) for data_set in every]
-    return np.concatenate([data_set.frequency for data_set in every]), np.concatenate(strains)
+    tests = list(data_sets)
+    strains = [data_set.amplitude * unit_strain(bushing, data_set.direction) for data_set in tests]
+    return np.concatenate([data_set.frequency for data_set in tests]), np.concatenate(strains)
 
 
 def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Array:

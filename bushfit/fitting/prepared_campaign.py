@@ -47,7 +47,7 @@ class PreparedCampaign:
     bounds: Bounds = field(default_factory=dict)
 
     @classmethod
-    def of(cls, campaign: Campaign) -> "PreparedCampaign":
+    def from_campaign(cls, campaign: Campaign) -> "PreparedCampaign":
         """The data sets of a campaign as its [fit] asks for them.
 
         Raises:
@@ -98,7 +98,7 @@ class PreparedCampaign:
         """True if outliers are left out."""
         return self.campaign.fit.loss != "linear"
 
-    def some(
+    def require_tests(
         self, tests: Sequence[_Kind], message: str, hint: str, found: str = "no [[loops]] and no [[sweeps]]"
     ) -> Sequence[_Kind]:
         """Return the tests, or raise a FitError where there is none."""
@@ -124,35 +124,45 @@ class PreparedCampaign:
         return replace(self, sweeps=with_level_errors(new, noise.level, noise.level_freedom))
 
     @property
-    def given(self) -> dict[str, float]:
+    def given_values(self) -> dict[str, float]:
         """Values the campaign gives, to start from or to hold."""
         settings = self.campaign.fit.parameters
         return {name: setting.value for name, setting in settings.items() if setting.value is not None}
 
-    def start(self, data_sets: Sequence[MeasuredTest], held: Mapping[str, float]) -> dict[str, float]:
+    def start_values(self, data_sets: Sequence[MeasuredTest], fixed: Mapping[str, float]) -> dict[str, float]:
         """Values of the paper's parameters, and what the campaign gives, to start a fit of some tests from."""
         with error_location(self.campaign.path):
-            return start_values(self.campaign.bushing, data_sets, {**self.given, **held})
+            return start_values(self.campaign.bushing, data_sets, {**self.given_values, **fixed})
 
-    def started(self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], held: Mapping[str, float]) -> Model:
+    def starting_model(
+        self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], stage_fixed: Mapping[str, float]
+    ) -> Model:
         """A model to fit to some tests: with the values that the campaign gives to start from, or, where those meet the
         tests worse, with what is read off them."""
-        fixed = {name: value for name, value in self.given.items() if not self.free((name,))}
-        bushing, every = self.campaign.bushing, list[tuple[Model, dict[str, float]]]()
-        for known in (self.given, fixed):
+        fixed = {name: value for name, value in self.given_values.items() if not self.free((name,))}
+        bushing, candidates = self.campaign.bushing, list[tuple[Model, dict[str, float]]]()
+        for values_given in (self.given_values, fixed):
             with error_location(self.campaign.path):
-                values = start_values(bushing, data_sets, {**known, **held})
-            every.append((Model.with_defaults(bushing, effects, values), values))
-        model, values = every[0] if fixed == self.given else min(every, key=lambda pair: _misfit(pair[0], data_sets))
-        given = {effect_name_of(name) for name in self.given}
-        added = [name for name in effects if name not in BASE and name not in given]
+                values = start_values(bushing, data_sets, {**values_given, **stage_fixed})
+            candidates.append((Model.with_defaults(bushing, effects, values), values))
+        model, values = (
+            candidates[0]
+            if fixed == self.given_values
+            else min(candidates, key=lambda pair: _misfit(pair[0], data_sets))
+        )
+        named_effects = {effect_name_of(name) for name in self.given_values}
+        added = [name for name in effects if name not in BASE and name not in named_effects]
         added = [name for name in added if get_effect(name).replaces not in effects]
         if not added:
             return model
         replaced = {get_effect(name).replaces for name in added}
-        kept = [name for name in (*BASE, *effects) if name in replaced or (name in effects and name not in added)]
-        plain = Model.with_defaults(bushing, [*dict.fromkeys(kept)], values)
-        still = [name for name in (*model.parameters, *plain.parameters) if name in held or not self.free((name,))]
+        effects_before = [
+            name for name in (*BASE, *effects) if name in replaced or (name in effects and name not in added)
+        ]
+        plain = Model.with_defaults(bushing, [*dict.fromkeys(effects_before)], values)
+        still = [
+            name for name in (*model.parameters, *plain.parameters) if name in stage_fixed or not self.free((name,))
+        ]
         return designed(model, plain, data_sets, still, self.bounds)
 
     def free(self, names: Sequence[str]) -> tuple[str, ...]:
@@ -165,7 +175,7 @@ class PreparedCampaign:
         """The model that [fit] asks for: the paper's three branches and the effects that it adds."""
         return with_base(self.campaign.fit.effects)
 
-    def chosen(self, places: Sequence[str] | None) -> list[MeasuredTest]:
+    def select_tests(self, places: Sequence[str] | None) -> list[MeasuredTest]:
         """Data sets of the places of these names; by default the axial ones, as in the paper, and the specimens'.
 
         Where no loop of the bushing is axial, all loops are taken by default, and so with sweeps.
@@ -175,7 +185,7 @@ class PreparedCampaign:
             ModelError: a name that is neither a direction nor a specimen of the campaign.
         """
         hint = "add measured tests, or make some with bushfit simulate"
-        data_sets = self.some(self.data_sets, "there is nothing to fit", hint)
+        data_sets = self.require_tests(self.data_sets, "there is nothing to fit", hint)
         if places is None:
             return [*_compound(self.loops), *_compound(self.sweeps)]
         with error_location(self.campaign.path):
@@ -193,7 +203,7 @@ class PreparedCampaign:
     def static_loops(self) -> list[MeasuredLoop]:
         """The loops `fit-static` uses: the axial ones, else those of the bushing, else all."""
         hint = "add a quasi-static loop, or run bushfit fit for the sweeps alone"
-        return [*_first(self.some(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))]
+        return [*_first(self.require_tests(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))]
 
     @cached_property
     def smallest_sweep(self) -> MeasuredSweep:
@@ -206,16 +216,16 @@ class PreparedCampaign:
             FitError: no sweep, or none at the amplitudes named.
         """
         hint = "add a stepped-sine file, or run bushfit fit-static for the loops alone"
-        every = self.some(self.sweeps, "fit-dynamic needs a sweep", hint, "no [[sweeps]]")
-        sweeps = _first([data_set for data_set in every if data_set.test.stepped == "frequency"] or every)
+        available = self.require_tests(self.sweeps, "fit-dynamic needs a sweep", hint, "no [[sweeps]]")
+        sweeps = _first([data_set for data_set in available if data_set.test.stepped == "frequency"] or available)
         wanted = self.campaign.fit.dynamic_amplitudes
         if not wanted:
             sweep = min(sweeps, key=lambda data_set: float(data_set.amplitude.min()))
             return sweep.at_amplitudes(_smallest(sweep))
         for sweep in sweeps:
-            there = np.isclose(sweep.amplitude[:, None], wanted, rtol=_SAME_LEVEL).any(axis=1)
-            if there.any():
-                return sweep.at_amplitudes(sweep.amplitude[there])
+            selected = np.isclose(sweep.amplitude[:, None], wanted, rtol=_SAME_LEVEL).any(axis=1)
+            if selected.any():
+                return sweep.at_amplitudes(sweep.amplitude[selected])
         levels = sorted({float(x) for sweep in sweeps for x in sweep.amplitude})
         raise FitError(
             "no sweep at these amplitudes",
@@ -238,13 +248,17 @@ def _compound(data_sets: Sequence[_Kind]) -> Sequence[_Kind]:
     """The axial ones and those of specimens; all where the bushing has others only."""
     if not any(data_set.direction is Direction.AXIAL for data_set in data_sets):
         return data_sets
-    return [each for each in data_sets if each.direction is Direction.AXIAL or isinstance(each.direction, Specimen)]
+    return [
+        data_set
+        for data_set in data_sets
+        if data_set.direction is Direction.AXIAL or isinstance(data_set.direction, Specimen)
+    ]
 
 
 def _first(data_sets: Sequence[_Kind]) -> Sequence[_Kind]:
     """The axial ones, else those of the bushing, else all."""
     axial = [data_set for data_set in data_sets if data_set.direction is Direction.AXIAL]
-    return axial or [each for each in data_sets if not isinstance(each.direction, Specimen)] or data_sets
+    return axial or [data_set for data_set in data_sets if not isinstance(data_set.direction, Specimen)] or data_sets
 
 
 def _smallest(sweep: MeasuredSweep) -> Array:
@@ -253,4 +267,4 @@ def _smallest(sweep: MeasuredSweep) -> Array:
         return sweep.amplitude.min(keepdims=True)
     if sweep.test.stepped is None:
         return sweep.amplitude
-    return np.array([sweep.amplitude[sweep.frequency == at].min() for at in np.unique(sweep.frequency)])
+    return np.array([sweep.amplitude[sweep.frequency == frequency].min() for frequency in np.unique(sweep.frequency)])

@@ -25,7 +25,7 @@ from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, anderson
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.model_error import model_error_warning, with_model_error
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, parted, sources, with_level_errors
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, sources, split_by_kind, with_level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.profile import limit95, profile95
 from bushfit.fitting.rig_class import largest_error, words_of
@@ -77,7 +77,7 @@ def fit_joint(
 
     Args:
         effects: the model; the paper's three branches, and what [fit] adds to them, unless told.
-        directions: and specimens whose tests to use; see `PreparedCampaign.chosen`.
+        directions: and specimens whose tests to use; see `PreparedCampaign.select_tests`.
         profile: whether to add 95 % intervals by profile likelihood.
 
     Raises:
@@ -86,23 +86,23 @@ def fit_joint(
     for effect in map(get_effect, effects or ()):
         if effect.corrects:
             get_place(effect.corrects, data.campaign.specimens)
-    data_sets = data.chosen(directions)
-    left = [data_set for data_set in data.data_sets if data_set not in data_sets]
+    data_sets = data.select_tests(directions)
+    unused = [data_set for data_set in data.data_sets if data_set not in data_sets]
     effects = data.effects if effects is None else effects
     found = _solve(data, data_sets, effects, {}, solver=solve)
-    most = largest_error(data.campaign.rig)
-    errors = level_errors(found.minimised, found.solution.residual, found.solution.jacobian, most)
-    at_limit = any(error >= _AT_LIMIT * limit for error, limit in zip(errors.error, most, strict=True))
+    largest = largest_error(data.campaign.rig)
+    errors = level_errors(found.minimised, found.solution.residual, found.solution.jacobian, largest)
+    at_limit = any(error >= _AT_LIMIT * limit for error, limit in zip(errors.error, largest, strict=True))
     counts = errors.freedom and any(errors.error) and not at_limit  # an error that would have to be larger is a gap
     found, error = with_model_error(found, data.bounds, data.campaign.rig)
     if counts and not error:
-        loops, sweeps = parted(data_sets)
+        loops, sweeps = split_by_kind(data_sets)
         data_sets = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
         found = _solve(data, data_sets, effects, {}, found.solution.model, solve)
     notes = [_LEVELS.format(words_of(errors.error))] if errors.matters and not at_limit and not error else []
-    notes += [*([model_error_warning(error) + NEXT] if error else []), *unfitted(found.solution.model, left, NEXT)]
-    result = _result(data, [found], notes=notes, left=left)
-    result = replace(result, usable=usable(found.solution, found.minimised, left), model_error=error)
+    notes += [*([model_error_warning(error) + NEXT] if error else []), *unfitted(found.solution.model, unused, NEXT)]
+    result = _result(data, [found], notes=notes, unused=unused)
+    result = replace(result, usable=usable(found.solution, found.minimised, unused), model_error=error)
     if not profile:
         return result
     return replace(result, profile=profile95(found.solution, found.minimised, result.covariance, data.bounds))
@@ -118,10 +118,10 @@ def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Resul
         FitError: no loop, or data that cannot support the fit.
     """
     data_sets = data.static_loops()
-    held, known = _springpot(data, springpot)
-    found = _solve(data, data_sets, BASE if held else ("elastic", "friction"), held)
-    notes = [] if held else [_without_springpot(data, found.solution, data_sets)]
-    return _result(data, [found], known, notes)
+    fixed, fixed_covariance = _springpot(data, springpot)
+    found = _solve(data, data_sets, BASE if fixed else ("elastic", "friction"), fixed)
+    notes = [] if fixed else [_without_springpot(data, found.solution, data_sets)]
+    return _result(data, [found], fixed_covariance, notes)
 
 
 def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
@@ -130,16 +130,18 @@ def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
     The static parameters' own errors are carried into those of m and alpha.
     """
     data_sets: list[MeasuredTest] = [data.smallest_sweep]
-    held = {name: static.model.values[name] for name in STATIC}
-    return _result(data, [_solve(data, data_sets, BASE, held)], static.covariance.restricted(STATIC))
+    fixed = {name: static.model.values[name] for name in STATIC}
+    return _result(data, [_solve(data, data_sets, BASE, fixed)], static.covariance.restricted(STATIC))
 
 
 def given_static(data: PreparedCampaign) -> Result | None:
     """mu, sigma_fmax and eps_half as the campaign's [fit] holds them; None where it does not hold all three."""
-    held = {name: data.given[name] for name in STATIC if name in data.given and name not in data.free(STATIC)}
-    if len(held) < len(STATIC):
+    fixed = {
+        name: data.given_values[name] for name in STATIC if name in data.given_values and name not in data.free(STATIC)
+    }
+    if len(fixed) < len(STATIC):
         return None
-    return Result(Model.with_defaults(data.campaign.bushing, ("elastic", "friction"), held))
+    return Result(Model.with_defaults(data.campaign.bushing, ("elastic", "friction"), fixed))
 
 
 @lru_cache(maxsize=1)  # `run` asks for it, and so does what its static fit says of the springpot
@@ -151,7 +153,7 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
     """
     loops, sweep = data.static_loops(), data.smallest_sweep
     springpot, passes = dict[str, float](), list[Mapping[str, float]]()
-    asked, answered = list[Array](), list[Array]()
+    inputs, outputs = list[Array](), list[Array]()
     for _ in range(_MOST_PASSES):
         static = _solve(data, loops, BASE if springpot else ("elastic", "friction"), springpot)
         found = static.solution.model.values
@@ -161,11 +163,11 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
         passes.append(dict(model.values))
         if all(abs(before.get(name, np.inf) - value) <= _AGREED * abs(value) for name, value in passes[-1].items()):
             return TwoStep(tuple(passes), _result(data, [static, dynamic]))
-        coordinates = Coordinates.of(model, DYNAMIC)
+        coordinates = Coordinates.of_parameters(model, DYNAMIC)
         if springpot:
-            asked.append(coordinates.point(springpot))
-            answered.append(coordinates.point(model.values))
-            springpot = coordinates.possible(anderson(asked, answered))
+            inputs.append(coordinates.point(springpot))
+            outputs.append(coordinates.point(model.values))
+            springpot = coordinates.possible(anderson(inputs, outputs))
         else:
             springpot = {name: model.values[name] for name in DYNAMIC}
     raise FitError(
@@ -179,8 +181,8 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
 def _springpot(data: PreparedCampaign, springpot: Result | None) -> tuple[dict[str, float], Covariance | None]:
     if springpot is not None:
         return {name: springpot.model.values[name] for name in DYNAMIC}, springpot.covariance.restricted(DYNAMIC)
-    given = {name: data.given[name] for name in DYNAMIC if name in data.given}
-    return (given if len(given) == len(DYNAMIC) else {}), None
+    values = {name: data.given_values[name] for name in DYNAMIC if name in data.given_values}
+    return (values if len(values) == len(DYNAMIC) else {}), None
 
 
 def _without_springpot(data: PreparedCampaign, solution: Solution, loops: Sequence[MeasuredLoop]) -> str:
@@ -190,8 +192,8 @@ def _without_springpot(data: PreparedCampaign, solution: Solution, loops: Sequen
         better, source = fit_two_step(data).result.model.values, "with m and alpha from this campaign's sweep"
     except FitError:  # no sweep, or none that goes with the loops: a typical rubber tells as much as can be told
         ratio, alpha = _TYPICAL_SPRINGPOT
-        held = {"m": ratio * found["mu"], "alpha": alpha}
-        better = _solve(data, loops, BASE, held).solution.model.values
+        fixed = {"m": ratio * found["mu"], "alpha": alpha}
+        better = _solve(data, loops, BASE, fixed).solution.model.values
         source = f"with the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
     changes = ", ".join(f"{name} by {100 * (better[name] / found[name] - 1):+.1f} %" for name in STATIC)
     return (
@@ -205,28 +207,28 @@ def _solve(
     data: PreparedCampaign,
     data_sets: Sequence[MeasuredTest],
     effects: Sequence[str],
-    held: Mapping[str, float],
+    fixed: Mapping[str, float],
     model: Model | None = None,
     solver: Callable[..., Solution] = solve_with_lmfit,
 ) -> WeightedFit:
     """Fit what the campaign leaves free of a model, from its values or else from start values taken from the data."""
-    model = model or data.started(effects, data_sets, held)
-    names = [name for name in data.free(tuple(model.parameters)) if name not in held]
+    model = model or data.starting_model(effects, data_sets, fixed)
+    names = [name for name in data.free(tuple(model.parameters)) if name not in fixed]
     return estimate(model, data_sets, names, data.bounds, robust=data.robust, solver=solver)
 
 
 def _result(
     data: PreparedCampaign,
     steps: Sequence[WeightedFit],
-    held: Covariance | None = None,
+    fixed: Covariance | None = None,
     notes: Sequence[str] = (),
-    left: Sequence[MeasuredTest] = (),
+    unused: Sequence[MeasuredTest] = (),
 ) -> Result:
     """Collect the result of the steps of a procedure: the last model, with the uncertainty of all of them."""
     model, data_sets = steps[-1].solution.model, [data_set for step in steps for data_set in step.data_sets]
     stages = [FitStage(_moving(step), step.weighed, step.process) for step in steps]
     fitted = tuple(name for step in steps for name in step.solution.coordinates.names)
-    cov = covariance(model, stages, held)
+    cov = covariance(model, stages, fixed)
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     of_tests = (*implausible(data.campaign.bushing, data_sets), *apart_in_temperature(model, data_sets))
     doubts = [*of_tests, *data.assumed]
@@ -242,14 +244,14 @@ def _result(
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},
         specimens=data.campaign.specimens,
-        tests=misfits(model, data_sets, left),
+        tests=misfits(model, data_sets, unused),
     )
 
 
 def _moving(step: WeightedFit) -> tuple[str, ...]:
     """The parameters whose errors a fit tells; beside an error of the model, one at rest on a bound counts as held."""
-    held = step.solution.at_bound if step.process else {}
-    return tuple(name for name in step.solution.coordinates.names if name not in held)
+    fixed = step.solution.at_bound if step.process else {}
+    return tuple(name for name in step.solution.coordinates.names if name not in fixed)
 
 
 def cautions(model: Model, step: WeightedFit, bounds: Bounds, covariance: Covariance, advice: str = "") -> list[str]:
@@ -274,9 +276,9 @@ def _checked(model: Model, data_sets: Sequence[MeasuredTest]) -> str:
     found = quality(model, data_sets, 0)
     missed = lack_of_fit(model, data_sets, 0)
     how = "meet" if missed is None else "miss"
-    by = "within their noise" if missed is None else f"by {number(np.sqrt(missed), 2)} times their noise"
+    extent = "within their noise" if missed is None else f"by {number(np.sqrt(missed), 2)} times their noise"
     return (
-        f"nothing was fitted here, every parameter is held; the values given {how} the tests {by} "
+        f"nothing was fitted here, every parameter is held; the values given {how} the tests {extent} "
         f"(NRMSE {number(100.0 * found.nrmse, 2)} %, reduced chi-square {number(found.reduced_chi_square, 3)})"
     )
 

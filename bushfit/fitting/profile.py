@@ -53,17 +53,23 @@ class _Profile:
     bounds: Bounds
     known: dict[float, Solution]
 
-    def value(self, at: float) -> float:
+    def value(self, coordinate: float) -> float:
         """Value of the parameter at a coordinate."""
-        least, most = self.best.model.parameters[self.name].bounds  # exp(log(bound)) may lie beyond it
-        return float(np.clip(Coordinates.of(self.best.model, [self.name]).values([at])[self.name], least, most))
+        minimum, maximum = self.best.model.parameters[self.name].bounds  # exp(log(bound)) may lie beyond it
+        return float(
+            np.clip(
+                Coordinates.of_parameters(self.best.model, [self.name]).values([coordinate])[self.name],
+                minimum,
+                maximum,
+            )
+        )
 
-    def fitted(self, at: float) -> Solution:
+    def fitted(self, coordinate: float) -> Solution:
         """The fit of the others, with the parameter held at a coordinate."""
-        if at not in self.known:
-            near = self.known[min(self.known, key=lambda known: abs(known - at))].model
-            self.known[at] = solve(
-                near.with_values({self.name: self.value(at)}),
+        if coordinate not in self.known:
+            near = self.known[min(self.known, key=lambda known: abs(known - coordinate))].model
+            self.known[coordinate] = solve(
+                near.with_values({self.name: self.value(coordinate)}),
                 self.data_sets,
                 [name for name in self.best.coordinates.names if name != self.name],
                 self.bounds,
@@ -71,27 +77,29 @@ class _Profile:
                 tolerance=1e-7,  # far less than what the rise of chi-square is compared with
                 strict=False,
             )
-        return self.known[at]
+        return self.known[coordinate]
 
-    def root_rise(self, at: float) -> float:
+    def root_rise(self, coordinate: float) -> float:
         """Root of the rise over the least chi-square."""
-        return float(np.sqrt(max(self.fitted(at).chi_square - self.best.chi_square, 0.0)))
+        return float(np.sqrt(max(self.fitted(coordinate).chi_square - self.best.chi_square, 0.0)))
 
     def end(self, start: float, bound: float, step: float, allowed: float) -> float | None:
         """Value at which the root of the rise, in steps from the best one to the bound, is as allowed, if anywhere."""
         from scipy.optimize import brentq
 
         steps = start + np.copysign(step, bound - start) * np.arange(_MOST_STEPS + 1)
-        for here, ahead in pairwise(np.clip(steps, min(start, bound), max(start, bound)).tolist()):
+        for current, ahead in pairwise(np.clip(steps, min(start, bound), max(start, bound)).tolist()):
             if self.root_rise(ahead) >= allowed:
-                end = brentq(lambda at: self.root_rise(at) - allowed, here, ahead, xtol=_PRECISION * step)
-                held_by_others = abs(end - start) > _FAR and self._bounded(end) > _HELD_BY_OTHERS * allowed**2
-                return None if held_by_others else self.value(end)
+                crossing = brentq(
+                    lambda coordinate: self.root_rise(coordinate) - allowed, current, ahead, xtol=_PRECISION * step
+                )
+                held_by_others = abs(crossing - start) > _FAR and self._bounded(crossing) > _HELD_BY_OTHERS * allowed**2
+                return None if held_by_others else self.value(crossing)
         return None
 
-    def _bounded(self, at: float) -> float:
+    def _bounded(self, coordinate: float) -> float:
         """How far chi-square would fall there if others could leave the bounds that they met on the way."""
-        found = self.fitted(at)
+        found = self.fitted(coordinate)
         return 0.0 if set(found.at_bound) <= set(self.best.at_bound) else found.gain(self.best.at_bound)
 
 

@@ -49,7 +49,8 @@ class LineNoise:
         shared_freedom: degrees of freedom behind their mean; 0 without repeats.
         calmer: without repeats, the scatter less the point that adds most to it, (k - 1, 2).
         steps: of repeats, what was stepped at each deviation, (k,).
-        apart: without repeats, the square of how far the point at each step lies off, in units of the robust scatter.
+        squared_distances: without repeats, squared distance of the point at each step from the smooth curve, in units
+            of the robust scatter.
     """
 
     scatter: Array
@@ -58,7 +59,7 @@ class LineNoise:
     shared_freedom: float = 0.0
     calmer: Array | None = None
     steps: Array = field(default_factory=lambda: np.empty(0))
-    apart: Mapping[float, float] = field(default_factory=dict)
+    squared_distances: Mapping[float, float] = field(default_factory=dict)
 
     @property
     def variance(self) -> Array:
@@ -66,18 +67,18 @@ class LineNoise:
         return np.asarray(np.square(self.scatter).sum(axis=0) / max(self.freedom, 1))
 
 
-def line_noise(sweep: Sweep, log_stiffness: Array, held: float, disturbed: Collection[float] = ()) -> LineNoise:
+def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed: Collection[float] = ()) -> LineNoise:
     """Estimate the noise of one line of a sweep without disturbed steps: by pairs of repeats, or about a smooth curve
     where there is no pair.
     """
-    chosen = (sweep.held == held) & ~np.isin(sweep.step, [*disturbed])
+    chosen = (sweep.held == held_value) & ~np.isin(sweep.step, [*disturbed])
     steps, column = np.unique(sweep.step[chosen], return_inverse=True)
     numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
     table = np.full((numbers.size, steps.size), np.nan + 0j)
     table[row, column] = log_stiffness[chosen]
-    differences = (one - other for one, other in combinations(table, 2))
-    kept = [(difference, _usual(difference, np.log(steps))) for difference in differences]
-    pairs = [(difference[usual], steps[usual]) for difference, usual in kept if usual.sum() >= FEWEST_STEPS]
+    differences = (one - second for one, second in combinations(table, 2))
+    usual_steps = [(difference, _usual(difference, np.log(steps))) for difference in differences]
+    pairs = [(difference[usual], steps[usual]) for difference, usual in usual_steps if usual.sum() >= FEWEST_STEPS]
     if not pairs:
         return _about_smooth_curve(steps, np.nanmean(table, axis=0))
     scatter = [_parts(np.diff(difference)) / np.sqrt(2.0) for difference, _ in pairs]
@@ -91,7 +92,7 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held: float, disturbed: Colle
         independent * sum(free_of(len(spread)) for spread in scatter),
         np.array(shared),
         independent * len(pairs),
-        steps=np.concatenate([np.sqrt(at[1:] * at[:-1]) for _, at in pairs]),
+        steps=np.concatenate([np.sqrt(pair_steps[1:] * pair_steps[:-1]) for _, pair_steps in pairs]),
     )
 
 
@@ -110,13 +111,13 @@ def _usual(difference: Array, log_step: Array) -> Array:
     if np.count_nonzero(usual) < FEWEST_SOUGHT:
         return usual
     parts = _parts(difference)
-    off = np.abs(parts - median(parts[usual]))
-    scale = MEDIAN_TO_SIGMA * median(off[usual])
-    lengths = np.log(np.maximum(np.hypot(*off.T), FLOOR))
+    distance = np.abs(parts - median(parts[usual]))
+    scale = MEDIAN_TO_SIGMA * median(distance[usual])
+    lengths = np.log(np.maximum(np.hypot(*distance.T), FLOOR))
     x, y, half = log_step[usual], lengths[usual], np.count_nonzero(usual) // 2
     slope = median((y[-half:] - y[:half]) / (x[-half:] - x[:half]))
     scale = scale * np.exp(np.maximum(slope * (log_step - median(x)), 0.0))[:, None]
-    return usual & np.all((off <= _OUTLIER * scale) | (scale == 0.0), axis=1)
+    return usual & np.all((distance <= _OUTLIER * scale) | (scale == 0.0), axis=1)
 
 
 def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
@@ -132,13 +133,13 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     inliers |= np.count_nonzero(inliers) < degree + 2  # too few would leave nothing free
     scatter = _freed(basis[inliers], values[inliers])
     curve = np.linalg.qr(basis)[0]
-    off, free = values - curve @ (curve.T @ values), 1.0 - np.square(curve).sum(axis=1)
-    falls = np.square(off).sum(axis=1) / np.maximum(free, FLOOR**2)
+    misfit, free = values - curve @ (curve.T @ values), 1.0 - np.square(curve).sum(axis=1)
+    falls = np.square(misfit).sum(axis=1) / np.maximum(free, FLOOR**2)
     worst = int(np.argmax(falls))  # the point without which the sum of squares about the curve falls most
     calmer = _freed(np.delete(basis, worst, axis=0), np.delete(values, worst, axis=0))
     squares = np.square(residual / np.maximum(MEDIAN_TO_SIGMA * usual, FLOOR)).sum(axis=1)
-    apart = dict(zip(steps.tolist(), squares.tolist(), strict=True))
-    return LineNoise(scatter, len(scatter), np.empty((0, 2)), calmer=calmer, apart=apart)
+    squared_distance = dict(zip(steps.tolist(), squares.tolist(), strict=True))
+    return LineNoise(scatter, len(scatter), np.empty((0, 2)), calmer=calmer, squared_distances=squared_distance)
 
 
 def disturbed(lines: Iterable[LineNoise]) -> list[float]:
@@ -146,7 +147,7 @@ def disturbed(lines: Iterable[LineNoise]) -> list[float]:
     there it is no noise of the rig."""
     points: dict[float, list[float]] = defaultdict(list)
     for line in lines:
-        for step, square in line.apart.items():
+        for step, square in line.squared_distances.items():
             points[step].append(square)
     return [
         step
@@ -181,9 +182,9 @@ def at_nominal(sweep: Sweep) -> Array:
     goes with amplitude; without two levels or more there is none.
     """
     value = np.log(sweep.stiffness)
-    off = np.log(sweep.amplitude_reached / sweep.amplitude)
+    log_ratio = np.log(sweep.amplitude_reached / sweep.amplitude)
     distinct = np.unique(sweep.amplitude).size
-    if distinct < 2 or not off.any():
+    if distinct < 2 or not log_ratio.any():
         return value
     degrees = min(_SURFACE_DEGREES[0], np.unique(sweep.frequency).size - 1), min(_SURFACE_DEGREES[1], distinct - 1)
     low, span = np.log(sweep.amplitude).min(), float(np.ptp(np.log(sweep.amplitude)))

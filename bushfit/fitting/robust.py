@@ -78,19 +78,19 @@ def estimate(
     slope. Outliers of loops have no weight from the start, see `drive`.
     """
     if not robust:
-        solution, same = solver(model, data_sets, names, bounds), tuple(data_sets)
-        return WeightedFit(solution, same, same, same, outliers_at(solution.model, same))
+        solution, unchanged = solver(model, data_sets, names, bounds), tuple(data_sets)
+        return WeightedFit(solution, unchanged, unchanged, unchanged, outliers_at(solution.model, unchanged))
     for _ in range(_MOST_ROUNDS):
         outlying = tuple(data_set.outlying(model) for data_set in data_sets)
-        kept = tuple(data_set.without(points) for data_set, points in zip(data_sets, outlying, strict=True))
-        softened = tuple(_softened(data_set, model) for data_set in kept)
+        retained = tuple(data_set.without(points) for data_set, points in zip(data_sets, outlying, strict=True))
+        softened = tuple(_softened(data_set, model) for data_set in retained)
         solution = solver(model, softened, names, bounds)
         before = solution.coordinates.point(model.values)
-        moved = (solution.coordinates.point(solution.model.values) - before) @ solution.jacobian
+        change = (solution.coordinates.point(solution.model.values) - before) @ solution.jacobian
         model = solution.model
-        if float(moved @ moved) < _SETTLED**2:
-            weighed = tuple(data_set.weighted(np.array(_efficiency(data_set.parts))) for data_set in kept)
-            return WeightedFit(solution, kept, softened, weighed, outliers_at(model, kept, outlying))
+        if float(change @ change) < _SETTLED**2:
+            weighed = tuple(data_set.weighted(np.array(_efficiency(data_set.parts))) for data_set in retained)
+            return WeightedFit(solution, retained, softened, weighed, outliers_at(model, retained, outlying))
     raise FitError(
         "the robust fit does not settle",
         found=f"{_MOST_ROUNDS} rounds of reweighting",
@@ -121,16 +121,16 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
 
     A displacement that is an outlier is never followed, see `drive`.
     """
-    left = [entry for entry in outliers if robust or entry.column == "displacement"]
+    excluded = [entry for entry in outliers if robust or entry.column == "displacement"]
     followed = [entry for entry in outliers if not robust and entry.column != "displacement"]
-    said = [
+    sentences = [
         (followed, " and the fit follows them: {}; --loss soft_l1 leaves them out"),
-        (left, ", left out of the fit: {}"),
+        (excluded, ", left out of the fit: {}"),
     ]
     return [
         f"{len(entries)} point{'s lie' if len(entries) > 1 else ' lies'} farther off than noise explains"
         f"{words.format(_places(entries))}"
-        for entries, words in said
+        for entries, words in sentences
         if entries
     ]
 

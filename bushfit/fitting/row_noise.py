@@ -176,12 +176,12 @@ def _fitted(power: Array, waves: Array, used: Array) -> _Model:
     """The autoregressive model, of the order that Schwarz's criterion prefers, of a periodogram where it is used."""
     ends = np.ones(power.size)
     ends[[0, -1]] = 0.5
-    cosines, seen = waves.real * (ends / ends.sum()), np.flatnonzero(used)
-    lowest = int(seen[0])
-    filled = np.interp(np.arange(power.size), seen, power[seen])
-    filled[:lowest] = power[seen[:_LOWEST]].mean()
+    cosines, used_numbers = waves.real * (ends / ends.sum()), np.flatnonzero(used)
+    lowest = int(used_numbers[0])
+    filled = np.interp(np.arange(power.size), used_numbers, power[used_numbers])
+    filled[:lowest] = power[used_numbers[:_LOWEST]].mean()
     models, prices = [], []
-    for order in (order for order in _ORDERS if order * _FEWEST <= seen.size):
+    for order in (order for order in _ORDERS if order * _FEWEST <= used_numbers.size):
         for _ in range(60):  # of filling in; nearly all take ten
             correlations = cosines[: order + 1] @ filled
             correlations[0] *= 1.0 + _FLOOR

@@ -54,8 +54,8 @@ def solve(
         FitError: fewer data than parameters, no finite response, or no convergence.
     """
     if not names:
-        left = residual(model, data_sets)
-        return Solution(model, Coordinates((), ()), left, np.empty((0, left.size)), 1, {}, stopped=False)
+        misfit = residual(model, data_sets)
+        return Solution(model, Coordinates((), ()), misfit, np.empty((0, misfit.size)), 1, {}, stopped=False)
     found = Descent.start(model, data_sets, names, bounds or {}, tolerance).finished(evaluations).solution
     if found.stopped and strict and not found.flat:
         raise FitError(
@@ -106,14 +106,14 @@ def _by_minpack(
             raise _OutOfBoundsError
         return model.with_values(coordinates.values(point))
 
-    def here(parameters: lmfit.Parameters) -> Model:
+    def model_of(parameters: lmfit.Parameters) -> Model:
         return model_at(tuple(parameter.value for parameter in parameters.values()))
 
     def misfit(parameters: lmfit.Parameters) -> Array:
-        return residual(here(parameters), data_sets)
+        return residual(model_of(parameters), data_sets)
 
     def slopes(parameters: lmfit.Parameters) -> Array:
-        return jacobian(here(parameters), data_sets, names)
+        return jacobian(model_of(parameters), data_sets, names)
 
     free = _blank_parameters(start.size)
     for parameter, value in zip(free.values(), np.clip(start, low, high).tolist(), strict=True):
@@ -132,9 +132,9 @@ def _by_minpack(
             calc_covar=False,
         )
     end = np.array([parameter.value for parameter in fit.params.values()])
-    best, met = here(fit.params), at_bound(names, end, low, high)
-    left, slope = residual(best, data_sets), jacobian(best, data_sets, names)
-    return Solution(best, coordinates, left, slope, int(fit.nfev), met, bool(fit.aborted))
+    best, met = model_of(fit.params), at_bound(names, end, low, high)
+    residuals, slope = residual(best, data_sets), jacobian(best, data_sets, names)
+    return Solution(best, coordinates, residuals, slope, int(fit.nfev), met, bool(fit.aborted))
 
 
 @cache

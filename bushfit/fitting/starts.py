@@ -13,7 +13,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.friction import harmonic_shape
 from bushfit.errors import FitError
 from bushfit.fitting.assess import implausible
-from bushfit.fitting.preparation import MeasuredTest, reached
+from bushfit.fitting.preparation import MeasuredTest, operating_conditions
 from bushfit.geometry import Bushing, stiffness_per_modulus
 
 #: Strain amplitude of the largest test over eps_half, before anything is known; chosen: the fit finds the rest.
@@ -36,7 +36,7 @@ _ALPHA_RANGE = (0.1, 0.6)
 
 
 def start_values(
-    bushing: Bushing | None, data_sets: Sequence[MeasuredTest], known: Mapping[str, float]
+    bushing: Bushing | None, data_sets: Sequence[MeasuredTest], fixed: Mapping[str, float]
 ) -> dict[str, float]:
     """Values of mu, m, alpha, sigma_fmax, eps_half to start from; `known` ones are kept and allowed for.
 
@@ -51,25 +51,27 @@ def start_values(
         - mu from the slope (secant of a loop's fundamental) of the slowest test, less what friction adds;
         - alpha from the slope of ln K'' over ln f, m from the growth of K' over ln f.
     """
-    frequency, strain = reached(bushing, data_sets)
-    modulus = np.concatenate([each.measured / stiffness_per_modulus(bushing, each.direction) for each in data_sets])
+    frequency, strain = operating_conditions(bushing, data_sets)
+    modulus = np.concatenate(
+        [data_set.measured / stiffness_per_modulus(bushing, data_set.direction) for data_set in data_sets]
+    )
     slow = frequency <= _SLOW * frequency.min()
     largest = int(np.argmax(np.where(slow, strain, 0.0)))
-    eps_half = known.get("eps_half", float(strain.max()) / _SCALED_STRAIN)
+    eps_half = fixed.get("eps_half", float(strain.max()) / _SCALED_STRAIN)
     shape = harmonic_shape(strain / eps_half)
     loss = max(modulus[largest].imag, _LEAST * abs(modulus[largest]))
-    sigma_fmax = known.get("sigma_fmax", loss * eps_half / shape[largest].imag)
+    sigma_fmax = fixed.get("sigma_fmax", loss * eps_half / shape[largest].imag)
     friction = sigma_fmax / eps_half * shape
-    mu = known.get("mu", max(modulus[largest].real - friction[largest].real, _LEAST_SHARE * abs(modulus[largest])))
+    mu = fixed.get("mu", max(modulus[largest].real - friction[largest].real, _LEAST_SHARE * abs(modulus[largest])))
     m, alpha = _USUAL[0] * mu, _USUAL[1]
     smallest = strain <= _SMALLEST * strain[~slow].min(initial=np.inf)
     log_omega = np.log(2.0 * np.pi * frequency[smallest])
     if not slow.all() and np.ptp(log_omega) >= _LEAST_RANGE:
-        least = _LEAST_SHARE * modulus.imag.clip(min=0.0) + 1e-9 * mu  # above zero, for its logarithm
-        viscous_loss = np.maximum(modulus.imag - friction.imag, least)
+        least_loss = _LEAST_SHARE * modulus.imag.clip(min=0.0) + 1e-9 * mu  # above zero, for its logarithm
+        viscous_loss = np.maximum(modulus.imag - friction.imag, least_loss)
         m, alpha = _springpot(log_omega, modulus.real[smallest], viscous_loss[smallest], _LEAST * mu)
     found = {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half}
-    found = {name: value for name, value in found.items() if name not in known}
+    found = {name: value for name, value in found.items() if name not in fixed}
     inside = {name: float(np.clip(value, *get_parameter(name).bounds)) for name, value in found.items()}
     if inside != found and (reasons := implausible(bushing, data_sets)):
         raise FitError(
@@ -77,7 +79,7 @@ def start_values(
             found=reasons[0],
             hint="if these are the units and the dimensions, give start values in [fit] of the campaign",
         )
-    return {**inside, **known}
+    return {**inside, **fixed}
 
 
 def _springpot(log_omega: Array, storage: Array, loss: Array, least_growth: float) -> tuple[float, float]:
@@ -90,5 +92,5 @@ def _springpot(log_omega: Array, storage: Array, loss: Array, least_growth: floa
 
 def _slope(x: Array, y: Array) -> float:
     """Slope of the straight line through points, (n,) each."""
-    apart = x - x.mean()
-    return float(apart @ y / (apart @ apart))
+    centred = x - x.mean()
+    return float(centred @ y / (centred @ centred))

@@ -59,17 +59,19 @@ class _Shared:
         """Share of what lies along the unit error of a group that is taken out, (2, groups)."""
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
-    def along(self, parts: Array) -> Array:
+    def components(self, parts: Array) -> Array:
         """Components along the unit error of each group, (..., 2, n) -> (..., 2, groups)."""
         return np.add.reduceat(parts * self.unit, self.starts, axis=-1)
 
-    def made(self, error: Array) -> Array:
+    def deviations(self, error: Array) -> Array:
         """Deviations by an error of each group, (..., 2, groups) -> (..., 2, n)."""
         return error[..., self.group] * self.unit
 
-    def less(self, parts: Array) -> Array:
+    def whiten(self, parts: Array) -> Array:
         """Deviations less the share of what lies along the unit error, which makes them white, (..., 2, n)."""
-        return parts - self.made(self.along(parts) / self.weight * self.share) if self.variance.any() else parts
+        return (
+            parts - self.deviations(self.components(parts) / self.weight * self.share) if self.variance.any() else parts
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +102,7 @@ class Whitening:
         parts = _gain_and_phase(deviation) * self._block.unit
         if self.model_error:
             return _flat(self._less_points(parts))
-        return _flat(self._line.less(self._block.less(parts)))
+        return _flat(self._line.whiten(self._block.whiten(parts)))
 
     def uncounted(self, influence: Array) -> Array:
         """Covariance that the noise adds to an estimate beside what is counted with a model error in the weights.
@@ -126,8 +128,8 @@ class Whitening:
         """Inner products of deviations, complex (m, n), in noise that no run shares, with a model error."""
         parts = _gain_and_phase(deviation) * self._block.unit
         order, starts = self._by_point
-        along = np.add.reduceat((parts * self._block.unit)[..., order], starts, axis=-1)
-        return ErrorProducts(_flat(parts) @ _flat(parts).T, _flat(along), self._point.weight.ravel())
+        components = np.add.reduceat((parts * self._block.unit)[..., order], starts, axis=-1)
+        return ErrorProducts(_flat(parts) @ _flat(parts).T, _flat(components), self._point.weight.ravel())
 
     @property
     def log_size(self) -> float:
@@ -148,15 +150,15 @@ class Whitening:
 
     def _less_points(self, parts: Array) -> Array:
         order, _ = self._by_point
-        left = np.empty_like(parts)
-        left[..., order] = self._point.less(parts[..., order])
-        return left
+        remainder = np.empty_like(parts)
+        remainder[..., order] = self._point.whiten(parts[..., order])
+        return remainder
 
-    def own(self, deviation: Array, *, shared: bool = True) -> Array:
+    def scaled(self, deviation: Array, *, shared: bool = True) -> Array:
         """Deviations over the random noise, complex (n,) -> (2, n), with `shared` less the block's likeliest error."""
         parts, block = _gain_and_phase(deviation), self._block
         if shared:
-            mean = block.along(parts * block.unit) / block.weight
+            mean = block.components(parts * block.unit) / block.weight
             weight = (block.variance + self._line.variance) * block.weight
             parts = parts - (weight / (1.0 + weight) * mean)[:, block.group]
         return parts / self.random
@@ -170,22 +172,22 @@ class Whitening:
             with what lines share.
         """
         block, line, noise = self._block, self._line, self.noise
-        parts = line.less(influence.reshape(-1, 2, self.weights.size))
+        parts = line.whiten(influence.reshape(-1, 2, self.weights.size))
         reactions = {}
         if noise.scatter_freedom:
-            reactions["scatter"] = line.less(block.less(block.less(parts))) * np.sqrt(2.0 / noise.scatter_freedom)
+            reactions["scatter"] = line.whiten(block.whiten(block.whiten(parts))) * np.sqrt(2.0 / noise.scatter_freedom)
         if noise.freedom:
             expected = block.variance + self.random[:, self.starts] ** 2 / np.bincount(block.group)
             error = np.minimum(expected * np.sqrt(2.0 / noise.freedom), block.variance) * (1.0 - block.share) ** 2
-            reactions["shared"] = line.less(block.made(block.along(parts) * error))
+            reactions["shared"] = line.whiten(block.deviations(block.components(parts) * error))
         if noise.level_freedom:
             expected = line.variance + 1.0 / line.weight
             error = np.minimum(expected * np.sqrt(2.0 / noise.level_freedom), line.variance) * (1.0 - line.share)
-            reactions["level"] = line.made(line.along(parts) * error)
+            reactions["level"] = line.deviations(line.components(parts) * error)
         return {
-            (id(noise), kind, which): _flat(reaction * only)
+            (id(noise), kind, column): _flat(reaction * only)
             for kind, reaction in reactions.items()
-            for which, only in enumerate(np.eye(2)[..., None])
+            for column, only in enumerate(np.eye(2)[..., None])
         }
 
     @cached_property

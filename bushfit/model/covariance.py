@@ -84,11 +84,11 @@ class Covariance:
         the variance of v is the sum of squares of what each spread adds to v.
         """
         variance = np.sum(np.square(self.root.T @ slopes), axis=0)
-        moved = [np.sum(slopes * (part @ slopes), axis=0) for part in self.spread]
-        unsure = np.sqrt(np.sum(np.square(moved), axis=0)) if moved else np.zeros_like(variance)
-        least = np.sqrt(2.0 / _MOST_FREEDOM)
+        changes = [np.sum(slopes * (part @ slopes), axis=0) for part in self.spread]
+        unsure = np.sqrt(np.sum(np.square(changes), axis=0)) if changes else np.zeros_like(variance)
+        smallest = np.sqrt(2.0 / _MOST_FREEDOM)
         share = np.divide(unsure, variance, out=np.zeros_like(variance), where=variance > 0.0)
-        return np.maximum(2.0 / np.square(np.maximum(share, least)), _LEAST_FREEDOM)
+        return np.maximum(2.0 / np.square(np.maximum(share, smallest)), _LEAST_FREEDOM)
 
     def correlations(self) -> list[tuple[str, str, float]]:
         """Two names and their correlation for every pair of parameters, the most correlated first."""
@@ -101,7 +101,7 @@ class Covariance:
 
     def restricted(self, names: Sequence[str]) -> "Covariance":
         """The covariance of some of the parameters, in the order that they have here."""
-        kept = [i for i, name in enumerate(self.names) if name in names]
-        square = np.ix_(kept, kept)
-        names = tuple(self.names[i] for i in kept)
+        indices = [i for i, name in enumerate(self.names) if name in names]
+        square = np.ix_(indices, indices)
+        names = tuple(self.names[i] for i in indices)
         return Covariance(names, self.matrix[square], tuple(part[square] for part in self.spread))

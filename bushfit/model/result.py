@@ -282,11 +282,11 @@ class Result:
         """A warning where the tests leave several models possible; none where they do not."""
         if not self.alternatives:
             return []
-        added = (sorted(set(each.model.effects) - {*self.model.effects}) for each in self.alternatives)
-        names = " or ".join(dict.fromkeys(" and ".join(each) for each in added if each))
+        added = (sorted(set(alternative.model.effects) - {*self.model.effects}) for alternative in self.alternatives)
+        names = " or ".join(dict.fromkeys(" and ".join(alternative) for alternative in added if alternative))
         lacking = f"the tests cannot tell what the model lacks, {names}: it is predicted without, and"
-        others = "the tests leave other values of the parameters possible:"
-        return [f"{lacking if names else others} low and high of predictions hold the model with each of these"]
+        open_values = "the tests leave other values of the parameters possible:"
+        return [f"{lacking if names else open_values} low and high of predictions hold the model with each of these"]
 
     def place(self, name: str) -> Place:
         """The specimen of this name, or else the direction; a ModelError where it is neither."""
@@ -310,8 +310,8 @@ class Result:
         if parameter.log and value > 0.0:
             factor = float(np.exp(min(half / value, _LARGEST_EXPONENT)))
             low, high = value / factor, value * factor
-        least, most = parameter.bounds
-        return max(low, min(least, value)), min(high, max(most, value))
+        minimum, maximum = parameter.bounds
+        return max(low, min(minimum, value)), min(high, max(maximum, value))
 
 
 def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
@@ -321,11 +321,13 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
     """
     names = [specimen.name for specimen in result.specimens]
 
-    def moved(model: Model) -> Model:
-        kept = [each.name for each in model.records if each.level is Level.MATERIAL or each.corrects in names]
-        return Model.with_defaults(bushing, kept, model.values)
+    def transfer(model: Model) -> Model:
+        effects = [
+            record.name for record in model.records if record.level is Level.MATERIAL or record.corrects in names
+        ]
+        return Model.with_defaults(bushing, effects, model.values)
 
-    model = moved(result.model)
+    model = transfer(result.model)
     measured = result.measured
     if measured:
         of_specimens = tuple(name for name in measured.directions if name in names)
@@ -340,9 +342,9 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
         specimens=result.specimens,
         unresolved=tuple(name for name in result.unresolved if name in model.effects),
         model_error=result.model_error or result.model.unnamed,
-        alternatives=tuple(replace(each, model=moved(each.model)) for each in result.alternatives),
+        alternatives=tuple(replace(record, model=transfer(record.model)) for record in result.alternatives),
     )
     sentence = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"
-    if left := ", ".join(each.name for each in result.model.records if each.name not in model.effects):
-        sentence += f"; left out, because they belong to {result.name} or its rig: {left}"
+    if omitted := ", ".join(record.name for record in result.model.records if record.name not in model.effects):
+        sentence += f"; left out, because they belong to {result.name} or its rig: {omitted}"
     return elsewhere, sentence

@@ -79,15 +79,15 @@ def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tup
     row = {name: i for i, name in enumerate(names)}
     for branch in model.records:
         assert isinstance(branch, Branch)
-        own = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
-        moved = [name for name in (*own.values(), *branch.uses) if name in row]
-        if not moved:
+        qualified = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
+        varied = [name for name in (*qualified.values(), *branch.uses) if name in row]
+        if not varied:
             continue
         if sensitivities := face(branch)[1]:
-            known = sensitivities(seen_by(branch, model.values), *test)
-            slopes = {name: known[short] for short, name in own.items() if name in row}
+            analytic = sensitivities(seen_by(branch, model.values), *test)
+            slopes = {name: analytic[short] for short, name in qualified.items() if name in row}
         else:
-            slopes = dict(zip(moved, differences(model, moved, partial(response, branch))[1], strict=True))
+            slopes = dict(zip(varied, differences(model, varied, partial(response, branch))[1], strict=True))
         for name, slope in slopes.items():
             total[row[name]] += slope
 
@@ -96,10 +96,10 @@ def _differences_at(
     place: Place, model: Model, names: Sequence[str], respond: Callable[[Values], Array]
 ) -> tuple[Array, Array]:
     """As `differences`; parameters that belong to another place are not moved, as nothing comes of it here."""
-    here = [i for i, name in enumerate(names) if place_suffix(name) in (None, str(place))]
-    response, moved = differences(model, [names[i] for i in here], respond)
+    local = [i for i, name in enumerate(names) if place_suffix(name) in (None, str(place))]
+    response, local_slopes = differences(model, [names[i] for i in local], respond)
     slopes = np.zeros((len(names), response.size), dtype=response.dtype)
-    slopes[here] = moved
+    slopes[local] = local_slopes
     return response, slopes
 
 
@@ -115,9 +115,9 @@ def differences(model: Model, names: Sequence[str], respond: Callable[[Values], 
         column = np.full((count + 1, 1), model.values[name])
         column[i] += _step(model.parameters[name], model.values[name])
         stacked[name], steps[i] = column, column[i] - model.values[name]
-    moved = respond(cast(Values, stacked))
-    moved = np.broadcast_to(moved, (count + 1, moved.shape[-1]))
-    return moved[count], (moved[:count] - moved[count]) / steps
+    responses = respond(cast(Values, stacked))
+    responses = np.broadcast_to(responses, (count + 1, responses.shape[-1]))
+    return responses[count], (responses[:count] - responses[count]) / steps
 
 
 def _step(parameter: Parameter, value: float) -> float:

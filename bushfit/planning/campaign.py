@@ -177,10 +177,10 @@ def _fit_one(
 ) -> Found:
     """Relative errors of the parameters that are fitted to one simulated campaign; None without a fit."""
     truth = clean.truth
-    coordinates, sizes = Coordinates.of(truth, names), relative_sizes(truth, names)
+    coordinates, sizes = Coordinates.of_parameters(truth, names), relative_sizes(truth, names)
     with threadpool_limits(1), suppress(FitError):
         campaign = replace(measure(clean, replace(settings, seed=seed)).campaign(), rig=rig)
-        data = PreparedCampaign.of(campaign)
+        data = PreparedCampaign.from_campaign(campaign)
         places = list(dict.fromkeys(str(data_set.direction) for data_set in data.data_sets))
         model = fit_joint(data, effects=truth.effects, directions=places).model
         return np.asarray((coordinates.point(model.values) - coordinates.point(truth.values)) / sizes)

@@ -18,7 +18,7 @@ from bushfit.effects import BASE, LIBRARY, twins_of
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.coordinates import Bounds, Coordinates
 from bushfit.fitting.information import relative_sizes
-from bushfit.fitting.preparation import MeasuredTest, parted
+from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.rig_class import of_class
 from bushfit.geometry import Bushing
@@ -70,7 +70,7 @@ def of_result(result: Result, noise: Noise | None = None, source: str = "") -> K
     names = tuple(name for name in fitted.names if fitted.stderr(name)) or tuple(model.parameters)
     covariance, words = np.eye(len(names)) / 4.0, "values given by hand, taken as right within a factor of 2.7"
     if fitted.names:
-        size = Coordinates.of(model, names).slopes(model.values) * relative_sizes(model, names)
+        size = Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names)
         covariance, words = fitted.restricted(names).matrix / np.outer(size, size), "a fitted model"
     strain = result.measured.strain[1] if result.measured else None
     return Knowledge(
@@ -103,9 +103,9 @@ def of_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -> 
     _check_rivals(rivals or (), LIBRARY)
     found = None if rivals is None else diagnose(data)
     noise = noise_of(data)
-    data = PreparedCampaign.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
+    data = PreparedCampaign.from_campaign(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
     data_sets = data.data_sets
-    model = data.started(data.effects, data_sets, {})
+    model = data.starting_model(data.effects, data_sets, {})
     held = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
     source = f"the tests of {data.campaign.name}"
 
@@ -202,7 +202,7 @@ def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:
 
 def noise_of(data: PreparedCampaign) -> Noise:
     """Noise of the rig of a campaign, from its tests where they show it, else assumed."""
-    loops, sweeps = parted(data.data_sets)
+    loops, sweeps = split_by_kind(data.data_sets)
     found = replace(Noise(), level=of_class(data.campaign.rig))
     if sweeps:
         noise = sweeps[0].noise

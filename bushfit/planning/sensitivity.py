@@ -21,7 +21,7 @@ from bushfit.effects.contract import UNKNOWN, Array, Circumstances
 from bushfit.fitting.coordinates import Coordinates, jacobian
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.noise import SweepNoise
-from bushfit.fitting.preparation import MeasuredTest, new_loop, new_sweep, parted
+from bushfit.fitting.preparation import MeasuredTest, new_loop, new_sweep, split_by_kind
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.planning.contract import Knowledge, Test, operating_points
@@ -142,7 +142,7 @@ class Grid:
         """Information of each test, from columns of all residuals: of parameters, (k, n), and further ones, (e, n)."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets])
         parts = np.split(np.concatenate((own, further)), ends[:-1], axis=-1)
-        of_loops = dict(zip(self._loops, zip(parted(self.data_sets)[0], parts, strict=False), strict=True))
+        of_loops = dict(zip(self._loops, zip(split_by_kind(self.data_sets)[0], parts, strict=False), strict=True))
         of_places = dict(zip(self._points, parts[len(self._loops) :], strict=True))
         k, products, size = len(own), [], []
         for test in self.tests:
@@ -191,7 +191,7 @@ class Grid:
 def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> Array:
     """Derivatives of whitened residuals by relative change of each parameter, of the bounded by typical size, (k + b,
     n)."""
-    model, bounded = knowledge.model, Coordinates.of(knowledge.model, knowledge.bounded)
+    model, bounded = knowledge.model, Coordinates.of_parameters(knowledge.model, knowledge.bounded)
     typical = np.array([parameter.typical for parameter in bounded.parameters]) / bounded.slopes(model.values)
     sizes = np.concatenate((relative_sizes(model, knowledge.names), typical))
     return jacobian(model, data_sets, (*knowledge.names, *knowledge.bounded)) * sizes[:, None]

@@ -188,7 +188,7 @@ def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame
                 moved_of(place): drive.displacement(drive.phase) * length,
                 force: drive.force * factor,
                 f"model {force}": data_set.force(model) * factor,
-                "residual [noise]": -data_set.shown(model),
+                "residual [noise]": -data_set.displayed_residual(model),
                 "outlier": np.where(np.isin(np.arange(drive.phase.size), outliers), "yes", "no"),
             }
         )
@@ -205,7 +205,7 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
 
     def rows(data_set: MeasuredSweep) -> pd.DataFrame:
         place, modelled = data_set.direction, data_set.stiffness(model)
-        gain, phase = np.split(-data_set.shown(model), 2)
+        gain, phase = np.split(-data_set.displayed_residual(model), 2)
         return pd.DataFrame(
             {
                 "sweep": data_set.sweep.name,
@@ -253,7 +253,7 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
         columns |= _stated(data_set) if isinstance(data_set, MeasuredSweep) else {}
         columns |= data_set.columns()
         for name, model, test in (("before", before.model, data_set), ("after", after.model, corrected)):
-            in_noise, percent = np.split(-test.misfit(model), test.parts), -100.0 * test.off(model)
+            in_noise, percent = np.split(-test.misfit(model), test.parts), -100.0 * test.relative_difference(model)
             columns |= {f"{part} {name} [noise]": of for part, of in zip(test.components, in_noise, strict=True)}
             columns |= {f"{part} {name} [%]": of for part, of in zip(test.components, percent, strict=True)}
         table: Any = loops_table if data_set.kind == "loop" else sweeps_table

@@ -140,9 +140,9 @@ def with_time_steps(campaign: Campaign) -> Values:
 def test_one_campaign_beside_two_scripts(benchmark: BenchmarkFixture, campaign: Campaign) -> None:
     """Processor time of each script and of the joint fit, noise, outliers, covariance and warnings included."""
     assert list(START) == list(FIVE)
-    benchmark.pedantic(lambda: fit_joint(PreparedCampaign.of(campaign)), rounds=1)
+    benchmark.pedantic(lambda: fit_joint(PreparedCampaign.from_campaign(campaign)), rounds=1)
     works: dict[str, Callable[[], Values]] = {
-        "bushfit": lambda: dict(fit_joint(PreparedCampaign.of(campaign)).model.values),
+        "bushfit": lambda: dict(fit_joint(PreparedCampaign.from_campaign(campaign)).model.values),
         "lmfit, closed form point by point": lambda: with_lmfit(campaign),
         "least_squares, time steps": lambda: with_time_steps(campaign),
     }

@@ -58,7 +58,7 @@ def table() -> Iterator[Rows]:
 
 @pytest.fixture(scope="module")
 def data(root: Path) -> PreparedCampaign:
-    return PreparedCampaign.of(load_campaign(root / "configs/cmp_15961.toml"))
+    return PreparedCampaign.from_campaign(load_campaign(root / "configs/cmp_15961.toml"))
 
 
 def seconds(works: Sequence[Callable[[], object]], repeats: int) -> list[float]:
@@ -107,8 +107,8 @@ def test_stiffness_against_bare_numpy(
 def test_joint_fit_against_bare_minpack(benchmark: BenchmarkFixture, data: PreparedCampaign, table: Rows) -> None:
     """The fit with covariance and advice over MINPACK with the same residual, Jacobian, start and tolerance."""
     found = benchmark(fit_joint, data)
-    data_sets = data.chosen(None)
-    coordinates = Coordinates.of(found.model, FIVE)
+    data_sets = data.select_tests(None)
+    coordinates = Coordinates.of_parameters(found.model, FIVE)
     start = coordinates.point(start_values(data.campaign.bushing, data_sets, {}))
 
     def model_at(point: np.ndarray) -> Model:
@@ -182,7 +182,7 @@ def test_diagnose(
     campaign = simulated.campaign()
 
     def work() -> object:
-        return diagnose(PreparedCampaign.of(campaign), None, DiagnosisSettings(without=without))
+        return diagnose(PreparedCampaign.from_campaign(campaign), None, DiagnosisSettings(without=without))
 
     benchmark.pedantic(work, rounds=1)
     if benchmark.enabled:

@@ -200,7 +200,7 @@ def write(folder: Path, order: tuple[str, str]) -> Path:
 
 @pytest.mark.parametrize(("order", "first"), [(("", ""), "cold"), (("order = 2", "order = 1"), "warm")])
 def test_a_campaign_gives_temperatures_and_order(tmp_path: Path, order: tuple[str, str], first: str) -> None:
-    data = PreparedCampaign.of(load_campaign(write(tmp_path, order)))
+    data = PreparedCampaign.from_campaign(load_campaign(write(tmp_path, order)))
     under = {sweep.name: sweep.circumstances for sweep in data.sweeps}
     assert under["cold"].temperature == pytest.approx(293.15)
     np.testing.assert_allclose(under["warm"].temperature, [303.15, 304.15, 305.15])

@@ -57,7 +57,7 @@ def diagnosed(measured: Measured) -> Diagnosed:
     ) -> Diagnosis:
         key = repr((effects, plan, seed, settings))
         if key not in known:
-            data = PreparedCampaign.of(measured(effects, plan, seed))
+            data = PreparedCampaign.from_campaign(measured(effects, plan, seed))
             known[key] = diagnose(data, None, DiagnosisSettings(**settings))  # type: ignore[arg-type]
         return known[key]
 
@@ -69,7 +69,7 @@ def fitted() -> Fitted:
     """fitted(campaign, *effects): the paper's model and more, fitted to all tests of a campaign."""
 
     def evidence(campaign: Campaign, *effects: str) -> Evidence:
-        data = PreparedCampaign.of(campaign)
+        data = PreparedCampaign.from_campaign(campaign)
         data_sets = [*data.loops, *data.sweeps]
         start = start_values(campaign.bushing, data_sets, {})
         gone = {get_effect(name).replaces for name in effects}

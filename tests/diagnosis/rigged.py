@@ -104,7 +104,7 @@ TWO = {"delay": {"tau": 1e-4}, "strain_stiffening": {"c3": 20.0}}
 
 
 def asked(campaign: Campaign, model: Model | None = None, **settings: object) -> Diagnosis:
-    diagnosis = diagnose(PreparedCampaign.of(campaign), model, DiagnosisSettings(**settings))  # type: ignore[arg-type]
+    diagnosis = diagnose(PreparedCampaign.from_campaign(campaign), model, DiagnosisSettings(**settings))  # type: ignore[arg-type]
     odds = [
         f"{label} {share:.3f}" for label, (_, share) in zip(diagnosis.odds.labels, diagnosis.odds.told, strict=True)
     ]

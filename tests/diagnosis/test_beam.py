@@ -143,7 +143,7 @@ def test_hum_is_told_though_its_rows_are_left_out(measured: Measured) -> None:
 
 @pytest.fixture
 def left(measured: Measured, paper_model: Model) -> tuple[PreparedCampaign, Model]:
-    return PreparedCampaign.of(measured({}, SHARED)), paper_model
+    return PreparedCampaign.from_campaign(measured({}, SHARED)), paper_model
 
 
 def at(data: PreparedCampaign, *points: tuple[int, float, int]) -> list[Outlier]:

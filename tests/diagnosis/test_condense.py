@@ -40,7 +40,7 @@ def swept(model: Model, points: int = POINTS, repeats: int = 2, seed: int = 3) -
 
 
 def data_of(*sweeps: Sweep) -> PreparedCampaign:
-    return PreparedCampaign.of(Campaign("long", Path("long.toml"), PAPER.bushing, sweeps=sweeps))
+    return PreparedCampaign.from_campaign(Campaign("long", Path("long.toml"), PAPER.bushing, sweeps=sweeps))
 
 
 def silent(frequency: Array, amplitude: Array, stepped: Any = "frequency") -> Sweep:
@@ -173,11 +173,11 @@ def test_means_that_a_robust_fit_leaves_out_are_told() -> None:
     assert np.count_nonzero(band) == 19
     off_there = replace(sweep, stiffness=np.where(band, 1.0 + 2.5 * SCATTER, 1.0) * sweep.stiffness)
     data = data_of(off_there)
-    robust = PreparedCampaign.of(replace(data.campaign, fit=replace(data.campaign.fit, loss="soft_l1")))
+    robust = PreparedCampaign.from_campaign(replace(data.campaign, fit=replace(data.campaign.fit, loss="soft_l1")))
     (told,) = [note for note in diagnose(robust).notes if "left out" in note]
     assert told == "swept: 1 of these points left out, farther off than noise"
     as_it_was = replace(robust.campaign, sweeps=(sweep,))
-    assert not any("left out" in note for note in diagnose(PreparedCampaign.of(as_it_was)).notes)
+    assert not any("left out" in note for note in diagnose(PreparedCampaign.from_campaign(as_it_was)).notes)
 
 
 @pytest.mark.parametrize(("most", "kept"), [(6.0, "012345"), (5.0, "01235"), (4.1, "0125"), (3.2, "015"), (0.1, "15")])
@@ -196,7 +196,7 @@ def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_re
         )
         for n, (of, size, place) in enumerate(made)
     )
-    data = PreparedCampaign.of(replace(campaign, loops=loops, rig=RigSettings(gain_error=0.01)))
+    data = PreparedCampaign.from_campaign(replace(campaign, loops=loops, rig=RigSettings(gain_error=0.01)))
     assert condensed(data)[1] == ()
     monkeypatch.setattr("bushfit.diagnosis.condense._MOST_ROWS", most * data.loops[0].size)
     fewer, said = condensed(data)

@@ -285,7 +285,7 @@ def power_law(size: float, phase_deg: float, p: float, q: float) -> Term:
 
 
 def found_in(campaign: Campaign, fitted: Fitted) -> Fingerprint | None:
-    evidence, data = fitted(campaign), PreparedCampaign.of(campaign)
+    evidence, data = fitted(campaign), PreparedCampaign.from_campaign(campaign)
     start = start_values(campaign.bushing, data.sweeps, {})
     return fingerprint(evidence, *weighed(evidence, campaign.rig), start, {})
 

@@ -39,7 +39,7 @@ def test_known_effects_are_recovered(name: str) -> None:
     simulated, sealed = hidden_campaign(1, [name])
     near = {key: ParameterSetting(0.95 * sealed.values[key]) for key in NEAR if key in sealed.values}
     campaign = replace(simulated.campaign(), fit=FitSettings(parameters=near))
-    result = fit_joint(PreparedCampaign.of(campaign), effects=with_base([name]), directions=BOTH)
+    result = fit_joint(PreparedCampaign.from_campaign(campaign), effects=with_base([name]), directions=BOTH)
     print(f"{name}: {100 * sealed.visible:.1f} % visible")
     reduced = agrees(result, sealed.values)
     # softening from cycle to cycle passes for scatter from cycle to cycle, and so for noise
@@ -52,7 +52,7 @@ def test_effects_without_a_law_in_time_are_recovered_from_their_first_harmonic(n
     effect = LIBRARY[name]
     truth = paper_model.with_effect(name, {qualified_name(effect, effect.amount): effect.amount.sized(1.0)})
     campaign = measure(in_closed_form(truth, PLAN), PLAN).campaign()
-    result = fit_joint(PreparedCampaign.of(campaign), effects=(*BASE, name), directions=BOTH)
+    result = fit_joint(PreparedCampaign.from_campaign(campaign), effects=(*BASE, name), directions=BOTH)
     assert 0.85 < agrees(result, truth.values) < 1.15
 
 
@@ -89,7 +89,7 @@ def test_a_small_effect_is_not_taken_for_one_at_rest_on_its_bound(measured: Meas
     """However wide the bounds: it has an error of its own, and the others carry their share of it."""
     effect, _, key = name.partition(".")
     campaign = measured({effect: {key: SMALL[name]}}, seed=1)
-    result = fit_joint(PreparedCampaign.of(campaign), effects=(*BASE, effect), directions=BOTH)
+    result = fit_joint(PreparedCampaign.from_campaign(campaign), effects=(*BASE, effect), directions=BOTH)
     interval = result.interval(name)
     print(f"{name} = {result.model.values[name]:.3g}, 95 % {interval}")
     assert not any("edge" in line for line in result.warnings)
@@ -102,7 +102,7 @@ def test_what_the_data_push_below_zero_rests_on_its_bound(measured: Measured) ->
     campaign = measured()
     for number, sweep in enumerate(campaign.sweeps):
         campaign = changed(campaign, number, np.exp(-2j * np.pi * sweep.frequency * 1e-4))
-    result = fit_joint(PreparedCampaign.of(campaign), effects=(*BASE, "viscous"), directions=BOTH)
+    result = fit_joint(PreparedCampaign.from_campaign(campaign), effects=(*BASE, "viscous"), directions=BOTH)
     assert result.model.values["viscous.eta"] == pytest.approx(0.0, abs=1e-6)
     assert any("viscous.eta ended at the edge" in line for line in result.warnings)
 
@@ -120,9 +120,9 @@ NAMES = ("kraus", "sliders", "distributed_sliders", "fractional_zener", "intrins
 
 def begun(model: Model, campaign: Campaign) -> tuple[Model, list[MeasuredTest]]:
     """The plain model as a fit begins, and the tests."""
-    data = PreparedCampaign.of(campaign)
+    data = PreparedCampaign.from_campaign(campaign)
     tests = [*data.loops, *data.sweeps]
-    return Model.with_defaults(model.bushing, BASE, data.start(tests, {})), tests
+    return Model.with_defaults(model.bushing, BASE, data.start_values(tests, {})), tests
 
 
 def families(model: Model, truth: str, values: Mapping[str, float]) -> dict[str, FittedFamily]:
@@ -170,7 +170,7 @@ def test_the_interval_of_the_gain_is_that_of_noise(paper_model: Model) -> None:
 
 
 def test_known_families_are_each_law_of_rate_with_each_of_amplitude(paper_model: Model, campaign: Campaign) -> None:
-    tests = PreparedCampaign.of(campaign).sweeps
+    tests = PreparedCampaign.from_campaign(campaign).sweeps
     found = known_families(paper_model, tests)
     assert len(found) == 4 * 6 - 1 - 1  # less the paper's own, and a second springpot on intrinsic time
     assert {"kraus", "maxwell", "fractional_zener+sliders", "second_springpot+coupled_breakdown"} < {*found}

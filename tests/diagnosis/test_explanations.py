@@ -21,7 +21,7 @@ from bushfit.diagnosis.propose import proposals, scores, sensitivity
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects import BASE, LIBRARY, get_effect
 from bushfit.effects.contract import Array, Values
-from bushfit.fitting.preparation import MeasuredTest, parted
+from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.model.model import Model
 
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
@@ -81,7 +81,7 @@ def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) ->
     made = {each.name: each for each in unnamed(bare)}
     of_one = {f"{how} {where}" for how in ("smooth", "rough") for where in ("axial", "radial")}
     assert set(made) == of_one | {"rough all", "loops"}  # what is smooth in all is the compound's
-    sweep = parted(bare.data_sets)[1][0]
+    sweep = split_by_kind(bare.data_sets)[1][0]
     point = sweep.whiten(np.ones(sweep.frequency.size)).reshape(2, -1)[0]
     same = np.flatnonzero((sweep.amplitude == LEVELS[1]) & (sweep.repeat == 1))
     distance = np.log(sweep.frequency[same, None] / sweep.frequency[same])

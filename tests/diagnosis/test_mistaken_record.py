@@ -101,8 +101,8 @@ def test_mended_repeats_still_share_the_error_of_their_gain(measured: Measured) 
     again = replace(campaign.loops[0], name="again")
     campaign = replace(campaign, loops=(*campaign.loops, again))
     wrong = on_loops(lambda x: replace(x, time=x.time / 10), 2)(campaign)
-    mended, _ = adopted(PreparedCampaign.of(wrong), ["ten_times_slower:again"])
-    right = PreparedCampaign.of(campaign)
+    mended, _ = adopted(PreparedCampaign.from_campaign(wrong), ["ten_times_slower:again"])
+    right = PreparedCampaign.from_campaign(campaign)
     assert [loop.gain_error for loop in mended.loops] == [loop.gain_error for loop in right.loops]
 
 

@@ -125,7 +125,9 @@ def test_sizes(root: Path, truths: Truths, found: Found, name: str) -> None:
         result = found[case].result
         if found[case].verdict == "ambiguous":  # it has its size once the reader says which it is
             campaign = load_campaign(root / "data/practice" / case / "bushing.toml")
-            result = diagnose(PreparedCampaign.of(campaign), settings=DiagnosisSettings(adopt=(effect,))).result
+            result = diagnose(
+                PreparedCampaign.from_campaign(campaign), settings=DiagnosisSettings(adopt=(effect,))
+            ).result
         assert effect in result.model.effects
         truth = truths[case]["effects"][theirs][key]
         truth = 1.0 / truth if theirs == "rig" else truth
@@ -163,7 +165,9 @@ def misread(clean: Undisturbed, reached: float, seen: float = 1.0) -> Undisturbe
 
 
 def asked(tests: Undisturbed) -> list[Diagnosis]:
-    return [diagnose(PreparedCampaign.of(measure(tests, replace(PLAN, seed=seed)).campaign())) for seed in (1, 2)]
+    return [
+        diagnose(PreparedCampaign.from_campaign(measure(tests, replace(PLAN, seed=seed)).campaign())) for seed in (1, 2)
+    ]
 
 
 @pytest.mark.slow

@@ -44,7 +44,7 @@ def test_the_class_of_a_rig_that_is_assumed_is_said(measured: Measured) -> None:
         (RigSettings(gain_error=4e-3), "0.4 % gain and 0.25 deg phase, phase assumed"),
         (RigSettings(gain_error=4e-3, phase_error=3.5e-3), ""),
     ):
-        assumed = PreparedCampaign.of(replace(campaign, rig=rig)).assumed
+        assumed = PreparedCampaign.from_campaign(replace(campaign, rig=rig)).assumed
         assert [note.partition(" class, ")[2] for note in assumed] == [words] * bool(words)
 
 
@@ -93,7 +93,7 @@ EVEN = (0.5, 0.5)
 
 @pytest.fixture
 def data_sets(measured: Measured) -> list[MeasuredTest]:
-    data = PreparedCampaign.of(measured())
+    data = PreparedCampaign.from_campaign(measured())
     return [*data.loops, *data.sweeps]
 
 
@@ -143,7 +143,10 @@ def test_a_direction_that_is_swept_is_no_next_test(paper_model: Model, measured:
     """Compliance and a softer rubber differ most in the stiff direction: to be swept where it has not been."""
     models = with_each(paper_model, {"viscous.eta": 100.0}, {"interface_slip.force": 1.0})
     campaign = measured()
-    alone, both = PreparedCampaign.of(one_direction(campaign)).sweeps, PreparedCampaign.of(campaign).sweeps
+    alone, both = (
+        PreparedCampaign.from_campaign(one_direction(campaign)).sweeps,
+        PreparedCampaign.from_campaign(campaign).sweeps,
+    )
     assert "axial" not in deciding_test(models, EVEN, alone)
     assert not any(direction in deciding_test(models, EVEN, both) for direction in ("axial", "radial"))
 

@@ -15,7 +15,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import WAVES
 from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
 from bushfit.effects.contract import Array
-from bushfit.fitting.preparation import MeasuredSweep, parted
+from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
 
 RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 RUN, LEVEL, WAVE, LOOP = range(4)
@@ -36,7 +36,7 @@ def test_what_shares_an_error_moves_together(
     bare: Evidence, unit: complex, kind: int, repeats: tuple[int, ...]
 ) -> None:
     """A column is what an error of the class makes of a run, or of all runs of a level, in gain or in phase."""
-    sweep = parted(bare.data_sets)[1][1]
+    sweep = split_by_kind(bare.data_sets)[1][1]
     there = (sweep.sweep.amplitude == LEVELS[1]) & np.isin(sweep.sweep.repeat, repeats)
     wanted = off(bare, sweep, lambda _: unit * there) * (RIG.gain_error if unit == 1.0 else RIG.phase_error)
     every = [
@@ -54,7 +54,7 @@ def test_what_shares_an_error_moves_together(
 
 def test_every_point_is_in_one_block_and_scatters_as_its_sweep(bare: Evidence) -> None:
     """Loops each by itself, and each level of a sweep in gain and in phase."""
-    loops, sweeps = parted(bare.data_sets)
+    loops, sweeps = split_by_kind(bare.data_sets)
     made = blocks(bare, RIG)
     rows = np.concatenate([block.rows for block in made])
     assert np.array_equal(np.sort(rows), np.arange(bare.residual.size))
@@ -84,7 +84,7 @@ def test_repeated_loops_share_their_gain(measured: Measured, fitted: Fitted) -> 
 
 def test_sizes_have_weights_that_sum_to_one(measured: Measured, fitted: Fitted, bare: Evidence) -> None:
     """The scatter has sizes of its own where few points tell it, loops alone have no runs."""
-    sweep = parted(bare.data_sets)[1][0]
+    sweep = split_by_kind(bare.data_sets)[1][0]
     few = replace(bare, data_sets=(replace(sweep, noise=replace(sweep.noise, scatter_freedom=4)),))
     alone = scattering_alone(fitted(no_sweeps(measured(plan=SHARED))))
     for evidence, scatters, runs in ((bare, 1, 5), (few, 3, 5), (alone, 1, 1)):

@@ -125,11 +125,11 @@ def test_inputs_are_left_alone_and_the_same_comes_twice(measured: Measured) -> N
     tests = [vars(test) for test in (*campaign.sweeps, *campaign.loops)]
     arrays = [array for test in tests for array in test.values() if isinstance(array, np.ndarray)]
     copies = [array.copy() for array in arrays]
-    one, other = (json.dumps(diagnose(PreparedCampaign.of(campaign)).to_document()) for _ in range(2))
+    one, other = (json.dumps(diagnose(PreparedCampaign.from_campaign(campaign)).to_document()) for _ in range(2))
     assert one == other
     assert all(np.array_equal(array, copy) for array, copy in zip(arrays, copies, strict=True))
 
 
 def test_nothing_to_diagnose(measured: Measured) -> None:
     with pytest.raises(BushfitError, match="nothing to diagnose"):
-        diagnose(PreparedCampaign.of(replace(measured(), loops=(), sweeps=())))
+        diagnose(PreparedCampaign.from_campaign(replace(measured(), loops=(), sweeps=())))

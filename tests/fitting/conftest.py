@@ -47,4 +47,4 @@ def rig(paper_model: Model) -> Callable[..., Campaign]:
 @pytest.fixture(scope="session")
 def measured(campaign: Campaign) -> PreparedCampaign:
     """The paper's bushing as an independent rig simulation measured it; its joint fit is `result`."""
-    return PreparedCampaign.of(campaign)
+    return PreparedCampaign.from_campaign(campaign)

@@ -34,7 +34,7 @@ def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(
     measured: PreparedCampaign, result: Result
 ) -> None:
     """The noise is estimated too, which can only add to the inverse of J J^T."""
-    model, data_sets = result.model, measured.chosen(None)
+    model, data_sets = result.model, measured.select_tests(None)
     found = covariance(model, [FitStage(FIVE, data_sets)])
     slope = jacobian(model, data_sets, FIVE)
     values = np.array([model.values[name] for name in FIVE])
@@ -47,7 +47,7 @@ def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(
 
 
 def test_quality_and_reach_are_those_of_the_data(measured: PreparedCampaign, result: Result) -> None:
-    data_sets = measured.chosen(None)
+    data_sets = measured.select_tests(None)
     found = quality(result.model, data_sets, 5)
     assert found.points == sum(data_set.counted for data_set in data_sets)
     assert found.reduced_chi_square == pytest.approx(1.0, abs=0.1)
@@ -61,7 +61,7 @@ def test_quality_and_reach_are_those_of_the_data(measured: PreparedCampaign, res
 def test_a_model_that_misses_the_data_is_told_and_one_that_does_not_is_not(
     measured: PreparedCampaign, result: Result
 ) -> None:
-    data_sets = measured.chosen(None)
+    data_sets = measured.select_tests(None)
     assert lack_of_fit(result.model, data_sets, 5) is None
     assert misfit(result.model, data_sets, 5) == []
     off = result.model.with_values({"mu": 1.05 * result.model.values["mu"]})
@@ -76,7 +76,7 @@ def test_a_model_that_misses_the_data_is_told_and_one_that_does_not_is_not(
 def test_a_parameter_that_no_test_sees_has_an_error_beyond_all_bounds(
     rig: Callable[..., Campaign], paper_model: Model
 ) -> None:
-    data_sets = PreparedCampaign.of(replace(rig(), sweeps=())).chosen(None)
+    data_sets = PreparedCampaign.from_campaign(replace(rig(), sweeps=())).select_tests(None)
     model = paper_model.with_effect("stiffness_factor.radial")
     names = (*FIVE[:1], "stiffness_factor.radial")
     found = covariance(model, [FitStage(names, data_sets)])
@@ -102,7 +102,7 @@ def without(campaign: Campaign, direction: Direction) -> tuple[Sweep, ...]:
 @pytest.mark.parametrize("factor", [1.0, 1.05])
 def test_a_test_that_was_left_out_is_told_where_the_model_misses_it(small: Campaign, factor: float) -> None:
     radial = [stiffer(sweep, factor) for sweep in without(small, Direction.AXIAL)]
-    data = PreparedCampaign.of(replace(small, sweeps=(*without(small, Direction.RADIAL), *radial)))
+    data = PreparedCampaign.from_campaign(replace(small, sweeps=(*without(small, Direction.RADIAL), *radial)))
     told = [line for line in fit_joint(data).warnings if "was not fitted" in line]
     assert len(told) == (factor != 1.0)
     if told:
@@ -116,11 +116,15 @@ def test_kilonewtons_taken_for_newtons_are_told(small: Campaign) -> None:
     """In the sweep, and in the loop as well."""
     axial = without(small, Direction.RADIAL)
     slip = replace(small, sweeps=tuple(stiffer(sweep, 1e-3) for sweep in axial))
-    (told,) = [line for line in fit_joint(PreparedCampaign.of(slip)).warnings if "units" in line]
+    (told,) = [line for line in fit_joint(PreparedCampaign.from_campaign(slip)).warnings if "units" in line]
     assert told.startswith(f"{small.loops[0].name} shows ")
     assert f"times the modulus of {axial[0].name}, which no rubber does: check the units" in told
     loops = tuple(replace(loop, force=1e-3 * loop.force) for loop in small.loops)
-    (told,) = [line for line in fit_joint(PreparedCampaign.of(replace(slip, loops=loops))).warnings if "units" in line]
+    (told,) = [
+        line
+        for line in fit_joint(PreparedCampaign.from_campaign(replace(slip, loops=loops))).warnings
+        if "units" in line
+    ]
     assert "kPa is that of no rubber" in told
 
 
@@ -128,7 +132,7 @@ def test_kilonewtons_taken_for_newtons_are_told(small: Campaign) -> None:
 def test_tests_at_other_temperatures_are_told_by_fit_and_diagnose(small: Campaign, warm: float, told: int) -> None:
     (loop,), (sweep,) = small.loops, without(small, Direction.RADIAL)
     at_23, hot = replace(loop, temperature=23.0 + CELSIUS), replace(sweep, temperature=warm + CELSIUS)
-    data = PreparedCampaign.of(replace(small, loops=(at_23,), sweeps=(hot,)))
+    data = PreparedCampaign.from_campaign(replace(small, loops=(at_23,), sweeps=(hot,)))
     for result in (fit_joint(data), fit_two_step(data).result, diagnose(data).result):
         lines = [line for line in result.warnings if "degC" in line]
         assert len(lines) == told
@@ -160,7 +164,7 @@ def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model: Mo
 
 def test_a_gain_that_does_not_weigh_moves_parameters_as_a_refit_says(small: Campaign, paper_model: Model) -> None:
     """What its standard error adds to the covariance are the squares of how far a loop that is off by it leads."""
-    data = PreparedCampaign.of(small)
+    data = PreparedCampaign.from_campaign(small)
     loop = replace(data.loops[0], gain_error=0.01, gain_weighs=False)
     fitted = solve(paper_model, (*data.sweeps, loop), FIVE).model
     off = replace(loop, drive=replace(loop.drive, force=1.01 * loop.drive.force))
@@ -205,7 +209,7 @@ def runs(result: Result, direction: str) -> dict[float | None, Misfit]:
 
 
 def test_thousands_of_rows_of_a_loop_do_not_hide_a_level_that_is_off(levelled: Campaign) -> None:
-    result = fit_joint(PreparedCampaign.of(level_off(levelled, 1, 2e-4, 1.03)))
+    result = fit_joint(PreparedCampaign.from_campaign(level_off(levelled, 1, 2e-4, 1.03)))
     assert result.quality is not None
     told = runs(result, "radial")
     assert result.quality.nrmse < 0.01, "the loop's rows make the total look well"
@@ -217,13 +221,13 @@ def test_thousands_of_rows_of_a_loop_do_not_hide_a_level_that_is_off(levelled: C
 
 def test_a_run_held_out_is_a_refit_without_it(levelled: Campaign) -> None:
     """One Gauss-Newton step against the real refit: the same to a tenth of the standard errors."""
-    data = PreparedCampaign.of(replace(levelled, loops=()))
-    (sweep,) = data.chosen(None)
+    data = PreparedCampaign.from_campaign(replace(levelled, loops=()))
+    (sweep,) = data.select_tests(None)
     best = solve(Model.with_defaults(levelled.bushing, ("elastic", "springpot", "friction"), {}), [sweep], FIVE)
     errors = np.sqrt(np.diag(np.linalg.inv(best.jacobian @ best.jacobian.T)))
     for level in LEVELS:
         rows = np.flatnonzero(np.tile(sweep.amplitude == level, 2))
-        step = LeaveOut.of(best.jacobian, best.residual).step(rows)
+        step = LeaveOut.from_fit(best.jacobian, best.residual).step(rows)
         assert step is not None
         rest = solve(best.model, [sweep.without(np.flatnonzero(sweep.amplitude == level))], FIVE)
         moved = best.coordinates.point(rest.model.values) - best.coordinates.point(best.model.values)
@@ -235,14 +239,14 @@ def test_what_the_rest_leaves_open_is_not_held_out() -> None:
     jacobian = np.zeros((2, 20))
     jacobian[0] = random.standard_normal(20)
     jacobian[1, :5] = 1.0
-    whole = LeaveOut.of(jacobian, 0.1 * random.standard_normal(20))
+    whole = LeaveOut.from_fit(jacobian, 0.1 * random.standard_normal(20))
     assert whole.step(np.arange(5)) is None
     assert whole.step(np.arange(5, 10)) is not None
-    assert LeaveOut.of(np.zeros((0, 20)), np.ones(20)).step(np.arange(3)).shape == (0,)  # type: ignore[union-attr]
+    assert LeaveOut.from_fit(np.zeros((0, 20)), np.ones(20)).step(np.arange(3)).shape == (0,)  # type: ignore[union-attr]
 
 
 def test_usable_within_what_95_of_a_hundred_points_show(levelled: Campaign) -> None:
-    result = fit_joint(PreparedCampaign.of(level_off(levelled, 1, 5e-4, 1.05)))
+    result = fit_joint(PreparedCampaign.from_campaign(level_off(levelled, 1, 5e-4, 1.05)))
     by_place = {place.place: place for place in result.usable}
     assert by_place["axial"].held_out
     assert 0.004 < by_place["axial"].stiffness < 0.02
@@ -255,14 +259,14 @@ def test_what_the_rest_cannot_tell_counts_as_fitted(levelled: Campaign, paper_mo
     that are given are predictions."""
     alone = of_levels(levelled, levelled.sweeps[0].amplitude == 2e-4)
     held = FitSettings(parameters={"mu": ParameterSetting(value=1e6)})
-    (place,) = fit_joint(PreparedCampaign.of(replace(alone, fit=held))).usable
+    (place,) = fit_joint(PreparedCampaign.from_campaign(replace(alone, fit=held))).usable
     assert not place.held_out
     two = replace(of_levels(levelled, levelled.sweeps[0].amplitude != 5e-4), loops=())
-    (place,) = fit_joint(PreparedCampaign.of(level_off(two, 0, 2e-4, 1.1))).usable
+    (place,) = fit_joint(PreparedCampaign.from_campaign(level_off(two, 0, 2e-4, 1.1))).usable
     assert not place.held_out
     assert place.stiffness < 0.2
     every = {name: ParameterSetting(value=value, vary=False) for name, value in paper_model.values.items()}
-    result = fit_joint(PreparedCampaign.of(replace(levelled, fit=FitSettings(parameters=every))))
+    result = fit_joint(PreparedCampaign.from_campaign(replace(levelled, fit=FitSettings(parameters=every))))
     assert all(place.held_out for place in result.usable)
 
 
@@ -270,7 +274,7 @@ def test_a_robust_fit_counts_no_outliers(levelled: Campaign) -> None:
     sweep = levelled.sweeps[0]
     spoiled = sweep.stiffness.copy()
     spoiled[10] *= 2.0
-    data = PreparedCampaign.of(
+    data = PreparedCampaign.from_campaign(
         replace(levelled, sweeps=(replace(sweep, stiffness=spoiled),), fit=FitSettings(loss="soft_l1"))
     )
     result = fit_joint(data)

@@ -56,7 +56,7 @@ def waves(size: float, seed: int) -> Off:
 def spoiled(campaign: Campaign, off: Off) -> Campaign:
     """The axial tests of a campaign, their stiffness off; of a loop its first harmonic."""
     loops = list[Loop]()
-    for data in PreparedCampaign.of(campaign).loops:
+    for data in PreparedCampaign.from_campaign(campaign).loops:
         loop, drive = data.test, data.drive
         both = basis(drive.phase, 1).T[1:]
         first = both @ loop.force / np.sum(np.square(both), axis=1)
@@ -124,7 +124,7 @@ def test_bands_hold_a_rubber_that_is_not_quite_the_model(
         off = waves(size, seed)
         campaign = spoiled(rig(seed, shared=True), off)
         try:
-            data = PreparedCampaign.of(campaign if loops else replace(campaign, loops=()))
+            data = PreparedCampaign.from_campaign(campaign if loops else replace(campaign, loops=()))
         except FitError:  # so far off that the loop would give energy
             continue
         result = fit_joint(data)
@@ -147,7 +147,7 @@ def test_bands_hold_a_rubber_that_is_not_quite_the_model(
 @pytest.fixture
 def off_by_waves(rig: Rig) -> tuple[Campaign, Result]:
     campaign = spoiled(rig(3, shared=True), waves(0.03, 3))
-    return campaign, fit_joint(PreparedCampaign.of(campaign))
+    return campaign, fit_joint(PreparedCampaign.from_campaign(campaign))
 
 
 def test_a_model_error_is_told_and_kept_in_the_file(off_by_waves: tuple[Campaign, Result]) -> None:
@@ -180,7 +180,7 @@ def test_neither_the_order_of_tests_nor_a_scale_of_force_matters(off_by_waves: t
         loops=tuple(replace(loop, force=4.0 * loop.force) for loop in campaign.loops),
         sweeps=tuple(replace(sweep, stiffness=4.0 * sweep.stiffness) for sweep in campaign.sweeps),
     )
-    turned, scaled = (fit_joint(PreparedCampaign.of(each)) for each in (other, stiffer))
+    turned, scaled = (fit_joint(PreparedCampaign.from_campaign(each)) for each in (other, stiffer))
     for name in FIVE:
         factor = 4.0 if name in ("mu", "m", "sigma_fmax") else 1.0
         error = 0.02 * (result.covariance.stderr(name) or 0.0)
@@ -193,7 +193,7 @@ def test_parameters_on_their_bounds_beside_a_model_error(rig: Rig, paper_model: 
     campaign = spoiled(rig(3, shared=True), waves(0.03, 3))
     given = {name: ParameterSetting(value=paper_model.values[name], vary=False) for name in held}
     fit = FitSettings(parameters={**given, "mu": ParameterSetting(max=0.7 * paper_model.values["mu"])})
-    result = fit_joint(PreparedCampaign.of(replace(campaign, fit=fit)), profile=not held)
+    result = fit_joint(PreparedCampaign.from_campaign(replace(campaign, fit=fit)), profile=not held)
     assert result.model_error is not None
     assert set(result.profile) == (set() if held else set(FIVE))
     assert result.at_bound == {"mu": "max"}
@@ -204,13 +204,13 @@ def test_parameters_on_their_bounds_beside_a_model_error(rig: Rig, paper_model: 
 def test_the_closest_fit_is_as_near_as_five_parameters_can_be(off_by_waves: tuple[Campaign, Result]) -> None:
     """Root mean square of the relative misfit, each operating point alike, against plain least squares from there."""
     campaign, result = off_by_waves
-    data_sets = PreparedCampaign.of(campaign).chosen(None)
-    coordinates = Coordinates.of(result.model, FIVE)
+    data_sets = PreparedCampaign.from_campaign(campaign).select_tests(None)
+    coordinates = Coordinates.of_parameters(result.model, FIVE)
 
     def misfit(point: np.ndarray) -> np.ndarray:
         model, parts = result.model.with_values(coordinates.values(point)), []
         for data_set in data_sets:
-            rows = data_set.off(model)
+            rows = data_set.relative_difference(model)
             parts.append(rows[:, :: rows.shape[1] // 40] if data_set.kind == "loop" else rows)
         return np.concatenate([part.ravel() for part in parts])
 
@@ -231,7 +231,7 @@ def test_a_ripple_of_a_dense_sweep_bends_no_parameter(rig: Rig, paper_model: Mod
     noise = np.exp(rng.normal(0.0, 5e-3, silent.size) + 1j * rng.normal(0.0, 5e-3, silent.size))
     sweep = Sweep("dense", Direction.AXIAL, frequency, amplitude, silent * noise)
     loops = tuple(loop for loop in rig(seed).loops if loop.direction is Direction.AXIAL)
-    result = fit_joint(PreparedCampaign.of(replace(rig(seed), loops=loops, sweeps=(sweep,))))
+    result = fit_joint(PreparedCampaign.from_campaign(replace(rig(seed), loops=loops, sweeps=(sweep,))))
     apart = np.abs(result.model.stiffness(Direction.AXIAL, frequency, amplitude) / silent) - 1.0
     assert np.abs(apart).max() < 0.02
     assert result.model.values["mu"] == pytest.approx(paper_model.values["mu"], rel=0.01)
@@ -243,8 +243,8 @@ def test_a_ripple_of_a_dense_sweep_bends_no_parameter(rig: Rig, paper_model: Mod
 def test_the_covariance_is_the_sandwich_of_noise_and_process(rig: Rig) -> None:
     """In full, J^+ V J^+^T, V by one standard deviation of each independent source of error."""
     campaign = replace(spoiled(rig(3, shared=True), waves(0.03, 3)), loops=())
-    data = PreparedCampaign.of(campaign)
-    plain = estimate(data.started(data.effects, data.sweeps, {}), data.sweeps, FIVE, data.bounds)
+    data = PreparedCampaign.from_campaign(campaign)
+    plain = estimate(data.starting_model(data.effects, data.sweeps, {}), data.sweeps, FIVE, data.bounds)
     found, _ = with_model_error(plain, data.bounds)
     (sweep,) = found.weighed
     assert found.process is not None
@@ -252,7 +252,7 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(rig: Rig) -> None:
     model, random = found.solution.model, sweep.noise.scatter(sweep.name, sweep.held, sweep.step)
     run = np.unique(np.stack((sweep.held, sweep.repeat)), axis=1, return_inverse=True)[1]
     sources = [
-        sweep.moved(found.process.shapes * sweep.stiffness(model), model),
+        sweep.residual_change(found.process.shapes * sweep.stiffness(model), model),
         *(sweep.whiten(unit * np.diag(size).astype(complex)) for unit, size in zip((1.0, 1.0j), random, strict=True)),
         *(np.array(sweep.moved_together(run == i)) * np.array(sweep.noise.shared)[:, None] for i in np.unique(run)),
     ]

@@ -144,7 +144,7 @@ def test_rows_without_weight_count_for_nothing_and_are_still_shown(loop: Measure
     assert light.counted == np.count_nonzero(loop.drive.weight[500:])
     assert np.all(light.residual(paper_model)[:500] == 0.0)
     off = (loop.force(paper_model) - loop.drive.force) / loop.drive.noise
-    np.testing.assert_allclose(light.shown(paper_model)[:500], off[:500], rtol=1e-9)
+    np.testing.assert_allclose(light.displayed_residual(paper_model)[:500], off[:500], rtol=1e-9)
     np.testing.assert_allclose(light.residual(paper_model)[500:], loop.residual(paper_model)[500:], rtol=1e-12)
     assert light.relative(paper_model).size == light.counted
     quarter = loop.weighted(np.full(loop.size, 0.25))
@@ -170,7 +170,7 @@ def test_a_gain_error_of_the_rig_pulls_no_fit(rig: Rig, paper_model: Model) -> N
     stated, asked = RigSettings(gain_error=5e-3), []
     for seed in range(8):
         (loop,) = prepare_loops(rig(seed, force_noise=5e-3).loops, stated)
-        residual, column = loop.residual(paper_model), loop.moved(loop.measured, paper_model)
+        residual, column = loop.residual(paper_model), loop.residual_change(loop.measured, paper_model)
         asked.append(-(column @ residual) / (column @ column))
     print("mean gain asked for, less 1:", np.mean(asked))
     assert abs(np.mean(asked)) < 1e-3
@@ -182,7 +182,9 @@ def test_repeats_of_a_loop_share_the_error_of_its_gain(campaign: Campaign) -> No
     (loop,) = campaign.loops
     faster = replace(loop, name="faster", time=loop.time / 2.0)
     again = [replace(loop, name=f"again_{number}", displacement=1.01 * loop.displacement) for number in range(3)]
-    found = PreparedCampaign.of(replace(campaign, loops=(loop, *again, faster), rig=RigSettings(gain_error=5e-3))).loops
+    found = PreparedCampaign.from_campaign(
+        replace(campaign, loops=(loop, *again, faster), rig=RigSettings(gain_error=5e-3))
+    ).loops
     np.testing.assert_allclose([each.gain_error for each in found], [1e-2] * 4 + [5e-3])
 
 
@@ -208,17 +210,17 @@ def test_only_tests_of_the_same_points_contradict_one_another(measured: Prepared
 def test_dynamic_amplitudes_choose_the_levels(measured: PreparedCampaign) -> None:
     assert set(measured.smallest_sweep.amplitude) == {1e-4}
     other = replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(2e-4, 5e-4)))
-    assert set(PreparedCampaign.of(other).smallest_sweep.amplitude) == {2e-4, 5e-4}
-    absent = PreparedCampaign.of(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
+    assert set(PreparedCampaign.from_campaign(other).smallest_sweep.amplitude) == {2e-4, 5e-4}
+    absent = PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
     with pytest.raises(FitError, match="no sweep at these amplitudes"):
         _ = absent.smallest_sweep
 
 
 def test_a_direction_without_tests_is_refused_with_those_there_are(measured: PreparedCampaign) -> None:
     with pytest.raises(FitError, match=r"no test in the directions[\s\S]*axial, radial[\s\S]*torsion"):
-        measured.chosen([Direction.TORSION])
+        measured.select_tests([Direction.TORSION])
     with pytest.raises(FitError, match="there is nothing to fit"):
-        PreparedCampaign.of(replace(measured.campaign, loops=(), sweeps=())).chosen(None)
+        PreparedCampaign.from_campaign(replace(measured.campaign, loops=(), sweeps=())).select_tests(None)
 
 
 def test_magnitudes_in_coarse_steps_are_told(campaign: Campaign) -> None:

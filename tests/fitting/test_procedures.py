@@ -56,7 +56,8 @@ def shown(values: np.ndarray) -> str:
 @pytest.mark.parametrize("name", NAMES)
 def test_an_ideal_rig_gives_the_truth_within_0_2_percent(rig: Rig, models: dict[str, Model], name: str) -> None:
     found = errors(
-        fit_joint(PreparedCampaign.of(rig(model=models[name], settings=SimulateSettings()))), models[name].values
+        fit_joint(PreparedCampaign.from_campaign(rig(model=models[name], settings=SimulateSettings()))),
+        models[name].values,
     )
     print(f"{name}, no noise: {shown(found)}")
     assert np.max(np.abs(found)) < 2e-3
@@ -68,7 +69,7 @@ def test_an_ideal_rig_gives_the_truth_within_0_2_percent(rig: Rig, models: dict[
 def test_the_mean_over_seeds_is_the_truth(rig: Rig, models: dict[str, Model], name: str, seeds: int) -> None:
     truth, joint, two_step, spread = models[name], [], [], []
     for seed in range(seeds):
-        data = PreparedCampaign.of(rig(seed, truth))
+        data = PreparedCampaign.from_campaign(rig(seed, truth))
         result = fit_joint(data)
         joint.append(errors(result, truth.values))
         spread.append([(result.covariance.stderr(n) or 0.0) / truth.values[n] for n in FIVE])
@@ -87,7 +88,7 @@ def test_two_step_errors_are_those_of_many_campaigns(rig: Rig) -> None:
     values, stated = [], []
     for seed in range(SEEDS):
         campaign = replace(rig(seed), rig=RigSettings(gain_error=0.0))
-        result = fit_two_step(PreparedCampaign.of(campaign)).result
+        result = fit_two_step(PreparedCampaign.from_campaign(campaign)).result
         order = [result.covariance.names.index(n) for n in FIVE]
         values.append(np.log([result.model.values[n] for n in FIVE]))
         scale = np.array([result.model.values[n] for n in FIVE])
@@ -121,7 +122,7 @@ def test_radial_sweep_follows_from_axial_tests(measured: PreparedCampaign, resul
 def test_either_waveform_gives_the_truth(rig: Rig, paper_model: Model, waveform: str) -> None:
     loops = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2, waveform=waveform),)  # type: ignore[arg-type]
     sweeps = (SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), BAND),)
-    results = [fit_joint(PreparedCampaign.of(rig(seed, loops=loops, sweeps=sweeps))) for seed in range(20)]
+    results = [fit_joint(PreparedCampaign.from_campaign(rig(seed, loops=loops, sweeps=sweeps))) for seed in range(20)]
     assert np.max(np.abs(np.mean([errors(result, paper_model.values) for result in results], axis=0))) < 0.015
 
 
@@ -151,7 +152,7 @@ def test_a_known_springpot_is_held_and_nothing_is_left_out(
     measured: PreparedCampaign, table_1: dict[str, float]
 ) -> None:
     settings = {name: ParameterSetting(value=table_1[name]) for name in ("m", "alpha")}
-    data = PreparedCampaign.of(replace(measured.campaign, fit=FitSettings(parameters=settings)))
+    data = PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(parameters=settings)))
     static = fit_static(data)
     assert not any("left out" in line for line in static.warnings)
     assert static.model.values["m"] == table_1["m"]
@@ -169,7 +170,7 @@ def test_errors_of_held_parameters_are_carried_over(measured: PreparedCampaign, 
 
 def test_hidden_physics_is_told_and_widens_the_errors(rig: Rig, paper_model: Model) -> None:
     heavy = paper_model.with_effect("inertia", {"inertia.mass": 0.1})
-    plain, hidden = (fit_joint(PreparedCampaign.of(rig(0, model))) for model in (paper_model, heavy))
+    plain, hidden = (fit_joint(PreparedCampaign.from_campaign(rig(0, model))) for model in (paper_model, heavy))
     assert any("the model misses the tests by" in line for line in hidden.warnings)
     shares = [(each.covariance.stderr("m") or 0.0) / each.model.values["m"] for each in (hidden, plain)]
     assert shares[0] > 3.0 * shares[1]
@@ -177,7 +178,7 @@ def test_hidden_physics_is_told_and_widens_the_errors(rig: Rig, paper_model: Mod
 
 def test_magnitude_and_loss_factor_residuals_give_the_same_answer(measured: PreparedCampaign, result: Result) -> None:
     other = fit_joint(
-        PreparedCampaign.of(replace(measured.campaign, fit=FitSettings(residuals="magnitude_loss_factor")))
+        PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(residuals="magnitude_loss_factor")))
     )
     for name in FIVE:
         error = 0.3 * (result.covariance.stderr(name) or 0.0)
@@ -186,7 +187,7 @@ def test_magnitude_and_loss_factor_residuals_give_the_same_answer(measured: Prep
 
 def test_held_and_bounded_parameters(measured: PreparedCampaign) -> None:
     settings = {"alpha": ParameterSetting(value=0.3, vary=False), "mu": ParameterSetting(max=1.05e6)}
-    result = fit_joint(PreparedCampaign.of(replace(measured.campaign, fit=FitSettings(parameters=settings))))
+    result = fit_joint(PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(parameters=settings))))
     assert result.model.values["alpha"] == 0.3
     assert "alpha" not in result.fitted
     assert result.covariance.stderr("alpha") is None
@@ -196,9 +197,9 @@ def test_held_and_bounded_parameters(measured: PreparedCampaign) -> None:
 
 def test_missing_tests_are_said(measured: PreparedCampaign, result: Result) -> None:
     with pytest.raises(FitError, match="fit-static needs a loop"):
-        fit_static(PreparedCampaign.of(replace(measured.campaign, loops=())))
+        fit_static(PreparedCampaign.from_campaign(replace(measured.campaign, loops=())))
     with pytest.raises(FitError, match="fit-dynamic needs a sweep"):
-        fit_dynamic(PreparedCampaign.of(replace(measured.campaign, sweeps=())), result)
+        fit_dynamic(PreparedCampaign.from_campaign(replace(measured.campaign, sweeps=())), result)
 
 
 @pytest.mark.parametrize(
@@ -217,7 +218,7 @@ def test_a_value_extrapolated_beyond_its_bounds_is_moved_back(
     loops = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),)
     sweeps = (SimulatedSweep(Direction.AXIAL, (1e-4,), (5.0, 25.0, 75.0, 155.0)),)
     plan = SimulateSettings(repeats=2, noise=noise, force_noise=0.003, loops=loops, sweeps=sweeps)
-    found = fit_two_step(PreparedCampaign.of(rig(seed, truth, settings=plan)))
+    found = fit_two_step(PreparedCampaign.from_campaign(rig(seed, truth, settings=plan)))
     low, high = truth.parameters["alpha"].bounds
     assert all(low <= values["alpha"] <= high for values in found.passes)
 
@@ -258,7 +259,10 @@ def bands_covered(result: Result, truth: Model) -> np.ndarray:
 def coverage(rig: Rig, truth: Model, seeds: int, **noise: Any) -> tuple[np.ndarray, np.ndarray]:
     """Per seed whether each parameter's interval, (seeds, 5), and the share of each band, hold the truth."""
     exact = RigSettings(gain_error=0.0, phase_error=0.0)  # as it is simulated: no calibration is off
-    results = [fit_joint(PreparedCampaign.of(replace(rig(seed, truth, **noise), rig=exact))) for seed in range(seeds)]
+    results = [
+        fit_joint(PreparedCampaign.from_campaign(replace(rig(seed, truth, **noise), rig=exact)))
+        for seed in range(seeds)
+    ]
     inside = np.array([covered(result, truth.values) for result in results])
     return inside, np.array([bands_covered(result, truth) for result in results])
 
@@ -311,7 +315,7 @@ def test_95_percent_intervals_cover_where_the_gain_of_a_loop_is_off(
     for seed in range(seeds):
         campaign = rig(seed, gain_error=5e-3, level_gain_error=5e-3)
         result = fit_joint(
-            PreparedCampaign.of(replace(campaign, rig=RigSettings(gain_error=5e-3) if stated else UNSTATED))
+            PreparedCampaign.from_campaign(replace(campaign, rig=RigSettings(gain_error=5e-3) if stated else UNSTATED))
         )
         inside.append(covered(result, paper_model.values))
         ends = np.log([result.interval(name) or (np.nan, np.nan) for name in FIVE])
@@ -344,9 +348,9 @@ def off_by_level(campaign: Campaign, error: float, seed: int) -> Campaign:
 def test_errors_of_levels_are_told(rig: Rig, paper_model: Model, error: float) -> None:
     found, matters, freedom = [], [], []
     for seed in range(30):
-        data = PreparedCampaign.of(off_by_level(rig(seed), error, seed))
-        solution = solve(paper_model, data.chosen(BOTH), FIVE)
-        told = level_errors(data.chosen(BOTH), solution.residual, solution.jacobian, (1.0, 1.0))
+        data = PreparedCampaign.from_campaign(off_by_level(rig(seed), error, seed))
+        solution = solve(paper_model, data.select_tests(BOTH), FIVE)
+        told = level_errors(data.select_tests(BOTH), solution.residual, solution.jacobian, (1.0, 1.0))
         found.append(np.square(told.error))
         matters.append(told.matters)
         freedom.append(told.freedom)

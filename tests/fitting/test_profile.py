@@ -37,12 +37,12 @@ def plan(largest: float, **changes: Any) -> dict[str, Any]:
 
 
 def profiled(campaign: Campaign) -> Result:
-    return fit_joint(PreparedCampaign.of(campaign), profile=True)
+    return fit_joint(PreparedCampaign.from_campaign(campaign), profile=True)
 
 
 def test_good_data_make_it_the_symmetric_interval(rig: Rig) -> None:
     told: list[tuple[str, int | None, int | None, str]] = []
-    data = PreparedCampaign.of(replace(rig(1, **plan(1e-3)), rig=RigSettings(gain_error=0.0)))
+    data = PreparedCampaign.from_campaign(replace(rig(1, **plan(1e-3)), rig=RigSettings(gain_error=0.0)))
     with report_progress_to(lambda *step: told.append(step)):
         result = fit_joint(data, profile=True)
     assert told == [("profiles", done, 5, "") for done in (*range(6), None)]
@@ -74,8 +74,8 @@ def test_what_the_data_leave_open_stays_open(rig: Rig, paper_model: Model) -> No
 
 @pytest.mark.parametrize("largest", [1e-3, 1e-4], ids=["good", "weak"])
 def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(rig: Rig, largest: float) -> None:
-    data = PreparedCampaign.of(rig(3, **plan(largest, loops=())))
-    data_sets = data.chosen(None)
+    data = PreparedCampaign.from_campaign(rig(3, **plan(largest, loops=())))
+    data_sets = data.select_tests(None)
     result = profiled(data.campaign)
     best = solve(result.model, data_sets, FIVE)
     linear = np.sqrt(np.diag(np.linalg.inv(best.jacobian @ best.jacobian.T)))
@@ -95,13 +95,13 @@ def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(rig: Rig, lar
 def test_what_rests_on_a_bound_is_told_by_how_far_from_it_the_tests_let_it_be(rig: Rig, paper_model: Model) -> None:
     """Of rubber that is all springpot and friction the tests show how much of a spring there is at most."""
     rubber = paper_model.with_values({"mu": 1e3, "m": 6e5, "alpha": 0.15})
-    data = PreparedCampaign.of(replace(rig(0, rubber, **plan(1e-3)), rig=RigSettings(gain_error=0.0)))
-    best = solve(fit_joint(data).model, data.chosen(None), FIVE)
+    data = PreparedCampaign.from_campaign(replace(rig(0, rubber, **plan(1e-3)), rig=RigSettings(gain_error=0.0)))
+    best = solve(fit_joint(data).model, data.select_tests(None), FIVE)
     assert best.at_bound == {"mu": "min"}
-    limit = limit95(best, data.chosen(None), "mu", {})
+    limit = limit95(best, data.select_tests(None), "mu", {})
     assert limit is not None
     held = best.model.with_values({"mu": limit})
-    rise = solve(held, data.chosen(None), FIVE[1:]).chi_square - best.chi_square
+    rise = solve(held, data.select_tests(None), FIVE[1:]).chi_square - best.chi_square
     assert rise == pytest.approx(1.645**2 * max(best.chi_square / (best.residual.size - 5), 1.0), rel=0.05)
     (told,) = (line for line in fit_joint(data).warnings if line.startswith("mu ended"))
     assert "at most" in told
@@ -166,7 +166,7 @@ ROUGH: dict[str, Any] = {"repeats": 1, "noise": 1e-2, "loops": ()}
 
 
 def warnings(campaign: Campaign, **asked: Any) -> tuple[str, ...]:
-    return fit_joint(PreparedCampaign.of(campaign), **asked).warnings
+    return fit_joint(PreparedCampaign.from_campaign(campaign), **asked).warnings
 
 
 #: Tests that lack something: loops, sweeps, what must be said, what is known, the further test.
@@ -220,7 +220,7 @@ def test_an_effect_that_is_not_there_is_said_to_be_no_different_from_zero(rig: R
 
 
 def test_directions_that_share_no_parameter_have_sentences_of_their_own(rig: Rig) -> None:
-    result = fit_joint(PreparedCampaign.of(rig(1, **ROUGH, sweeps=(sweep(1e-4, 5e-4),))))
+    result = fit_joint(PreparedCampaign.from_campaign(rig(1, **ROUGH, sweeps=(sweep(1e-4, 5e-4),))))
     friction, springpot = [line for line in result.warnings if "standard errors:" in line]
     assert "sigma_fmax and eps_half are known only as a ratio" in friction
     assert "m and alpha cannot be told from one another" in springpot

@@ -66,7 +66,7 @@ def with_factor(campaign: Campaign, rows: Sequence[int] | np.ndarray, factor: fl
 
 
 def robust(campaign: Campaign) -> Result:
-    return fit_joint(PreparedCampaign.of(replace(campaign, fit=SOFT)))
+    return fit_joint(PreparedCampaign.from_campaign(replace(campaign, fit=SOFT)))
 
 
 def moved(one: Result, other: Result) -> np.ndarray:
@@ -85,7 +85,7 @@ def test_three_percent_outliers_move_no_parameter_by_a_standard_error(
     for seed in range(seeds):
         clean = rig(seed, shared=shared)
         after = robust(spoilt_campaign(clean, kind, seed))
-        shifts.append(moved(after, fit_joint(PreparedCampaign.of(clean))))
+        shifts.append(moved(after, fit_joint(PreparedCampaign.from_campaign(clean))))
         assert (after.quality.reduced_chi_square if after.quality else 0.0) == pytest.approx(1.0, abs=0.1)
     worst = np.max(np.abs(shifts), axis=0)
     print(f"{kind}, block errors {shared}: moved by at most {dict(zip(FIVE, worst.round(2), strict=True))} errors")
@@ -99,7 +99,10 @@ def test_outliers_do_not_spoil_the_bins_of_a_long_loop(rig: Rig, kind: str) -> N
     sweep = SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), tuple(np.arange(5.0, 156.0, 25.0)))
     clean = rig(3, loops=loops, sweeps=(sweep,))
     assert clean.loops[0].force.size > MOST_ROWS
-    assert np.max(np.abs(moved(robust(spoilt_campaign(clean, kind, 3)), fit_joint(PreparedCampaign.of(clean))))) < 1.0
+    assert (
+        np.max(np.abs(moved(robust(spoilt_campaign(clean, kind, 3)), fit_joint(PreparedCampaign.from_campaign(clean)))))
+        < 1.0
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -118,7 +121,7 @@ def test_clean_tests_have_no_outliers_and_the_same_answer(rig: Rig, other_models
     shifts = []
     for model, shared, seed in product(other_models.values(), (False, True), range(seeds)):
         campaign = rig(seed, model, shared=shared)
-        before, after = fit_joint(PreparedCampaign.of(campaign)), robust(campaign)
+        before, after = fit_joint(PreparedCampaign.from_campaign(campaign)), robust(campaign)
         assert before.outliers == after.outliers == ()
         shifts.append(moved(after, before))
     print(f"{len(shifts)} clean campaigns: soft_l1 moves a parameter by {np.max(np.abs(shifts)):.2f} errors at most")
@@ -135,7 +138,7 @@ def test_physics_that_the_model_lacks_makes_no_outliers(rig: Rig, paper_model: M
         },
         "mullins_softening": {"mullins_softening.share": 0.2, "mullins_softening.cycles": 1.0},
     }[effect]  # fmt: skip
-    assert fit_joint(PreparedCampaign.of(rig(1, paper_model.with_effect(effect, values)))).outliers == ()
+    assert fit_joint(PreparedCampaign.from_campaign(rig(1, paper_model.with_effect(effect, values)))).outliers == ()
 
 
 def test_outliers_are_listed_by_file_and_row_and_told(rig: Rig) -> None:
@@ -143,7 +146,7 @@ def test_outliers_are_listed_by_file_and_row_and_told(rig: Rig) -> None:
     force = campaign.loops[0].force.copy()
     force[123] *= -1.0
     dirty = with_factor(replace(campaign, loops=(replace(campaign.loops[0], force=force),)), [4, 70], 1.1)
-    linear, soft = fit_joint(PreparedCampaign.of(dirty)), robust(dirty)
+    linear, soft = fit_joint(PreparedCampaign.from_campaign(dirty)), robust(dirty)
     places = [(entry.test, entry.row, entry.column) for entry in soft.outliers]
     assert places == [("loop_axial_1", 124, "force"), ("sweep_axial", 5, "stiffness"), ("sweep_axial", 71, "stiffness")]
     assert all(entry.distance > 5.0 for entry in soft.outliers)
@@ -184,7 +187,7 @@ def test_a_fit_of_one_level_names_the_row_of_the_file(rig: Rig) -> None:
     down = np.argsort(-sweep.amplitude, kind="stable")
     columns = {name: getattr(sweep, name)[down] for name in ("frequency", "amplitude", "stiffness", "repeat")}
     falling = replace(campaign, sweeps=(replace(sweep, **columns, reached=None), *campaign.sweeps[1:]), fit=SOFT)
-    data = PreparedCampaign.of(with_factor(falling, [down.size - 7], 1.1))
+    data = PreparedCampaign.from_campaign(with_factor(falling, [down.size - 7], 1.1))
     dynamic, joint = fit_dynamic(data, fit_static(data)), fit_joint(data)
     assert [entry.row for entry in dynamic.outliers] == [entry.row for entry in joint.outliers] == [down.size - 6]
     marked = data.without(dynamic.outliers).sweeps[0]

@@ -49,12 +49,12 @@ STARTS = 5
 
 @pytest.fixture
 def axial(measured: PreparedCampaign) -> list[MeasuredTest]:
-    return measured.chosen(None)
+    return measured.select_tests(None)
 
 
 @pytest.fixture
 def data_sets(rig: Callable[..., Campaign]) -> list[MeasuredTest]:
-    return PreparedCampaign.of(rig(1)).data_sets
+    return PreparedCampaign.from_campaign(rig(1)).data_sets
 
 
 def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(
@@ -93,10 +93,10 @@ def test_random_starts_end_at_one_minimum(
     """Two decades per parameter: a tenth to ten times the answer, alpha over its own range.
 
     From a start that is far too stiff a fit may lose a branch for good. It then says that the branch rests on a bound,
-    and `PreparedCampaign.started` takes no such start: it takes values read off the tests where they meet these better.
+    and `starting_model` takes no such start: it takes values read off the tests where they meet these better.
     """
     best, rng = np.array([result.model.values[name] for name in FIVE]), np.random.default_rng(1)
-    read_off = residual(measured.started(measured.effects, axial, {}), axial)
+    read_off = residual(measured.starting_model(measured.effects, axial, {}), axial)
     ends, costs = [], []
     for _ in range(many):
         start = dict(zip(FIVE, best * 10.0 ** rng.uniform(-1.0, 1.0, 5), strict=True))
@@ -189,7 +189,7 @@ def test_it_follows_the_bend_of_a_valley(paper_model: Model, monkeypatch: pytest
         settings = SimulateSettings(
             loops=(loop,), sweeps=(sweep,), repeats=2, noise=0.003, force_noise=0.003, seed=seed
         )
-        data = PreparedCampaign.of(simulate(damped, settings).campaign())
+        data = PreparedCampaign.from_campaign(simulate(damped, settings).campaign())
         data_sets = [*data.loops, *data.sweeps]
         model = started(paper_model, data_sets, "delay", "maxwell")
         bent = Descent.start(model, data_sets, tuple(model.parameters), {}).finished(400)
@@ -205,7 +205,7 @@ def test_it_follows_the_bend_of_a_valley(paper_model: Model, monkeypatch: pytest
 
 def elsewhere(model: Model, names: list[str], rng: np.random.Generator) -> Model:
     """The model a decade about its values, each parameter by itself."""
-    coordinates = Coordinates.of(model, names)
+    coordinates = Coordinates.of_parameters(model, names)
     point = coordinates.point({name: model.values[name] for name in names})
     return model.with_values(coordinates.possible(point + rng.uniform(-2.3, 2.3, point.size)))
 
@@ -216,10 +216,10 @@ def elsewhere(model: Model, names: list[str], rng: np.random.Generator) -> Model
 def test_no_random_start_ends_lower(root: Path, campaigns: tuple[str, ...]) -> None:
     rng, lowest, errors, others = np.random.default_rng(0), [], 0, []
     for campaign in campaigns:
-        data = PreparedCampaign.of(load_campaign(root / f"configs/{campaign}.toml"))
-        data_sets = data.chosen(TESTS[campaign])
+        data = PreparedCampaign.from_campaign(load_campaign(root / f"configs/{campaign}.toml"))
+        data_sets = data.select_tests(TESTS[campaign])
         for family in FAMILIES:
-            model = data.started(with_base((*data.campaign.fit.effects, *family)), data_sets, {})
+            model = data.starting_model(with_base((*data.campaign.fit.effects, *family)), data_sets, {})
             names = list(data.free(tuple(model.parameters)))
             own, ends = solve(model, data_sets, names, data.bounds).chi_square, list[float]()
             for _ in range(STARTS):

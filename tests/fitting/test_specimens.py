@@ -76,13 +76,13 @@ def both(rig: Callable[..., Campaign], coupons: Campaign) -> Campaign:
 
 
 def test_coupons_are_fitted_beside_the_axial_tests(both: Campaign) -> None:
-    data = PreparedCampaign.of(both)
-    assert {str(data_set.direction) for data_set in data.chosen(None)} == {"axial", "DMA"}
-    assert {str(data_set.direction) for data_set in data.chosen(["DMA", "radial"])} == {"DMA", "radial"}
+    data = PreparedCampaign.from_campaign(both)
+    assert {str(data_set.direction) for data_set in data.select_tests(None)} == {"axial", "DMA"}
+    assert {str(data_set.direction) for data_set in data.select_tests(["DMA", "radial"])} == {"DMA", "radial"}
     assert {data_set.direction for data_set in data.static_loops()} == {Direction.AXIAL}
     assert data.smallest_sweep.direction is Direction.AXIAL
     with pytest.raises(ModelError, match=r"no such direction or specimen[\s\S]*dma[\s\S]*torsion, DMA"):
-        data.chosen(["dma"])
+        data.select_tests(["dma"])
     result = fit_joint(data)
     assert result.measured is not None
     assert result.measured.directions == ("axial", "DMA")
@@ -91,20 +91,24 @@ def test_coupons_are_fitted_beside_the_axial_tests(both: Campaign) -> None:
 
 def test_two_steps_with_a_coupon(coupons: Campaign) -> None:
     """fit-dynamic takes the sweep of the frequency; of one of the amplitude the smallest at each frequency."""
-    frequency = PreparedCampaign.of(coupons).smallest_sweep
+    frequency = PreparedCampaign.from_campaign(coupons).smallest_sweep
     assert set(frequency.amplitude) == {1e-3}
-    amplitude = PreparedCampaign.of(replace(coupons, sweeps=coupons.sweeps[:1])).smallest_sweep
+    amplitude = PreparedCampaign.from_campaign(replace(coupons, sweeps=coupons.sweeps[:1])).smallest_sweep
     assert amplitude.frequency.tolist() == [10.0, 100.0]
-    static = fit_joint(PreparedCampaign.of(coupons))
-    assert fit_dynamic(PreparedCampaign.of(coupons), static).model.values["alpha"] == pytest.approx(0.24, rel=0.1)
+    static = fit_joint(PreparedCampaign.from_campaign(coupons))
+    assert fit_dynamic(PreparedCampaign.from_campaign(coupons), static).model.values["alpha"] == pytest.approx(
+        0.24, rel=0.1
+    )
     with pytest.raises(FitError, match="fit-static needs a loop"):
-        fit_static(PreparedCampaign.of(coupons))
+        fit_static(PreparedCampaign.from_campaign(coupons))
 
 
 def test_effects_of_the_campaign_are_in_every_fit(coupons: Campaign, paper_model: Model) -> None:
     mount = sweep(paper_model, MOUNT, FREQUENCIES, [1e-4, 5e-4], factor=1.1)
     effects = FitSettings(effects=("stiffness_factor.mount",))
-    data = PreparedCampaign.of(replace(coupons, sweeps=(*coupons.sweeps, mount), specimens=(DMA, MOUNT), fit=effects))
+    data = PreparedCampaign.from_campaign(
+        replace(coupons, sweeps=(*coupons.sweeps, mount), specimens=(DMA, MOUNT), fit=effects)
+    )
     fits = [fit_joint(data), fit(data, effects=("stiffness_factor.mount",)).result, diagnose(data).result]
     for result in fits:
         assert result.model.effects[3:] == ("stiffness_factor.mount",)
@@ -112,7 +116,7 @@ def test_effects_of_the_campaign_are_in_every_fit(coupons: Campaign, paper_model
         assert result.specimens == (DMA, MOUNT)
     unknown = replace(data.campaign, fit=FitSettings(effects=("inertai",)))
     with pytest.raises(ModelError, match=r"epdm.toml, \[fit\] effects: unknown effect[\s\S]*\"inertia\"\?"):
-        fit_joint(PreparedCampaign.of(unknown))
+        fit_joint(PreparedCampaign.from_campaign(unknown))
 
 
 VALUES = {"temperature.softening": 4e-3, "temperature.shift": 0.12}
@@ -145,7 +149,7 @@ def test_all_temperatures_are_fitted_at_once(clean: Undisturbed, truth: Model) -
     """From what is read off the tests: the shift within its interval as often as it claims, and a stiffness between."""
     off, inside, bands, warm = [], 0, 0, CELSIUS + 30.0
     for seed in range(SEEDS):
-        data = PreparedCampaign.of(measure(clean, replace(PLAN, seed=seed)).campaign())
+        data = PreparedCampaign.from_campaign(measure(clean, replace(PLAN, seed=seed)).campaign())
         result = fit_joint(data, effects=(*BASE, "temperature"))
         assert not [line for line in result.warnings if "degC" in line]
         low, high = result.interval("temperature.shift") or (0.0, 0.0)
@@ -161,7 +165,7 @@ def test_all_temperatures_are_fitted_at_once(clean: Undisturbed, truth: Model) -
 
 
 def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -> None:
-    data = PreparedCampaign.of(measure(clean, PLAN).campaign())
+    data = PreparedCampaign.from_campaign(measure(clean, PLAN).campaign())
     result = fit_joint(data, effects=(*BASE, "temperature"))
     found = master_curve(result, data.sweeps)
     assert [round(each.temperature - CELSIUS) for each in found] == list(DEGREES)
@@ -184,7 +188,7 @@ def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -
 def test_the_error_of_a_sweep_s_own_shift_factor_is_what_it_scatters_by(clean: Undisturbed, truth: Model) -> None:
     off = []
     for seed in range(SEEDS):
-        sweeps = PreparedCampaign.of(measure(clean, replace(PLAN, seed=seed)).campaign()).sweeps
+        sweeps = PreparedCampaign.from_campaign(measure(clean, replace(PLAN, seed=seed)).campaign()).sweeps
         off += [(each.own[0] - each.shift[0]) / each.own[1] for each in master_curve(Result(truth), sweeps)]
     print(f"{len(off)} shift factors off by {np.std(off):.2f} of their standard errors")
     assert 0.8 < np.std(off) < 1.25
@@ -196,7 +200,7 @@ def test_a_sweep_off_the_law_says_so(truth: Model) -> None:
     simulated = simulate(truth, replace(PLAN, sweeps=tuple(tested))).campaign()
     pairs = zip(simulated.sweeps, DEGREES, strict=True)
     stated = tuple(replace(sweep, temperature=CELSIUS + at) for sweep, at in pairs)
-    data = PreparedCampaign.of(replace(simulated, sweeps=stated))
+    data = PreparedCampaign.from_campaign(replace(simulated, sweeps=stated))
     found = master_curve(fit_joint(data, effects=(*BASE, "temperature")), data.sweeps)
     off = np.array([(each.own[0] - each.shift[0]) / each.own[1] for each in found])
     assert abs(off[1]) > 4.0 * max(abs(off[0]), abs(off[-1]))
@@ -224,7 +228,7 @@ def test_a_sweep_of_amplitudes_has_no_shift_factor(truth: Model) -> None:
 def test_only_tests_of_its_temperature_stand_beside_a_prediction(clean: Undisturbed) -> None:
     """At 38 degC one of five sweeps; all of them tell how well the model meets them."""
     campaign = measure(clean, PLAN).campaign()
-    result = fit_joint(PreparedCampaign.of(campaign), effects=(*BASE, "temperature"))
+    result = fit_joint(PreparedCampaign.from_campaign(campaign), effects=(*BASE, "temperature"))
     grid: dict[str, Any] = {"directions": ("axial",), "frequencies": BAND, "amplitudes": (5e-4,)}
     at_38, at_30 = (predict_campaign(result, campaign, **grid, temperature=CELSIUS + at) for at in (38.0, 30.0))
     assert len(at_38.measured) == len(SWEEPS)

@@ -121,7 +121,9 @@ def test_the_guess_holds_the_papers_and_a_measured_rubber(root: Path) -> None:
     print("paper, in standard errors", found.round(2))
     assert np.abs(found).max() < Z95
     # An EPDM of 70 Shore A whose filler nobody states; its strain sweeps alone, which the five parameters can meet.
-    fitted = fit_joint(PreparedCampaign.of(load_campaign(root / "configs/epdm_70.toml")), directions=["DMA"]).model
+    fitted = fit_joint(
+        PreparedCampaign.from_campaign(load_campaign(root / "configs/epdm_70.toml")), directions=["DMA"]
+    ).model
     for phr in (40.0, 50.0, 60.0):
         found = off(guess(BUSHING, Compound(70, phr, "EPDM")), dict(fitted.values))
         print(f"coupon, taken for {phr:g} phr, in standard errors", found.round(2))
@@ -174,7 +176,7 @@ LOOP = SimulatedLoop(AXIAL, 1e-3, 0.1)
 @pytest.fixture(scope="module")
 def data() -> PreparedCampaign:
     settings = SimulateSettings(loops=(LOOP,), sweeps=(SWEEP,), repeats=2, noise=0.005, force_noise=0.005, seed=2)
-    return PreparedCampaign.of(simulate(Model(PAPER, BASE, NO_SPRING), settings).campaign())
+    return PreparedCampaign.from_campaign(simulate(Model(PAPER, BASE, NO_SPRING), settings).campaign())
 
 
 @pytest.fixture(scope="module")
@@ -201,7 +203,7 @@ def test_what_a_fit_within_bounds_finds_scatters_as_counted() -> None:
 def test_tests_tell_a_bounded_parameter_as_if_it_were_free(data: PreparedCampaign, measured: Knowledge) -> None:
     """The others go with it as they would to make up for it, and are known worse than where it is held."""
     k, covariance = len(measured.names), measured.covariance
-    counted = PreparedCampaign.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise_of(data))))
+    counted = PreparedCampaign.from_campaign(replace(data.campaign, rig=rig_of(data.campaign.rig, noise_of(data))))
     slopes = relative_slopes(measured, [*counted.loops, *counted.sweeps])
     made_up = -np.linalg.lstsq(slopes[:k].T, slopes[k])[0]
     assert measured.bounded == ("mu",)
@@ -225,7 +227,7 @@ def test_a_plan_beside_a_bound_counts_it_and_says_so(measured: Knowledge) -> Non
 def test_a_parameter_that_the_tests_do_not_see_stops_no_plan(data: PreparedCampaign, effect: str) -> None:
     """Tests at one temperature, and a force that saturates nowhere."""
     campaign = replace(data.campaign, fit=replace(data.campaign.fit, effects=(effect,)))
-    known = of_campaign(PreparedCampaign.of(campaign))
+    known = of_campaign(PreparedCampaign.from_campaign(campaign))
     points = (Points(AXIAL, np.array([20.0, 100.0]), np.array([2e-4, 2e-4])),)
     planned = plan(known, Wanted("predictions", 2.0, RigSettings(), (AXIAL,), points, known.names)).planned
     assert np.all(np.isfinite(known.covariance))

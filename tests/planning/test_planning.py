@@ -290,7 +290,7 @@ def test_rivals_stand_beside_what_a_diagnosis_is_sure_of_and_take_few_hours(know
         seed=4, repeats=3, noise=0.004, force_noise=0.003, loops=PAPER_LOOPS, sweeps=PAPER_SWEEPS
     )
     campaign = replace(simulate(model, settings).campaign(), rig=RigSettings(max_frequency=300.0))
-    after = of_campaign(PreparedCampaign.of(campaign), ("viscous", "delay"))
+    after = of_campaign(PreparedCampaign.from_campaign(campaign), ("viscous", "delay"))
     assert {rival.model.effects[3] for rival in after.rivals} <= {"inertia", "fixture_resonance"}  # whose limit it is
     assert [rival.model.effects[4:] for rival in after.rivals] == [("viscous",), ("delay",)]
     found = plan_tests(after, campaign, aim="rivals").plan
@@ -335,7 +335,9 @@ def test_what_is_given_by_hand_half_of_the_rows_and_a_rig_that_can_make_no_test(
     # Whatever its sampling, the noise of a force is that of as many rows as planned loops have.
     (loop,) = campaign.loops
     thin = replace(loop, **{key: getattr(loop, key)[::2] for key in ("time", "displacement", "force")})
-    whole, half = (noise_of(PreparedCampaign.of(replace(campaign, loops=(each,)))).force for each in (loop, thin))
+    whole, half = (
+        noise_of(PreparedCampaign.from_campaign(replace(campaign, loops=(each,)))).force for each in (loop, thin)
+    )
     assert half == pytest.approx(np.sqrt(2.0) * whole, rel=0.05)
 
 

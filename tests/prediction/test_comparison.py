@@ -38,7 +38,7 @@ OTHER = {"mu": 1.08, "m": 1.05, "alpha": 1.04, "sigma_fmax": 0.9}
 
 
 def fitted(clean: Undisturbed, seed: int) -> Result:
-    return fit_joint(PreparedCampaign.of(measure(clean, replace(PLAN, seed=seed)).campaign()))
+    return fit_joint(PreparedCampaign.from_campaign(measure(clean, replace(PLAN, seed=seed)).campaign()))
 
 
 def against(reference: Result, other: Result) -> Comparison:

@@ -41,7 +41,7 @@ def test_bands_of_an_open_model_are_narrow_where_it_was_measured_and_only_there(
 ) -> None:
     """The direction that such sweeps leave wholly open cancels where the stiffness does not depend on it."""
     plan = SimulateSettings(repeats=3, noise=5e-3, sweeps=(SimulatedSweep(Direction.AXIAL, amplitudes, frequencies),))
-    result = fit_joint(PreparedCampaign.of(measure(undisturbed(paper_model, plan), plan).campaign()))
+    result = fit_joint(PreparedCampaign.from_campaign(measure(undisturbed(paper_model, plan), plan).campaign()))
 
     def width(frequency: float, amplitude: float) -> float:
         band = predict(result, Direction.AXIAL, [frequency], [amplitude]).stiffness

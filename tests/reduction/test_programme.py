@@ -206,7 +206,7 @@ def test_a_softening_in_the_virgin_cycles_of_a_programme_is_diagnosed(paper_mode
     values = {"mullins_softening.share": 0.2, "mullins_softening.cycles": 1.0}
     softening = paper_model.with_effect("mullins_softening", values)
     loop = SimulatedLoop(Direction.AXIAL, cycles=5, amplitudes=(2e-4, 5e-4, 1e-3), frequency=0.1, pause=12.0)
-    data = PreparedCampaign.of(simulate(softening, replace(NOISE, loops=(loop,))).campaign())
+    data = PreparedCampaign.from_campaign(simulate(softening, replace(NOISE, loops=(loop,))).campaign())
     found = diagnose(data)
     share = found.result.model.values["mullins_softening.share"]
     print(f"{found.verdict}: {[effect.name for effect in found.effects]}, share {share:.3f} of 0.2")
@@ -234,7 +234,7 @@ def test_a_programme_fits_as_its_loops_in_files_of_their_own(paper_model: Model)
     results = []
     for loops in ((whole,), single):
         simulated = simulate(paper_model, replace(NOISE, loops=loops))
-        data = PreparedCampaign.of(simulated.campaign())
+        data = PreparedCampaign.from_campaign(simulated.campaign())
         assert len(data.loops) == 6
         results.append(fit_joint(data))
         assert [outlier for outlier in results[-1].outliers if outlier.distance > 6.0] == []

@@ -241,7 +241,7 @@ NASTY = "<script>alert(1)</script> --> & $x_1$ 衬套"
 
 @pytest.fixture(scope="module")
 def data(root: Path) -> PreparedCampaign:
-    return PreparedCampaign.of(load_campaign(root / "configs/cmp_15961.toml"))
+    return PreparedCampaign.from_campaign(load_campaign(root / "configs/cmp_15961.toml"))
 
 
 def drawn() -> Figure:

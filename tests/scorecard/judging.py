@@ -97,7 +97,9 @@ def against_truth(folder: Path, silent: Path, model: Path) -> float:
     """
     told = load_result(model).model
     with patch.multiple("bushfit.campaign.campaign", **_EVERY_ROW):
-        tests, true = (PreparedCampaign.of(load_campaign(each / "bushing.toml")) for each in (folder, silent))
+        tests, true = (
+            PreparedCampaign.from_campaign(load_campaign(each / "bushing.toml")) for each in (folder, silent)
+        )
     data_sets = with_gains((*tests.loops, *tests.sweeps), weigh=True)
     told = solve(told, data_sets, tuple(told.values)).model
     off = residual(told, data_sets)

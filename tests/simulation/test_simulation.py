@@ -214,7 +214,7 @@ def test_tests_are_read_back_and_what_is_fitted_to_them_is_the_truth(paper_model
     for looped, loop in zip(campaign.loops, simulated.loops, strict=True):
         np.testing.assert_allclose(looped.force, loop.force, atol=1e-5 * np.ptp(loop.force))
     places = [test.direction for test in (*campaign.sweeps, *campaign.loops)]
-    fitted = fit_joint(PreparedCampaign.of(campaign), directions=places).model.values
+    fitted = fit_joint(PreparedCampaign.from_campaign(campaign), directions=places).model.values
     largest = {"mu": 0.04, "m": 0.15, "alpha": 0.08, "sigma_fmax": 0.12, "eps_half": 0.12}
     for name in FIVE:
         assert fitted[name] == pytest.approx(paper_model.values[name], rel=largest[name])
@@ -251,7 +251,7 @@ def test_the_rig_is_warm_and_drifts_as_planned(paper_model: Model, tmp_path: Pat
     truth = paper_model.with_effect("temperature", values).with_effect("drift", values)
     tests = (replace(LOOP, temperature=300.0), replace(SWEEP, temperature=305.0))
     simulated = simulate(truth, SimulateSettings(repeats=2, loops=tests[:1], sweeps=tests[1:]))
-    data = PreparedCampaign.of(written(simulated, tmp_path))
+    data = PreparedCampaign.from_campaign(written(simulated, tmp_path))
     (loop,), (sweep,) = data.loops, data.sweeps
     assert loop.circumstances.temperature == pytest.approx(300.0)
     assert (loop.circumstances.turn, sweep.circumstances.turn[-1]) == (0.0, 1.0)

@@ -10,7 +10,7 @@ import numpy as np
 from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.unnamed import harmonics
-from bushfit.fitting.preparation import alike, parted
+from bushfit.fitting.preparation import group_repeats, split_by_kind
 from bushfit.gaussian_process import coordinates, in_lengths, patterns
 
 #: Lengths in ln frequency and ln strain: what relaxes does so over decades of frequency, and what breaks over more than
@@ -46,8 +46,8 @@ def compound(evidence: Evidence) -> Group | None:
     columns = np.zeros((len(share), evidence.residual.size))
     for test, first, last in zip(data_sets, ends[:-1], ends[1:], strict=True):
         stiffness = model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind)
-        columns[:, evidence.place[test]] = test.moved(share[:, first:last] * stiffness, model)
-    for loops in alike(parted(data_sets)[0]):
+        columns[:, evidence.place[test]] = test.residual_change(share[:, first:last] * stiffness, model)
+    for loops in group_repeats(split_by_kind(data_sets)[0]):
         overtones = harmonics(evidence, loops)[_OVERTONES:]
         order = 2 + np.arange(len(overtones)) // 2
         columns = np.concatenate((columns, overtones / order[:, None]))

@@ -84,6 +84,6 @@ def _meeting(frequency: float, points: Sequence[_Left], outlier_count: int, chan
         (frequency, frequency),
         (min(amplitudes), max(amplitudes)),
         float(np.sqrt(np.mean(np.square([distance for *_, distance in points])))),
-        max(float(np.linalg.norm(sweep.off(model)[:, point])) for sweep, point, _ in points),
+        max(float(np.linalg.norm(sweep.relative_difference(model)[:, point])) for sweep, point, _ in points),
         -log(by_chance),
     )

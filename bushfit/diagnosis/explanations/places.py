@@ -11,7 +11,7 @@ from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import FaultyPlace
 from bushfit.effects.contract import Array
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, parted
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, split_by_kind
 
 #: Neighbouring frequencies that one disturbance covers at most: mains hum and its sidebands.
 _WIDEST = 3
@@ -26,7 +26,7 @@ def places(evidence: Evidence) -> list[FaultyPlace]:
 
     The columns do not depend on the model.
     """
-    loops, sweeps = parted(evidence.data_sets)
+    loops, sweeps = split_by_kind(evidence.data_sets)
     found = [*_frequencies(evidence, sweeps), *_levels(evidence, sweeps), *_repeats(evidence, sweeps)]
     return found + ([_loop(evidence, loop) for loop in loops] if len(loops) < len(evidence.data_sets) else [])
 

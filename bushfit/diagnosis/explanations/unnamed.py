@@ -10,7 +10,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import Explanation
 from bushfit.effects.contract import Array
 from bushfit.fitting.measured_loop import smooth_waves
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, alike, parted
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, group_repeats, split_by_kind
 from bushfit.gaussian_process import spread_nodes
 from bushfit.reading.measurement import SAME_TEMPERATURE
 
@@ -33,10 +33,10 @@ def unnamed(evidence: Evidence) -> list[Explanation]:
     Returns:
         A smooth and a rough Gaussian process for each direction, a rough one for all, and the harmonics of the loops.
     """
-    loops, sweeps = parted(evidence.data_sets)
+    loops, sweeps = split_by_kind(evidence.data_sets)
     found = [(f"{how} {location}", group) for how in _LENGTHS for location, group in _processes(evidence, sweeps, how)]
     if loops:
-        groups = alike(loops)
+        groups = group_repeats(loops)
         shapes = block_diag(*[smooth_waves(np.arange(_PHASES) / _PHASES)] * len(groups))
         columns = np.concatenate([harmonics(evidence, group) for group in groups])
         found.append(("loops", Group(columns, shapes, together=True)))

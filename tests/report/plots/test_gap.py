@@ -94,7 +94,7 @@ def test_one_symmetric_scale_and_cells_that_are_measured_minus_model_in_percent(
     assert (storage < 0).all(), "the measurement lies below a model that is too stiff"
     here = (data_set.amplitude == 2e-4) & (data_set.frequency == 55.0)
     assert here.sum() == 3
-    assert storage[16 + 5] == pytest.approx(-100.0 * data_set.off(harder)[0][here].mean())
+    assert storage[16 + 5] == pytest.approx(-100.0 * data_set.relative_difference(harder)[0][here].mean())
     assert np.std(values(axes[1])) < 2.0
     assert sum(len(found.get_segments()) for found in axes[0].collections if hasattr(found, "get_segments")) >= 48
 

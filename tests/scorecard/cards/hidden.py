@@ -265,7 +265,7 @@ def _noise_free_data(model: Model, plan: SimulateSettings) -> list[MeasuredTest]
         for number, (test, motion) in enumerate(motions)
     ]
     campaign = Campaign("plan", Path("plan"), model.bushing, tuple(loops), tuple(sweeps))
-    data = PreparedCampaign.of(campaign)
+    data = PreparedCampaign.from_campaign(campaign)
     silent = [loop.noise_free(model).with_noise(3e-3) for loop in data.loops]
     return [*silent, *(sweep.noise_free(model) for sweep in data.sweeps)]
 

@@ -98,7 +98,7 @@ def _worked(task: Task, folder: Path, hours: float | None) -> Outcome:
         write_files(place, files)
         write_files(sealed_file.parent, {sealed_file.name: _SEALED.dump_json(sealed)})
         started = time.process_time()
-        data = PreparedCampaign.of(load_campaign(place / "campaign.toml"))
+        data = PreparedCampaign.from_campaign(load_campaign(place / "campaign.toml"))
         found = diagnose_campaign(data, without=task.without)
         diagnosis, seconds = found.diagnosis, time.process_time() - started
         write_results(place / "results", found.files, Formats(pictures=False, pages=False), overwrite=True)
@@ -123,7 +123,7 @@ def _settled(
         return outcome
     tests = planned_session(campaign, hours) if outcome.verdict == "ambiguous" else ()
     if tests:
-        again = diagnose(PreparedCampaign.of(with_session(campaign, hidden, tests)))
+        again = diagnose(PreparedCampaign.from_campaign(with_session(campaign, hidden, tests)))
         return replace(outcome, settled=_outcome(task, truth, again, 0.0).settles)
     return replace(outcome, settled="elsewhere", decides=next_test) if outcome.left_open else outcome
 
