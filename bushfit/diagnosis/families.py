@@ -93,12 +93,8 @@ def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str
     warm = ["temperature"] if apart_in_temperature(model, data_sets) else []
     rates, amplitudes = (["", *(name for name in laws if _fits(model, name))] for laws in (_RATE, _AMPLITUDE))
     found = [[*warm, *filter(None, pair)] for pair in product(rates, amplitudes)]
-    return tuple("+".join(names) for names in found if names and not _clash(names))
-
-
-def _clash(names: Sequence[str]) -> bool:
-    """True if one of some effects vanishes beside another."""
-    return any({*get_effect(name).never_with} & {*names} for name in names)
+    possible = [names for names in found if not any({*get_effect(name).never_with} & {*names} for name in names)]
+    return tuple("+".join(names) for names in possible if names)
 
 
 def _fits(model: Model, name: str) -> bool:

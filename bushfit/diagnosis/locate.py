@@ -93,7 +93,10 @@ def _read_sweep(
     size = f"{number(100 * abs(largest), 2)} % of |K| {sides[0]} the model"
     line = lines[worst]
     fixed_axis = {"frequency": "amplitude", "amplitude": "frequency", None: "run"}[line.stepped]
-    level = f"at every {fixed_axis}{_over_lines(pieces, fixed_axis)}"
+    means = [float(np.mean(piece)) for piece in pieces]
+    level = f"at every {fixed_axis}"
+    if len(means) > 1 and np.ptp(means) >= _CHANGES * max(abs(mean) for mean in means):
+        level += f", {_way(means[0], means[-1])} with {fixed_axis}"
     if len(touched) < len(lines):
         level = "at " + ", ".join(lines[i].words for i in touched)
     unit, factor = ("Hz", 1.0) if line.stepped != "amplitude" else line.direction.display.displacement
@@ -101,17 +104,16 @@ def _read_sweep(
     trend = _trend(line.stepped or "frequency", line.step, pieces[worst])
     if len(touched) > 1 and line.stepped:
         trend = f"most at {line.words}, there {trend}"
-    across = [line.words for line, piece in zip(lines, pieces, strict=True) if _crosses(piece, largest)]
+    across = [
+        line.words
+        for line, piece in zip(lines, pieces, strict=True)
+        if np.max(-np.sign(largest) * piece) > _STRONG * abs(largest)
+    ]
     opposite = f"; {sides[1]} it at {', '.join(across)}" if across else ""
     return (
         f"measured {line.direction} {quantity} is up to {size} ({low:.3g} to {high:.3g} {unit}), {level}, {trend}"
         f"{opposite}"
     )
-
-
-def _crosses(piece: Array, largest: float) -> bool:
-    """True if a line has much misfit of the opposite sign to the largest."""
-    return bool(np.max(-np.sign(largest) * piece) > _STRONG * abs(largest))
 
 
 def _trend(stepped: str, step: Array, misfit: Array) -> str:
@@ -125,13 +127,6 @@ def _trend(stepped: str, step: Array, misfit: Array) -> str:
     }
     shape = max(shapes, key=lambda words: abs(float(np.corrcoef(shapes[words], misfit)[0, 1])))
     return f"{_way(float(misfit[np.argmin(step)]), float(misfit[np.argmax(step)]))} {shape}"
-
-
-def _over_lines(pieces: Sequence[Array], fixed_axis: str) -> str:
-    means = [float(np.mean(piece)) for piece in pieces]
-    if len(means) < 2 or np.ptp(means) < _CHANGES * max(abs(mean) for mean in means):
-        return ""
-    return f", {_way(means[0], means[-1])} with {fixed_axis}"
 
 
 def _way(first: float, last: float) -> str:

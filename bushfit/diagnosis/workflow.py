@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -52,26 +51,31 @@ def diagnose(
         get_candidate(name)
     mended = [name for name in settings.adopt if get_mistake(name)]
     data, messages = adopted(data, mended)
-    data, begun, excluded_points = _without_wild(data, model, settings)
+    data, initial, excluded_points = _without_wild(data, model, settings)
     whole, (data, fewer) = data, condensed(data)
     if fewer:
-        begun = _begin(data, model, settings)
+        initial = _begin(data, model, settings)
     request = DiagnosisRequest(
         data,
-        begun.evidence,
+        initial.evidence,
         lambda mended: _begin(mended, model, settings).evidence,
         settings.without,
         settings.max_effects,
         settings.tolerance,
-        begun.start,
-        meetings(excluded_points, whole.sweeps, begun.evidence.model),
-        begun.held,
+        initial.start,
+        meetings(excluded_points, whole.sweeps, initial.evidence.model),
+        initial.held,
         data.bounds,
     )
     search = Search(request)
     hypotheses = search.run()
     found = DiagnosisWriter(search, judged(hypotheses, settings.tolerance), hypotheses, settings.unresolved).diagnosis()
-    fewer += _left_out_of_fewer(whole, data, begun.outliers)
+    pairs = zip(whole.sweeps, data.sweeps, strict=True)
+    changed = {after.name for before, after in pairs if after.size < before.size}
+    counts = Counter(outlier.test for outlier in initial.outliers if outlier.test in changed)
+    fewer += tuple(
+        f"{name}: {count} of these points left out, farther off than noise" for name, count in counts.items()
+    )
     of_loops = outliers_at(found.result.model, data.loops)
     outliers = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(excluded_points, robust=True))
     notes = (*messages, *fewer, *found.notes, *data.assumed, *outliers)
@@ -80,16 +84,6 @@ def diagnose(
         found.result, outliers=(*of_loops, *excluded_points), warnings=warnings, specimens=data.campaign.specimens
     )
     return replace(found, notes=notes, result=result)
-
-
-def _left_out_of_fewer(
-    whole: PreparedCampaign, fewer: PreparedCampaign, outliers: Sequence[Outlier]
-) -> tuple[str, ...]:
-    """A sentence on each sweep that was condensed and of whose points a robust fit then left some out."""
-    pairs = zip(whole.sweeps, fewer.sweeps, strict=True)
-    changed = {after.name for before, after in pairs if after.size < before.size}
-    counts = Counter(outlier.test for outlier in outliers if outlier.test in changed)
-    return tuple(f"{name}: {count} of these points left out, farther off than noise" for name, count in counts.items())
 
 
 def _without_wild(
@@ -101,14 +95,14 @@ def _without_wild(
     """
     excluded_points: tuple[Outlier, ...] = ()
     for _ in range(_MOST_ROUNDS):
-        begun = _begin(data, model, settings)
+        initial = _begin(data, model, settings)
         known_rows = {(outlier.test, outlier.row) for outlier in excluded_points}  # a robust fit finds them anew
-        found = (*begun.outliers, *outliers_at(begun.evidence.model, split_by_kind(begun.evidence.data_sets)[1]))
+        found = (*initial.outliers, *outliers_at(initial.evidence.model, split_by_kind(initial.evidence.data_sets)[1]))
         wild = tuple(outlier for outlier in found if (outlier.test, outlier.row) not in known_rows)
         if not wild:
             break
         data, excluded_points = data.without(wild), (*excluded_points, *wild)
-    return data, begun, excluded_points
+    return data, initial, excluded_points
 
 
 class InitialFit(NamedTuple):

@@ -154,14 +154,11 @@ def _shift_columns(
     among = _rows(evidence, sweeps)
     columns = np.zeros((2 + 2 * sloping, among.stop - among.start))
     for sweep, rows in zip(sweeps, chosen, strict=True):
-        values = [rows.astype(float), *([rows * _centred_log_step(sweep.step)] if sloping else [])]
+        log_step = np.log(sweep.step)
+        slope = 2.0 * (log_step - log_step.mean()) / max(float(np.ptp(log_step)), 1e-9)
+        values = [rows.astype(float), *([rows * slope] if sloping else [])]
         row_slice = evidence.place[sweep]
         columns[:, row_slice.start - among.start : row_slice.stop - among.start] = [
             column for value in values for column in sweep.moved_together(value)
         ]
     return columns
-
-
-def _centred_log_step(step: Array) -> Array:
-    x = np.log(step)
-    return 2.0 * (x - x.mean()) / max(float(np.ptp(x)), 1e-9)
