@@ -109,7 +109,7 @@ def _print_comparison(output: Output, compared: ComparisonOutput) -> None:
         _print_parameters(output, compared)
     if compared.families:
         title = "families; held out: root mean square in units of noise, 1 where noise is all"
-        output.print_table(title, FAMILY_HEADS, SideBySide.of(compared.document).family_cells())
+        output.print_table(title, FAMILY_HEADS, SideBySide.from_document(compared.document).family_cells())
     output.warn(line for line in compared.warnings if line not in compared.notes)
 
 

@@ -164,7 +164,7 @@ class ComparisonOutput:
     @cached_property
     def files(self) -> Sequence[ResultFile]:
         """Document, tables, figure and page."""
-        shown = SideBySide.of(self.document)
+        shown = SideBySide.from_document(self.document)
         names = ("parameters", *(["families"] if self.families else []), "differences")
         files = [json_file("compare", self.document)]
         files += [table_file(name, partial(lambda name: shown.tables()[name], name)) for name in names]

@@ -56,12 +56,12 @@ class ContrastPanel(NamedTuple):
     Args:
         header: quantity with its unit.
         lines: one per result and level.
-        least: smallest span of the axis of a difference; 0 of a value.
+        minimum_span: smallest span of the axis of a difference; 0 of a value.
     """
 
     header: str
     lines: list[ContrastLine]
-    least: float
+    minimum_span: float
 
 
 class PlaceContrast(NamedTuple):
@@ -69,13 +69,13 @@ class PlaceContrast(NamedTuple):
 
     Args:
         place: direction or specimen.
-        along: header of the quantity along x.
+        x_header: header of the quantity along x.
         levels: smallest and largest held value, as texts.
         panels: stiffness and loss factor, and the differences of both from the first result.
     """
 
     place: str
-    along: str
+    x_header: str
     levels: list[str]
     panels: list[ContrastPanel]
 
@@ -87,7 +87,7 @@ class SideBySide:
     document: ComparisonFile
 
     @classmethod
-    def of(cls, document: Mapping[str, Any], file: Path | None = None) -> SideBySide:
+    def from_document(cls, document: Mapping[str, Any], file: Path | None = None) -> SideBySide:
         """Validate a document.
 
         Args:
@@ -102,15 +102,15 @@ class SideBySide:
         """
         require_schema(document, file, "a comparison", SCHEMA, hint="bushfit compare writes it anew")
         checked = validate_tables(document, file, ComparisonFile, kind=ModelError)
-        first, *others = [entry["label"] for entry in checked["compared"]] or [""]
+        first, *other_labels = [entry["label"] for entry in checked["compared"]] or [""]
         families = checked["families"]
-        expected = [(first, other) for other in dict.fromkeys(others) if other != first]
+        expected = [(first, label) for label in dict.fromkeys(other_labels) if label != first]
         pairs = [(pair["reference"], pair["other"]) for pair in checked["pairs"]]
         places = {tuple(pair["places"]) for pair in checked["pairs"]}
-        if not expected or len(expected) < len(others) or pairs != expected or len(places) > 1 or () in places:
+        if not expected or len(expected) < len(other_labels) or pairs != expected or len(places) > 1 or () in places:
             rule = "each result but the first compared with the first, at the same places"
             raise ModelError("results that do not go together", file=file, place="pairs", expected=rule)
-        if families and [family["label"] for family in families] != [first, *others]:
+        if families and [family["label"] for family in families] != [first, *other_labels]:
             raise ModelError("families that do not go together", file=file, place="families", expected="all compared")
         return cls(checked)
 
@@ -127,7 +127,11 @@ class SideBySide:
         return [*self.document["pairs"][0]["places"]]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Tables by name: `parameters`, `differences` and, of families, `families`."""
+        """Tables by name: `parameters`, `differences` and, of families, `families`.
+
+        Returns:
+            Tables by name, a row per parameter, point or family.
+        """
         pairs = self.document["pairs"]
         parameters = [
             {
@@ -149,7 +153,7 @@ class SideBySide:
             for row in pair["parameters"]
         ]
         families = {"families": pd.DataFrame([*self._families()])} if self.document["families"] else {}
-        by_place = [self.at(place) for place in self.places]
+        by_place = [self.differences_at(place) for place in self.places]
         differences = pd.concat([tables[pair["other"]] for pair in pairs for tables in by_place], ignore_index=True)
         return {"parameters": pd.DataFrame(parameters), **families, "differences": differences}
 
@@ -174,7 +178,11 @@ class SideBySide:
             }
 
     def family_cells(self) -> Iterator[list[str]]:
-        """Rows of texts on the families, with the columns `FAMILY_HEADS`."""
+        """Rows of texts on the families, with the columns `FAMILY_HEADS`.
+
+        Returns:
+            An iterator over rows, a text per column.
+        """
         for family, entry in zip(self.document["families"] or (), self.document["compared"], strict=False):
             parts = len(family["parts"])
             yield [
@@ -187,8 +195,11 @@ class SideBySide:
                 f"{parts} of {parts + len(family['skipped'])}",
             ]
 
-    def at(self, place: str) -> dict[str, pd.DataFrame]:
+    def differences_at(self, place: str) -> dict[str, pd.DataFrame]:
         """Rows of the table of differences at a place, by the label of the second result.
+
+        Returns:
+            Table of each second result by its label, a row per operating point.
 
         Raises:
             ModelError: a place that some results lack, or columns of different length.
@@ -220,36 +231,53 @@ class SideBySide:
         Returns:
             Curves at the smallest and the largest held value.
         """
-        tables = self.at(place)
-        headers = ContrastHeaders.of(next(iter(tables.values())))
+        tables = self.differences_at(place)
+        headers = ContrastHeaders.from_table(next(iter(tables.values())))
         grid = numbers(next(iter(tables.values())), "frequency [Hz]", headers.amplitude)
         over_frequency = np.unique(grid[0]).size > 1
-        along, held = ("frequency [Hz]", headers.amplitude) if over_frequency else (headers.amplitude, "frequency [Hz]")
+        x_header, fixed_header = (
+            ("frequency [Hz]", headers.amplitude) if over_frequency else (headers.amplitude, "frequency [Hz]")
+        )
         levels = np.unique(np.unique(grid[int(over_frequency)])[[0, -1]])
-        first, *others = self.names
-        results = [(first, tables[others[0]], "reference "), *((label, tables[label], "other ") for label in others)]
-        differences = [(label, tables[label], "") for label in others]
+        first, *other_labels = self.names
+        results = [
+            (first, tables[other_labels[0]], "reference "),
+            *((label, tables[label], "other ") for label in other_labels),
+        ]
+        differences = [(label, tables[label], "") for label in other_labels]
 
-        def lines(quantity: str, scale: float, of: list[tuple[str, pd.DataFrame, str]]) -> Iterator[ContrastLine]:
-            for label, table, prefix in of:
+        def lines(
+            quantity: str, scale: float, tables_of_results: list[tuple[str, pd.DataFrame, str]]
+        ) -> Iterator[ContrastLine]:
+            """Lines of a quantity with their bands.
+
+            Args:
+                quantity: header of the quantity.
+                scale: factor from the table to the panel.
+                tables_of_results: label, table, and start of the header of each result.
+
+            Yields:
+                A line per result and level.
+            """
+            for label, table, prefix in tables_of_results:
                 header = f"{prefix}{quantity}"
-                columns = numbers(table, along, held, header, f"{header}, low", f"{header}, high")
+                columns = numbers(table, x_header, fixed_header, header, f"{header}, low", f"{header}, high")
                 for level, value in enumerate(levels):
                     x, _, *ends = columns[:, columns[1] == value]
                     yield ContrastLine(label, level, x, *(scale * end for end in ends))
 
         largest = max(float(np.nanmax(line.value, initial=0.0)) for line in lines(headers.stiffness, 1.0, results))
         name, unit = split_header(headers.stiffness)
-        shown_unit, scale = display_unit(unit or "", 1.0, largest)
+        display_name, scale = display_unit(unit or "", 1.0, largest)
         relative = [*lines(headers.relative, 100.0, differences)]
         panels = [
-            ContrastPanel(f"{name} [{shown_unit}]", [*lines(headers.stiffness, scale, results)], 0.0),
+            ContrastPanel(f"{name} [{display_name}]", [*lines(headers.stiffness, scale, results)], 0.0),
             ContrastPanel("loss factor [-]", [*lines("loss factor [-]", 1.0, results)], 0.0),
             ContrastPanel(f"{name} minus {first} [% of {first}]", relative, _LEAST_PERCENT),
             ContrastPanel(f"loss factor minus {first} [-]", [*lines(headers.loss, 1.0, differences)], _LEAST_LOSS),
         ]
-        names = [format_range(split_header(held)[1] or "", float(level)) for level in levels]
-        return PlaceContrast(place, along, names, panels)
+        names = [format_range(split_header(fixed_header)[1] or "", float(level)) for level in levels]
+        return PlaceContrast(place, x_header, names, panels)
 
 
 class ContrastHeaders(NamedTuple):
@@ -268,8 +296,11 @@ class ContrastHeaders(NamedTuple):
     loss: str
 
     @classmethod
-    def of(cls, table: pd.DataFrame) -> ContrastHeaders:
+    def from_table(cls, table: pd.DataFrame) -> ContrastHeaders:
         """Headers of a table, whose quantity may be a stiffness or a modulus.
+
+        Returns:
+            Headers of the columns that the table has.
 
         Raises:
             ModelError: a column is missing.

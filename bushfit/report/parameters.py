@@ -49,7 +49,14 @@ def interval_kind(result: Result) -> str:
 
 
 def parameter_rows(result: Result) -> Iterator[ParameterRow]:
-    """Rows of the parameters of a result with standard errors and 95 % intervals, by profile if there are any."""
+    """Rows of the parameters of a result with standard errors and 95 % intervals, by profile if there are any.
+
+    Args:
+        result: fitted or given model.
+
+    Returns:
+        An iterator over rows, one per parameter.
+    """
     for name, parameter in result.model.parameters.items():
         value, stderr = result.model.values[name], result.covariance.stderr(name)
         interval = result.profile.get(name) or result.interval(name)
@@ -61,9 +68,9 @@ def parameter_rows(result: Result) -> Iterator[ParameterRow]:
         if stderr and value:  # two of the standard error
             carried = math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2
             digits = min(max(carried, _FEWEST_DIGITS), _MOST_DIGITS)
-        known = [end * factor for end in interval or () if end is not None]
-        shown, *texts = format_aligned([value * factor, *known], digits, minimum_digits=2)
+        finite_ends = [end * factor for end in interval or () if end is not None]
+        value_text, *texts = format_aligned([value * factor, *finite_ends], digits, minimum_digits=2)
         ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
         error = "" if stderr is None else format_aligned([stderr * factor], 2)[0]
         state = f"at {result.at_bound[name]}" if name in result.at_bound else "held" * (name not in result.fitted)
-        yield ParameterRow(name, state, shown, error, " to ".join(ends), unit, parameter.meaning)
+        yield ParameterRow(name, state, value_text, error, " to ".join(ends), unit, parameter.meaning)

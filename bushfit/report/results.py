@@ -82,7 +82,16 @@ def raw_file(name: str, content: bytes) -> ResultFile:
 
 
 def page_file(name: str, page: Callable[[Documents, Tables], str], files: Sequence[ResultFile]) -> ResultFile:
-    """HTML page of the documents and tables among other result files."""
+    """HTML page of the documents and tables among other result files.
+
+    Args:
+        name: name of the file without its ending.
+        page: function that makes the HTML from documents and tables by name.
+        files: result files with the documents and tables.
+
+    Returns:
+        File whose page is made when it is written.
+    """
 
     def make() -> str:
         documents, tables = (
@@ -123,7 +132,14 @@ class Formats:
         return f"{name}.{ending(self.table_form)}"
 
     def names(self, file: ResultFile) -> list[str]:
-        """Names of the files that a result file becomes: none if its kind is left out, one for each picture format."""
+        """Names of the files that a result file becomes: none if its kind is left out, one for each picture format.
+
+        Args:
+            file: file of the result.
+
+        Returns:
+            File names with endings.
+        """
         pictures = [f"{file.name}.{form}" for form in self.picture_forms] if self.pictures else []
         return {
             "json": [f"{file.name}.json"],
@@ -135,6 +151,12 @@ class Formats:
 
     def encode(self, file: ResultFile) -> dict[str, bytes]:
         """Bytes of the files that a result file becomes, by their names.
+
+        Args:
+            file: file of the result.
+
+        Returns:
+            Content by file name; empty if the kind is left out.
 
         Raises:
             OutputError: a table that is too large for its format.
@@ -184,7 +206,7 @@ def write_results(
         files: files of the result.
         formats: formats to write, and kinds to leave out.
         overwrite: whether to replace files of an earlier result.
-        inputs: files that the run has read; none of them is replaced.
+        inputs: files that the run has read; they are not replaced.
 
     Returns:
         Names of the files written, in their order.
@@ -196,8 +218,8 @@ def write_results(
     ordered = sorted(files, key=lambda file: _KINDS.index(file.kind))
     names = [name for file in ordered for name in formats.names(file)]
     check_free(folder, names, overwrite=overwrite, inputs=inputs)
-    made = track("files made", (formats.encode(file) for file in ordered), len(ordered))
-    for contents in made:
+    encoded = track("files made", (formats.encode(file) for file in ordered), len(ordered))
+    for contents in encoded:
         write_files(folder, contents)
     return names
 
@@ -258,8 +280,8 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
                 )
             if any(_is_same(folder / name, file) for file in inputs):
                 raise OutputError("a result would replace an input of this run", file=folder / name, hint=elsewhere)
-        known = _recorded(folder) if existing else set()
-        foreign = [name for name in existing if not _is_recorded(folder / name, known)]
+        record = _recorded(folder) if existing else set()
+        foreign = [name for name in existing if not _is_recorded(folder / name, record)]
     except OSError as error:
         raise unwritable(folder, error) from error
     if foreign:
@@ -278,10 +300,10 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
         )
 
 
-def _is_same(file: Path, other: Path) -> bool:
+def _is_same(file: Path, reference: Path) -> bool:
     """Return True if two paths lead to one existing file."""
     with suppress(OSError):
-        return file.samefile(other)
+        return file.samefile(reference)
     return False
 
 
@@ -293,10 +315,12 @@ def _recorded(folder: Path) -> set[tuple[str, str]]:
     return set()
 
 
-def _is_recorded(file: Path, known: set[tuple[str, str]]) -> bool:
+def _is_recorded(file: Path, record: set[tuple[str, str]]) -> bool:
     """Return True if a file is, byte for byte, one that bushfit wrote."""
     return (
-        file.is_file() and not file.is_symlink() and (hashlib.sha256(file.read_bytes()).hexdigest(), file.name) in known
+        file.is_file()
+        and not file.is_symlink()
+        and (hashlib.sha256(file.read_bytes()).hexdigest(), file.name) in record
     )
 
 

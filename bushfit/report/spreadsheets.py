@@ -29,21 +29,28 @@ def xlsx(order: Order) -> Exported:
 
 def _tables(order: Order) -> dict[str, pd.DataFrame]:
     """Tables by name: two for each place, parameters, and provenance."""
-    found = {
+    tables = {
         "parameters": parameters_table(order.result),
-        "provenance": pd.DataFrame(_said(order), columns=["what", "value"]),
+        "provenance": pd.DataFrame(_provenance_rows(order), columns=["what", "value"]),
     }
     for name, prediction in zip(place_names(order.places), order.predictions, strict=True):
         display = order.units.display(prediction.direction.motion) if order.units else None
-        while {name, f"{name} wide"} & found.keys():  # a specimen may have any name
+        while {name, f"{name} wide"} & tables.keys():  # a specimen may have any name
             name += "_"
-        found[name] = prediction_table(prediction, display)
-        found[f"{name} wide"] = wide_table(prediction, display)
-    return dict(sorted(found.items(), key=lambda pair: pair[0] in _OF_ALL))
+        tables[name] = prediction_table(prediction, display)
+        tables[f"{name} wide"] = wide_table(prediction, display)
+    return dict(sorted(tables.items(), key=lambda pair: pair[0] in _OF_ALL))
 
 
 def parameters_table(result: Result) -> pd.DataFrame:
-    """Every parameter in SI, with its standard error and 95 % interval where it has one."""
+    """Every parameter in SI, with its standard error and 95 % interval where it has one.
+
+    Args:
+        result: fitted or given model.
+
+    Returns:
+        A row per parameter.
+    """
     model, rows = result.model, []
     for name, value in model.values.items():  # noqa: PD011  # no frame
         parameter, (low, high) = model.parameters[name], result.interval(name) or (None, None)
@@ -62,7 +69,7 @@ def parameters_table(result: Result) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _said(order: Order) -> Iterator[tuple[str, str]]:
+def _provenance_rows(order: Order) -> Iterator[tuple[str, str]]:
     """Rows of the table of provenance: names and values, with the warnings."""
     result, bushing = order.result, order.result.model.bushing
     yield "bushing", result.name

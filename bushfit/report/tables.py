@@ -11,7 +11,7 @@ from bushfit.diagnosis.record import Diagnosis, level_of
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, printable
 from bushfit.fitting.master_curve import Shifted
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Display, Place
 from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
@@ -56,14 +56,14 @@ def words(place: Place) -> tuple[str, str, str]:
 def columns_of(place: Place) -> tuple[str, str, str]:
     """Headers of amplitude, |K| and the force in the tables of a place."""
     (length, _), (force, _), (stiffness, _) = place.display
-    moved, resisting, resisted = words(place)
-    return f"{moved} [{length}]", f"{resisted} [{stiffness}]", f"{resisting} [{force}]"
+    motion_name, resisting, resisted = words(place)
+    return f"{motion_name} [{length}]", f"{resisted} [{stiffness}]", f"{resisting} [{force}]"
 
 
 def moved_of(place: Place) -> str:
     """Header of displacement, rotation or strain in the tables of a place."""
-    moved = "strain" if place.motion is STRAINING else "displacement"
-    return f"{moved} [{place.display.displacement.name}]"
+    motion_name = "strain" if place.motion is STRAINING else "displacement"
+    return f"{motion_name} [{place.display.displacement.name}]"
 
 
 def _amplitudes(place: Place, amplitude: Array) -> dict[str, Array]:
@@ -89,7 +89,7 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
         last four; the four if an unresolved effect belongs to the rig; and the measured stiffness and loss factor.
     """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
-    moved, _, resisted = words(prediction.direction)
+    motion_name, _, resisted = words(prediction.direction)
     force = f"{resisted} [{stiffness}]"
     names, scales = (force, "loss factor [-]", f"storage {force}", f"loss {force}"), (factor, 1.0, factor, factor)
 
@@ -97,7 +97,10 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
         quantities = reading.stiffness, reading.loss_factor, reading.storage_stiffness, reading.loss_stiffness
         return list(zip(names, quantities, scales, strict=True))
 
-    columns = {"frequency [Hz]": prediction.frequency, f"{moved} [{length}]": prediction.amplitude * length_factor}
+    columns = {
+        "frequency [Hz]": prediction.frequency,
+        f"{motion_name} [{length}]": prediction.amplitude * length_factor,
+    }
     columns |= {name: band.value * scale for name, band, scale in bands(prediction)}
     for name, band, scale in bands(prediction):
         columns |= {f"{name}, low": band.low * scale, f"{name}, high": band.high * scale}
@@ -130,20 +133,27 @@ def wide_table(prediction: Prediction, display: Display | None = None) -> pd.Dat
     return wide.reset_index()
 
 
-def shaken_table(found: PredictedResonance) -> pd.DataFrame:
-    """Transmissibility, deformation and stiffness of a mass on a mount over frequency, a row per frequency."""
+def shaken_table(resonance: PredictedResonance) -> pd.DataFrame:
+    """Transmissibility, deformation and stiffness of a mass on a mount over frequency, a row per frequency.
+
+    Args:
+        resonance: predicted response of the mass.
+
+    Returns:
+        A row per frequency; further columns if an unresolved effect belongs to the rig.
+    """
     table = pd.DataFrame(
         {
-            "frequency [Hz]": found.frequency,
-            "transmissibility [-]": np.abs(found.transmissibility),
-            "phase [deg]": np.degrees(np.angle(found.transmissibility)),
-            **_amplitudes(found.place, found.amplitude),
-            **_responses(found.place, found.stiffness),
+            "frequency [Hz]": resonance.frequency,
+            "transmissibility [-]": np.abs(resonance.transmissibility),
+            "phase [deg]": np.degrees(np.angle(resonance.transmissibility)),
+            **_amplitudes(resonance.place, resonance.amplitude),
+            **_responses(resonance.place, resonance.stiffness),
         }
     )
-    if found.if_rigs:
-        other = shaken_table(found.if_rigs).iloc[:, 1:].add_suffix(f", {IF_RIGS}")
-        table = pd.concat([table, other], axis=1)
+    if resonance.if_rigs:
+        if_rigs = shaken_table(resonance.if_rigs).iloc[:, 1:].add_suffix(f", {IF_RIGS}")
+        table = pd.concat([table, if_rigs], axis=1)
     return table
 
 
@@ -171,29 +181,37 @@ def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame
     """Measured and modelled force of every loop: a row per recorded row, or per bin of phase where a loop is long.
 
     The residual is measured minus model, in units of the noise of one row. An outlier was left out of the fit.
-    """
 
-    def rows(data_set: MeasuredLoop) -> pd.DataFrame:
+    Args:
+        model: model to compare with the tests.
+        data_sets: measured loops.
+
+    Returns:
+        A row per recorded row or bin of phase.
+    """
+    tables = []
+    for data_set in data_sets:
         place, drive = data_set.direction, data_set.drive
         (_, length), (_, factor), _ = place.display
         force = columns_of(place)[2]
         binned = drive.phase.size < data_set.test.force.size
         outliers = np.empty(0) if binned else drive.outliers["force"].rows
-        return pd.DataFrame(
-            {
-                "loop": data_set.name,
-                "direction": str(place),
-                "time [s]": drive.phase / drive.frequency,
-                "frequency [Hz]": drive.frequency,
-                moved_of(place): drive.displacement(drive.phase) * length,
-                force: drive.force * factor,
-                f"model {force}": data_set.force(model) * factor,
-                "residual [noise]": -data_set.displayed_residual(model),
-                "outlier": np.where(np.isin(np.arange(drive.phase.size), outliers), "yes", "no"),
-            }
+        tables.append(
+            pd.DataFrame(
+                {
+                    "loop": data_set.name,
+                    "direction": str(place),
+                    "time [s]": drive.phase / drive.frequency,
+                    "frequency [Hz]": drive.frequency,
+                    moved_of(place): drive.displacement(drive.phase) * length,
+                    force: drive.force * factor,
+                    f"model {force}": data_set.force(model) * factor,
+                    "residual [noise]": -data_set.displayed_residual(model),
+                    "outlier": np.where(np.isin(np.arange(drive.phase.size), outliers), "yes", "no"),
+                }
+            )
         )
-
-    return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
+    return pd.concat(tables, ignore_index=True)
 
 
 def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFrame:
@@ -201,33 +219,41 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
 
     Residuals are measured minus model, in units of noise. Temperature, part and stated error are columns only where a
     test states them.
-    """
 
-    def rows(data_set: MeasuredSweep) -> pd.DataFrame:
+    Args:
+        model: model to compare with the tests.
+        data_sets: measured sweeps.
+
+    Returns:
+        A row per measured point.
+    """
+    tables = []
+    for data_set in data_sets:
         place, modelled = data_set.direction, data_set.stiffness(model)
         gain, phase = np.split(-data_set.displayed_residual(model), 2)
-        return pd.DataFrame(
-            {
-                "sweep": data_set.sweep.name,
-                "direction": str(place),
-                **_stated(data_set),
-                "frequency [Hz]": data_set.frequency,
-                **_amplitudes(place, data_set.amplitude),
-                "repeat": data_set.repeat,
-                **_responses(place, data_set.measured),
-                **_responses(place, modelled, "model "),
-                "stiffness residual [noise]": gain,
-                "loss residual [noise]": phase,
-                "model over measured [-]": np.abs(modelled / data_set.measured),
-                "loss factor difference [-]": loss_factor(data_set.measured) - loss_factor(modelled),
-                "outlier": np.where(data_set.weights > 0.0, "no", "yes"),
-            }
+        tables.append(
+            pd.DataFrame(
+                {
+                    "sweep": data_set.sweep.name,
+                    "direction": str(place),
+                    **_condition_columns(data_set),
+                    "frequency [Hz]": data_set.frequency,
+                    **_amplitudes(place, data_set.amplitude),
+                    "repeat": data_set.repeat,
+                    **_responses(place, data_set.measured),
+                    **_responses(place, modelled, "model "),
+                    "stiffness residual [noise]": gain,
+                    "loss residual [noise]": phase,
+                    "model over measured [-]": np.abs(modelled / data_set.measured),
+                    "loss factor difference [-]": loss_factor(data_set.measured) - loss_factor(modelled),
+                    "outlier": np.where(data_set.weights > 0.0, "no", "yes"),
+                }
+            )
         )
+    return pd.concat(tables, ignore_index=True)
 
-    return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
 
-
-def _stated(data_set: MeasuredSweep) -> dict[str, Any]:
+def _condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
     """Columns with what a sweep steps through and with the conditions that its test states."""
     sweep, conditions = data_set.sweep, data_set.source.conditions if data_set.source else {}
     columns: dict[str, Any] = {"stepped": sweep.stepped or "neither"}
@@ -245,63 +271,94 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
 
     A row is a sweep point or a row of a loop, where it was recorded, also if the record was mistaken. Percent are of
     |K| or of half the range of a loop's force. The table also has the response of the model to use.
+
+    Args:
+        diagnosis: finished diagnosis with the models before and after.
+
+    Returns:
+        A row per point of a sweep or row of a loop.
     """
     before, after = diagnosis.before, diagnosis.after
-
-    def rows(data_set: MeasuredTest, corrected: MeasuredTest) -> pd.DataFrame:
+    tables = []
+    for data_set, corrected in zip(before.data_sets, after.data_sets, strict=True):
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
-        columns |= _stated(data_set) if isinstance(data_set, MeasuredSweep) else {}
+        columns |= _condition_columns(data_set) if isinstance(data_set, MeasuredSweep) else {}
         columns |= data_set.columns()
         for name, model, test in (("before", before.model, data_set), ("after", after.model, corrected)):
             in_noise, percent = np.split(-test.misfit(model), test.parts), -100.0 * test.relative_difference(model)
-            columns |= {f"{part} {name} [noise]": of for part, of in zip(test.components, in_noise, strict=True)}
-            columns |= {f"{part} {name} [%]": of for part, of in zip(test.components, percent, strict=True)}
+            columns |= {
+                f"{part} {name} [noise]": column for part, column in zip(test.components, in_noise, strict=True)
+            }
+            columns |= {f"{part} {name} [%]": column for part, column in zip(test.components, percent, strict=True)}
         table: Any = loops_table if data_set.kind == "loop" else sweeps_table
         responses = table(diagnosis.result.model, [data_set])
-        return pd.DataFrame(columns | {name: responses[name] for name in responses if _MEASURED.match(name)})
-
-    pairs = zip(before.data_sets, after.data_sets, strict=True)
-    return pd.concat([rows(*pair) for pair in pairs], ignore_index=True)
+        tables.append(pd.DataFrame(columns | {name: responses[name] for name in responses if _MEASURED.match(name)}))
+    return pd.concat(tables, ignore_index=True)
 
 
-def master_curve_table(found: Sequence[Shifted]) -> pd.DataFrame:
-    """Points of sweeps at several temperatures, as measured and shifted to 23 degC, a row per point."""
+def master_curve_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
+    """Points of sweeps at several temperatures, as measured and shifted to 23 degC, a row per point.
 
-    def rows(shifted: Shifted) -> pd.DataFrame:
+    Args:
+        shifted_sweeps: sweeps shifted to 23 degC.
+
+    Returns:
+        A row per point.
+    """
+    tables = []
+    for shifted in shifted_sweeps:
         sweep, place = shifted.sweep, shifted.sweep.direction
-        return pd.DataFrame(
-            {
-                "sweep": sweep.name,
-                "direction": str(place),
-                "temperature [degC]": sweep.temperature - CELSIUS,
-                "frequency [Hz]": sweep.frequency,
-                **_amplitudes(place, sweep.amplitude),
-                **_responses(place, sweep.measured),
-                "reduced frequency [Hz]": shifted.reduced_frequency,
-                **_responses(place, shifted.reduced_stiffness, "reduced "),
-            }
+        tables.append(
+            pd.DataFrame(
+                {
+                    "sweep": sweep.name,
+                    "direction": str(place),
+                    "temperature [degC]": sweep.temperature - CELSIUS,
+                    "frequency [Hz]": sweep.frequency,
+                    **_amplitudes(place, sweep.amplitude),
+                    **_responses(place, sweep.measured),
+                    "reduced frequency [Hz]": shifted.reduced_frequency,
+                    **_responses(place, shifted.reduced_stiffness, "reduced "),
+                }
+            )
         )
+    return pd.concat(tables, ignore_index=True)
 
-    return pd.concat([rows(shifted) for shifted in found], ignore_index=True)
 
+def shift_factors_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
+    """log10 of the shift factor of shifted sweep, by the fitted law and fitted alone, with 95 % intervals.
 
-def shift_factors_table(found: Sequence[Shifted]) -> pd.DataFrame:
-    """log10 of the shift factor of shifted sweep, by the fitted law and fitted alone, with 95 % intervals."""
-    both = {"log10 a_T": [shifted.shift for shifted in found], "own log10 a_T": [shifted.own for shifted in found]}
+    Args:
+        shifted_sweeps: sweeps shifted to 23 degC.
+
+    Returns:
+        A row per sweep.
+    """
+    both = {
+        "log10 a_T": [shifted.shift for shifted in shifted_sweeps],
+        "own log10 a_T": [shifted.own for shifted in shifted_sweeps],
+    }
     columns: dict[str, Any] = {
-        "sweep": [shifted.sweep.name for shifted in found],
-        "direction": [str(shifted.sweep.direction) for shifted in found],
-        "temperature [degC]": [shifted.temperature - CELSIUS for shifted in found],
+        "sweep": [shifted.sweep.name for shifted in shifted_sweeps],
+        "direction": [str(shifted.sweep.direction) for shifted in shifted_sweeps],
+        "temperature [degC]": [shifted.temperature - CELSIUS for shifted in shifted_sweeps],
     }
     for name, pairs in both.items():
         value, error = np.array(pairs).T / np.log(10.0)
         ends = (("", value), (", low", value - Z95 * error), (", high", value + Z95 * error))
-        columns |= {f"{name} [-]{end}": of for end, of in ends}
+        columns |= {f"{name} [-]{end}": column for end, column in ends}
     return pd.DataFrame(columns)
 
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Every effect of the library: score, gain in chi-square, probability, parameters, and the reason of the result."""
+    """Every effect of the library: score, gain in chi-square, probability, parameters, and the reason of the result.
+
+    Args:
+        diagnosis: finished diagnosis.
+
+    Returns:
+        A row per effect.
+    """
     rows = [
         {
             "effect": judged.name,
@@ -332,19 +389,19 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
         "frequency [Hz]": contrast.reference.frequency,
         **_amplitudes(contrast.place, contrast.reference.amplitude),
     }
-    for who, side in (("reference", contrast.reference), ("other", contrast.other)):
-        for what, band, scale in ((name, side.stiffness, factor), ("loss factor [-]", side.loss_factor, 1.0)):
-            for end, of in _ends(band).items():
-                values[f"{who} {what}{end}"] = of * scale
+    for result_name, side in (("reference", contrast.reference), ("other", contrast.other)):
+        for quantity, band, scale in ((name, side.stiffness, factor), ("loss factor [-]", side.loss_factor, 1.0)):
+            for end, column in _ends(band).items():
+                values[f"{result_name} {quantity}{end}"] = column * scale
     differences = (
         (f"relative difference of {words(contrast.place)[2]} [-]", contrast.stiffness, relative),
         ("difference of loss factor [-]", contrast.loss_factor, np.asarray),
     )
-    for what, band, shown in differences:
+    for quantity, band, convert in differences:
         wide = comparison.widened(band)
         sure = bool(len(band.root)) & ((wide.low > 0.0) | (wide.high < 0.0))
-        values |= {f"{what}{end}": shown(of) for end, of in _ends(band).items()}
-        values[f"{what}, sure"] = np.where(sure, "yes", "no")
+        values |= {f"{quantity}{end}": convert(column) for end, column in _ends(band).items()}
+        values[f"{quantity}, sure"] = np.where(sure, "yes", "no")
     return pd.DataFrame(values)
 
 
@@ -367,7 +424,14 @@ _OF_STEPS = {
 
 
 def reduced_table(reduction: Reduction) -> pd.DataFrame:
-    """Raw histories reduced to a sweep: columns of a sweep file, then columns on the quality of each point."""
+    """Raw histories reduced to a sweep: columns of a sweep file, then columns on the quality of each point.
+
+    Args:
+        reduction: reduced histories of one direction.
+
+    Returns:
+        A row per operating point, sorted by amplitude, repeat and frequency.
+    """
     place, steps = reduction.direction, pd.DataFrame([vars(step) for step in reduction.steps])
     (length, length_factor), _, (stiffness, _) = place.display
     responses = _responses(place, steps["stiffness"].to_numpy())
@@ -388,16 +452,23 @@ def reduced_table(reduction: Reduction) -> pd.DataFrame:
     return frame.sort_values(order, ignore_index=True, kind="stable")
 
 
-def resonance_table(found: Resonance) -> pd.DataFrame:
-    """A resonance test reduced to a sweep: columns of a sweep file, then columns on the origin of each point."""
+def resonance_table(resonance: Resonance) -> pd.DataFrame:
+    """A resonance test reduced to a sweep: columns of a sweep file, then columns on the origin of each point.
+
+    Args:
+        resonance: resonance test reduced to stiffness over frequency.
+
+    Returns:
+        A row per frequency.
+    """
     return pd.DataFrame(
         {
-            "frequency [Hz]": found.frequency,
-            **_amplitudes(Direction.AXIAL, found.amplitude),  # which translation it is makes no difference
-            **_responses(Direction.AXIAL, found.stiffness),
-            "relative error [-]": found.relative_error,
-            "transmissibility [-]": np.abs(found.transmissibility),
-            "rows averaged": found.rows,
+            "frequency [Hz]": resonance.frequency,
+            **_amplitudes(Direction.AXIAL, resonance.amplitude),  # which translation it is makes no difference
+            **_responses(Direction.AXIAL, resonance.stiffness),
+            "relative error [-]": resonance.relative_error,
+            "transmissibility [-]": np.abs(resonance.transmissibility),
+            "rows averaged": resonance.rows,
         }
     )
 
@@ -408,9 +479,9 @@ def shortened(name: str, letters: int) -> str:
     return name if len(name) <= letters else f"{name[: (letters - 1) // 2]}…{name[-(letters // 2) :]}"
 
 
-def spread(count: int, most: int) -> Array:
+def spread(count: int, maximum: int) -> Array:
     """Indices of at most so many of `count` elements, evenly from the first to the last, (min(count, most),)."""
-    return np.linspace(0, count - 1, min(most, count)).round().astype(int)
+    return np.linspace(0, count - 1, min(maximum, count)).round().astype(int)
 
 
 def numbers(rows: pd.DataFrame, *headers: str) -> Array:

@@ -27,6 +27,9 @@ def report_page(documents: Documents, tables: Tables) -> str:
         documents: model, plain fit and diagnosis by the names of their files without endings.
         tables: sweeps, loops, gap and predicted places by the names of their files without endings.
 
+    Returns:
+        The page as HTML.
+
     Raises:
         ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
     """
@@ -39,22 +42,33 @@ def report_page(documents: Documents, tables: Tables) -> str:
 def comparison_page(documents: Documents, _: Tables) -> str:
     """The page of a comparison as HTML, made from its document.
 
+    Returns:
+        The page as HTML.
+
     Raises:
         ModelError: a document that is not as bushfit writes it.
     """
     from bushfit.report.compared import SideBySide
     from bushfit.report.page.comparison import comparison_context
 
-    return rendered("compare.html", comparison_context(SideBySide.of(documents["compare"])))
+    return rendered("compare.html", comparison_context(SideBySide.from_document(documents["compare"])))
 
 
 def rendered(template: str, context: dict[str, Any]) -> str:
-    """A page from a template, with a content policy that allows only its own style and script."""
+    """A page from a template, with a content policy that allows only its own style and script.
+
+    Args:
+        template: name of the template.
+        context: values that the template uses, by name.
+
+    Returns:
+        The page as HTML.
+    """
     from markupsafe import Markup
 
     style, script = (Markup((_TEMPLATES / name).read_text(encoding="utf-8")) for name in ("style.css", "script.js"))
-    own = f"style-src {_hash(style)}; script-src {_hash(script)}; img-src data:"
-    allowed = f"default-src 'none'; {own}; base-uri 'none'; form-action 'none'"
+    sources = f"style-src {_hash(style)}; script-src {_hash(script)}; img-src data:"
+    allowed = f"default-src 'none'; {sources}; base-uri 'none'; form-action 'none'"
     page = filled(template, {"style": style, "script": script, "allowed": allowed, **context})
     return printable(page, lines=True) + "\n"
 
@@ -94,6 +108,9 @@ def folder_pages(folder: Path, base: str = "") -> list[ResultFile]:
     Args:
         folder: as `bushfit run`, `diagnose`, a fit, `compare` or `batch` wrote it.
         base: of a batch, beginning of its links, if the page is written elsewhere.
+
+    Returns:
+        HTML files of the folder; their content is made when they are written.
 
     Raises:
         ModelError: a folder without results, or a file in it that is not as bushfit writes it.

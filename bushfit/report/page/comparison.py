@@ -35,19 +35,30 @@ def read_comparison(folder: Path) -> list[ResultFile]:
     """
     file = folder / "compare.json"
     document = read_document(file)
-    SideBySide.of(document, file)
+    SideBySide.from_document(document, file)
     return [json_file("compare", document)]
 
 
 def comparison_context(comparison: SideBySide) -> dict[str, Any]:
-    """Everything that the template of a comparison needs."""
+    """Everything that the template of a comparison needs.
+
+    Args:
+        comparison: validated comparison.
+
+    Returns:
+        Values of the template by name.
+    """
     document, names = comparison.document, comparison.names
-    reference, *others = names.values()
+    reference, *other_names = names.values()
     families = bool(document["families"])
     places = comparison.places
     entries = [_entry(entry) for entry in document["compared"]]
     body = document["compared"][0]["bushing"]
-    title = f"{others[0]} compared with {reference}" if len(others) == 1 else f"{len(others)} results and {reference}"
+    title = (
+        f"{other_names[0]} compared with {reference}"
+        if len(other_names) == 1
+        else f"{len(other_names)} results and {reference}"
+    )
     drawn = len(names) * len(places) <= _MOST_DRAWN
     return {
         "document": document,
@@ -59,7 +70,7 @@ def comparison_context(comparison: SideBySide) -> dict[str, Any]:
         "sizes": [row for place in places for row in _sizes(comparison, place)],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*comparison.family_cells()],
-        "judged": families and len(others) + document["words"][0].startswith("use "),
+        "judged": families and len(other_names) + document["words"][0].startswith("use "),
         "most": MOST,
         "cells": parameter_cells,
         "chance": chance,
@@ -71,7 +82,9 @@ def comparison_context(comparison: SideBySide) -> dict[str, Any]:
 
 
 def _is_modulus(comparison: SideBySide, place: str) -> bool:
-    return ContrastHeaders.of(next(iter(comparison.at(place).values()))).stiffness.startswith("modulus")
+    return ContrastHeaders.from_table(next(iter(comparison.differences_at(place).values()))).stiffness.startswith(
+        "modulus"
+    )
 
 
 def _entry(entry: ComparedEntry) -> dict[str, Any]:
@@ -81,20 +94,20 @@ def _entry(entry: ComparedEntry) -> dict[str, Any]:
     if measured:
         strain = format_range("%", *(100.0 * end for end in measured.strain))
         tests = f"{format_range('Hz', *measured.frequency)}, strain {strain}, {', '.join(measured.directions)}"
-    stated = dict(conditions(source.conditions for source in entry["inputs"]))
+    test_conditions = dict(conditions(source.conditions for source in entry["inputs"]))
     body = tube_description(Bushing(*astuple(bushing))) if bushing else "rubber compound"
-    return {"of": entry, "body": body, "tests": tests, "conditions": stated}
+    return {"of": entry, "body": body, "tests": tests, "conditions": test_conditions}
 
 
 def _sizes(comparison: SideBySide, place: str) -> Iterator[dict[str, Any]]:
     """Smallest and largest difference from the first result at a place, and the number of significant points."""
-    for label, table in comparison.at(place).items():
-        heads = ContrastHeaders.of(table)
+    for label, table in comparison.differences_at(place).items():
+        heads = ContrastHeaders.from_table(table)
         row: dict[str, Any] = {"label": label, "place": place}
         for key, header, scale, unit in (("stiffness", heads.relative, 100.0, " %"), ("loss", heads.loss, 1.0, "")):
             (values,) = scale * numbers(table, header)
-            known = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
-            ends = dict.fromkeys(signed(end, 0.1 * max(map(abs, known))) for end in known)
+            finite_ends = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
+            ends = dict.fromkeys(signed(end, 0.1 * max(map(abs, finite_ends))) for end in finite_ends)
             row[key] = " to ".join(ends) + unit
             significant = int((table[f"{header}, sure"] == "yes").sum())
             count = "all" if significant == len(table) else f"{significant} of"
@@ -110,22 +123,22 @@ def _tabled(comparison: SideBySide, places: Sequence[str]) -> Iterator[tuple[Any
     Cells: place, label, frequency, amplitude; then of stiffness and loss factor both values, their difference with its
     interval, and whether it is significant at all points at once.
     """
-    tables = [(label, place, table) for place in places for label, table in comparison.at(place).items()]
-    most = max(_ROWS // max(len(tables), 1), 1)
-    amplitudes = min(most, _AMPLITUDES)
+    tables = [(label, place, table) for place in places for label, table in comparison.differences_at(place).items()]
+    point_limit = max(_ROWS // max(len(tables), 1), 1)
+    amplitudes = min(point_limit, _AMPLITUDES)
     for label, place, table in tables:
-        heads, loss = ContrastHeaders.of(table), "loss factor [-]"
+        heads, loss = ContrastHeaders.from_table(table), "loss factor [-]"
         ((_, length), (_, unit)) = (split_header(header) for header in heads[:2])
         kinds = ((heads.stiffness, heads.relative, f" {unit}", 100.0, " %"), (loss, heads.loss, "", 1.0, ""))
         amplitude, frequency = numbers(table, heads.amplitude, "frequency [Hz]")
-        for index in grid_corners(amplitude, frequency, amplitudes, min(most // amplitudes, _FREQUENCIES)):
+        for index in grid_corners(amplitude, frequency, amplitudes, min(point_limit // amplitudes, _FREQUENCIES)):
             row, cells = table.iloc[index], []
-            for what, difference, of, scale, percent in kinds:
+            for quantity, difference, suffix, scale, percent in kinds:
                 value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))
                 size, *ends = (signed(end, high - low) for end in (value, low, high))
-                sides = format_aligned([row[f"{who} {what}"] for who in ("reference", "other")], 4)
+                sides = format_aligned([row[f"{who} {quantity}"] for who in ("reference", "other")], 4)
                 significant = row[f"{difference}, sure"] == "yes"
-                cells.append((*(side + of for side in sides), size + percent, " to ".join(ends), significant))
+                cells.append((*(side + suffix for side in sides), size + percent, " to ".join(ends), significant))
             point = f"{number(frequency[index], 4)} Hz", format_range(length or "", amplitude[index])
             yield place, label, *point, *cells
 
@@ -137,4 +150,8 @@ def _files(compared: Sequence[ComparedEntry]) -> list[tuple[str, str]]:
         named = [(entry["source"], entry["sha256"] or ""), *((str(s.file), s.sha256) for s in entry["inputs"])]
         for file in named:
             labels.setdefault(file, []).append(entry["label"])
-    return [(f"{', '.join(dict.fromkeys(of))}: {file}", sha256) for (file, sha256), of in labels.items() if sha256]
+    return [
+        (f"{', '.join(dict.fromkeys(entry_labels))}: {file}", sha256)
+        for (file, sha256), entry_labels in labels.items()
+        if sha256
+    ]

@@ -68,9 +68,12 @@ def index_page(documents: Documents, _: Tables, *, reported: Collection[str] = (
         documents: `batch`, the content of batch.json.
         reported: folders of the parts that have a report.
         base: start of the links.
+
+    Returns:
+        The page as HTML.
     """
     batch = validate_tables(documents["batch"], None, BatchFile, kind=ModelError)
-    curves = _Curves.of(batch)
+    curves = _Curves.from_batch(batch)
     status = [_status(part) for part in batch.parts]
     ordered = sorted(
         range(len(status)), key=lambda index: _ORDER.index(status[index]) if status[index] else len(_ORDER)
@@ -78,9 +81,9 @@ def index_page(documents: Documents, _: Tables, *, reported: Collection[str] = (
     important = sum(map(bool, status))
     labels = [name for name in _LABELS if len({part.labels.get(name, "") for part in batch.parts}) > 1]
     heads = (["result"] if batch.limits else []) + labels
-    most = max(1, _MOST_CELLS // (len(heads) + len(batch.quantities) + (4 if curves else 1)))
-    first, others = ordered[: min(important, most)], ordered[important:]
-    chosen = first + [others[index] for index in spread(len(others), max(0, most - len(first)))]
+    row_limit = max(1, _MOST_CELLS // (len(heads) + len(batch.quantities) + (4 if curves else 1)))
+    first, ordinary = ordered[: min(important, row_limit)], ordered[important:]
+    chosen = first + [ordinary[index] for index in spread(len(ordinary), max(0, row_limit - len(first)))]
     warnings = list(dict.fromkeys(line for index in chosen for line in batch.parts[index].warnings))
 
     def link(part: PartTable) -> str:
@@ -88,7 +91,7 @@ def index_page(documents: Documents, _: Tables, *, reported: Collection[str] = (
         return base + quote(part.folder) + target if part.folder else ""
 
     def attention(*wanted: str) -> list[tuple[PartTable, str]]:
-        listed = [part for part, what in zip(batch.parts, status, strict=True) if what in wanted]
+        listed = [part for part, state in zip(batch.parts, status, strict=True) if state in wanted]
         return [(part, link(part)) for part in listed[:_MOST_NAMED]]
 
     def remarks(part: PartTable) -> str:
@@ -166,7 +169,7 @@ class _Curves:
     usual: Array
 
     @classmethod
-    def of(cls, batch: BatchFile) -> "_Curves | None":
+    def from_batch(cls, batch: BatchFile) -> "_Curves | None":
         """Curves of a batch; None if it has none."""
         if not batch.curve_points:
             return None

@@ -76,6 +76,9 @@ def report_record(documents: Documents, tables: Tables, files: Mapping[str, Path
         tables: by name: loops, sweeps, gap, and one per predicted place, which gives its grid.
         files: of the documents, for error messages.
 
+    Returns:
+        Record for `report_context`.
+
     Raises:
         ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
     """
@@ -150,6 +153,9 @@ def has_model(folder: Path) -> bool:
 def read_results(folder: Path) -> list[ResultFile]:
     """Documents and tables of a folder of results.
 
+    Returns:
+        Result files with the documents and tables of the folder.
+
     Raises:
         ModelError: no folder, no results in it, or a file that is not as bushfit writes it.
     """
@@ -180,6 +186,9 @@ def read_results(folder: Path) -> list[ResultFile]:
 
 def read_table(folder: Path, name: str) -> pd.DataFrame | None:
     """A table of a folder in the form it was written in; None where it is missing.
+
+    Returns:
+        Columns as numbers, or as texts for the headers in `tables.TEXTS`; None without a file.
 
     Raises:
         ModelError: a table that is not as bushfit writes it.

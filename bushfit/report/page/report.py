@@ -90,7 +90,14 @@ class Headline(NamedTuple):
 
 
 def report_context(record: ReportRecord) -> dict[str, Any]:
-    """Everything that the template of a report needs."""
+    """Everything that the template of a report needs.
+
+    Args:
+        record: records of the result.
+
+    Returns:
+        Values of the template by name.
+    """
     result, diagnosis, campaign, tests = record.result, record.diagnosis, record.campaign, record.tests
     bodies = [("Bushing", tube_description(result.model.bushing))] if result.model.bushing else []
     bodies += [(f"Specimen {specimen}", _specimen_description(specimen)) for specimen in result.specimens]
@@ -142,6 +149,13 @@ def headline(record: ReportRecord, prediction: Prediction) -> Headline:
     The point is the amplitude in the middle of those predicted and the frequency nearest to the geometric mean of the
     lowest and highest. Static stiffness is that at the lowest tested frequency, where it is at most 1 Hz, at the same
     amplitude. The interval of the dynamic stiffening counts the correlation of both.
+
+    Args:
+        record: records of the result.
+        prediction: prediction of one place on its grid.
+
+    Returns:
+        Texts with units.
     """
     result, place = record.result, prediction.direction
     (length, to_length), _, (name, factor) = place.display
@@ -156,7 +170,7 @@ def headline(record: ReportRecord, prediction: Prediction) -> Headline:
     unit, to_unit = display_unit(name, factor, float(stiffness.value[dynamic]))
     values = [[to_unit * float(end[i]) for end in (stiffness.value, stiffness.low, stiffness.high)] for i in (0, -1)]
     loss = [float(end[dynamic]) for end in (points.loss_factor.value, points.loss_factor.low, points.loss_factor.high)]
-    known = static != dynamic and lowest <= _STATIC
+    has_static = static != dynamic and lowest <= _STATIC
     return Headline(
         str(place),
         f"{number(frequency, 3)} Hz",
@@ -167,9 +181,9 @@ def headline(record: ReportRecord, prediction: Prediction) -> Headline:
         _interval(loss, 3),
         f"{number(math.degrees(math.atan(loss[0])), 3)}°",
         _accuracy(result, str(place)),
-        f"{number(values[0][0], 4)} {unit}" if known else "not tested",
-        f"at {number(lowest, 2)} Hz" if known else f"lowest frequency {number(lowest, 3)} Hz",
-        _stiffening(points.stiffness.root, stiffness.value) if known else "",
+        f"{number(values[0][0], 4)} {unit}" if has_static else "not tested",
+        f"at {number(lowest, 2)} Hz" if has_static else f"lowest frequency {number(lowest, 3)} Hz",
+        _stiffening(points.stiffness.root, stiffness.value) if has_static else "",
         _basis(record, str(place)),
     )
 
@@ -239,8 +253,8 @@ def _figures(record: ReportRecord, predictions: Sequence[Prediction]) -> tuple[l
         appendix.append(("s", lambda: plots.fits.sweeps_figure(result, sweeps, "Sweeps and their residuals")))
     for count, prediction in enumerate(predictions):
         place = prediction.direction
-        shown = partial(plots.prediction.prediction_figure, result, prediction, sweeps)
-        page.append((f"p{count}-", partial(shown, f"{place}: prediction and measurement")))
+        draw_place = partial(plots.prediction.prediction_figure, result, prediction, sweeps)
+        page.append((f"p{count}-", partial(draw_place, f"{place}: prediction and measurement")))
         if np.unique(prediction.frequency).size > 1:
             parts = partial(plots.appendix.complex_figure, result, prediction, sweeps)
             appendix.append((f"c{count}-", partial(parts, f"{place}: storage and loss stiffness, Cole-Cole diagram")))
@@ -269,9 +283,16 @@ def _specimen_description(specimen: Specimen) -> str:
     )
 
 
-def conditions(stated: Iterable[Mapping[str, str | float]]) -> Iterator[tuple[str, str]]:
-    """Names and values of the conditions of all tests, each distinct value once."""
-    tests = list(stated)
+def conditions(test_conditions: Iterable[Mapping[str, str | float]]) -> Iterator[tuple[str, str]]:
+    """Names and values of the conditions of all tests, each distinct value once.
+
+    Args:
+        test_conditions: conditions of each test by their campaign keys.
+
+    Returns:
+        An iterator over pairs of name and value.
+    """
+    tests = list(test_conditions)
     for key, name in _CONDITIONS.items():
         values = list(dict.fromkeys(test[key] for test in tests if key in test))
         if numbers := sorted(value for value in values if not isinstance(value, str)):
@@ -287,7 +308,7 @@ def _test_row(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str | int
     """Texts of a row of the table of tests: range, conditions and misfit of the model."""
     unit, factor = DISPLAYS[test.unit]
     misfit = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
-    stated = [
+    condition_texts = [
         words.format(value if isinstance(value, str) else number(value, 3))
         for key, words in _BESIDE_TEST.items()
         if (value := test.conditions.get(key)) is not None
@@ -299,7 +320,7 @@ def _test_row(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str | int
         "frequency": format_range("Hz", *test.frequency_Hz),
         "amplitude": format_range(unit, *(factor * end for end in test.amplitude)),
         "rows": test.rows,
-        "conditions": ", ".join(stated),
+        "conditions": ", ".join(condition_texts),
         "use": ("fitted" if misfit.fitted else "not fitted") if misfit else "",
         "nrmse": f"{number(100 * misfit.nrmse, 2)} %" if misfit else "",
         "chi": number(misfit.reduced_chi_square, 2) if misfit else "",
@@ -355,7 +376,16 @@ def _tabled(predictions: Sequence[Prediction]) -> Iterator[list[str]]:
 
 
 def grid_corners(amplitude: Array, frequency: Array, amplitudes: int, frequencies: int) -> Iterator[int]:
-    """Indices of at most so many operating points, evenly over the amplitudes and frequencies of a grid, each (n,)."""
+    """Indices of at most so many operating points, evenly over the amplitudes and frequencies of a grid, each (n,).
+
+    Args:
+        amplitude: amplitude of each point of the grid [m, rad or 1], (n,).
+        frequency: frequency of each point [Hz], (n,).
+        amplitudes, frequencies: largest number of amplitudes, and of frequencies at each.
+
+    Returns:
+        An iterator over indices of operating points.
+    """
     levels = np.unique(amplitude)
     for level in levels[spread(levels.size, amplitudes)]:
         rows = np.flatnonzero(amplitude == level)

@@ -48,6 +48,9 @@ def picture(figure: Figure, name: str) -> Picture:
     Args:
         figure: to draw; title and caption are removed from it.
         name: that no other picture of the page has; identifiers begin with it.
+
+    Returns:
+        Title, caption and drawing for the template.
     """
     title, caption = figure.get_suptitle().replace("\n", " "), figure.get_supxlabel().replace("\n", " ")
     figure.suptitle("")

@@ -40,6 +40,9 @@ def complex_figure(result: Result, prediction: Prediction, table: pd.DataFrame |
         prediction: of one place, at two frequencies or more.
         table: sweeps, as `tables.sweeps_table` makes it; those that step the frequency are laid over; None without.
         title: of the figure.
+
+    Returns:
+        Figure with three panels.
     """
     place = prediction.direction
     amplitude_header, stiffness_header, _ = columns_of(place)
@@ -51,12 +54,12 @@ def complex_figure(result: Result, prediction: Prediction, table: pd.DataFrame |
     figure = style.new_figure(title, style.ROW)
     storage, loss, cole_cole = figure.subplots(1, 3)
     for level, look in zip(levels, style.styles(levels.size, "amplitude"), strict=True):
-        here = lines.amplitude == level
-        frequency = lines.frequency[here]
+        mask = lines.amplitude == level
+        frequency = lines.frequency[mask]
         for axes, band in ((storage, lines.storage_stiffness), (loss, lines.loss_stiffness)):
-            axes.plot(frequency, factor * band.value[here], color=look.color, ls=look.dashes, lw=1.1)
-            axes.fill_between(frequency, factor * band.low[here], factor * band.high[here], color=look.color, alpha=0.2)
-        real, imaginary = (factor * b.value[here] for b in (lines.storage_stiffness, lines.loss_stiffness))
+            axes.plot(frequency, factor * band.value[mask], color=look.color, ls=look.dashes, lw=1.1)
+            axes.fill_between(frequency, factor * band.low[mask], factor * band.high[mask], color=look.color, alpha=0.2)
+        real, imaginary = (factor * b.value[mask] for b in (lines.storage_stiffness, lines.loss_stiffness))
         cole_cole.plot(real, imaginary, color=look.color, ls=look.dashes, lw=1.1)
         near = measured[np.isclose(measured[amplitude_header], level * length, 0.01, 0.0)]
         x, magnitude, loss_factor = (near[name] for name in ("frequency [Hz]", stiffness_header, "loss factor [-]"))
@@ -79,8 +82,8 @@ def _measured(result: Result, prediction: Prediction, table: pd.DataFrame | None
     keys, values = ["frequency [Hz]", amplitude], [stiffness, "loss factor [-]"]
     if table is None or table.empty:
         return pd.DataFrame(columns=[*keys, *values], dtype=float)
-    here = table[table["direction"] == str(prediction.direction)]
-    groups = [group for group in sweep_groups(here, result) if group.axis == "frequency" and group.shares_levels]
+    sweeps = table[table["direction"] == str(prediction.direction)]
+    groups = [group for group in sweep_groups(sweeps, result) if group.axis == "frequency" and group.shares_levels]
     rows = [curve.rows[curve.rows["outlier"] == "no"] for group in groups for curve in group.curves]
     empty = pd.DataFrame(columns=[*keys, *values], dtype=float)
     return pd.concat(rows).groupby(keys, as_index=False)[values].mean() if rows else empty
@@ -117,16 +120,16 @@ def ellipses_figure(result: Result, title: str) -> Figure | None:
     axes.spines[:].set_visible(False)
     frames, ellipses = [], []
     # one panel for all pairs: a panel each takes ten times as long to draw
-    for y, low in enumerate(rows[:0:-1]):
-        for x, left in enumerate(rows[: len(rows) - 1 - y]):
-            correlation = correlations.get(frozenset((left.name, low.name)), 0.0)
-            chosen = np.isin(covariance.names, (left.name, low.name))
+    for y, y_row in enumerate(rows[:0:-1]):
+        for x, x_row in enumerate(rows[: len(rows) - 1 - y]):
+            correlation = correlations.get(frozenset((x_row.name, y_row.name)), 0.0)
+            chosen = np.isin(covariance.names, (x_row.name, y_row.name))
             radius = float(np.sqrt(2.0 * fdtri(2.0, covariance.freedom(chosen).min(), 0.95)))
             scale = _HALF_CELL / (1.15 * radius)
             across, up = np.cos(angle), correlation * np.cos(angle) + math.sqrt(1.0 - correlation**2) * np.sin(angle)
             ellipses.append(np.stack([x + scale * radius * across, y + scale * radius * up], axis=1))
             frames.append(corners + np.array([x, y]))
-            x_ends, y_ends = (scale * halves[row.name] * np.array([-1.0, 1.0]) for row in (left, low))
+            x_ends, y_ends = (scale * halves[row.name] * np.array([-1.0, 1.0]) for row in (x_row, y_row))
             dashed: dict[str, Any] = {"color": style.GREY, "lw": 0.6, "ls": [(0, (4, 3))]}
             axes.vlines(x + x_ends, y - _HALF_CELL, y + _HALF_CELL, **dashed)
             axes.hlines(y + y_ends, x - _HALF_CELL, x + _HALF_CELL, **dashed)
@@ -134,9 +137,9 @@ def ellipses_figure(result: Result, title: str) -> Figure | None:
             text = f"{correlation:+.2f}"
             axes.text(x, y + _HALF_CELL + 0.02, text, ha="center", va="bottom", **(style.WORDS | strong))
             if y == 0:
-                _add_ticks(axes.xaxis, x, x_ends, left, "\n")
+                _add_ticks(axes.xaxis, x, x_ends, x_row, "\n")
             if x == 0:
-                _add_ticks(axes.yaxis, y, y_ends, low)
+                _add_ticks(axes.yaxis, y, y_ends, y_row)
     axes.add_collection(PolyCollection(frames, facecolors="none", edgecolors=style.INK, lw=0.8))
     axes.add_collection(PolyCollection(ellipses, facecolors="#1f4e9c40", edgecolors="#1f4e9c", lw=1.0))
     axes.tick_params(length=0.0)

@@ -56,7 +56,7 @@ class Panel:
 
     Args:
         title: what it is, with its unit.
-        values: one per bushing, NaN where there is none, (n,).
+        values: value of each bushing, NaN where it is not known, (n,).
         allowed: the lowest and the highest allowed value; empty where there is no limit.
         missed: places of the bushings that miss it.
         intervals: ends of the 95 % intervals, (2, n), where they are known.
@@ -73,13 +73,19 @@ class Panel:
 def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> Figure:
     """Two columns of panels, the bushings along x in the manifest's order; of more than forty quantities the first.
 
-    The names of the bushings, (n,), stand along x too where they are few.
+    Args:
+        panels: quantities of the batch.
+        title: name of the batch.
+        names: names of the bushings, (n,); they are ticks along x where they are few.
+
+    Returns:
+        Figure with a panel per quantity.
     """
     drawn = panels[:_MOST_PANELS]
-    along = [shortened(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
+    tick_names = [shortened(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
     lines = math.ceil(len(drawn) / _COLUMNS)
-    height = style.ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * style.FRAME
-    height += 0.12 * max(0, max(map(len, along), default=0) - 16)  # there is room for 16 letters as it is
+    height = style.ROW * (0.9 + 0.1 * bool(tick_names)) * lines + 0.35 * style.FRAME
+    height += 0.12 * max(0, max(map(len, tick_names), default=0) - 16)  # there is room for 16 letters as it is
     figure = style.new_figure(f"{title}: {len(names)} bushings", height)
     grid = figure.subplots(lines, _COLUMNS, sharex=True, squeeze=False)
     for axes in grid.flat[len(drawn) :]:
@@ -89,28 +95,30 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
         lowest = place + _COLUMNS >= len(drawn)
         axes.tick_params(labelbottom=lowest)
         axes.xaxis.set_in_layout(place // _COLUMNS == lines - 1)  # else its labels hang into the empty cell below
-        if along:
-            ticks = range(1, len(along) + 1)
-            axes.set_xticks(ticks, along, rotation=90, fontsize=style.SMALL - 1, family=style.fonts(), parse_math=False)
+        if tick_names:
+            ticks = range(1, len(tick_names) + 1)
+            axes.set_xticks(
+                ticks, tick_names, rotation=90, fontsize=style.SMALL - 1, family=style.fonts(), parse_math=False
+            )
         elif lowest:
             axes.set_xlabel("bushing, in the manifest's order", **style.WORDS)
         axes.set_xlim(0.5, len(names) + 0.5)
     limits = "Dashed: limits; red: out of them, the worst by name." if any(panel.allowed for panel in drawn) else ""
-    beyond = "Triangles: further out than the panel reaches, the furthest by name and value."
+    beyond_note = "Triangles: further out than the panel reaches, the furthest by name and value."
     few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in drawn)
     more = f"The first {len(drawn)} of {len(panels)} quantities." * (len(panels) > len(drawn))
     return style.explained(
-        figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more
+        figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond_note, more
     )
 
 
 def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     """One quantity over all bushings, with its limits and the names of those that miss them."""
-    there = np.isfinite(panel.values)
-    place, values = np.flatnonzero(there), panel.values[there]
-    ends = None if panel.intervals is None else panel.intervals[:, there]
+    finite = np.isfinite(panel.values)
+    place, values = np.flatnonzero(finite), panel.values[finite]
+    ends = None if panel.intervals is None else panel.intervals[:, finite]
     low, high = _reach(values, panel.allowed, ends)
-    shown = np.clip(values, low, high)
+    clipped = np.clip(values, low, high)
     bad = np.isin(place, list(panel.missed))
     cloud = values.size > _CLOUD
     good_style = {**style.DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, 1500 / values.size))} if cloud else style.POINT
@@ -118,9 +126,9 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
         axes.vlines(place + 1, *ends, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
     kinds = (~bad, _GOOD, good_style, 2), (bad, _OUT, style.DOT if cloud else style.POINT, 4)
     for chosen, color, look, order in kinds:
-        for marker, which in (("o", shown == values), ("^", shown < values), ("v", shown > values)):
-            at, drawn = chosen & which, look if marker == "o" else style.POINT
-            axes.plot(place[at] + 1, shown[at], marker, color=color, zorder=order, rasterized=cloud, **drawn)
+        for marker, mask in (("o", clipped == values), ("^", clipped < values), ("v", clipped > values)):
+            subset, drawn = chosen & mask, look if marker == "o" else style.POINT
+            axes.plot(place[subset] + 1, clipped[subset], marker, color=color, zorder=order, rasterized=cloud, **drawn)
     axes.axhline(float(np.median(values)), color=style.GREY, lw=0.9, zorder=1)
     for limit in filter(math.isfinite, panel.allowed):
         axes.axhline(limit, color=_OUT, lw=0.9, ls=(0, (5, 2)), zorder=3)
@@ -133,7 +141,7 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     axes.set_title(panel.title + count, fontsize=style.SMALL, loc="left", color=_OUT if count else style.INK, pad=3)
     _name(axes, panel, (low, high), names)
     if cloud:  # how many bushings lie where, at the right edge
-        counts, edges = np.histogram(shown, bins=60, range=axes.get_ylim())
+        counts, edges = np.histogram(clipped, bins=60, range=axes.get_ylim())
         side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
         side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)
         side.set_axis_off()
@@ -151,8 +159,10 @@ def _reach(values: Array, allowed: Sequence[float], ends: Array | None) -> tuple
     half = np.ptp(ends, axis=0) / 2.0 if ends is not None else np.empty(0)
     half = half[np.isfinite(half)]
     rounding = 5e-4 * abs(middle)
-    least = max(float(np.median(half)) if half.size else 0.0, rounding) or 1.0
-    return min(float(near.min()), *limits, middle - least), max(float(near.max()), *limits, middle + least)
+    minimum_half = max(float(np.median(half)) if half.size else 0.0, rounding) or 1.0
+    return min(float(near.min()), *limits, middle - minimum_half), max(
+        float(near.max()), *limits, middle + minimum_half
+    )
 
 
 def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[str]) -> None:
@@ -162,24 +172,25 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
     """
     low, high = panel.allowed if panel.allowed else (-math.inf, math.inf)
     middle = float(np.nanmedian(panel.values))
-    beyond = set(np.flatnonzero((panel.values < reach[0]) | (panel.values > reach[1])).tolist())
+    outside = set(np.flatnonzero((panel.values < reach[0]) | (panel.values > reach[1])).tolist())
 
     def order(k: int) -> tuple[bool, float]:
         value = panel.values[k]
         return k not in panel.missed, min(high - value, value - low) if k in panel.missed else -abs(value - middle)
 
-    taken: list[tuple[float, float, int, bool]] = []
-    for k in sorted(beyond.union(panel.missed), key=order)[:_MOST_NAMED]:
+    occupied: list[tuple[float, float, int, bool]] = []
+    for k in sorted(outside.union(panel.missed), key=order)[:_MOST_NAMED]:
         value = float(np.clip(panel.values[k], *reach))
-        text = shortened(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in beyond else "")
+        text = shortened(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in outside else "")
         place, above = (k + 0.5) / panel.values.size, value < (reach[0] + reach[1]) / 2.0
         half, line = 0.5 * _LETTER * len(text), 1
         center = min(max(place, half), 1.0 - half)
         while any(
-            abs(center - other) < half + room and at == line and side == above for other, room, at, side in taken
+            abs(center - other_center) < half + room and other_line == line and side == above
+            for other_center, room, other_line, side in occupied
         ):
             line += 1
-        taken.append((center, half, line, above))
+        occupied.append((center, half, line, above))
         axes.annotate(
             text,
             (center, value),
@@ -205,6 +216,9 @@ def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Ar
         headers: columns of the points, such as "measured stiffness axial 25 Hz 0.1 mm [N/mm]", (k,).
         usual: stiffness of the parts that do not differ, in the unit of the headers, (n, k).
         singles: stiffness of the parts that differ, by name, (k,) each; six are drawn.
+
+    Returns:
+        Figure with one panel.
     """
     points = [match.groupdict() for header in headers if (match := _POINT.fullmatch(header))]
     place, unit, length = (points[0][name] for name in ("place", "unit", "length"))
@@ -230,34 +244,40 @@ def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Ar
 
 
 @style.in_own_style
-def comparison_figure(found: SideBySide) -> Figure:
+def comparison_figure(comparison: SideBySide) -> Figure:
     """All results at every place they are compared at: two rows of panels a place, the differences below the values.
 
     Drawn over frequency at the smallest and the largest amplitude, or over amplitude where there is one frequency.
+
+    Args:
+        comparison: validated comparison.
+
+    Returns:
+        Figure with four panels per place.
     """
-    first, *others = found.names
-    shown = [found.curves(place) for place in found.places]
-    figure = style.new_figure(f"{', '.join(others)} against {first}", 2 * len(shown) * style.ROW)
-    grid = figure.subplots(2 * len(shown), 2, squeeze=False)
-    looks = dict(zip(found.names, style.styles(len(found.names), "loop"), strict=True))
-    for i, sides in enumerate(shown):
+    first, *other_labels = comparison.names
+    contrasts = [comparison.curves(place) for place in comparison.places]
+    figure = style.new_figure(f"{', '.join(other_labels)} against {first}", 2 * len(contrasts) * style.ROW)
+    grid = figure.subplots(2 * len(contrasts), 2, squeeze=False)
+    looks = dict(zip(comparison.names, style.styles(len(comparison.names), "loop"), strict=True))
+    for i, sides in enumerate(contrasts):
         for axes, panel in zip(grid[2 * i : 2 * i + 2].flat, sides.panels, strict=True):
             for line in panel.lines:
-                look, along = looks[line.label], {"ls": _DASHES[line.level], "lw": _STROKE, **style.POINT}
+                look, line_style = looks[line.label], {"ls": _DASHES[line.level], "lw": _STROKE, **style.POINT}
                 markers = {"marker": look.marker, "markevery": max(line.x.size // _MARKS, 1)}
-                axes.plot(line.x, line.value, color=look.color, **markers, **along)
+                axes.plot(line.x, line.value, color=look.color, **markers, **line_style)
                 # bands of several results lie on each other
                 axes.fill_between(line.x, line.low, line.high, color=look.color, alpha=0.18, lw=0)
-            shown_as = panel.header if panel.least else f"{sides.place} {panel.header}"
-            style.label_axes(axes, sides.along, shown_as, panel.lines[0].x)
-            if panel.least:
+            y_label = panel.header if panel.minimum_span else f"{sides.place} {panel.header}"
+            style.label_axes(axes, sides.x_header, y_label, panel.lines[0].x)
+            if panel.minimum_span:
                 axes.axhline(0.0, color=looks[first].color, lw=_STROKE)
-                style.least_span(axes, panel.least)
+                style.widen_span(axes, panel.minimum_span)
         marked = {"lw": _STROKE, **style.POINT}
         lines = [Line2D([], [], color=look.color, marker=look.marker, **marked) for look in looks.values()]
         dashes = [Line2D([], [], color=style.INK, lw=_STROKE, ls=dash) for dash in _DASHES[: len(sides.levels)]]
-        called = [f"{label}: {style.file_name(name)}" for label, name in found.names.items()]
-        style.legend(grid[2 * i, 1], lines, called, "", besides=dict(zip(sides.levels, dashes, strict=True)))
+        called = [f"{label}: {style.file_name(name)}" for label, name in comparison.names.items()]
+        style.legend(grid[2 * i, 1], lines, called, "", extra_lines=dict(zip(sides.levels, dashes, strict=True)))
     return style.explained(
         figure,
         "Shaded: 95 % bands. Lower panels: the band of each point by itself; "

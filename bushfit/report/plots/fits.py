@@ -54,6 +54,9 @@ def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
         result: the model beside the tests.
         table: as `tables.sweeps_table` makes it.
         title: of the figure.
+
+    Returns:
+        Figure with four panels per place and stepped quantity.
     """
     groups = [group.thinned() for group in sweep_groups(table, result)]
     figure = style.new_figure(title, (style.ROW + _STRIP) * len(groups))
@@ -114,19 +117,19 @@ def drawn_points(curve: Curve) -> pd.DataFrame:
 
 
 def draw_points(
-    axes: Axes, rows: pd.DataFrame, along: str, header: str, scale: float, look: style.Style, curves: int
+    axes: Axes, rows: pd.DataFrame, x_header: str, header: str, scale: float, look: style.Style, curves: int
 ) -> None:
     """Draw means of the repeats of a column with bars from the smallest to the largest.
 
     Args:
         axes: panel.
         rows: of one level.
-        along, header: columns along x and y.
+        x_header, header: columns along x and y.
         scale: factor from the column to the panel.
         look: of the level.
         curves: number of levels in the panel, which share its points.
     """
-    repeats = rows.groupby(along)[header]
+    repeats = rows.groupby(x_header)[header]
     count = len(repeats)
     drawn = scale * repeats.agg(["mean", "min", "max"]).iloc[thinning(count, curves)]
     if count < len(rows):
@@ -137,8 +140,8 @@ def draw_points(
 
 def thinning(count: int, curves: int) -> slice:
     """Every n-th of the points of a curve, so that the panel stays readable."""
-    most = max(_CURVE_POINTS, _PANEL_POINTS // curves)
-    return slice(None, None, max(1, -(-count // most)))
+    maximum = max(_CURVE_POINTS, _PANEL_POINTS // curves)
+    return slice(None, None, max(1, -(-count // maximum)))
 
 
 def points_note(table: pd.DataFrame) -> str:
@@ -204,6 +207,9 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
         result: the model beside the tests; it includes the effects of the rig.
         table: as `tables.loops_table` makes it.
         title: of the figure.
+
+    Returns:
+        Figure with two panels per place.
     """
     places = list(loops_of(table, result))
     figure = style.new_figure(title, 1.25 * style.ROW * len(places))  # a hysteresis loop wants a square
@@ -222,7 +228,7 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
         phase_panel.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
         handles = [look.handle(False) for look in style.styles(len(loops), "loop")]
         model = {"model": Line2D([], [], color=style.INK, lw=0.8)}
-        style.legend(phase_panel, handles, loop_labels(place, loops), "loop", besides=model)
+        style.legend(phase_panel, handles, loop_labels(place, loops), "loop", extra_lines=model)
     return style.explained(
         figure,
         "Left: measured force over displacement without its noise. Black lines: model. Right: measured minus model, "
@@ -239,23 +245,31 @@ def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame]) -> No
     name, factor = place.display.force
     unit, to_figure = display_unit(name, factor, max(loop[force].abs().max() for loop in loops.values()) / factor)
     scale = to_figure / factor
-    moved, resisting, _ = place.motion.words
-    style.label_axes(axes, f"{moved} [{place.display.displacement.name}]", f"{place} {resisting} [{unit}]")
+    motion_name, resisting, _ = place.motion.words
+    style.label_axes(axes, f"{motion_name} [{place.display.displacement.name}]", f"{place} {resisting} [{unit}]")
     for loop, look in zip(loops.values(), style.styles(len(loops), "loop"), strict=True):
         counted = loop[loop["outlier"] == "no"]
-        shown = counted.iloc[_drawn_rows(counted)]
-        modelled = scale * shown[f"model {force}"].to_numpy()
-        turns = shown["time [s]"] * shown["frequency [Hz]"]
+        drawn = counted.iloc[_drawn_rows(counted)]
+        modelled = scale * drawn[f"model {force}"].to_numpy()
+        turns = drawn["time [s]"] * drawn["frequency [Hz]"]
         modelled[1:][np.diff(turns) > 0.5] = np.nan  # between the first and the last cycles
-        axes.plot(shown[motion], scale * shown[force], "o", color=look.color, alpha=0.5, **style.DOT)
-        axes.plot(shown[motion], modelled, color=style.INK, lw=0.8)
+        axes.plot(drawn[motion], scale * drawn[force], "o", color=look.color, alpha=0.5, **style.DOT)
+        axes.plot(drawn[motion], modelled, color=style.INK, lw=0.8)
     outliers = pd.concat(loops.values())
     outliers = outliers[outliers["outlier"] == "yes"]
     style.mark_outliers(axes, outliers[motion].to_numpy(), scale * outliers[force].to_numpy())
 
 
 def loop_labels(place: Place, loops: dict[str, pd.DataFrame]) -> list[str]:
-    """Label of each loop by amplitude and frequency, with the name of the test where these repeat."""
+    """Label of each loop by amplitude and frequency, with the name of the test where these repeat.
+
+    Args:
+        place: direction or specimen of the loops.
+        loops: rows of each loop by the name of its test.
+
+    Returns:
+        Labels in the order of the loops.
+    """
     labels = []
     for loop in loops.values():
         motion = loop[moved_of(place)]

@@ -59,6 +59,9 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
         result: the model to use, whose specimens give places by their names.
         diagnosis: the document of diagnosis.json.
         title: of the figure.
+
+    Returns:
+        Figure with a row of panels per map and per place with loops.
     """
     sides = _sides(table, diagnosis)
     sweeps = table[table["kind"] == "sweep"]
@@ -153,8 +156,8 @@ def _scale(sweeps: pd.DataFrame, sides: Mapping[str, str]) -> tuple[Array, Scala
 def _draw_map(axes: Axes, group: SweepGroup, header: str, colors: ScalarMappable) -> None:
     """Draw a row of cells per level, each as wide as the step."""
     rows = _map_rows(group)
-    along = np.concatenate([curve.rows[group.x_header] for curve in rows])
-    logarithmic = _is_logarithmic(along)
+    x_values = np.concatenate([curve.rows[group.x_header] for curve in rows])
+    logarithmic = _is_logarithmic(x_values)
     ends = []
     for row, curve in enumerate(rows):
         x, values = _binned(*means(curve.rows, group.x_header, header))
@@ -167,12 +170,12 @@ def _draw_map(axes: Axes, group: SweepGroup, header: str, colors: ScalarMappable
         inset = 0.3 * (high - low)[below]
         axes.hlines(np.full(inset.size, row), low[below] + inset, high[below] - inset, color="white", lw=1.1)
         ends.append((low.min(), high.max()))
-    left, right = np.array(ends)[:, 0].min(), np.array(ends)[:, 1].max()
-    axes.hlines(np.arange(1, len(rows)) - 0.5, left, right, color="white", lw=1.5)
+    x_start, x_end = np.array(ends)[:, 0].min(), np.array(ends)[:, 1].max()
+    axes.hlines(np.arange(1, len(rows)) - 0.5, x_start, x_end, color="white", lw=1.5)
     axes.set(ylim=(-0.5, len(rows) - 0.5))
     if logarithmic:
-        style.logarithmic(axes, along)
-    axes.set_xlim(left, right)
+        style.logarithmic(axes, x_values)
+    axes.set_xlim(x_start, x_end)
     axes.grid(visible=False)
     axes.spines[:].set(visible=True, color=style.GREY)
 
@@ -183,25 +186,28 @@ def _binned(x: Array, values: Array) -> tuple[Array, Array]:
     return np.array([x[block].mean() for block in blocks]), np.array([values[block].mean() for block in blocks])
 
 
-def _is_logarithmic(along: Array) -> bool:
+def _is_logarithmic(values: Array) -> bool:
     """Check for values that are spaced more evenly by ratio than by difference."""
-    distinct = np.unique(along)
+    distinct = np.unique(values)
     if distinct.size < 3:
         return False
     ratios, steps = np.diff(np.log(distinct)), np.diff(distinct)
     return bool(np.std(ratios) / np.mean(ratios) < np.std(steps) / np.mean(steps))
 
 
-def _cells(along: Array, *, logarithmic: bool) -> tuple[Array, Array]:
+def _cells(values: Array, *, logarithmic: bool) -> tuple[Array, Array]:
     """Lower and upper edge of the cell of each value, (n,) each: half way to its neighbours.
 
     Where one neighbour is much further away than the other, a point was left out and the nearer one decides.
     """
-    x = np.log(along) if logarithmic else along
+    x = np.log(values) if logarithmic else values
     steps = np.diff(x) if x.size > 1 else np.array([0.2 if logarithmic else 0.2 * x[0]])
-    left, right = (np.concatenate(ends)[: x.size] for ends in ((steps[:1], steps), (steps, steps[-1:])))
-    left, right = np.where(left > 1.75 * right, right, left), np.where(right > 1.75 * left, left, right)
-    low, high = x - left / 2.0, x + right / 2.0
+    step_below, step_above = (np.concatenate(ends)[: x.size] for ends in ((steps[:1], steps), (steps, steps[-1:])))
+    step_below, step_above = (
+        np.where(step_below > 1.75 * step_above, step_above, step_below),
+        np.where(step_above > 1.75 * step_below, step_below, step_above),
+    )
+    low, high = x - step_below / 2.0, x + step_above / 2.0
     return (np.exp(low), np.exp(high)) if logarithmic else (np.maximum(low, 0.0), high)
 
 
@@ -238,7 +244,7 @@ def _draw_loops(panels: Sequence[Axes], place: Place, loops: dict[str, pd.DataFr
             curve = sector_means(phase_after_turn(loop, place), loop[f"force {side} [%]"].to_numpy())
             axes.plot(*curve, color=look.color, ls=look.dashes, lw=1.3)
         axes.axhline(0.0, color=style.GREY, lw=0.6, zorder=1)
-        style.least_span(axes, 1.0)
+        style.widen_span(axes, 1.0)
         axes.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
     limits = [axes.get_ylim() for axes in panels]
     for axes in panels:

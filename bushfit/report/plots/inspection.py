@@ -41,12 +41,15 @@ def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 
         files: all files that were inspected.
         first: number of the first file to draw.
         count: of files to draw.
+
+    Returns:
+        Figure with a row of panels per file.
     """
-    shown, names = files[first : first + count], Counter(file.label for file in files)
+    drawn_files, names = files[first : first + count], Counter(file.label for file in files)
     page = f", {first // count + 1} of {-(-len(files) // count)}" if len(files) > count else ""
-    figure = style.new_figure(f"Test files as recorded{page}", (style.ROW + 0.7) * len(shown))
-    grid = figure.add_gridspec(len(shown), 1)
-    for row, file in enumerate(shown):
+    figure = style.new_figure(f"Test files as recorded{page}", (style.ROW + 0.7) * len(drawn_files))
+    grid = figure.add_gridspec(len(drawn_files), 1)
+    for row, file in enumerate(drawn_files):
         name = f"{file.file.parent.name}/{file.label}" if names[file.label] > 1 else file.label
         title = f"{style.file_name(name, letters=48)}: {file.kind}, {file.direction or 'direction unknown'}"
         title += ", sign of the force reversed" * (file.entry.get("force_sign") == -1)
@@ -57,20 +60,20 @@ def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 
             panel = _draw_history(figure, grid[row, 0], file.measured, loop=file.kind == "loop")
         panel.set_title(title, fontsize=8.5, loc="left", color=style.GREY)
     _scale_alike(figure.axes[:])
-    swept = any(isinstance(file.measured, Sweep) for file in shown)
+    swept = any(isinstance(file.measured, Sweep) for file in drawn_files)
     return style.explained(
         figure,
         "Sweeps: points as measured, lines through the means of the repeats." * swept,
-        "Panels of one direction share their scales if each fills a third of them." * (len(shown) > 1),
+        "Panels of one direction share their scales if each fills a third of them." * (len(drawn_files) > 1),
     )
 
 
 def _scale_alike(panels: Sequence[Axes]) -> None:
     """Give panels of one direction and quantity common scales if all stay readable in them."""
-    alike: dict[tuple[object, ...], list[Axes]] = {}
+    groups: dict[tuple[object, ...], list[Axes]] = {}
     for axes in panels:
-        alike.setdefault((axes.get_label(), axes.get_xlabel(), axes.get_ylabel()), []).append(axes)
-    for group in alike.values():
+        groups.setdefault((axes.get_label(), axes.get_xlabel(), axes.get_ylabel()), []).append(axes)
+    for group in groups.values():
         ends = np.array([(axes.get_xlim(), axes.get_ylim()) for axes in group])  # (panels, axes, ends)
         low, high = ends[..., 0].min(axis=0), ends[..., 1].max(axis=0)
         if np.all(high - low <= _ALIKE * np.ptp(ends, axis=-1)):
@@ -112,7 +115,7 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
     length = sweep.direction.display.displacement
     factor, labels = stiffness_scale(sweep.direction, _largest(sweep.direction, sweep.stiffness))
     by_amplitude = sweep.stepped == "amplitude"
-    held, unit, scale = ("frequency", "Hz", 1.0) if by_amplitude else ("amplitude", *length)
+    fixed_quantity, unit, scale = ("frequency", "Hz", 1.0) if by_amplitude else ("amplitude", *length)
     table = pd.DataFrame(
         {
             "x": sweep.step * (length.factor if by_amplitude else 1.0),
@@ -122,7 +125,7 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
         }
     )
     pair = place.subgridspec(1, 2).subplots(squeeze=False)[0]
-    looks = style.styles(table["level"].nunique(), held)
+    looks = style.styles(table["level"].nunique(), fixed_quantity)
     for axes, quantity, label in zip(pair, ("stiffness", "loss"), labels, strict=True):
         for (_, rows), look in zip(table.groupby("level"), looks, strict=True):
             means = rows.groupby("x")[quantity].mean()
@@ -133,7 +136,7 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
         style.label_axes(axes, x_label, label, table["x"].to_numpy())
     if sweep.stepped:
         levels = [format_range(unit, scale * level) for level in np.unique(table["level"])]
-        style.name_levels(pair[-1], levels, held, [True] * len(levels))
+        style.name_levels(pair[-1], levels, fixed_quantity, [True] * len(levels))
     return pair[0]
 
 
@@ -150,24 +153,33 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
         reduction: operating points of all histories.
         histories: as recorded; the first four are drawn.
         title: of the figure.
+
+    Returns:
+        Figure with a strip per history above four panels.
     """
-    shown = histories[:_MOST_HISTORIES]
-    figure = style.new_figure(title, _STRIP * len(shown) + style.ROW + _NOISE_ROW)
-    grid = figure.add_gridspec(len(shown) + 2, 2, height_ratios=[_STRIP] * len(shown) + [style.ROW, _NOISE_ROW])
+    drawn_histories = histories[:_MOST_HISTORIES]
+    figure = style.new_figure(title, _STRIP * len(drawn_histories) + style.ROW + _NOISE_ROW)
+    grid = figure.add_gridspec(
+        len(drawn_histories) + 2, 2, height_ratios=[_STRIP] * len(drawn_histories) + [style.ROW, _NOISE_ROW]
+    )
     steps = pd.DataFrame([vars(step) for step in reduction.steps]).sort_values("frequency", kind="stable")
     levels = np.unique(steps["level"])
     looks = dict(zip(levels, style.styles(len(levels), "amplitude"), strict=True))
-    for row, history in enumerate(shown):
+    for row, history in enumerate(drawn_histories):
         strip = figure.add_subplot(grid[row, :])
         _draw_strip(strip, history, reduction, looks)
         if len(histories) > 1:  # the title names one
             name = style.file_name(history.name, letters=100)  # as many as fit on a line
             strip.set_title(name, fontsize=style.SMALL, loc="left", color=style.GREY, pad=2)
-    points = [figure.add_subplot(grid[len(shown), column]) for column in range(2)]
+    points = [figure.add_subplot(grid[len(drawn_histories), column]) for column in range(2)]
     _draw_points(points, reduction, steps, looks)
-    quality = [figure.add_subplot(grid[len(shown) + 1, column], sharex=points[0]) for column in range(2)]
+    quality = [figure.add_subplot(grid[len(drawn_histories) + 1, column], sharex=points[0]) for column in range(2)]
     _draw_quality(quality, steps, looks)
-    left_out = f" The first {len(shown)} of {len(histories)} histories." if len(histories) > len(shown) else ""
+    left_out = (
+        f" The first {len(drawn_histories)} of {len(histories)} histories."
+        if len(histories) > len(drawn_histories)
+        else ""
+    )
     return style.explained(
         figure,
         f"Top: displacement over time; coloured: steady cycles used, grey: ramps, pauses, transients.{left_out}",
@@ -230,40 +242,48 @@ def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, 
 
 
 @style.in_own_style
-def resonance_figure(found: Resonance, title: str) -> Figure:
-    """Transmissibility, amplitude reached, stiffness and loss factor of a resonance test over the frequency."""
+def resonance_figure(resonance: Resonance, title: str) -> Figure:
+    """Transmissibility, amplitude reached, stiffness and loss factor of a resonance test over the frequency.
+
+    Args:
+        resonance: resonance test reduced to stiffness over frequency.
+        title: title of the figure.
+
+    Returns:
+        Figure with four panels.
+    """
     figure = style.new_figure(title, 2 * style.ROW)
     (ratio, amplitude), (stiffness, loss) = figure.subplots(2, 2, sharex=True)
     (unit, length), _, stiffness_units = TRANSLATION.display
-    stiffness_unit, factor = display_unit(*stiffness_units, float(np.abs(found.stiffness).max()))
+    stiffness_unit, factor = display_unit(*stiffness_units, float(np.abs(resonance.stiffness).max()))
     color = style.styles(1, "amplitude")[0].color
     upper = (
-        (ratio, np.abs(found.transmissibility), "transmissibility |T| [-]"),
-        (amplitude, length * found.amplitude, f"amplitude reached [{unit}]"),
+        (ratio, np.abs(resonance.transmissibility), "transmissibility |T| [-]"),
+        (amplitude, length * resonance.amplitude, f"amplitude reached [{unit}]"),
     )
     for axes, values, label in upper:
-        axes.plot(found.frequency, values, "o", color=color, **style.DOT)
+        axes.plot(resonance.frequency, values, "o", color=color, **style.DOT)
         style.label_axes(axes, "", label)
         style.logarithmic(axes, values, "y")
-    ratio.plot(found.test.frequency, np.abs(found.test.transmissibility), color=style.GREY, lw=0.7, zorder=1)
-    frequency, largest = found.peak
+    ratio.plot(resonance.test.frequency, np.abs(resonance.test.transmissibility), color=style.GREY, lw=0.7, zorder=1)
+    frequency, largest = resonance.peak
     ratio.annotate(f"{frequency:.1f} Hz", (frequency, largest), (4, 0), textcoords="offset points", **style.WORDS)
-    magnitude, factors = factor * np.abs(found.stiffness), loss_factor(found.stiffness)
+    magnitude, factors = factor * np.abs(resonance.stiffness), loss_factor(resonance.stiffness)
     lower = (
         (stiffness, magnitude, magnitude, f"stiffness |K| [{stiffness_unit}]"),
         (loss, factors, 1.0 + factors**2, "loss factor [-]"),
     )
     for axes, values, scale, label in lower:
-        error = 2.0 * found.relative_error * scale
-        axes.plot(found.frequency, values, "o", color=color, **style.DOT)
+        error = 2.0 * resonance.relative_error * scale
+        axes.plot(resonance.frequency, values, "o", color=color, **style.DOT)
         low, high = axes.get_ylim()
-        axes.vlines(found.frequency, values - error, values + error, color=color, lw=0.7, alpha=0.6)
+        axes.vlines(resonance.frequency, values - error, values + error, color=color, lw=0.7, alpha=0.6)
         axes.set_ylim(low, high)
-        style.label_axes(axes, "frequency [Hz]", label, found.test.frequency)
+        style.label_axes(axes, "frequency [Hz]", label, resonance.test.frequency)
     hidden = f"Points with an error of |K| beyond {100 * LARGEST_ERROR:g} % are not drawn."
     return style.explained(
         figure,
         "Grey line: acceleration of the mass over that of the base, as measured. Points: means of neighbouring rows.",
         "Bars: twice the standard error; it is large where the mass moves almost as the base does.",
-        hidden * bool(found.left_out.size),
+        hidden * bool(resonance.left_out.size),
     )

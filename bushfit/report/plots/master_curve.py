@@ -24,25 +24,28 @@ _BEYOND = 4.0
 
 
 @style.in_own_style
-def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> Figure:
+def master_curve_figure(model: Model, shifted_sweeps: Sequence[Shifted], title: str) -> Figure:
     """Stiffness and loss factor over reduced frequency, a row of panels per place.
 
     Args:
-        model: fitted.
-        found: sweeps shifted to 23 degC.
-        title: of the figure.
+        model: fitted model.
+        shifted_sweeps: sweeps shifted to 23 degC.
+        title: title of the figure.
+
+    Returns:
+        Figure with two panels per place.
     """
-    places = list(dict.fromkeys(shifted.sweep.direction for shifted in found))
-    degrees = sorted({_degree(shifted) for shifted in found})
+    places = list(dict.fromkeys(shifted.sweep.direction for shifted in shifted_sweeps))
+    degrees = sorted({_degree(shifted) for shifted in shifted_sweeps})
     figure = style.new_figure(title, style.ROW * len(places))
     grid, levels = figure.subplots(len(places), 2, squeeze=False), []
     for place, (stiffness, loss) in zip(places, grid, strict=True):
-        of_place = [shifted for shifted in found if shifted.sweep.direction is place]
+        of_place = [shifted for shifted in shifted_sweeps if shifted.sweep.direction is place]
         reached = np.sort(np.concatenate([shifted.sweep.amplitude for shifted in of_place]))
         near = np.searchsorted(reached, _NEAR * reached) - np.arange(reached.size)
         level = float(np.median(reached[near.argmax() :][: near.max()]))  # near it most points lie
-        moved, length = place.display.displacement
-        levels.append(f"{place} {number(level * length, 3)} {moved}")
+        length_unit, length = place.display.displacement
+        levels.append(f"{place} {number(level * length, 3)} {length_unit}")
         unit, factor = display_unit(
             *place.display.stiffness, max(np.abs(shifted.reduced_stiffness).max() for shifted in of_place)
         )
@@ -68,28 +71,31 @@ def master_curve_figure(model: Model, found: Sequence[Shifted], title: str) -> F
 
 
 @style.in_own_style
-def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -> Figure:
+def shift_factors_figure(result: Result, shifted_sweeps: Sequence[Shifted], title: str) -> Figure:
     """Shift factors over temperature by the law and of sweep sweep alone, and their difference.
 
     Args:
-        result: fitted, with the error of the law.
-        found: sweeps shifted to 23 degC.
-        title: of the figure.
+        result: fitted result with the error of the law.
+        shifted_sweeps: sweeps shifted to 23 degC.
+        title: title of the figure.
+
+    Returns:
+        Figure with two panels.
     """
     figure = style.new_figure(title, style.ROW)
-    factors, off = figure.subplots(1, 2)
-    kelvin = np.array([shifted.temperature for shifted in found])
+    factors, differences = figure.subplots(1, 2)
+    kelvin = np.array([shifted.temperature for shifted in shifted_sweeps])
     fine = np.linspace(kelvin.min(), kelvin.max(), _FINE)
     line, error = (values / np.log(10.0) for values in law(result, fine))
-    own, unsure = np.array([shifted.own for shifted in found]).T / np.log(10.0)
-    at_law = np.array([shifted.shift[0] for shifted in found]) / np.log(10.0)
+    single, unsure = np.array([shifted.own for shifted in shifted_sweeps]).T / np.log(10.0)
+    at_law = np.array([shifted.shift[0] for shifted in shifted_sweeps]) / np.log(10.0)
     color = style.styles(1, "amplitude")[0].color
-    for axes, base, points in ((factors, line, own), (off, 0.0 * line, own - at_law)):
+    for axes, base, points in ((factors, line, single), (differences, 0.0 * line, single - at_law)):
         axes.fill_between(fine - CELSIUS, base - Z95 * error, base + Z95 * error, color="#ebebeb", lw=0)
         axes.plot(fine - CELSIUS, base, color=style.INK, lw=1.1)
         axes.errorbar(kelvin - CELSIUS, points, Z95 * unsure, fmt="o", color=color, lw=0.8, **style.POINT)
     style.label_axes(factors, "temperature [degC]", "log10 a_T [-]")
-    style.label_axes(off, "temperature [degC]", "log10 a_T, sweep minus law [-]")
+    style.label_axes(differences, "temperature [degC]", "log10 a_T, sweep minus law [-]")
     return style.explained(
         figure,
         f"Line: law, with a shift of {number(result.model.values[SHIFT], 3)} 1/K at 23 °C; grey: its 95 % band.",
@@ -97,9 +103,9 @@ def shift_factors_figure(result: Result, found: Sequence[Shifted], title: str) -
     )
 
 
-def _degree(found: Shifted) -> float:
+def _degree(shifted: Shifted) -> float:
     """Temperature of a sweep, rounded [degC]."""
-    return float(np.round(found.temperature - CELSIUS))
+    return float(np.round(shifted.temperature - CELSIUS))
 
 
 @style.in_own_style
@@ -107,9 +113,12 @@ def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
     """Storage and loss modulus of sweep part and of its Maxwell arms, and the relative error within the band.
 
     Args:
-        model: whose effects the arms replace.
-        arms: of sweep effect.
-        title: of the figure.
+        model: model whose effects the arms replace.
+        arms: arms of each effect.
+        title: title of the figure.
+
+    Returns:
+        Figure with two panels.
     """
     figure = style.new_figure(title, style.ROW)
     moduli, errors = figure.subplots(1, 2)
@@ -121,12 +130,12 @@ def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
     unit, factor = display_unit("Pa", 1.0, max(float(np.abs(whole).max()) for whole in wholes))
     looks = style.styles(len(arms), "loop")
     for part, whole, look in zip(arms, wholes, looks, strict=True):
-        made = part.at(omega)
+        arm_modulus = part.at(omega)
         for share, dashes in ((np.real, "-"), (np.imag, (0, (5, 1.5)))):
             moduli.plot(frequency, factor * share(whole), color=style.GREY, lw=2.6, alpha=0.45, ls=dashes)
-            moduli.plot(frequency, factor * share(made), color=look.color, lw=1.1, ls=dashes)
-        off = 100.0 * np.abs(made / whole - 1.0)[inside]
-        errors.plot(frequency[inside], off, color=look.color, lw=1.1)
+            moduli.plot(frequency, factor * share(arm_modulus), color=look.color, lw=1.1, ls=dashes)
+        percent_error = 100.0 * np.abs(arm_modulus / whole - 1.0)[inside]
+        errors.plot(frequency[inside], percent_error, color=look.color, lw=1.1)
     style.label_axes(moduli, "frequency [Hz]", f"modulus [{unit}]", frequency)
     style.label_axes(errors, "frequency [Hz]", "error of the modulus [%]", frequency)
     moduli.axvspan(low, high, color="#ebebeb", lw=0, zorder=0)

@@ -59,11 +59,6 @@ class SweepGroup(NamedTuple):
         """Header of the column along x."""
         return _header(self.place, self.axis)
 
-    @property
-    def held(self) -> Axis:
-        """Quantity that is held while the other is stepped."""
-        return "amplitude" if self.axis == "frequency" else "frequency"
-
     def thinned(self) -> SweepGroup:
         """At most 24 of the curves, evenly from the first to the last."""
         return self._replace(curves=[self.curves[index] for index in spread(len(self.curves), MOST_CURVES)])
@@ -80,6 +75,9 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
     Args:
         table: as `tables.sweeps_table` or the sweeps of `tables.gap_table` make it.
         result: model whose specimens give places by their names.
+
+    Returns:
+        Groups in the order of the table.
     """
     rows = table.rename(columns={"sweep": "test"})
     groups = []
@@ -92,10 +90,10 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
 
 
 def _group(place: Place, axis: Axis, rows: pd.DataFrame, *, free: bool) -> SweepGroup:
-    held: Axis = "amplitude" if axis == "frequency" else "frequency"
-    header = "test" if free else _header(place, held)
-    unit = "Hz" if held == "frequency" else place.display.displacement.name
-    keys, palette = [rows[header]], "loop" if free else str(held)
+    fixed: Axis = "amplitude" if axis == "frequency" else "frequency"
+    header = "test" if free else _header(place, fixed)
+    unit = "Hz" if fixed == "frequency" else place.display.displacement.name
+    keys, palette = [rows[header]], "loop" if free else str(fixed)
     if not free and "part" in rows and len(set(rows["part"].fillna(""))) > 1:
         keys, palette = ["part " + rows["part"].fillna("not stated"), *keys], "loop"
     if not free and "temperature [degC]" in rows:
@@ -116,10 +114,19 @@ def _header(place: Place, axis: Axis) -> str:
     return "frequency [Hz]" if axis == "frequency" else columns_of(place)[0]
 
 
-def means(rows: pd.DataFrame, along: str, *headers: str) -> tuple[Array, ...]:
-    """Distinct values of a column, (k,), and the means over its repeats of other columns, (k,) each."""
-    found = rows.groupby(along)[list(headers)].mean()
-    return found.index.to_numpy(dtype=float), *found.to_numpy(dtype=float).T
+def means(rows: pd.DataFrame, x_header: str, *headers: str) -> tuple[Array, ...]:
+    """Distinct values of a column, (k,), and the means over its repeats of other columns, (k,) each.
+
+    Args:
+        rows: rows of a table.
+        x_header: column whose distinct values group the rows.
+        headers: columns to average.
+
+    Returns:
+        Distinct values, (k,), and the means of each column, (k,) each.
+    """
+    averages = rows.groupby(x_header)[list(headers)].mean()
+    return averages.index.to_numpy(dtype=float), *averages.to_numpy(dtype=float).T
 
 
 def loops_of(table: pd.DataFrame, result: Result) -> Iterator[tuple[Place, dict[str, pd.DataFrame]]]:

@@ -26,7 +26,14 @@ _ONE_RUN = 2.8
 
 @style.in_own_style
 def plan_figure(plan: Plan) -> Figure:
-    """Operating points of the plan (left) and the standard programme (right) by direction, and the errors of both."""
+    """Operating points of the plan (left) and the standard programme (right) by direction, and the errors of both.
+
+    Args:
+        plan: plan, standard programme and present knowledge.
+
+    Returns:
+        Figure with a row of panels per direction and one of errors.
+    """
     programmes = {"planned": plan.planned, "standard programme": plan.standard}
     tests = [test for programme in programmes.values() for test in programme.tests]
     places = list(dict.fromkeys(test.direction for test in tests))
@@ -38,9 +45,9 @@ def plan_figure(plan: Plan) -> Figure:
         for axes, (name, programme) in zip(row, programmes.items(), strict=True):
             _draw(axes, [test for test in programme.tests if test.direction == place], _COLORS[name])
             style.label_axes(axes, "frequency [Hz]", f"{place} amplitude [{place.display.displacement.name}]")
-            for along, values in zip(("x", "y"), ends.T, strict=True):
-                style.logarithmic(axes, values, along)  # type: ignore[arg-type]
-                axes.set(**{f"{along}lim": (values.min() / 1.6, values.max() * 1.6)})
+            for axis_name, values in zip(("x", "y"), ends.T, strict=True):
+                style.logarithmic(axes, values, axis_name)  # type: ignore[arg-type]
+                axes.set(**{f"{axis_name}lim": (values.min() / 1.6, values.max() * 1.6)})
     for axes, (name, programme) in zip(grid[0], programmes.items(), strict=True):
         title = f"{name}: {len(programme.tests)} runs in {number(programme.hours, 2)} h"
         axes.set_title(title, loc="left", **style.NAMES)
@@ -71,12 +78,12 @@ def _draw(axes: Axes, tests: Sequence[Test], color: str) -> None:
 
 
 def _name_sizes(axes: Axes, sizes: Sequence[int]) -> None:
-    shown = [sizes[place] for place in spread(len(sizes), 4)]
+    chosen_sizes = [sizes[place] for place in spread(len(sizes), 4)]
     looks: dict[str, Any] = {"color": style.GREY, "ls": "", "mec": "white", "mew": 0.3}
-    handles = [Line2D([], [], marker="o", ms=_ONE_RUN * np.sqrt(size), **looks) for size in shown]
-    words = [f"sweep, {size} run{'s' * (size > 1)}" for size in shown]
+    handles = [Line2D([], [], marker="o", ms=_ONE_RUN * np.sqrt(size), **looks) for size in chosen_sizes]
+    words = [f"sweep, {size} run{'s' * (size > 1)}" for size in chosen_sizes]
     loop = {"loop": Line2D([], [], marker="D", ms=_ONE_RUN, **looks)}
-    style.legend(axes, handles, words, "", besides=loop)
+    style.legend(axes, handles, words, "", extra_lines=loop)
 
 
 def _draw_errors(axes: Axes, plan: Plan, programmes: dict[str, Programme]) -> None:
@@ -95,8 +102,8 @@ def _draw_stiffness(axes: Axes, programmes: dict[str, Programme]) -> None:
     for (name, programme), marker in zip(programmes.items(), "os", strict=True):
         values = 100.0 * np.sort(programme.stiffness)
         share = 100.0 * (np.arange(values.size) + 0.5) / values.size
-        each = max(values.size // 5, 1)
-        axes.plot(share, values, color=_COLORS[name], lw=1.3, marker=marker, markevery=each, **style.POINT)
+        marker_step = max(values.size // 5, 1)
+        axes.plot(share, values, color=_COLORS[name], lw=1.3, marker=marker, markevery=marker_step, **style.POINT)
     style.label_axes(axes, "share of the points wanted [%]", "error of stiffness [%]")
     axes.set_ylim(bottom=0.0)
     marks = zip(_COLORS.items(), "os^", strict=True)

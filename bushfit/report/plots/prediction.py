@@ -43,7 +43,15 @@ class Lines(NamedTuple):
 
 
 def lines_of(result: Result, prediction: Prediction) -> Lines:
-    """The prediction on its own grid refined for smooth lines."""
+    """The prediction on its own grid refined for smooth lines.
+
+    Args:
+        result: fitted or given model.
+        prediction: prediction of one place on its grid.
+
+    Returns:
+        Prediction for the bushing alone and with the rig.
+    """
     grid = [
         values if values.size < 2 else np.union1d(values, np.geomspace(values[0], values[-1], _FINE))
         for values in map(np.unique, (prediction.frequency, prediction.amplitude))
@@ -68,6 +76,9 @@ def prediction_figure(
         table: sweeps to lay over, as `tables.sweeps_table` makes it; None without.
         title: of the figure.
         note: sentences below the figure.
+
+    Returns:
+        Figure with one or two rows of panels, and one per group of free sweeps.
     """
     place, lines = prediction.direction, lines_of(result, prediction)
     groups = _groups_at(result, prediction, table)
@@ -116,21 +127,21 @@ def _rows(prediction: Prediction, groups: Sequence[SweepGroup]) -> list[tuple[Ax
     return rows
 
 
-def _measured(groups: Sequence[SweepGroup], what: Axis) -> Array:
+def _measured(groups: Sequence[SweepGroup], quantity: Axis) -> Array:
     """Amplitudes [SI] or frequencies [Hz] of all measured points."""
     columns = []
     for group in groups:
-        length = group.place.display.displacement.factor if what == "amplitude" else 1.0
-        header = columns_of(group.place)[0] if what == "amplitude" else "frequency [Hz]"
+        length = group.place.display.displacement.factor if quantity == "amplitude" else 1.0
+        header = columns_of(group.place)[0] if quantity == "amplitude" else "frequency [Hz]"
         columns += [curve.rows[header].to_numpy() / length for curve in group.curves]
     return np.concatenate([np.empty(0), *columns])
 
 
-def _chosen(levels: Array, measured: Array, most: int) -> Array:
+def _chosen(levels: Array, measured: Array, maximum: int) -> Array:
     """The levels that were measured, or all where fewer than two were; at most so many, evenly."""
-    known = levels[[np.isclose(measured, level, _SAME, 0.0).any() for level in levels]]
-    chosen = known if known.size > 1 else levels
-    return chosen[spread(chosen.size, most)]
+    measured_levels = levels[[np.isclose(measured, level, _SAME, 0.0).any() for level in levels]]
+    chosen = measured_levels if measured_levels.size > 1 else levels
+    return chosen[spread(chosen.size, maximum)]
 
 
 def draw_prediction(
@@ -149,43 +160,43 @@ def draw_prediction(
         Whether there are points at these levels.
     """
     prediction, place = lines.bushing, lines.bushing.direction
-    held: Axis = "amplitude" if axis == "frequency" else "frequency"
+    fixed: Axis = "amplitude" if axis == "frequency" else "frequency"
     amplitude_header, stiffness_header, _ = columns_of(place)
     scales = {"frequency": 1.0, "amplitude": place.display.displacement.factor}
     x_header = "frequency [Hz]" if axis == "frequency" else amplitude_header
-    x, held_values = scales[axis] * getattr(prediction, axis), getattr(prediction, held)
-    points = _points_at(groups, "frequency [Hz]" if held == "frequency" else amplitude_header, scales[held] * levels)
+    x, held_values = scales[axis] * getattr(prediction, axis), getattr(prediction, fixed)
+    points = _points_at(groups, "frequency [Hz]" if fixed == "frequency" else amplitude_header, scales[fixed] * levels)
     to_table = place.display.stiffness.factor
     factor, labels = stiffness_scale(place, to_table * float(prediction.stiffness.value.max()))
-    looks, laid = style.styles(levels.size, held), [len(rows) > 0 for rows in points]
+    looks, laid = style.styles(levels.size, fixed), [len(rows) > 0 for rows in points]
     kinds = (("stiffness", stiffness_header, factor), ("loss_factor", "loss factor [-]", 1.0))
     for axes, label, (name, header, scale) in zip(pair, labels, kinds, strict=True):
         from_si = scale * (to_table if name == "stiffness" else 1.0)
         for look, level, rows in zip(looks, levels, points, strict=True):
-            here = held_values == level
-            _draw_line(axes, x[here], getattr(prediction, name), here, from_si, look)
+            mask = held_values == level
+            _draw_line(axes, x[mask], getattr(prediction, name), mask, from_si, look)
             if prediction.if_rigs is not None:
-                other = from_si * getattr(prediction.if_rigs, name).value[here]
-                axes.plot(x[here], other, color=look.color, lw=_DOUBLE)
-                axes.plot(x[here], other, color="white", lw=_CORE)
+                rig_values = from_si * getattr(prediction.if_rigs, name).value[mask]
+                axes.plot(x[mask], rig_values, color=look.color, lw=_DOUBLE)
+                axes.plot(x[mask], rig_values, color="white", lw=_CORE)
             if len(rows):
                 if lines.rig is not None:
-                    axes.plot(x[here], from_si * getattr(lines.rig, name).value[here], color=look.color, lw=_THIN)
+                    axes.plot(x[mask], from_si * getattr(lines.rig, name).value[mask], color=look.color, lw=_THIN)
                 draw_points(axes, rows, x_header, header, scale, look, levels.size)
         style.label_axes(axes, x_header, label, x)
         highest = from_si * getattr(prediction, name).high.max()
-        style.least_span(axes, 0.04 * highest if name == "stiffness" else 0.01)  # flat curves shall look flat
-    unit, to_people = display_unit(*(("Hz", 1.0) if held == "frequency" else place.display.displacement), levels.min())
+        style.widen_span(axes, 0.04 * highest if name == "stiffness" else 0.01)  # flat curves shall look flat
+    unit, to_people = display_unit(*(("Hz", 1.0) if fixed == "frequency" else place.display.displacement), levels.min())
     names = [format_range(unit, to_people * level) for level in levels]
-    besides = _other_lines(with_rig=any(laid) and lines.rig is not None, if_rigs=prediction.if_rigs is not None)
-    style.name_levels(pair[-1], names, held, laid, besides)
+    extra_lines = _other_lines(with_rig=any(laid) and lines.rig is not None, if_rigs=prediction.if_rigs is not None)
+    style.name_levels(pair[-1], names, fixed, laid, extra_lines)
     return any(laid)
 
 
-def _draw_line(axes: Axes, x: Array, band: Band, here: Array, scale: float, look: style.Style) -> None:
+def _draw_line(axes: Axes, x: Array, band: Band, mask: Array, scale: float, look: style.Style) -> None:
     marker = "_" if x.size == 1 else ""  # a single point is a stroke
-    axes.plot(x, scale * band.value[here], color=look.color, ls=look.dashes, lw=_LINE, marker=marker, ms=14.0)
-    axes.fill_between(x, scale * band.low[here], scale * band.high[here], color=look.color, alpha=0.22, lw=0)
+    axes.plot(x, scale * band.value[mask], color=look.color, ls=look.dashes, lw=_LINE, marker=marker, ms=14.0)
+    axes.fill_between(x, scale * band.low[mask], scale * band.high[mask], color=look.color, alpha=0.22, lw=0)
 
 
 def _points_at(groups: Sequence[SweepGroup], header: str, levels: Array) -> list[pd.DataFrame]:

@@ -133,11 +133,11 @@ class Style(NamedTuple):
         return Line2D([], [], color=self.color, ls=self.dashes, lw=1.3, marker=self.marker * marked, **POINT)
 
 
-def styles(count: int, what: str) -> list[Style]:
+def styles(count: int, palette: str) -> list[Style]:
     """Styles of so many levels, by colour alone where a colour bar names them; `what` chooses the colour scale."""
-    name, first, last = _SCALES[what]
+    name, first, last = _SCALES[palette]
     colors = colormaps[name](np.linspace(first, last, count))
-    if count > MOST_NAMED and what != "loop":
+    if count > MOST_NAMED and palette != "loop":
         return [Style(color, _DASHES[0], _MARKERS[0]) for color in colors]
     return [Style(c, _DASHES[i % len(_DASHES)], _MARKERS[i % len(_MARKERS)]) for i, c in enumerate(colors)]
 
@@ -178,7 +178,7 @@ def label_left(axes: Axes, label: str, **place: Any) -> None:
     axes.set_ylabel("\n".join(lines), family=fonts(), parse_math=False, **NAMES, **place)
 
 
-def logarithmic(axes: Axes, values: Array, along: Literal["x", "y"] = "x") -> None:
+def logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -> None:
     """Make an axis logarithmic, with plain numbers.
 
     Args:
@@ -186,29 +186,39 @@ def logarithmic(axes: Axes, values: Array, along: Literal["x", "y"] = "x") -> No
         values: that the axis shows.
         along: "x" or "y".
     """
-    axis = {"x": axes.xaxis, "y": axes.yaxis}[along]
-    axes.set(**{f"{along}scale": "log"})
+    axis = {"x": axes.xaxis, "y": axes.yaxis}[axis_name]
+    axes.set(**{f"{axis_name}scale": "log"})
     axis.set_major_locator(LogLocator(subs=(1, 3) if values.max() < _LOG_RATIO**2 * values.min() else (1,)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 
 
-def least_span(axes: Axes, least: float) -> None:
-    """Widen a y axis to at least this span, so that rounding errors do not fill the panel."""
+def widen_span(axes: Axes, minimum: float) -> None:
+    """Widen a y axis to at least this span, so that rounding errors do not fill the panel.
+
+    Args:
+        axes: panel.
+        minimum: smallest span of the y axis, in its unit.
+    """
     low, high = axes.get_ylim()
-    if high - low < least:
-        axes.set_ylim((low + high - least) / 2.0, (low + high + least) / 2.0)
+    if high - low < minimum:
+        axes.set_ylim((low + high - minimum) / 2.0, (low + high + minimum) / 2.0)
 
 
 def noise_band(axes: Axes) -> None:
     """Shade the band in which 95 % of the residuals should be."""
     axes.axhspan(-Z95, Z95, color="#ebebeb", lw=0, zorder=0)
     axes.axhline(0.0, color=GREY, lw=0.6, zorder=1)
-    least_span(axes, 7.0)
+    widen_span(axes, 7.0)
 
 
 def mark_outliers(axes: Axes, x: Array, y: Array) -> None:
-    """Draw crosses at outliers, (n,) each, at the edge of the panel if they are beyond it."""
+    """Draw crosses at outliers, (n,) each, at the edge of the panel if they are beyond it.
+
+    Args:
+        axes: panel.
+        x, y: outliers in the units of the panel, (n,) each.
+    """
     low, high = axes.get_ylim()
     if x.size:
         axes.plot(x, np.clip(y, low, high), "x", color="#c1121f", ms=4.5, mew=1.2, zorder=5, clip_on=False)
@@ -221,7 +231,7 @@ def legend(
     labels: Sequence[str],
     title: str,
     *,
-    besides: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
+    extra_lines: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
     **place: Any,
 ) -> None:
     """Add a legend to a panel, by default at its right.
@@ -230,13 +240,13 @@ def legend(
         axes: panel.
         handles, labels: of the lines; of more than eight, eight are named, and the number of the others.
         title: of the legend.
-        besides: further lines by their labels.
+        extra_lines: further lines by their labels.
         place: options of matplotlib's legend.
     """
     named = [(handles[place], labels[place]) for place in spread(len(handles), MOST_NAMED)]
-    if left := len(handles) - len(named):
-        named.append((Line2D([], [], ls=""), f"and {left} more"))
-    named += [(line, text) for text, line in (besides or {}).items()]
+    if omitted := len(handles) - len(named):
+        named.append((Line2D([], [], ls=""), f"and {omitted} more"))
+    named += [(line, text) for text, line in (extra_lines or {}).items()]
     lines, texts = zip(*named, strict=True)
     axes.legend(lines, texts, fontsize=SMALL, title_fontsize=SMALL, **(_LEGEND | {"title": title} | place))
 
@@ -244,9 +254,9 @@ def legend(
 def name_levels(
     axes: Axes,
     levels: Sequence[str],
-    what: str,
+    quantity: str,
     marked: Sequence[bool],
-    besides: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
+    extra_lines: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
 ) -> None:
     """Name the levels of a panel by a legend, or of more than eight by a colour bar.
 
@@ -255,13 +265,13 @@ def name_levels(
         levels: amplitudes or frequencies as texts, rising, (k,).
         what: "amplitude" or "frequency", the title.
         marked: whether each level has points, (k,).
-        besides: further lines by their labels.
+        extra_lines: further lines by their labels.
     """
-    looks = styles(len(levels), what)
+    looks = styles(len(levels), quantity)
     if len(levels) <= MOST_NAMED:
-        order = 1 if what == "amplitude" else -1
+        order = 1 if quantity == "amplitude" else -1
         handles = [look.handle(points) for look, points in zip(looks, marked, strict=True)]
-        legend(axes, handles[::order], levels[::order], what, besides=besides)
+        legend(axes, handles[::order], levels[::order], quantity, extra_lines=extra_lines)
         return
     edges = np.arange(len(levels) + 1) - 0.5
     colors = ScalarMappable(BoundaryNorm(edges, len(levels)), ListedColormap([look.color for look in looks]))
@@ -270,7 +280,7 @@ def name_levels(
     bar.set_ticks(ticks.tolist(), labels=[levels[tick] for tick in ticks], **WORDS)
     bar.ax.tick_params(length=2, colors=INK, which="both")
     bar.minorticks_off()
-    bar.ax.set_title(what, **WORDS)
+    bar.ax.set_title(quantity, **WORDS)
     bar.outline.set(edgecolor=GREY, linewidth=0.6)
 
 
@@ -282,10 +292,10 @@ def file_name(name: str, letters: int = 20) -> str:
 def first_sentences(sentences: Sequence[str]) -> str:
     """The first sentences, as many as leave room for the panels, and the number of the others."""
     ends = np.cumsum([len(sentence) for sentence in sentences])
-    kept = max(int(np.searchsorted(ends, _MOST_LETTERS)), 1)
-    more = len(sentences) - kept
-    shown = [sentence[0].upper() + sentence[1:] for sentence in sentences[:kept]]
-    return ". ".join([*shown, *([f"And {more} more warnings, in the model file and the report"] if more > 0 else [])])
+    count = max(int(np.searchsorted(ends, _MOST_LETTERS)), 1)
+    more = len(sentences) - count
+    texts = [sentence[0].upper() + sentence[1:] for sentence in sentences[:count]]
+    return ". ".join([*texts, *([f"And {more} more warnings, in the model file and the report"] if more > 0 else [])])
 
 
 def explained(figure: Figure, *sentences: str) -> Figure:
@@ -299,8 +309,13 @@ def to_image(figure: Figure, form: str = "png", *, outlines: bool = True) -> byt
     """The figure as PNG, SVG or PDF: the same bytes for the same figure, without date and version.
 
     Args:
+        figure: figure to draw.
         form: "png", "svg" or "pdf".
-        outlines: whether texts of an SVG are outlines, which look the same everywhere, or texts, which are shorter.
+        outlines: True to draw the texts of an SVG as outlines, which look the same everywhere; False to keep
+            texts, which are shorter.
+
+    Returns:
+        Content of the file.
     """
     buffer = io.BytesIO()
     with _own_settings(**{"svg.fonttype": "path" if outlines else "none"}):
