@@ -45,12 +45,11 @@ def without_copied_tests(tests: Sequence[_Test]) -> list[_Test]:
     Returns:
         The remaining tests, each with a note that names its copies.
     """
-    return [
-        _with_note(first, f"the same data are in {_listed([_file(copy) for copy in copies])}: counted once")
-        if copies
-        else first
-        for first, *copies in group_copies(tests)
-    ]
+    remaining = []
+    for first, *copies in group_copies(tests):
+        files = [copy.source.file.name if copy.source else copy.name for copy in copies]
+        remaining.append(_with_note(first, f"the same data are in {_listed(files)}: counted once") if files else first)
+    return remaining
 
 
 def without_copied_repeats(sweep: Sweep) -> Sweep:
@@ -109,10 +108,6 @@ def _digits(sweep: Sweep, rows: NDArray[np.bool_]) -> bytes:
 def _with_note(test: _Test, note: str) -> _Test:
     source: Source | None = test.source
     return replace(test, source=source and source.with_note(note))
-
-
-def _file(test: Loop | Sweep) -> str:
-    return test.source.file.name if test.source else test.name
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -88,8 +88,8 @@ def command(
         histories = _read(files, test_options)
         body, direction = "direction", histories[0].direction
         name = str(direction)
-        stated = parse_grid(levels, "--levels", direction.motion.displacement_unit) or ()
-        reduction = reduce(histories, fewest_cycles=cycles, levels=stated)
+        nominal_levels = parse_grid(levels, "--levels", direction.motion.displacement_unit) or ()
+        reduction = reduce(histories, fewest_cycles=cycles, levels=nominal_levels)
         points, warnings = reduced_table(reduction), reduction.warnings
         records = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
         title = f"{records}: {len(reduction.steps)} points, {direction}"

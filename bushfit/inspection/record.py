@@ -142,7 +142,11 @@ class Inspection:
         return "; ".join(assumptions) or None
 
     def to_document(self) -> InspectedFile:
-        """Document of the inspection for JSON, without the measured data. Returns its entries by key."""
+        """Document of the inspection for JSON.
+
+        Returns:
+            Entries by key; the measured data are left out.
+        """
         return {
             "file": str(self.file),
             "sheet": self.entry.get("sheet"),

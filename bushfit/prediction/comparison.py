@@ -192,7 +192,14 @@ def compare(
 
 
 def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
-    """Adjust the probabilities of parameters for all parameters of all comparisons, see `holm`."""
+    """Adjust the probabilities of parameters for the number of all parameters of all comparisons, see `holm`.
+
+    Args:
+        comparisons: comparisons with the same reference.
+
+    Returns:
+        The comparisons, with `holm` in each tested parameter.
+    """
     adjusted = iter(holm([row.p for comparison in comparisons for row in comparison.parameters if row.p is not None]))
 
     def with_adjusted(row: ParameterContrast) -> ParameterContrast:

@@ -73,7 +73,11 @@ class Cycles:
         return cls(time, edges, np.searchsorted(time, edges).astype(np.intp), peak - trough)
 
     def runs(self) -> list[slice]:
-        """Find runs of cycles with similar periods and ranges, without holes. Returns slices of the cycles."""
+        """Find runs of cycles with similar periods and ranges, without holes.
+
+        Returns:
+            Slices of the cycles, in order.
+        """
         if self.range.size == 0:
             return []
         period = np.diff(self.edges)

@@ -184,15 +184,15 @@ def _to_its_ends(span: _SteadySpan, time: Floats, motion: Floats, before: float,
 
     The part is not extended beyond `before`, the end of the previous part, and `after`, the beginning of the next one.
     """
-    begin, end = max(span.begin - span.period / 2.0, before), min(span.end + span.period / 2.0, after)
-
-    def is_periodic(low: float, high: float, shift: float) -> bool:
-        rows = slice(*np.searchsorted(time, [low, high]))
+    limits = []
+    for limit, neighbour, shift in ((span.begin, before, span.period), (span.end, after, -span.period)):
+        extended = limit - shift / 2.0
+        extended = max(extended, neighbour) if shift > 0.0 else min(extended, neighbour)
+        rows = slice(*np.searchsorted(time, (extended, limit) if shift > 0.0 else (limit, extended)))
         change = change_after(time, motion, shift, rows)
-        return float(np.quantile(change, 0.9)) < SAME_MOTION * span.range if change.size else True
-
-    begin = begin if is_periodic(begin, span.begin, span.period) else span.begin
-    end = end if is_periodic(span.end, end, -span.period) else span.end
+        is_periodic = not change.size or float(np.quantile(change, 0.9)) < SAME_MOTION * span.range
+        limits.append(extended if is_periodic else limit)
+    begin, end = limits
     near = _AT_END * span.period
     begin = float(time[0]) if begin - time[0] < near else begin
     return replace(span, begin=begin, end=float(time[-1]) if time[-1] - end < near else end)

@@ -124,19 +124,15 @@ def motion_turns(time: Floats, motion: Floats) -> MotionTurns:
     duration = np.maximum(np.diff(borders), float(row_time.min()))  # a record may begin at a crossing
     dwell = np.bincount(half, row_time * (np.abs(motion - height[half]) < small), coarse.size) / duration
     neighbour = np.maximum(np.append(duration[1:], 0.0), np.append(0.0, duration[:-1]))
-    rippled = _is_repeated(duration, height) | (dwell < _DWELL)
+    again = np.abs(np.log(duration[2:] / duration[:-2])) < _SAME_HALF_CYCLE
+    again &= np.abs(height[2:] - height[:-2]) < _SAME_HALF_CYCLE * np.abs(height[1:-1] - height[:-2])
+    is_repeated = np.append(again, [False] * 2) | np.append([False] * 2, again)  # a cycle later or earlier
+    rippled = is_repeated | (dwell < _DWELL)
     if rippled.size > 2:
         rippled[[0, -1]] = rippled[[1, -2]]  # the record cuts the first and the last half cycle short
     rippled &= duration < _PAUSE * neighbour
     ripple = rippled[half[fine]] & ~np.isin(fine, coarse)
     return MotionTurns(_reversals(motion, fine[~ripple]), fine[ripple], prominence)
-
-
-def _is_repeated(duration: Floats, height: Floats) -> NDArray[np.bool_]:
-    """Mask of the half cycles that come again a cycle later or earlier, by duration and by height, (halves,) each."""
-    again = np.abs(np.log(duration[2:] / duration[:-2])) < _SAME_HALF_CYCLE
-    again &= np.abs(height[2:] - height[:-2]) < _SAME_HALF_CYCLE * np.abs(height[1:-1] - height[:-2])
-    return np.append(again, [False] * 2) | np.append([False] * 2, again)
 
 
 def stroke_middles(height: Floats) -> Floats:
