@@ -9,7 +9,7 @@ import numpy as np
 
 from bushfit import units
 from bushfit.geometry import Place
-from bushfit.reading.names import Labels, Quantity, labels_above, labels_in_names
+from bushfit.reading.names import Labels, StatedQuantity, labels_above, labels_in_names
 from bushfit.reading.sweeps import ONE_TEST
 from bushfit.reading.table import Table
 
@@ -45,7 +45,7 @@ def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> L
     counting = test_options.get("amplitude")
     if counting is None:
         return labels
-    frequencies = labels.of("Hz")
+    frequencies = labels.of_dimension("Hz")
     quantities = tuple(
         quantity if quantity in frequencies else quantity._replace(convention=counting)
         for quantity in labels.quantities
@@ -103,12 +103,13 @@ def keys_from_labels(
     return keys, {label: ", ".join(words) for label, words in facts.items()}, is_counted
 
 
-def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -> tuple[str, Quantity]:
+def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -> tuple[str, StatedQuantity]:
     """Origin and value of the amplitude or frequency that a sweep was tested at."""
     role = _HELD_ROLES[key]
     expected = place.motion.displacement_unit if role == "amplitude" else "Hz"
     label, found = next(
-        ((label, quantities) for label, labels in sources.items() if (quantities := labels.of(expected))), ("", [])
+        ((label, quantities) for label, labels in sources.items() if (quantities := labels.of_dimension(expected))),
+        ("", []),
     )
     if len(found) == 1:
         return label, found[0]
@@ -143,15 +144,15 @@ def wrong_labels(
     expected = direction.motion.displacement_unit
     amplitudes_in_name = [
         units.parse_quantity(quantity.text, expected) / (2.0 if quantity.convention == "peak-to-peak" else 1.0)
-        for quantity in labels.of(expected)
+        for quantity in labels.of_dimension(expected)
     ]
     if amplitudes_in_name and not any(_is_close(value, x) for value in amplitudes_in_name for x in amplitudes):
         double = any(_is_close(value, 2.0 * x) for value in amplitudes_in_name for x in amplitudes)
         found = _listed([factor * x for x in amplitudes])
-        yield f"the name says {_join_quantities(labels.of(expected))}, the amplitude is {found} {unit} zero-to-peak" + (
-            ": the name may count peak-to-peak" if double else ""
-        )
-    frequencies_in_name = labels.of("Hz")
+        named = _join_quantities(labels.of_dimension(expected))
+        doubt = ": the name may count peak-to-peak" if double else ""
+        yield f"the name says {named}, the amplitude is {found} {unit} zero-to-peak{doubt}"
+    frequencies_in_name = labels.of_dimension("Hz")
     if frequencies_in_name and not any(
         _is_close(units.parse_quantity(quantity.text, "Hz"), f) for quantity in frequencies_in_name for f in frequencies
     ):
@@ -162,7 +163,7 @@ def _is_close(value: float, reference: float) -> bool:
     return abs(value - reference) <= _AGREEMENT * reference
 
 
-def _join_quantities(quantities: Sequence[Quantity]) -> str:
+def _join_quantities(quantities: Sequence[StatedQuantity]) -> str:
     return " or ".join(
         dict.fromkeys(f"{quantity.text} {quantity.convention or ''}".rstrip() for quantity in quantities)
     )

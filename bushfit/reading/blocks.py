@@ -144,7 +144,7 @@ def _label_columns(
     """Texts of the added columns by header: quantities that all blocks state, direction, part, and block number."""
     columns: dict[str, list[str]] = {}
     for role, expected in (("amplitude", "m"), ("amplitude", "rad"), ("amplitude", "1"), ("frequency", "Hz")):
-        stated = [label.of(expected) for label in labels]
+        stated = [label.of_dimension(expected) for label in labels]
         if role not in roles and all(len(own) == 1 for own in stated):
             parts = {(own[0].unit, own[0].convention) for own in stated}
             if len(parts) == 1:

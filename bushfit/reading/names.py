@@ -1,10 +1,9 @@
-"""What the name of a file or sheet, and the lines above its table, say of its test: amplitude, direction and so on."""
+"""Labels of a test: amplitude, direction and conditions in the name of its file or sheet, and above its table."""
 
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from functools import reduce
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,14 +13,14 @@ from bushfit.geometry import Direction
 from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, AmplitudeConvention, Vocabulary, plain, split_convention
 from bushfit.reading.layout import Line
 
-#: Units as names have them, in lower case, with the usual spelling of those that have another one elsewhere.
+#: Usual spelling of the units in names, by their spelling in lower case.
 _UNITS = {
     **{"mm": "mm", "um": "µm", "µm": "µm", "μm": "µm", "deg": "deg", "grad": "deg", "rad": "rad"},
     **{"%": "%", "pct": "%", "mhz": "mHz", "hz": "Hz", "n": "N", "kn": "kN"},
     **{"degc": "degC", "gradc": "degC", "grdc": "degC", "°c": "degC", "c": "degC"},
 }
-#: A quantity in a name, "0.5mm", "A0,5 mm", "0p5mm", "10Hz", "2deg", with the word before it and its sign; not the
-#: "20Hz" of "5-20Hz" nor "10mm_min".
+#: Quantity in a name, with the word before it and its sign: "0.5mm", "A0,5 mm", "0p5mm", "10Hz", "2deg"; but neither
+#: "20Hz" in "5-20Hz" nor "10mm_min".
 _QUANTITY = re.compile(
     r"(?<![^\W_])(?<!\d[.,-])(?:(?P<word>[^\W\d_]+)(?P<gap>[\s_=:]*))?(?P<sign>\+/?-|±|-|\+)?\s*"
     r"(?P<number>\d+(?:[.,p]\d+)?)[ _-]?"
@@ -29,42 +28,49 @@ _QUANTITY = re.compile(
     r"(?![\s/_-]*(?:(?:per|pro|p)[\s_-]*)?(?:min|s|sec)(?![A-Za-z]|-s))",
     re.IGNORECASE,
 )
-#: Words, glued to a number or before it, that say what it is: an amplitude, a preload, a size and so on.
-_WORDS = {meant: frozenset(words) for meant, words in WORDS["beside"].items()}
-#: A date: 2024-05-03, 2024_05_03, 20240503 or 03.05.2024.
+#: Words before a number by the kind of quantity that they announce: amplitude, preload, size and so on.
+_WORDS = {kind: frozenset(words) for kind, words in WORDS["beside"].items()}
+#: Date: 2024-05-03, 2024_05_03, 20240503 or 03.05.2024.
 _DATE = re.compile(
     r"(?<!\d)(?:20\d\d([-_.]?)(?:0[1-9]|1[0-2])\1(?:0[1-9]|[12]\d|3[01])"
     r"|(?:0?[1-9]|[12]\d|3[01])\.(?:0?[1-9]|1[0-2])\.20\d\d)(?!\d)"
 )
-#: A number of a specimen: "SN12", "Nr. 7", "Probe_3", "#4".
+#: Number of a specimen: "SN12", "Nr. 7", "Probe_3", "#4".
 _SPECIMEN_NUMBER = re.compile(
     r"(?:(?<![^\W_])(?:s[/_]?n|serial|nr|no|probe|specimen|sample|muster|prüfling|pruefling|éprouvette|probeta)|#)"
     r"[\s_.:#-]*(\d[A-Za-z0-9]*)(?![^\W_]|[.,]\d)",
     re.IGNORECASE,
 )
-#: What the temperature of a test may be [degC], so that a part's number with a C is none; chosen.
+#: Range of test temperatures [degC]; chosen: a number with a C outside it belongs to a part.
 _TEMPERATURES = (-100.0, 300.0)
-#: What the lines above a table may state, by the names that it goes by; amplitude and frequency are headers.
+#: Keys of a campaign by their names above a table.
 _KEY_OF = {plain(name): key for key, names in WORDS["above"].items() for name in names}
-#: The names that an amplitude and a frequency go by there.
+#: Names of amplitude and frequency above a table.
 _VOCABULARY = Vocabulary({role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}, {})
-#: What parts a key from its value above a table.
+#: Separator of a name and its value above a table.
 _AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)")
-#: A decimal comma of the number that begins a value.
+#: Decimal comma of the number that begins a value.
 _COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
-#: Characters of the longest value above a table that is taken; chosen: a longer one is a text.
+#: Characters of the longest value above a table; chosen: a longer one is a text.
 _LONGEST_VALUE = 60
 
-#: For the starts of words, without accents, the direction they name.
-_WORD_STARTS = {start: Direction(named) for named, starts in WORDS["direction"].items() for start in starts}
-#: Short for a direction in names; in headers rad is a unit.
+#: Direction by the start of a word, without accents.
+_WORD_STARTS = {start: Direction(name) for name, starts in WORDS["direction"].items() for start in starts}
+#: Direction by its abbreviation in names; in headers rad is a unit.
 _SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORSION, "tor": Direction.TORSION}
-#: A word, without the letters of a unit behind a number.
+#: Word that is no unit behind a number.
 _WORD = re.compile(r"(?<![a-z\d.,])(?:[a-z]+)")
 
 
-class Quantity(NamedTuple):
-    """A quantity such as "0.05 mm" as a name has it; `is_marked` where a word or sign says that it is the amplitude."""
+class StatedQuantity(NamedTuple):
+    """Quantity in a label.
+
+    Args:
+        text: number and unit, such as "0.05 mm".
+        unit: unit alone.
+        is_marked: True if a word or sign marks it as the amplitude or frequency.
+        convention: definition of an amplitude, if it is stated.
+    """
 
     text: str
     unit: str
@@ -74,9 +80,15 @@ class Quantity(NamedTuple):
 
 @dataclass(frozen=True)
 class Labels:
-    """What is said of a test outside its table: `quantities` that may be its amplitude or frequency, and keys."""
+    """Statements on a test outside its table.
 
-    quantities: tuple[Quantity, ...] = ()
+    Args:
+        quantities: that may be its amplitude or frequency.
+        direction: of the bushing.
+        temperature, preload, date, operator, specimen_number: values of these keys of a campaign, as texts.
+    """
+
+    quantities: tuple[StatedQuantity, ...] = ()
     direction: Direction | None = None
     temperature: str | None = None
     preload: str | None = None
@@ -84,143 +96,159 @@ class Labels:
     operator: str | None = None
     specimen_number: str | None = None
 
-    def of(self, expected: str) -> list[Quantity]:
-        """The quantities of the dimension of a unit, each once; those that are marked alone, if any is."""
-        found = [each for each in dict.fromkeys(self.quantities) if units.is_compatible(each.unit, expected)]
-        return [each for each in found if each.is_marked] or found
+    def of_dimension(self, unit: str) -> list[StatedQuantity]:
+        """Different quantities of the dimension of an SI unit; only the marked ones if there are any."""
+        fitting = [quantity for quantity in dict.fromkeys(self.quantities) if units.is_compatible(quantity.unit, unit)]
+        return [quantity for quantity in fitting if quantity.is_marked] or fitting
 
     def __or__(self, other: "Labels") -> "Labels":
-        """What both say; what this one says goes first."""
-        own = {unit for unit in ("m", "rad", "1", "Hz") if self.of(unit)}
-        more = tuple(each for each in other.quantities if not any(units.is_compatible(each.unit, unit) for unit in own))
-        either = {field.name: getattr(self, field.name) or getattr(other, field.name) for field in fields(self)}
-        return Labels(**{**either, "quantities": self.quantities + more})
+        """Labels of both; those on the left take precedence."""
+        dimensions = [unit for unit in ("m", "rad", "1", "Hz") if self.of_dimension(unit)]
+        added = (
+            quantity
+            for quantity in other.quantities
+            if not any(units.is_compatible(quantity.unit, unit) for unit in dimensions)
+        )
+        values = {field.name: getattr(self, field.name) or getattr(other, field.name) for field in fields(self)}
+        return Labels(**{**values, "quantities": (*self.quantities, *added)})
 
 
-#: Where nothing is said.
+#: Labels without any statement.
 NO_LABELS = Labels()
 
 
 def labels_in_names(*names: str) -> Labels:
-    """What names say of a test, such as those of its sheet and its file; what an earlier one says goes first.
+    """Find the labels of a test in names.
 
-    Only a number with its unit counts: dates and numbers of parts are no amplitudes.
+    Args:
+        names: of its sheet, file and so on, in their order of precedence.
+
+    Returns:
+        Labels. Numbers without a unit, such as dates and numbers of parts, are no amplitudes.
     """
-    return reduce(lambda labels, name: labels | _labels_in_name(unicodedata.normalize("NFC", name)), names, Labels())
+    labels = NO_LABELS
+    for name in names:
+        labels |= _labels_in_name(unicodedata.normalize("NFC", name))
+    return labels
 
 
 def _labels_in_name(name: str) -> Labels:
+    """Labels in one name."""
     date, rest = _DATE.search(name), _DATE.sub(" ", name)
     number = _SPECIMEN_NUMBER.search(rest)
-    quantities: list[Quantity] = []
-    stated: dict[str, Any] = {"date": date and date[0], "specimen_number": number and number[1]}
+    quantities: list[StatedQuantity] = []
+    values: dict[str, Any] = {"date": date and date[0], "specimen_number": number and number[1]}
     for match in _QUANTITY.finditer(rest):
-        word, is_glued = plain(match["word"] or ""), bool(match["word"]) and not match["gap"] and not match["sign"]
+        word, sign = plain(match["word"] or ""), match["sign"]
+        is_joined = bool(match["word"]) and not match["gap"] and not sign
         unit, digits = _UNITS[match["unit"].lower()], re.sub("[,p]", ".", match["number"].lower())
-        # a dash after a word parts it from the number, unless the word says what the number is
-        known = (
-            word in _WORDS["preload"] | _WORDS["temperature"] | _WORDS["force"]
-            or not match["word"]
-            or bool(match["gap"])
-        )
-        text = f"{'-' if match['sign'] == '-' and known else ''}{float(digits):g} {unit}"
+        announced = word in _WORDS["preload"] | _WORDS["temperature"] | _WORDS["force"]
+        # a dash after another word is no sign
+        is_negative = sign == "-" and (announced or not match["word"] or bool(match["gap"]))
+        text, value = f"{'-' * is_negative}{float(digits):g} {unit}", float(digits) * (-1.0 if is_negative else 1.0)
+        is_peak = sign in ("+-", "+/-", "±")
         if word in _WORDS["preload"] or (unit in ("N", "kN") and word in _WORDS["force"]):
-            stated.setdefault("preload", text)
+            values.setdefault("preload", text)
         elif unit == "degC":
-            is_plain = match["unit"].lower() != "c" or len(match["number"]) > 1
-            low, high = _TEMPERATURES
-            is_said = word in _WORDS["temperature"] or (is_plain and not is_glued)
-            if is_said and low < float(text.split()[0]) < high:
-                stated.setdefault("temperature", text)
-        elif unit not in ("N", "kN") and float(text.split()[0]) > 0.0:
-            quantities += _amplitude_or_frequency(word, match, rest, text, unit, is_glued=is_glued)
-    return Labels(tuple(quantities), named_direction([name], short=True), **stated)
-
-
-def _amplitude_or_frequency(
-    word: str, match: re.Match[str], name: str, text: str, unit: str, *, is_glued: bool
-) -> list[Quantity]:
-    """The quantity of a match, unless a word beside it says that it is another one."""
-    if unit in ("Hz", "mHz"):
-        is_frequency = word in _WORDS["frequency"]
-        return [Quantity(text, unit, is_frequency)] if is_frequency or not is_glued else []
-    padded = re.match(r"0\d", match["number"])  # "05mm" may be 5 mm or 0.5 mm
-    if padded or word in _WORDS["size"] or (is_glued and word not in _WORDS["amplitude"]):
-        return []
-    is_peak = match["sign"] in ("+-", "+/-", "±")
-    convention = "zero-to-peak" if is_peak else split_convention(name[match.end("unit") :])[1]
-    return [Quantity(text, unit, is_peak or word in _WORDS["amplitude"], convention)]
+            is_plain = (match["unit"].lower() != "c" or len(match["number"]) > 1) and not is_joined
+            if (is_plain or word in _WORDS["temperature"]) and _TEMPERATURES[0] < value < _TEMPERATURES[1]:
+                values.setdefault("temperature", text)
+        elif unit in ("N", "kN") or value <= 0.0:
+            continue
+        elif unit in ("Hz", "mHz"):
+            if word in _WORDS["frequency"] or not is_joined:
+                quantities.append(StatedQuantity(text, unit, word in _WORDS["frequency"]))
+        elif re.match(r"0\d", match["number"]):
+            continue  # "05mm" may be 5 mm or 0.5 mm
+        elif word in _WORDS["amplitude"] or not (word in _WORDS["size"] or is_joined):
+            convention = "zero-to-peak" if is_peak else split_convention(rest[match.end("unit") :])[1]
+            quantities.append(StatedQuantity(text, unit, is_peak or word in _WORDS["amplitude"], convention))
+    return Labels(tuple(quantities), named_direction([name], short=True), **values)
 
 
 def labels_above(lines: Iterable[Line]) -> Labels:
-    """What lines such as those above a table state of its test: each a name and a value, as "Temperature: 23 degC".
+    """Find the labels of a test in lines of a name and a value, such as "Temperature: 23 degC".
 
-    What is not understood is left out; so is a quantity without a unit.
+    Args:
+        lines: above a table or between its blocks.
+
+    Returns:
+        Labels. Unknown names and quantities without a unit are left out.
     """
-    return reduce(lambda labels, line: labels | _label_above(line), lines, Labels())
+    labels = NO_LABELS
+    for line in lines:
+        labels |= _label_in_line(line)
+    return labels
 
 
-def _label_above(line: Line) -> Labels:
-    cells = _cells(line)
-    if len(cells) < 2 or len(cells[0]) > _LONGEST_VALUE:
-        return Labels()
-    name, unit = units.split_header(cells[0])
-    values = [_COMMA.sub(r"\1.", value) for value in (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}")]
-    key = _KEY_OF.get(plain(name))
-    if key in ("date", "operator", "specimen_number"):
-        is_value = len(cells[1]) <= _LONGEST_VALUE and plain(cells[1]) not in _KEY_OF  # else a row of headers
-        stated: dict[str, Any] = {key: cells[1]} if is_value else {}
-        return Labels(**stated)
-    for value in values:
-        if key == "temperature" and _is_quantity(value, "K"):
-            return Labels(temperature=value)
-        if key == "preload" and (_is_quantity(value, "m") or _is_quantity(value, "N")):
-            return Labels(preload=value)
-        heading = _VOCABULARY.heading(cells[0])
-        if heading and heading.role in ("frequency", "amplitude") and not key:
-            found = [unit for unit in ("Hz", "m", "rad", "1") if _is_quantity(value, unit) and value[0].isdigit()]
-            if found and (found[0] == "Hz") == (heading.role == "frequency"):
-                return Labels((Quantity(value, value.split()[-1], True, heading.convention),))
-    return Labels()
-
-
-def _cells(line: Line) -> Sequence[str]:
-    """The filled cells of a line of a sheet, or key and value of a line of text."""
+def _label_in_line(line: Line) -> Labels:
+    """Label in a line of text, or in a row of a sheet."""
     if isinstance(line.content, str):
         cells = _AFTER_KEY.split(line.content.lstrip("#%/; "))
     else:
         cells = [cell if isinstance(cell, str) else f"{cell:.12g}" for cell in line.content]
         cells = [*_AFTER_KEY.split(cells[0], maxsplit=1), *cells[1:]]
-    return [cell.strip(' "') for cell in cells if cell.strip(' "')]
+    cells = [cell.strip(' "') for cell in cells if cell.strip(' "')]
+    if len(cells) < 2 or len(cells[0]) > _LONGEST_VALUE:
+        return NO_LABELS
+    name, unit = units.split_header(cells[0])
+    key = _KEY_OF.get(plain(name))
+    if key in ("date", "operator", "specimen_number"):
+        is_value = len(cells[1]) <= _LONGEST_VALUE and plain(cells[1]) not in _KEY_OF  # else a row of headers
+        values: dict[str, Any] = {key: cells[1]} if is_value else {}
+        return Labels(**values)
+    heading = _VOCABULARY.heading(cells[0])
+    for form in (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}"):
+        text = _COMMA.sub(r"\1.", form)
+        if key == "temperature" and _is_quantity(text, "K"):
+            return Labels(temperature=text)
+        if key == "preload" and (_is_quantity(text, "m") or _is_quantity(text, "N")):
+            return Labels(preload=text)
+        if heading and not key and text[0].isdigit():
+            fitting = [si for si in ("Hz", "m", "rad", "1") if _is_quantity(text, si)]
+            if fitting and (fitting[0] == "Hz") == (heading.role == "frequency"):
+                return Labels((StatedQuantity(text, text.split()[-1], True, heading.convention),))
+    return NO_LABELS
 
 
-def _is_quantity(text: str, expected: str) -> bool:
-    """Whether a text is a quantity of the dimension of an SI unit."""
+def _is_quantity(text: str, unit: str) -> bool:
+    """Return True if a text is a quantity of the dimension of an SI unit."""
     try:
-        units.parse_temperature(text) if expected == "K" else units.parse_quantity(text, expected)
+        units.parse_temperature(text) if unit == "K" else units.parse_quantity(text, unit)
     except UnitError:
         return False
     return True
 
 
 def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction | None:
-    """The one direction that texts, such as headers, name; None where they name none or several.
+    """Find the direction that texts name.
 
-    With `short`, "ax", "rad" and "tors" count as well, as in names of files.
+    Args:
+        texts: headers or names.
+        short: True if the abbreviations "ax", "rad" and "tors" count too, as in names of files.
+
+    Returns:
+        The direction; None if the texts name none or several.
     """
-    plain = unicodedata.normalize("NFKD", " ".join(texts)).encode("ascii", "ignore").decode().casefold()
-    found = {named for start, named in _WORD_STARTS.items() if re.search(rf"(?<![a-z]){start}", plain)}
-    if short and not found:
-        found = {_SHORT[word] for word in _WORD.findall(plain) if word in _SHORT}
-    return found.pop() if len(found) == 1 else None
+    folded = unicodedata.normalize("NFKD", " ".join(texts)).encode("ascii", "ignore").decode().casefold()
+    directions = {direction for start, direction in _WORD_STARTS.items() if re.search(rf"(?<![a-z]){start}", folded)}
+    if short and not directions:
+        directions = {_SHORT[word] for word in _WORD.findall(folded) if word in _SHORT}
+    return directions.pop() if len(directions) == 1 else None
 
 
 def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool, sheet: str | None = None) -> Direction | None:
-    """The direction that the file of a test names; None where it does not say.
+    """Find the direction that a test file names: in the name of its sheet, else in its own name, else in its headers.
 
-    The name of its sheet goes before the file's, and that before the headers. Where the displacement `turns`, in units
-    of angle, it is torsion unless another rotation is named.
+    Args:
+        file: path.
+        headers: of the table.
+        turns: True if the displacement is an angle, so that the direction is torsion unless another rotation is named.
+        sheet: name of the sheet, if there is one.
+
+    Returns:
+        The direction; None if it is not stated.
     """
-    named = named_direction([sheet or ""], short=True) or named_direction([file.stem], short=True)
-    named = named or named_direction(headers)
-    return Direction.TORSION if turns and not (named and named.is_rotation) else named
+    names = (named_direction([name], short=True) for name in (sheet or "", file.stem))
+    direction = next(filter(None, names), None) or named_direction(headers)
+    return Direction.TORSION if turns and not (direction and direction.is_rotation) else direction

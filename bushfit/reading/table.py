@@ -35,7 +35,7 @@ from bushfit.reading.numerals import Numerals, weigh
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, Channels, RowSource, Sheet, Text
 from bushfit.reading.times import clock
-from bushfit.reading.wide import as_long
+from bushfit.reading.wide import unpivot
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 #: Rows that are converted at a time if pandas cannot read them; chosen: their texts fill some MiB.
@@ -102,7 +102,7 @@ class Table(LabelledCells):
                 source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line
             )
             may_be_wide = "amplitude" in names and stated.header_line is None
-            if may_be_wide and (wide := as_long(source, opened.file, vocabulary, layout, delimiter)):
+            if may_be_wide and (wide := unpivot(source, opened.file, vocabulary, layout, delimiter)):
                 return *wide, True
             return *combined(source, layout, vocabulary), False
 

@@ -1,8 +1,8 @@
-"""Wide tables of a sweep, turned into long ones: frequencies down and amplitudes across, or the reverse.
+r"""Wide tables of a sweep, turned into long ones: frequencies down and amplitudes across, or the reverse.
 
-A wide table has one block or more, side by side or one below the other. The first column of a block holds the values of
-one of frequency and amplitude; above every other column stand the value of the other and what the column holds, in one
-cell ("K* 0.1 mm [N/mm]") or in several, of which those that are merged over columns are filled at the left only:
+A wide table has one block or more, side by side or one below the other. The first column of a block contains
+frequencies or amplitudes. The header of every other column states a level of the other one, and the quantity, in one
+cell ("K* 0.1 mm [N/mm]") or in several. Of merged header cells only the leftmost is filled:
 
     K* [N/mm];0.1 mm;0.2 mm            ;0.1 mm;       ;0.2 mm;              f [Hz];K*_0.1mm [N/mm];tan_d_0.1mm;...
     5        ;1520  ;1390        f [Hz];K*    ;tan d  ;K*    ;tan d         5     ;1520           ;0.101      ;...
@@ -11,7 +11,7 @@ cell ("K* 0.1 mm [N/mm]") or in several, of which those that are merged over col
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate, groupby
 from pathlib import Path
@@ -20,41 +20,45 @@ from typing import NamedTuple
 from bushfit import units
 from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import COUNTED
-from bushfit.reading.headers import AmplitudeConvention, Heading, Vocabulary, split_convention
-from bushfit.reading.layout import DELIMITERS, Content, Layout, is_comment, split
+from bushfit.reading.headers import AmplitudeConvention, Vocabulary, split_convention
+from bushfit.reading.layout import DELIMITERS, Layout, is_comment, split
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import Combined, RowSource
 
-#: The two roles of which one runs down and the other across.
+#: Roles of which one runs down and the other across.
 _STEPPED = ("frequency", "amplitude")
-#: The two in the plural.
-_PLURAL = {"frequency": "frequencies", "amplitude": "amplitudes"}
 #: Rows above a block that may be its header; chosen: a title, levels, quantities, and units.
 _MOST_HEADER_ROWS = 4
-#: A number in a header, with what names it before ("A = 0.1") and what may be its unit after it.
+#: Number in a header, with its symbol ("A = 0.1") and the word behind it that may be its unit.
 _LEVEL = re.compile(
     r"(?:(?P<name>[^\W\d_]+)\s*=\s*)?(?<![\w.,*'|])±?(?P<number>\d+(?:[.,]\d+)?(?:e[+-]?\d+)?)(?![.,]?\d)"
     r"(?:\s*[\[(]?\s*(?P<unit>[^\W\d_]+|%|°)[\])]?)?",
     re.IGNORECASE,
 )
-#: What a symbol before a level stands for: "A = 0.1".
+#: Meaning of a symbol before a level: "A = 0.1".
 _SYMBOLS = {"f": "frequency", "a": "amplitude", "x": "amplitude", "s": "amplitude", "\u03b3": "amplitude"}
 #: Columns of a wide table; chosen: two for each of a hundred levels.
 _MOST_COLUMNS = 200
-#: What joins a level to a quantity in a header, and says no more.
+#: Words and marks that join a level to a quantity in a header and have no meaning.
 _JOINTS = re.compile(r"[\[(]\s*(?:at|bei)?\s*[\])]|(?<!\w)(?:at|bei|für|for|à|a|@|:|,|;|=|-)(?!\w)")
-#: Characters of a header; chosen: the rest of a longer text says nothing.
+#: Characters of a header; chosen: longer texts are no headers.
 _LONGEST_HEADER = 200
-#: A level that may have thousands: 1,250.
-_OPEN = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
-#: What parts the two roles that a corner names: "f [Hz] \ A [mm]".
+#: Level that may have a thousands separator: 1,250.
+_GROUPED = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
+#: Separator of the two roles in a corner: "f [Hz] \ A [mm]".
 _CORNER = re.compile(r"\s*[\\|]\s*|\s+/\s+")
 
 
-class _WideHeading(NamedTuple):
-    """What header cells say of a column: what it holds, in which unit, at which level of frequency or amplitude.
+class _Meaning(NamedTuple):
+    """Meaning of a header cell, or of all header cells of a column; None for what is not stated.
 
-    Of what they do not say, it has None.
+    Args:
+        role: quantity in the column.
+        unit: of the quantity.
+        level: number of the frequency or amplitude at which the quantity was measured.
+        stepped: role of the level, "frequency" or "amplitude".
+        level_unit: unit of the level.
+        convention: of an amplitude.
     """
 
     role: str | None = None
@@ -64,230 +68,253 @@ class _WideHeading(NamedTuple):
     level_unit: str | None = None
     convention: AmplitudeConvention | None = None
 
-    def filled_by(self, other: "_WideHeading") -> "_WideHeading":
-        """What this says, and where it does not, the other."""
+    def completed_by(self, other: "_Meaning") -> "_Meaning":
+        """This meaning, with what it does not state from another one."""
         return other._replace(**{name: value for name, value in self._asdict().items() if value is not None})
 
 
 class _Series(NamedTuple):
-    """A column of a wide table: what its header says of it and of the column down; line, value down and cell each."""
+    """Column of a wide table.
 
-    heading: _WideHeading
-    down: _WideHeading
+    Args:
+        meaning: of its header.
+        first: meaning of the first column of its block.
+        points: line number, cell of the first column, and cell of this column, for each row.
+    """
+
+    meaning: _Meaning
+    first: _Meaning
     points: list[tuple[int, str | float, str | float]]
 
 
-#: A row of a wide table: its line and cells.
+#: Line number and cells of a row.
 _Row = tuple[int, list[str | float]]
 
 
-def as_long(
+def unpivot(
     source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layout, delimiter: str | None
 ) -> tuple[RowSource, Layout] | None:
-    """A wide table as a long one, of which the headers are names of roles; None where a file holds no wide table.
+    """Turn a wide table into a long one: a row for each frequency and amplitude.
 
-    `layout` is that of the file read as a long table, `delimiter` what parts the cells, where that is known.
+    Args:
+        source: lines of the file.
+        file: path, for errors.
+        vocabulary: meaning of headers.
+        layout: of the file if it is read as a long table.
+        delimiter: as stated; "" for a workbook; None to try all.
+
+    Returns:
+        Source and layout of the long table, whose headers are names of roles; None if the file has no wide table.
 
     Raises:
-        MeasurementError: blocks that do not belong together, or that do not say what they hold.
+        MeasurementError: the blocks differ, or do not state their quantity.
     """
-    if len(layout.headers) > _MOST_COLUMNS:
-        return None
-    named = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))]
-    if len(named) > 2 and len(set(named)) == len(named) and set(named) & set(_STEPPED):
+    roles = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))]
+    is_long = len(roles) > 2 and len(set(roles)) == len(roles) and not set(roles).isdisjoint(_STEPPED)
+    if is_long or len(layout.headers) > _MOST_COLUMNS:
         return None
     for mark in DELIMITERS.values() if delimiter is None else (delimiter,):
-        lines = (line for line in source.head() if not is_comment(line.content, mark))
-        rows: list[_Row] = [
-            (number, [c[:_LONGEST_HEADER] if isinstance(c, str) else c for c in _cells(content, mark)])
-            for number, content in lines
-        ]
-        blocks = list(_blocks(rows, vocabulary))
-        if series := [one for block in blocks for one in _series(*block, vocabulary)]:
-            long, long_layout = _as_long_table(series, source, file, mark)
+        rows: list[_Row] = []
+        for number, content in source.head():
+            if not is_comment(content, mark):
+                cells = split(content, mark) if isinstance(content, str) else content
+                rows.append((number, [c[:_LONGEST_HEADER] if isinstance(c, str) else c for c in cells]))
+        blocks = list(_find_blocks(rows, vocabulary))
+        if series := [column for headers, data in blocks for column in _read_block(headers, data, vocabulary)]:
+            sheet, long_layout = _long_table(series, source, file, mark)
             cells = (cell for headers, _ in blocks for row in headers for cell in row)
-            read = ((cell, [_read_heading(part, vocabulary) for part in _CORNER.split(cell)]) for cell in cells)
-            written = tuple(cell for cell, parts in read if any(part.role or part.stepped for part in parts))
-            return long, replace(long_layout, written=written)
+            parsed = ((cell, [_read_header(part, vocabulary) for part in _CORNER.split(cell)]) for cell in cells)
+            written = tuple(cell for cell, parts in parsed if any(part.role or part.stepped for part in parts))
+            return sheet, replace(long_layout, written=written)
     return None
 
 
-def _cells(content: Content, delimiter: str) -> Sequence[str | float]:
-    return split(content, delimiter) if isinstance(content, str) else content
-
-
-def _blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
+def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
     """Header cells and rows of numbers of each block, without the columns before and after it."""
-    starts = [_first_number(cells) for _, cells in rows]
-    done = 0
+
+    def first_number(cells: Sequence[str | float]) -> int | None:
+        """Index of the first filled cell if it is a number, and so are another cell and about half of the row."""
+        numbers = {index: is_like_number(str(cell)) for index, cell in enumerate(cells) if cell != ""}
+        first = next(iter(numbers), 0)
+        return first if sum(numbers.values()) > max(1, len(numbers) / 2 - 1) and numbers[first] else None
+
+    starts = [first_number(cells) for _, cells in rows]
+    end = 0
     for start, run in groupby(range(len(rows)), key=starts.__getitem__):
         numbers = list(run)
         if start is None or len(numbers) < 2:
             continue
-        part = rows[max(done, numbers[0] - _MOST_HEADER_ROWS) : numbers[-1] + 1]
-        done = numbers[-1] + 1
+        part = rows[max(end, numbers[0] - _MOST_HEADER_ROWS) : numbers[-1] + 1]
+        end = numbers[-1] + 1
         width = max(len(cells) for _, cells in part)
         padded = [(line, cells + [""] * (width - len(cells))) for line, cells in part]
         headers = [[str(cell) for cell in cells] for _, cells in padded[: -len(numbers)]]
         bottom = headers[-1] if headers else [""] * width
-        corners = [[one.stepped for one in _corner(cell, vocabulary)] for cell in bottom]
-        edges = [start, *(at for at in range(start + 1, width) if any(corners[at]) and corners[at] == corners[start])]
-        for first, last in zip(edges, [*edges[1:], width], strict=True):
+        corners = [[meaning.stepped for meaning in _read_corner(cell, vocabulary)] for cell in bottom]
+        repeated = [n for n in range(start + 1, width) if any(corners[n]) and corners[n] == corners[start]]
+        for first, last in zip([start, *repeated], [*repeated, width], strict=True):
             data = [(line, cells[first:last]) for line, cells in padded[-len(numbers) :]]
             yield [cells[first:last] for cells in headers], data
 
 
-def _first_number(cells: Sequence[str | float]) -> int | None:
-    """Index of the first filled cell, if it is a number and so is another, and half of the row or more."""
-    numbers = {index: is_like_number(str(cell)) for index, cell in enumerate(cells) if cell != ""}
-    first = next(iter(numbers), 0)
-    return first if sum(numbers.values()) > max(1, len(numbers) / 2 - 1) and numbers[first] else None
-
-
-def _series(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_Series]:
-    """The columns of a block; none where it is no block of a wide table."""
+def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_Series]:
+    """Columns of a block; none if it is no block of a wide table."""
     columns = [index for index in range(1, len(data[0][1])) if any(cells[index] != "" for _, cells in data)]
-    headings = dict.fromkeys(columns, _WideHeading())
-    down, across = _WideHeading(), _WideHeading()
+    meanings = dict.fromkeys(columns, _Meaning())
+    down, across = _Meaning(), _Meaning()
     for distance, cells in enumerate(reversed(headers)):
-        # an empty cell is merged with the one before it
         merged: Iterator[str] = accumulate(cells, lambda before, cell: cell or before)
         texts = list(merged) if distance else cells
-        row = {column: _read_heading(texts[column], vocabulary) for column in columns}
-        if any(texts[column] and row[column] == _WideHeading() for column in columns):
+        row = {column: _read_header(texts[column], vocabulary) for column in columns}
+        if any(texts[column] and row[column] == _Meaning() for column in columns):
             break
-        levels = {one.stepped for one in row.values() if one.level}
-        for corner in _corner(cells[0], vocabulary):
-            named = corner._replace(level_unit=corner.level_unit or corner.unit, role=None, unit=None)
+        levels = {meaning.stepped for meaning in row.values() if meaning.level}
+        for corner in _read_corner(cells[0], vocabulary):
             if corner.role is not None:
                 continue
+            axis = corner._replace(level_unit=corner.level_unit or corner.unit, unit=None)
             if corner.stepped in levels - {None} or (levels and down.stepped not in (None, corner.stepped)):
-                across = across.filled_by(named)
+                across = across.completed_by(axis)
             else:
-                down = down.filled_by(named)
-        headings = {column: one.filled_by(row[column]) for column, one in headings.items()}
-    stepped = next((one.stepped for one in (*headings.values(), across) if one.stepped), None)
+                down = down.completed_by(axis)
+        meanings = {column: meaning.completed_by(row[column]) for column, meaning in meanings.items()}
+    stepped = next((meaning.stepped for meaning in (*meanings.values(), across) if meaning.stepped), None)
     stepped = stepped or next((role for role in _STEPPED if down.stepped and role != down.stepped), None)
-    headings = {c: one.filled_by(across)._replace(stepped=one.stepped or stepped) for c, one in headings.items()}
-    if stepped is None or len(columns) < 2 or not all(one.level for one in headings.values()):
+    if stepped is None or len(columns) < 2:
+        return []
+    meanings = {n: m.completed_by(across)._replace(stepped=m.stepped or stepped) for n, m in meanings.items()}
+    if not all(meaning.level for meaning in meanings.values()):
         return []
     down = down._replace(stepped=_STEPPED[stepped == _STEPPED[0]])
-    return [_Series(one, down, [(line, cells[0], cells[c]) for line, cells in data]) for c, one in headings.items()]
+    return [_Series(m, down, [(line, cells[0], cells[n]) for line, cells in data]) for n, m in meanings.items()]
 
 
-def _corner(text: str, vocabulary: Vocabulary) -> list[_WideHeading]:
-    """What the cells of a corner say that names one thing or two: "f [Hz]", "f [Hz] \\ A [mm]"; no level."""
-    return [one for part in _CORNER.split(text) if not (one := _read_heading(part, vocabulary)).level]
+def _read_corner(text: str, vocabulary: Vocabulary) -> list[_Meaning]:
+    """Meanings of a corner that names one role or two, without levels: "f [Hz]", "f [Hz] \\ A [mm]"."""
+    return [meaning for part in _CORNER.split(text) if not (meaning := _read_header(part, vocabulary)).level]
 
 
-def _read_heading(text: str, vocabulary: Vocabulary) -> _WideHeading:
-    """What a header cell says; nothing where a part of it is not understood."""
+def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
+    """Meaning of a header cell; empty if a part of the cell is not understood."""
     whole, convention = split_convention(text.replace("_", " "))
     if is_like_number(text):
-        return _WideHeading(level=text)
-    heading = vocabulary.heading(text)
-    glued = _LEVEL.fullmatch((heading and heading.unit) or "")  # "tan delta 1 %" is at a level, and no unit of 1 %
-    if heading and not (glued and _stepped_in(glued["unit"])) and units.is_unit(heading.unit or "1"):
-        return _of_role(heading)
-    if text and units.is_unit(bare := whole.strip("[]() ")):
-        return _WideHeading(unit=bare, convention=convention)
-    if not (found := _LEVEL.search(whole)):
-        return _WideHeading()
-    unit, end = found["unit"], found.end()
-    stepped = _stepped_in(unit)
-    if unit and not stepped:
-        unit, end = None, found.end("number")
-    rest = _JOINTS.sub(" ", whole[: found.start()] + " " + whole[end:]).strip()
-    stepped = stepped or _SYMBOLS.get((found["name"] or "").lower())
-    level = _WideHeading(level=found["number"], stepped=stepped, level_unit=unit, convention=convention)
+        return _Meaning(level=text)
+    if (named := _named(text, vocabulary)) and units.is_unit(named.unit or named.level_unit or "1"):
+        number = _LEVEL.fullmatch(named.unit or named.level_unit or "")
+        if not (number and _role_of_unit(number["unit"])):  # "tan delta 1 %" has a level, and no unit of 1 %
+            return named
+    if text and units.is_unit(unit := whole.strip("[]() ")):
+        return _Meaning(unit=unit, convention=convention)
+    if not (match := _LEVEL.search(whole)):
+        return _Meaning()
+    stepped = _role_of_unit(match["unit"])
+    rest = whole[: match.start()] + " " + whole[match.end() if stepped else match.end("number") :]
+    rest = _JOINTS.sub(" ", rest).strip()
+    level = _Meaning(
+        level=match["number"],
+        stepped=stepped or _SYMBOLS.get((match["name"] or "").lower()),
+        level_unit=match["unit"] if stepped else None,
+        convention=convention,
+    )
     if not rest:
         return level
-    if heading := vocabulary.heading(rest):
-        return level.filled_by(_of_role(heading)._replace(convention=convention))
-    bare = rest.strip("[]() ")
-    if unit or not _stepped_in(bare):
-        return _WideHeading()
-    return level._replace(level_unit=bare, stepped=_stepped_in(bare))
+    if named := _named(rest, vocabulary):
+        return level.completed_by(named._replace(convention=convention))
+    unit = rest.strip("[]() ")
+    return (
+        level._replace(level_unit=unit, stepped=role) if not stepped and (role := _role_of_unit(unit)) else _Meaning()
+    )
 
 
-def _of_role(heading: Heading) -> _WideHeading:
-    """What a header says that names a role."""
-    if heading.role in _STEPPED:
-        return _WideHeading(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
-    return _WideHeading(heading.role, heading.unit)
+def _named(text: str, vocabulary: Vocabulary) -> _Meaning | None:
+    """Meaning of a header that names a role; None if it names none."""
+    heading = vocabulary.heading(text)
+    if heading and heading.role in _STEPPED:
+        return _Meaning(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
+    return _Meaning(heading.role, heading.unit) if heading else None
 
 
-def _stepped_in(unit: str | None) -> str | None:
-    """What has a unit: a frequency, or an amplitude."""
+def _role_of_unit(unit: str | None) -> str | None:
+    """Role of a level with a unit: frequency or amplitude."""
     roles = {"Hz": "frequency", "m": "amplitude", "rad": "amplitude", "1": "amplitude"}
     return next((role for si, role in roles.items() if unit and units.is_compatible(unit, si)), None)
 
 
-def _as_long_table(
-    series: Sequence[_Series], source: RowSource, file: Path, delimiter: str
-) -> tuple[RowSource, Layout]:
-    """The columns of all blocks as one long table: a row for each value down at each level."""
+def _long_table(series: Sequence[_Series], source: RowSource, file: Path, delimiter: str) -> tuple[RowSource, Layout]:
+    """Long table of the columns of all blocks, with its layout."""
     by_role: dict[str | None, list[_Series]] = {}
-    for one in series:
-        by_role.setdefault(one.heading.role, []).append(one)
-    blocks = [sorted(columns, key=lambda one: _value(one.heading.level)) for columns in by_role.values()]
-    levels = [
-        [(_value(one.heading.level), [_value(text) for _, text, _ in one.points]) for one in columns]
-        for columns in blocks
-    ]
-    down = {(one.down.stepped, one.down.level_unit, one.down.convention) for one in series}
-    across = {(one.heading.stepped, one.heading.level_unit, one.heading.convention) for one in series}
-    quantities = dict.fromkeys((one.heading.role, one.heading.unit, None) for one in series)
-    faults = {
-        "a block of this wide table does not say what it holds": (
-            None in by_role,
-            "a quantity such as K* [N/mm] or tan delta above each block, or in each header",
-        ),
-        "the blocks of this wide table differ": (
-            any(own != levels[0] for own in levels),
-            "the same frequencies and amplitudes in all blocks",
-        ),
-        "this wide table counts one thing in two ways": (
-            len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role),
-            "one unit for each quantity, and levels of one kind",
-        ),
-    }
-    for problem, (is_so, expected) in faults.items():
-        if is_so:
-            place = f'sheet "{source.sheet}"' if source.sheet else f"line {series[0].points[0][0] - 1}"
-            hint = "correct the wide table, or write it as a long one: a row for each frequency and amplitude"
-            raise MeasurementError(
-                problem, file=file, place=place, found=_described(series), expected=expected, hint=hint
-            )
+    for column in sorted(series, key=lambda column: _number(column.meaning.level)):
+        by_role.setdefault(column.meaning.role, []).append(column)
+    by_role = {role: by_role[role] for role in dict.fromkeys(column.meaning.role for column in series)}
+    down = {(column.first.stepped, column.first.level_unit, column.first.convention) for column in series}
+    meanings = [column.meaning for column in series]
+    across = {(meaning.stepped, meaning.level_unit, meaning.convention) for meaning in meanings}
+    quantities = dict.fromkeys((meaning.role, meaning.unit, None) for meaning in meanings)
+    counts_twice = len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role)
+    _check_blocks(series, by_role, source, file, counts_twice=counts_twice)
     headers = [
         f"{role}{COUNTED[convention]}{f' [{unit}]' if unit else ''}".replace("_", " ")
         for role, unit, convention in (*down, *across, *quantities)
     ]
     numbers: list[int] = []
     rows: list[list[str | float]] = []
-    for beside in zip(*blocks, strict=True):
-        text = beside[0].heading.level or ""
-        level = text if _OPEN.fullmatch(text) else _value(text)
-        for points in zip(*(column.points for column in beside), strict=True):
+    for columns in zip(*by_role.values(), strict=True):
+        text = columns[0].meaning.level or ""
+        level = text if _GROUPED.fullmatch(text) else _number(text)
+        for points in zip(*(column.points for column in columns), strict=True):
             numbers.append(points[0][0])
             rows.append([points[0][1], level, *(cell for _, _, cell in points)])
     sheet = Combined(source.sheet or "", rows, numbers=numbers)
     return sheet, Layout(delimiter, tuple(headers), min(numbers) - 1, ("",) * len(headers), None)
 
 
-def _value(text: str | float | None) -> float:
-    """A number of a header, whichever its decimal mark; nan where it has separators between thousands."""
+def _check_blocks(
+    series: Sequence[_Series],
+    by_role: Mapping[str | None, Sequence[_Series]],
+    source: RowSource,
+    file: Path,
+    *,
+    counts_twice: bool,
+) -> None:
+    """Refuse blocks that do not make one table.
+
+    Raises:
+        MeasurementError: a block does not state its quantity, blocks have other levels, or one thing has two units.
+    """
+    levels = [
+        [(_number(column.meaning.level), [_number(text) for _, text, _ in column.points]) for column in columns]
+        for columns in by_role.values()
+    ]
+    if None in by_role:
+        problem = "a block of this wide table does not say what it holds"
+        expected = "a quantity such as K* [N/mm] or tan delta above each block, or in each header"
+    elif any(block != levels[0] for block in levels):
+        problem = "the blocks of this wide table differ"
+        expected = "the same frequencies and amplitudes in all blocks"
+    elif counts_twice:
+        problem = "this wide table counts one thing in two ways"
+        expected = "one unit for each quantity, and levels of one kind"
+    else:
+        return
+    plural = {"frequency": "frequencies", "amplitude": "amplitudes", None: "amplitudes"}
+    kinds = Counter((c.meaning.role, c.meaning.unit, c.meaning.stepped, len(c.points)) for c in series)
+    raise MeasurementError(
+        problem,
+        file=file,
+        place=f'sheet "{source.sheet}"' if source.sheet else f"line {series[0].points[0][0] - 1}",
+        found="; ".join(
+            f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of "
+            f"{count} {plural[stepped]}, {rows} rows"
+            for (role, unit, stepped, rows), count in kinds.items()
+        ),
+        expected=expected,
+        hint="correct the wide table, or write it as a long one: a row for each frequency and amplitude",
+    )
+
+
+def _number(text: str | float | None) -> float:
+    """Number in a header with either decimal mark; NaN if it has separators between thousands."""
     try:
         return float(str(text).replace(",", "."))
     except ValueError:
         return math.nan
-
-
-def _described(series: Sequence[_Series]) -> str:
-    """The columns of a wide table in words: what each holds, at which level, over how many rows."""
-    counted = Counter((one.heading.role, one.heading.unit, one.heading.stepped, len(one.points)) for one in series)
-    return "; ".join(
-        f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of "
-        f"{count} {_PLURAL[stepped or 'amplitude']}, {n} rows"
-        for (role, unit, stepped, n), count in counted.items()
-    )

@@ -15,7 +15,7 @@ from bushfit.reading.names import Labels, direction_of_file, labels_above, label
 
 
 def amplitudes(said: Labels, expected: str = "m") -> list[tuple[str, str | None]]:
-    return [(each.text, each.convention) for each in said.of(expected)]
+    return [(each.text, each.convention) for each in said.of_dimension(expected)]
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_lines_above_a_table_and_the_name_before_the_headers() -> None:
     assert units.parse_temperature(said.temperature) == pytest.approx(296.65)
     assert (said.date, said.operator, said.preload, said.specimen_number) == ("2024-05-03", "3", "2 kN", "17")
     assert amplitudes(said) == [("0.2 mm", "peak-to-peak")]
-    assert [each.text for each in said.of("Hz")] == ["10 Hz"]
+    assert [each.text for each in said.of_dimension("Hz")] == ["10 Hz"]
     headers = ["Radialweg [mm]", "Kraft [N]"]
     assert direction_of_file(Path("radial/axial_1.csv"), headers, turns=False) is Direction.AXIAL
     assert direction_of_file(Path("axial/loop_1.csv"), headers, turns=False) is Direction.RADIAL
@@ -109,7 +109,7 @@ def test_lines_above_a_table_and_the_name_before_the_headers() -> None:
 def test_any_name_and_any_line_say_something_that_can_be_read(text: str) -> None:
     for said in (labels_in_names(text), labels_above([Line(1, text)]), labels_above([Line(1, [text, text])])):
         for expected in ("m", "rad", "1", "Hz"):
-            for each in said.of(expected):
+            for each in said.of_dimension(expected):
                 assert units.parse_quantity(each.text, expected) >= 0.0
         if said.temperature:
             assert units.parse_temperature(said.temperature) > 0.0
