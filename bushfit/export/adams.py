@@ -19,7 +19,7 @@ from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, Order
 from bushfit.export.deck import (
     DOFS,
-    Table,
+    StiffnessTable,
     band_losses,
     comment_lines,
     common_losses,
@@ -62,10 +62,10 @@ class _Element(NamedTuple):
         exact: complex stiffness of the reference table at this frequency [N/m or N m/rad].
     """
 
-    tables: Sequence[Table]
+    tables: Sequence[StiffnessTable]
     displacement: Array
     force: Array
-    reference: Table
+    reference: StiffnessTable
     frequency: float
     exact: complex
 
@@ -73,7 +73,7 @@ class _Element(NamedTuple):
         """Damper constant [N s/m or N m s/rad], or loss angle [rad]."""
         return float(self.exact.imag / (2.0 * np.pi * self.frequency) if kind == "car" else np.angle(self.exact))
 
-    def stiffness(self, kind: Kind, table: Table) -> Array:
+    def stiffness(self, kind: Kind, table: StiffnessTable) -> Array:
         """Complex stiffness of the element at the points of a table, (n,)."""
         storage = np.interp(table.amplitude, self.displacement, self.force) / table.amplitude
         if kind == "ride":
@@ -106,7 +106,7 @@ def export(order: Order) -> Exported:
     return Exported(files, (*losses["car"], *losses["ride"], *shared))
 
 
-def _element(tables: Sequence[Table]) -> _Element:
+def _element(tables: Sequence[StiffnessTable]) -> _Element:
     """Element with a curve through the storage force at each amplitude.
 
     A single amplitude is extrapolated linearly, because splines need five points.

@@ -27,7 +27,7 @@ DOFS = {Direction.AXIAL: (3,), Direction.RADIAL: (1, 2), Direction.TORSION: (6,)
 NO_LOOPS = "no law in time: loops, overtones and transients need another format (fmu)"
 
 
-class Table(NamedTuple):
+class StiffnessTable(NamedTuple):
     """Stiffness of a direction over frequency at one amplitude.
 
     Args:
@@ -44,7 +44,7 @@ class Table(NamedTuple):
 
 
 #: Tables of all directions in one property of a solver.
-AmplitudeLevel = tuple[Table, ...]
+AmplitudeLevel = tuple[StiffnessTable, ...]
 
 
 def exported_directions(order: Order) -> list[Prediction]:
@@ -67,12 +67,14 @@ def exported_directions(order: Order) -> list[Prediction]:
     return predictions
 
 
-def stiffness_tables(prediction: Prediction) -> list[Table]:
+def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
     """Tables of one direction in order of amplitude."""
     direction = Direction(str(prediction.direction))
     stiffness = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
     rows = [(amplitude, prediction.amplitude == amplitude) for amplitude in np.unique(prediction.amplitude)]
-    return [Table(direction, float(value), prediction.frequency[mask], stiffness[mask]) for value, mask in rows]
+    return [
+        StiffnessTable(direction, float(value), prediction.frequency[mask], stiffness[mask]) for value, mask in rows
+    ]
 
 
 def amplitude_levels(order: Order) -> list[AmplitudeLevel]:
@@ -85,7 +87,7 @@ def amplitude_levels(order: Order) -> list[AmplitudeLevel]:
     return [tuple(tables[min(rank, len(tables) - 1)] for tables in by_direction) for rank in range(count)]
 
 
-def by_dof(level: AmplitudeLevel) -> Iterator[tuple[int, Table]]:
+def by_dof(level: AmplitudeLevel) -> Iterator[tuple[int, StiffnessTable]]:
     """Yield the degrees of freedom of a level, numbered from 1, with their tables."""
     yield from sorted(((dof, table) for table in level for dof in DOFS[table.direction]), key=lambda pair: pair[0])
 
@@ -101,14 +103,14 @@ class Form(NamedTuple):
     parts: Callable[[Array, Array], tuple[Array, Array]]
     joined: Callable[[Array, Array, Array], Array]
 
-    def in_units(self, table: Table, units: UnitSystem) -> tuple[Array, Array, Array]:
+    def in_units(self, table: StiffnessTable, units: UnitSystem) -> tuple[Array, Array, Array]:
         """Frequency and the two real tables in the units of the deck, (n,) each."""
         frequency = table.frequency * units.frequency.factor
         factor = units.display(table.direction.motion).stiffness.factor
         return frequency, *self.parts(frequency, table.stiffness * factor)
 
 
-def middle(rows: Sequence[Table]) -> Table:
+def middle(rows: Sequence[StiffnessTable]) -> StiffnessTable:
     """Table of the middle amplitude; of two, the lower."""
     return rows[(len(rows) - 1) // 2]
 
@@ -179,7 +181,7 @@ def deck_lines(
     return lines
 
 
-def describe_amplitudes(level: Iterable[Table]) -> str:
+def describe_amplitudes(level: Iterable[StiffnessTable]) -> str:
     """Amplitudes of a level: "axial at 0.2 mm, torsion at 1 deg"."""
     rows = [(table.direction, table.amplitude, *table.direction.display.displacement) for table in level]
     return ", ".join(f"{place} at {number(amplitude * factor, 6)} {unit}" for place, amplitude, unit, factor in rows)
@@ -226,7 +228,7 @@ def common_losses(order: Order) -> Iterator[str]:
         yield f"specimens: {', '.join(specimens)}"
 
 
-def _amplitude_loss(tables: Sequence[Table]) -> Iterator[str]:
+def _amplitude_loss(tables: Sequence[StiffnessTable]) -> Iterator[str]:
     """Sentence on the error of one amplitude per property; none for a single amplitude."""
     if len(tables) > 1:
         reference = middle(tables)

@@ -84,7 +84,7 @@ class Information:
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
+class DesignColumn:
     """An effect that a model lacks, in one shape: its whitened sensitivity, (n,) per typical amount."""
 
     effect: Effect
@@ -176,7 +176,7 @@ class Grid:
         return np.array([(gain, 0.0 if isinstance(test, SimulatedLoop) else phase) for test in self.tests])
 
     @cached_property
-    def columns(self) -> list[Column]:
+    def columns(self) -> list[DesignColumn]:
         """Effects that the model lacks and these tests might show, a column for each shape.
 
         What depends on the order of the tests or on their temperature is not among them, nor an effect that replaces a
@@ -185,7 +185,7 @@ class Grid:
         model, places = self.knowledge.model, dict.fromkeys(str(test.direction) for test in self.tests)
         missing = [effect for effect in missing_effects(model, places) if not (effect.replaces or effect.under)]
         of_effects = [(effect, sensitivity(model, self.data_sets, effect)[1]) for effect in missing]
-        return [Column(effect, row) for effect, rows in of_effects for row in rows]
+        return [DesignColumn(effect, row) for effect, rows in of_effects for row in rows]
 
 
 def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> Array:

@@ -48,7 +48,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Part:
+class RecordPart:
     """Where a loop stands in a record of several: its first row, from 0, and a sentence on what of it is left out."""
 
     first_row: int
@@ -85,7 +85,7 @@ class Loop:
     source: Source | None = None
     timed: bool = True
     weight: float = 1.0
-    part: Part | None = None
+    part: RecordPart | None = None
     softening: float | None = None
     temperature: float | None = None
 

@@ -122,9 +122,9 @@ def unpivot(
         blocks = list(_find_blocks(rows, vocabulary))
         if series := [column for headers, data in blocks for column in _read_block(headers, data, vocabulary)]:
             sheet, long_layout = _long_table(series, source, file, mark)
-            cells = (cell for headers, _ in blocks for row in headers for cell in row)
-            parsed = ((cell, [_read_header(part, vocabulary) for part in _CORNER.split(cell)]) for cell in cells)
-            written = tuple(cell for cell, parts in parsed if any(part.role or part.stepped for part in parts))
+            texts = (text for headers, _ in blocks for row in headers for text in row)
+            parsed = ((text, [_read_header(part, vocabulary) for part in _CORNER.split(text)]) for text in texts)
+            written = tuple(text for text, parts in parsed if any(part.role or part.stepped for part in parts))
             return sheet, replace(long_layout, written=written)
     return None
 

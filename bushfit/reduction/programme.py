@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.measurement import Floats, Loop, Part
+from bushfit.reading.measurement import Floats, Loop, RecordPart
 from bushfit.reading.stated import LoopFile
 from bushfit.reduction.cycles import (
     change_after,
@@ -215,7 +215,7 @@ def _loops(loop: Loop, time: Floats, spans: Sequence[_SteadySpan], test: LoopFil
         part = replace(
             loop.at(rows),
             name=f"{loop.name}_part_{number}",
-            part=Part(rows.start, sentence),
+            part=RecordPart(rows.start, sentence),
             softening=_softening(loop, span, from_rest=number == 1),
         )
         yield part if loop.timed else replace(part, time=test.clock(part.displacement))
