@@ -39,7 +39,7 @@ def stepped(
         parts += [amplitude * envelope * np.sin(2.0 * np.pi * turns), np.zeros(round(pause / step))]
     motion = np.concatenate(parts)
     force = model.force(direction, History(motion, step, periodic=False, frequency=points[0][0]))
-    return Loop("history", direction, np.arange(motion.size) * step, motion, force).at(slice(None, None, every))
+    return Loop("history", direction, np.arange(motion.size) * step, motion, force).select(slice(None, None, every))
 
 
 def measured(history: Loop, random: np.random.Generator, noise: float, drift: float = 0.0) -> Loop:

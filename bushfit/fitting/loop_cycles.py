@@ -159,7 +159,7 @@ def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, floa
 def _cut(loop: Loop, first: float, last: float) -> Loop:
     """The rows between two times [s], both counted in."""
     rows = slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right"))
-    return loop.at(rows)
+    return loop.select(rows)
 
 
 def _period(time: Array, motion: Array) -> float | None:

@@ -50,8 +50,8 @@ def _sides(layout: Layout) -> list[slice]:
     starts = [index for index, header in enumerate(headers) if header == headers[first]]
     sides = [slice(start, end) for start, end in zip(starts, [*starts[1:], len(headers)], strict=True)]
     names = [[header for header in headers[side] if header] for side in sides]
-    alike = all(own == names[0] for own in names) and 1 < len(names[0]) == len(set(names[0]))
-    return sides if len(sides) > 1 and alike else []
+    are_equal = all(block_names == names[0] for block_names in names) and 1 < len(names[0]) == len(set(names[0]))
+    return sides if len(sides) > 1 and are_equal else []
 
 
 def _side_by_side(
@@ -108,9 +108,9 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
             repeated = True
         if repeated:
             groups = [*groups, between] if contents else [[*above, *between]]
-        left = [] if repeated else [part for part in between if not is_comment(part.content, layout.delimiter)]
+        unassigned = [] if repeated else [part for part in between if not is_comment(part.content, layout.delimiter)]
         block, repeated = len(groups) - 1, False
-        contents += [(part.number, cells_of(part, layout), block) for part in (*left, line)]
+        contents += [(part.number, cells_of(part, layout), block) for part in (*unassigned, line)]
         between = []
     if len(groups) < 2:
         return source, layout
@@ -144,12 +144,14 @@ def _label_columns(
     """Texts of the added columns by header: quantities that all blocks state, direction, part, and block number."""
     columns: dict[str, list[str]] = {}
     for role, expected in (("amplitude", "m"), ("amplitude", "rad"), ("amplitude", "1"), ("frequency", "Hz")):
-        stated = [label.of_dimension(expected) for label in labels]
-        if role not in roles and all(len(own) == 1 for own in stated):
-            parts = {(own[0].unit, own[0].convention) for own in stated}
+        quantities = [label.of_dimension(expected) for label in labels]
+        if role not in roles and all(len(found_quantities) == 1 for found_quantities in quantities):
+            parts = {(found_quantities[0].unit, found_quantities[0].convention) for found_quantities in quantities}
             if len(parts) == 1:
                 unit, convention = parts.pop()
-                columns[f"{role}{COUNTED[convention]} [{unit}]"] = [own[0].text.split()[0] for own in stated]
+                columns[f"{role}{COUNTED[convention]} [{unit}]"] = [
+                    found_quantities[0].text.split()[0] for found_quantities in quantities
+                ]
     if "temperature" not in roles and all(label.temperature for label in labels):
         texts = [str(label.temperature).partition(" ") for label in labels]
         if len({unit for *_, unit in texts}) == 1:

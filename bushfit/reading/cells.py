@@ -94,8 +94,8 @@ class Cells:
                 if clock(str(cell)) is None:
                     return "text"
             elif isinstance(cell, str) and not is_like_number(cell):
-                texts = [str(padded[other]).lower() for other in self.needed]
-                if all(text in _MISSING for text in texts) or not any(is_like_number(str(other)) for other in cells):
+                texts = [str(padded[number]).lower() for number in self.needed]
+                if all(text in _MISSING for text in texts) or not any(is_like_number(str(text)) for text in cells):
                     return "text"
                 return "missing" if cell.lower() in _MISSING and cell else "cell"
         return None
@@ -104,7 +104,10 @@ class Cells:
         """Sentence on the rows that are left out because they hold no data of the test.
 
         Args:
-            rows: line number, cells and fault of each such row; default all that are found.
+            rows: line number, cells and fault of each such row; default all in the table.
+
+        Yields:
+            One sentence if there are such rows.
 
         Raises:
             MeasurementError: so many of these rows look like data that their meaning is in doubt.
@@ -129,36 +132,40 @@ class Cells:
             yield f"{len(faults)} row{'s' * (len(faults) > 1)} left out, without data: {', '.join(listed)}{more}"
 
     def without_faults(self) -> tuple[Self, list[tuple[int, Sequence[str | float], str]]]:
-        """The table without lines that hold no data, and line number, cells and fault of each such line.
+        """Remove lines without data from a text; only lines with letters, dashes or empty cells are examined.
 
-        Most lines of a text are data; only those with letters, dashes or empty cells are examined.
+        Returns:
+            The table, and line number, cells and fault of each removed line.
         """
         source, layout = self.source, self.layout
         lines = source.suspicious(layout, _MOST_LEFT_OUT) if isinstance(source, Text) and not layout.numbered else None
         if not lines or not isinstance(source, Text):
             return self, []
         faults: list[tuple[int, Sequence[str | float], str]] = []
-        kept, place = list[bytes](), 0
+        chunks, chunk_start = list[bytes](), 0
         for number, start, end in lines:
             line = Line(number, source.data[start:end].decode("utf-8", "replace").rstrip())
             cells = [] if is_comment(line.content, layout.delimiter) else list(cells_of(line, layout))
             if any(cells) and (fault := self._fault(cells, [*cells, *[""] * (len(self.headers) - len(cells))])):
                 faults.append((number, [*cells, *[""] * (len(self.headers) - len(cells))], fault))
-                kept.append(source.data[place:start])
-                place = end
-        data = b"".join([*kept, source.data[place:]]) if kept else source.data
+                chunks.append(source.data[chunk_start:start])
+                chunk_start = end
+        data = b"".join([*chunks, source.data[chunk_start:]]) if chunks else source.data
         return replace(self, source=Text(data, source.encoding)), faults
 
     def bad_row(
         self, line: int, cells: Sequence[str | float], count: int = 1, column: Column | None = None
     ) -> MeasurementError:
-        """Error for a row that does not fit the header, or has a cell that is no number.
+        """Create the error for a row that does not fit the header, or has a cell that is no number.
 
         Args:
             line: line number.
             cells: its cells.
             count: number of such rows.
             column: with the bad cell; default the first needed one without a number.
+
+        Returns:
+            The error.
         """
         width, also = len(self.headers), f", and {count - 1} more such rows" if count > 1 else ""
         needed = (column for column in self.roles.values() if column.index in self.needed)
@@ -188,13 +195,21 @@ class Cells:
         """Return True if a column begins with a number."""
         return holds_number(next(self.rows(), (0, ()))[1], index)
 
-    def texts(self, index: int, most: int | None = None) -> list[str]:
-        """Texts of a column, (n,), or of its first `most` rows; an empty cell, as merged ones are, repeats the last."""
+    def texts(self, index: int, count: int | None = None) -> list[str]:
+        """Read the texts of a column.
+
+        Args:
+            index: of the column.
+            count: number of rows; default all.
+
+        Returns:
+            Texts, (n,); an empty cell, such as a merged one, has the text of the cell above.
+        """
         column: Iterator[str | float] = (cells[index] if index < len(cells) else "" for _, cells in self.rows())
-        if most is None and index in self.large_texts:
+        if count is None and index in self.large_texts:
             column = iter(self.large_texts[index])
         texts, last = [], ""
-        for cell in islice(column, most):
+        for cell in islice(column, count):
             last = (cell.strip(" #") if isinstance(cell, str) else f"{cell:.12g}") or last
             texts.append(last)
         return texts
@@ -252,7 +267,15 @@ class Cells:
         return len(self.roles) > 1 or bool(self.layout.written) or any(map(is_row, rows))
 
     def place(self, line: int | None, column: Column | None) -> str | None:
-        """Location in the file in words: sheet, line and column as far as they are given."""
+        """Location in the file in words, as "line 3, column "Time [s]"".
+
+        Args:
+            line: line number, if it is known.
+            column: if it is known.
+
+        Returns:
+            Sheet, line and column; None if all are unknown.
+        """
         source = self.source
         parts = [
             f'{word_for_part(self.file)} "{source.sheet}"' if source.sheet else None,

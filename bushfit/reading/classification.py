@@ -71,12 +71,12 @@ def classify(
     """
     roles: dict[str, Column] = {}
     rejected: set[str] = set()
-    stated = _stated_indices(cells, vocabulary, columns)
+    role_by_index = _stated_indices(cells, vocabulary, columns)
     for index, header in sorted(enumerate(cells.headers), key=lambda column: is_symbol_k(column[1])):
         heading = vocabulary.heading(header) if header else None
-        if index in stated:
-            heading = Heading(stated[index], *_meaning(header))
-        elif heading and heading.role in stated.values():
+        if index in role_by_index:
+            heading = Heading(role_by_index[index], *_meaning(header))
+        elif heading and heading.role in role_by_index.values():
             heading = None
         if heading is None or heading.role in rejected:
             continue
@@ -90,8 +90,8 @@ def classify(
         if plain(header) == "t" and role == "temperature" and not units.kelvin_scale(column.unit or ""):
             continue  # a time, or another quantity
         if is_symbol_k(header) and role not in columns:
-            known = role in roles and not is_symbol_k(roles[role].header)  # K* is more specific than K
-            if known or not any(units.is_compatible(column.unit or "", si) for si in ("N/m", "N*m/rad")):
+            is_taken_up = role in roles and not is_symbol_k(roles[role].header)  # K* is more specific than K
+            if is_taken_up or not any(units.is_compatible(column.unit or "", si) for si in ("N/m", "N*m/rad")):
                 continue
         if role not in roles:
             roles[role] = column
@@ -137,21 +137,25 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
         MeasurementError: one header for two roles.
     """
     for role, text in columns.items():
-        others = [other for other, header in columns.items() if other != role and plain(header) == plain(text)]
-        if others:
+        same_columns = [
+            second_role
+            for second_role, header in columns.items()
+            if second_role != role and plain(header) == plain(text)
+        ]
+        if same_columns:
             raise cells.header_error(
                 "one column is named for two roles",
-                found=f'"{text}" for the {role.replace("_", " ")} and the {others[0].replace("_", " ")}',
+                found=f'"{text}" for the {role.replace("_", " ")} and the {same_columns[0].replace("_", " ")}',
                 expected="a column for each",
                 hint=f'name another column for one of them: columns = {{ {role} = "..." }} in the campaign',
             )
-    known = {heading.role for header in cells.headers if header and (heading := vocabulary.heading(header))}
+    named_roles = {heading.role for header in cells.headers if header and (heading := vocabulary.heading(header))}
     indices = {}
     for role, text in columns.items():
         number = int(text) if text.isdecimal() and len(text) < 5 else 0
         if 1 <= number <= len(cells.headers):
             indices[number - 1] = role
-        elif role not in known:
+        elif role not in named_roles:
             headers = cells.headers if cells.is_table else ()
             near = next(iter(get_close_matches(text, headers, n=1, cutoff=_ALIKE)), "")
             raise cells.header_error(
@@ -174,15 +178,15 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
                 texts[number], logarithm = text[len(word) + 1 : -1], base
     parts = [split_convention(text) for text in texts]
     conventions = {convention for convention in (heading.convention, *(part[1] for part in parts)) if convention}
-    stated = {unit for unit, _ in parts if unit}
-    unit, counting = next(iter(stated), None), next(iter(conventions), None)
+    stated_texts = {unit for unit, _ in parts if unit}
+    unit, counting = next(iter(stated_texts), None), next(iter(conventions), None)
     column = Column(heading.role, cells.headers[index], index, unit, 1.0, counting, logarithm)
-    if len(stated) > 1 or len(conventions) > 1:
+    if len(stated_texts) > 1 or len(conventions) > 1:
         raise UnitError(
             f"two units for the {heading.role.replace('_', ' ')}",
             file=cells.file,
             place=cells.place(cells.layout.header_line, column),
-            found=" and ".join(sorted(stated) if len(stated) > 1 else sorted(conventions)),
+            found=" and ".join(sorted(stated_texts) if len(stated_texts) > 1 else sorted(conventions)),
             expected="one unit, from the header, the units row or the campaign",
         )
     return column
@@ -203,7 +207,10 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
         return first if first.unit else second
     rows = [row for _, row in islice(cells.rows(), _FIRST)]
     texts = [[str(row[column.index]) for row in rows] for column in (first, second)]
-    numbers = [np.array([float(t) for t in own]) if all(map(units.is_number, own)) else None for own in texts]
+    numbers = [
+        np.array([float(t) for t in column_texts]) if all(map(units.is_number, column_texts)) else None
+        for column_texts in texts
+    ]
     factors = [ZERO_TO_PEAK[column.convention or "zero-to-peak"] for column in (first, second)]
     same_unit = first.unit == second.unit and numbers[0] is not None and numbers[1] is not None and len(rows) > 0
     if factors[0] != factors[1] and same_unit:

@@ -16,7 +16,7 @@ _LARGEST_BYTES = 1 << 30
 HEAD_BYTES = 1 << 18
 #: Bytes that are checked at a time; chosen: few enough to be held beside the file, enough to be fast.
 CHUNK_BYTES = 1 << 22
-#: Byte order marks, and Python's name of the encoding that each tells. UTF-32's begins with UTF-16's.
+#: Byte order marks with Python's name of the encoding. The mark of UTF-32 begins with that of UTF-16.
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -36,11 +36,19 @@ _COMMON_CHINESE = re.compile(rb"(?:[\xa1-\xa3\xb0-\xd7][\xa1-\xfe])+")
 def view_bytes(
     file: Path, kind: type[BushfitError], *, largest: int = _LARGEST_BYTES, hint: str = "thin it out"
 ) -> bytes:
-    """The bytes of a file: read and not mapped, because a mapped file that becomes shorter ends the process.
+    """Read the bytes of a file.
+
+    Args:
+        file: path.
+        kind: class of errors.
+        largest: number of bytes that is allowed.
+        hint: next step if the file is larger.
+
+    Returns:
+        Bytes, read and not mapped, because a mapped file that becomes shorter ends the process.
 
     Raises:
-        kind: the file is missing, no regular file, not readable, empty, becomes shorter or longer meanwhile, or has
-            more than `largest` bytes (with `hint`).
+        kind: the file is missing, no regular file, not readable, empty, too large, or its size changes during reading.
     """
     try:
         if not file.exists():
@@ -72,7 +80,16 @@ def view_bytes(
 def read_utf8(
     file: Path, kind: type[BushfitError], *, largest: int = _LARGEST_BYTES, hint: str = "thin it out"
 ) -> bytes:
-    """The bytes of a text file in UTF-8; a byte order mark stays in place.
+    """Read the bytes of a text file in UTF-8.
+
+    Args:
+        file: path.
+        kind: class of errors.
+        largest: number of bytes that is allowed.
+        hint: next step if the file is larger.
+
+    Returns:
+        Bytes, with the byte order mark if there is one.
 
     Raises:
         kind: as `view_bytes`, or the file is not UTF-8 text.
@@ -91,7 +108,14 @@ def read_utf8(
 
 
 def not_utf8(data: bytes) -> int | None:
-    """Index of the first byte that no text in UTF-8 has there; None where there is none."""
+    """Find the first byte that is not valid UTF-8 text.
+
+    Args:
+        data: bytes of a text.
+
+    Returns:
+        Index of the byte; None if all are valid.
+    """
     if (zero := data.find(0)) >= 0:
         return zero
     decoder = codecs.getincrementaldecoder("utf-8")()
@@ -104,32 +128,47 @@ def not_utf8(data: bytes) -> int | None:
 
 
 def line_of(data: bytes, index: int) -> str:
-    """The line of a byte in words, from 1."""
+    """Line of a byte, as "line 3", from 1."""
     number = data.count(b"\n", 0, index) + 1
     return f"line {number}"
 
 
 def sha256(data: bytes) -> Future[str]:
-    """SHA-256 of a file's bytes as hexadecimal digits, of many bytes made meanwhile in a thread."""
+    """Compute the SHA-256 of a file; of a large one in a thread.
+
+    Args:
+        data: bytes of the file.
+
+    Returns:
+        Future with the hexadecimal digits.
+    """
     if len(data) <= CHUNK_BYTES:
-        made = Future[str]()
-        made.set_result(hashlib.sha256(data).hexdigest())
-        return made
+        digest = Future[str]()
+        digest.set_result(hashlib.sha256(data).hexdigest())
+        return digest
     thread = ThreadPoolExecutor(1)
     digest = thread.submit(lambda: hashlib.sha256(data).hexdigest())
     thread.shutdown(wait=False)
     return digest
 
 
-def to_utf8(data: bytes, file: Path, stated: str | None = None) -> tuple[bytes, str]:
-    """A text as UTF-8 without byte order mark, and the encoding it had; errors name `file`.
+def to_utf8(data: bytes, file: Path, stated_encoding: str | None = None) -> tuple[bytes, str]:
+    """Convert a text to UTF-8.
+
+    Args:
+        data: bytes of the file.
+        file: path, for errors.
+        stated_encoding: as the user states it; default detected.
+
+    Returns:
+        UTF-8 without byte order mark, and the original encoding by Python's name.
 
     Raises:
         MeasurementError: no text, or not in the encoding stated.
     """
-    if stated is None and data.isascii() and 0 not in data:
+    if stated_encoding is None and data.isascii() and 0 not in data:
         return data, "utf-8"
-    encoding = stated or detect(data)
+    encoding = stated_encoding or detect(data)
     if encoding in ("utf-8", "utf-8-sig"):
         without_mark = data.removeprefix(codecs.BOM_UTF8)
         if (bad := not_utf8(without_mark)) is None:
@@ -145,20 +184,26 @@ def to_utf8(data: bytes, file: Path, stated: str | None = None) -> tuple[bytes, 
         raise MeasurementError(
             "unknown encoding",
             file=file,
-            found=f'"{stated}"',
+            found=f'"{stated_encoding}"',
             expected='a name such as "utf-8", "utf-16", "cp1252", "latin-1" or "gb18030"',
         ) from None
     return b"".join(parts).removeprefix(codecs.BOM_UTF8), encoding
 
 
 def detect(data: bytes) -> str:
-    """Python's name of the encoding of a text; "utf-8" also where it is no text.
+    """Detect the encoding of a text.
+
+    Args:
+        data: bytes of the file.
+
+    Returns:
+        Python's name of the encoding; "utf-8" if this is no text.
 
     Notes:
         Test files are ASCII but for a few letters of their header, too few for detectors that count letters, such as
         charset-normalizer and chardet. Here the bytes decide, in this order: a byte order mark; zeros beside ASCII
         (UTF-16); valid UTF-8; pairs of common Chinese characters (GB18030); and Western Latin for the rest (cp1252, or
-        Latin-1 where it has bytes that cp1252 lacks).
+        Latin-1 if cp1252 lacks a byte).
     """
     for mark, encoding in _MARKS:
         if data.startswith(mark):
@@ -181,7 +226,7 @@ def detect(data: bytes) -> str:
 
 
 def _undecodable(data: bytes, file: Path, bad: int, encoding: str) -> MeasurementError:
-    """The error for a byte, by its index, that a text in this encoding does not have."""
+    """Error for the byte at an index, which is not valid in an encoding."""
     return MeasurementError(
         "this is not text" if data[bad] == 0 else f"this is not {encoding.upper()} text",
         file=file,

@@ -129,7 +129,12 @@ _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
 def _combined_names(body: str, quantity: str) -> list[str]:
     """Names of a quantity, such as "acceleration", before and after names of a body, such as "base"."""
     parts = WORDS["resonance_parts"]
-    return [name for own in parts[body] for word in parts[quantity] for name in (f"{own} {word}", word + own)]
+    return [
+        name
+        for body_name in parts[body]
+        for word in parts[quantity]
+        for name in (f"{body_name} {word}", word + body_name)
+    ]
 
 
 #: Names of the columns of a resonance test (a mass on a mount on a shaker), by role.

@@ -1,7 +1,7 @@
 """Recordings of instruments and programs (MATLAB, TDMS, UFF, MDF, Parquet and Arrow), as groups of channels.
 
-Their content tells them. Each reader is loaded, with its library, when a file needs it. None makes up a unit: it is ""
-where a file states none.
+The first bytes of a file determine its format. Each reader imports its library when a file needs it. A unit that the
+file does not state is "".
 """
 
 import gc
@@ -29,33 +29,37 @@ from bushfit.reading.labview import labview
 from bushfit.reading.layout import Layout, Line
 from bushfit.reading.source import Channel, Channels, Group
 
-#: Values of a file that are read at most; chosen: ten million rows of twenty channels and more, 2 GiB.
+#: Values of the largest file; chosen: ten million rows of twenty channels and more, 2 GiB.
 _MOST_VALUES = 1 << 28
-#: Quantities of UFF by their number, with the SI unit, and the factor of dataset 164 to divide values by.
+#: Quantities of UFF by number, with their SI unit and the factor of dataset 164 that values are divided by.
 _UFF_QUANTITIES = {
     **{8: ("displacement", "m", "length"), 9: ("force", "N", "force"), 13: ("force", "N", "force")},
     **{17: ("time", "s", ""), 18: ("frequency", "Hz", "")},
 }
-#: What begins and ends a dataset of UFF.
+#: First and last line of a dataset of UFF.
 _UFF_MARK = b"    -1"
 #: ID line 5 of data at nodes: reference, its direction, numerator, denominator.
 _UFF_CODES = re.compile(r"(\s*-?\d+){4}\s*")
-#: The direction of UFF from which on a displacement is a rotation, and a force a moment.
+#: First direction of UFF in which a displacement is a rotation, and a force a moment.
 _UFF_ROTATIONS = 4
-#: The names that a base of recording goes by.
+#: Names of the base of a recording.
 _BASES = Vocabulary({"time": LOOP_COLUMNS["time"], "frequency": SWEEP_COLUMNS["frequency"]}, {})
 #: Channels that have no complex values.
 _REAL = Vocabulary(
     {"time": LOOP_COLUMNS["time"], **{role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}}, {}
 )
-#: What may be done about files without channels.
+#: Next step for files without channels.
 _HINT = "export it again, with its channels"
 _MATLAB_HINT = 'save vectors, or structs of them, with -v7; a table by way of table2struct(T, "ToScalar", true)'
 _UFF_HINT = "export records or frequency responses as dataset 58; of data at nodes (55) only the latter are read"
 
 
 def matlab(data: bytes, _: Path) -> Iterator[Group]:
-    """The vectors of a MATLAB file, and of each struct in it."""
+    """Read the vectors of a MATLAB file, with a group for each struct.
+
+    Yields:
+        Groups of channels.
+    """
     if data.startswith(b"MATLAB 7.3"):
         import h5py
 
@@ -69,9 +73,9 @@ def matlab(data: bytes, _: Path) -> Iterator[Group]:
 
 
 def _from_hdf5(node: Any) -> Any:
-    """A variable of MATLAB in HDF5 as scipy gives it: a dict, a list of them, a text, or an array with its axes turned.
+    """Variable of MATLAB in HDF5 as scipy returns it: a dict, a list of dicts, a text, or an array.
 
-    None where it is an object of a class, such as a table.
+    None for an object of a class, such as a table.
     """
     if getattr(node, "external", None) or getattr(node, "is_virtual", False):
         raise ValueError("its data are in other files")
@@ -94,13 +98,13 @@ def _from_hdf5(node: Any) -> Any:
 
 
 def _bound(values: int) -> None:
-    """Refuse a file that unpacks to more values than a recording has: some kilobytes may hold terabytes of them."""
+    """Refuse a file that unpacks to more values than a recording has."""
     if values > _MOST_VALUES:
         raise ValueError(f"it unpacks to {values} values, of which at most {_MOST_VALUES} are read")
 
 
 def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
-    """The vectors and the columns of matrices in a struct, and those of the structs in it."""
+    """Groups of the vectors and columns of matrices in a struct, and in the structs inside it."""
     channels: list[Channel] = []
     labels: list[tuple[str, str]] = []
     inner: dict[str, Mapping[str, Any]] = {}
@@ -124,7 +128,11 @@ def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
 
 
 def tdms(data: bytes, _: Path) -> Iterator[Group]:
-    """The channels of each group of a TDMS file; a waveform is recorded over time, unless it states another unit."""
+    """Read the channels of a TDMS file; a waveform is recorded over time, unless it states another unit.
+
+    Yields:
+        Groups of channels.
+    """
     from nptdms import TdmsFile
 
     file = TdmsFile.read(io.BytesIO(data))
@@ -133,40 +141,42 @@ def tdms(data: bytes, _: Path) -> Iterator[Group]:
     for group in file.groups():
         channels = []
         for channel in group.channels():
-            said, values, over = channel.properties, channel[:], None
-            if step := said.get("wf_increment"):
-                unit = said.get("wf_xunit_string") or "s"
-                name = (
-                    "frequency"
-                    if units.is_compatible(unit, "Hz")
-                    else "time"
-                    if units.is_compatible(unit, "s")
-                    else "x"
-                )
-                over = Channel(name, said.get("wf_start_offset", 0.0) + step * np.arange(len(values)), unit)
-            channels.append(Channel(channel.name, values, said.get("unit_string", ""), over))
+            properties, values, over = channel.properties, channel[:], None
+            if step := properties.get("wf_increment"):
+                unit = properties.get("wf_xunit_string") or "s"
+                bases = {"Hz": "frequency", "s": "time"}
+                name = next((name for si, name in bases.items() if units.is_compatible(unit, si)), "x")
+                over = Channel(name, properties.get("wf_start_offset", 0.0) + step * np.arange(len(values)), unit)
+            channels.append(Channel(channel.name, values, properties.get("unit_string", ""), over))
         yield group.name, channels, [*file.properties.items(), *group.properties.items()]
 
 
 def mdf(data: bytes, _: Path) -> Iterator[Group]:
-    """The channels of each group of an MDF file, over its master channel."""
+    """Read the channels of an MDF file over their master channels.
+
+    Yields:
+        Groups of channels.
+    """
     from asammdf import MDF
 
     with MDF(io.BytesIO(data)) as file:
         groups: Sequence[Any] = file.groups
         for index, group in enumerate(groups):
-            master, said = file.masters_db.get(index), group.channel_group
+            master, comments = file.masters_db.get(index), group.channel_group
             over = None if master is None else group.channels[master]
             is_time = getattr(over, "sync_type", 1) == 1  # older files have no other
             name, unit = ("time", "s") if over is None or is_time else (over.name, over.unit)
             signals = file.select([(None, index, number) for number in range(len(group.channels)) if number != master])
-            bases = [over and Channel(name, one.timestamps, unit) for one in signals]
-            channels = [Channel(one.name, one.samples, one.unit, own) for one, own in zip(signals, bases, strict=True)]
-            yield getattr(said, "acq_name", "") or said.comment or f"group {index + 1}", channels, ()
+            channels = [Channel(s.name, s.samples, s.unit, over and Channel(name, s.timestamps, unit)) for s in signals]
+            yield getattr(comments, "acq_name", "") or comments.comment or f"group {index + 1}", channels, ()
 
 
 def arrow(data: bytes, _: Path) -> Iterator[Group]:
-    """The columns of a Parquet or Arrow file, with the units that metadata of its fields state."""
+    """Read the columns of a Parquet or Arrow file, with units from the metadata of its fields.
+
+    Yields:
+        One group of channels.
+    """
     import pyarrow as pa
 
     if data.startswith(b"PAR1"):
@@ -180,8 +190,8 @@ def arrow(data: bytes, _: Path) -> Iterator[Group]:
     frame = table.to_pandas(ignore_metadata=True)
     channels = []
     for index, field in enumerate(table.schema):
-        said = field.metadata or {}
-        unit = (said.get(b"unit") or said.get(b"units") or b"").decode()
+        metadata = field.metadata or {}
+        unit = (metadata.get(b"unit") or metadata.get(b"units") or b"").decode()
         column = frame.iloc[:, index]
         plain = column.dt.tz_localize(None) if getattr(column.dtype, "tz", None) else column
         channels.append(Channel(field.name, plain.to_numpy(), unit))
@@ -189,9 +199,10 @@ def arrow(data: bytes, _: Path) -> Iterator[Group]:
 
 
 def uff(data: bytes, file: Path) -> Iterator[Group]:
-    """The records of a UFF file together, and each of its complex functions of a frequency by itself.
+    """Read a UFF file: functions (dataset 58), or if there are none, data at nodes (dataset 55).
 
-    Data at nodes (dataset 55) are taken where the file holds no functions (dataset 58).
+    Yields:
+        A group for each complex function of frequency, and one for all records over time.
     """
     import pyuff
 
@@ -199,8 +210,8 @@ def uff(data: bytes, file: Path) -> Iterator[Group]:
         raise ValueError("its last dataset has no end")
     book = pyuff.UFF(str(file))
     kinds = list(book.get_set_types())
-    kept = 58 if 58 in kinds else 55
-    sets = [book.read_sets(number) for number, kind in enumerate(kinds) if kind in (kept, 164)]
+    read_kind = 58 if 58 in kinds else 55
+    sets = [book.read_sets(number) for number, kind in enumerate(kinds) if kind in (read_kind, 164)]
     factors: Mapping[str, Any] = next((one for one in sets if one["type"] == 164), {})
     functions = [one for one in sets if one["type"] == 58] or [*_at_nodes(one for one in sets if one["type"] == 55)]
     quantities = Counter(one["ordinate_spec_data_type"] for one in functions)
@@ -225,15 +236,15 @@ def uff(data: bytes, file: Path) -> Iterator[Group]:
 
 
 def _at_nodes(steps: Iterable[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Frequency responses at nodes, of which each dataset 55 holds one frequency, as functions of dataset 58.
+    """Frequency responses at nodes, with one dataset 55 for each frequency, as functions of dataset 58.
 
-    ID line 5 says what a value is over what, as of I-DEAS Test: reference, its direction, numerator, denominator.
+    ID line 5 states reference, its direction, numerator and denominator, as in I-DEAS Test.
     """
     runs: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
     for one in steps:
         if one["analysis_type"] == 5 and np.iscomplexobj(one["r1"]):
-            said = [int(word) for word in one["id5"].split()] if _UFF_CODES.fullmatch(one["id5"]) else [0, 0, 0, 0]
-            runs.setdefault((one["load_case"], one["id1"], *said), []).append(one)
+            codes = [int(word) for word in one["id5"].split()] if _UFF_CODES.fullmatch(one["id5"]) else [0, 0, 0, 0]
+            runs.setdefault((one["load_case"], one["id1"], *codes), []).append(one)
     labels = dict.fromkeys((f"{axis}_axis_units_lab" for axis in ("abscissa", "ordinate", "orddenom")), "NONE")
     for (_, title, _, direction, upper, lower), run in runs.items():
         of_all = {"abscissa_spec_data_type": 18, "ordinate_spec_data_type": upper, "orddenom_spec_data_type": lower}
@@ -241,12 +252,12 @@ def _at_nodes(steps: Iterable[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
         for node, (axis, name) in product(run[0]["node_nums"], enumerate("XYZ", start=1)):
             values = [dict(zip(one["node_nums"], one[f"r{axis}"], strict=True)).get(node, 0.0) for one in run]
             if any(values):
-                own = {"id1": f"{title}, node {node} {name}", "rsp_node": node, "rsp_dir": axis}
-                yield {**run[0], **of_all, **own, "data": np.array(values), "ordinate_axis_lab": "NONE"}
+                identity = {"id1": f"{title}, node {node} {name}", "rsp_node": node, "rsp_dir": axis}
+                yield {**run[0], **of_all, **identity, "data": np.array(values), "ordinate_axis_lab": "NONE"}
 
 
 def _uff_text(function: Mapping[str, Any], key: str) -> str:
-    """A text of a UFF function; "" where it says nothing."""
+    """Text of a UFF function; "" if it is NONE."""
     text = " ".join(str(function[key]).split())
     return "" if text == "NONE" else text
 
@@ -254,7 +265,7 @@ def _uff_text(function: Mapping[str, Any], key: str) -> str:
 def _uff_axis(
     function: Mapping[str, Any], axis: str, values: NDArray[Any], direction: int, factors: Mapping[str, Any]
 ) -> Channel:
-    """An axis of a UFF function with the name of its quantity, in the unit of its label or of dataset 164."""
+    """Axis of a UFF function with the name of its quantity, in the unit of its label or of dataset 164."""
     name, si, factor = _UFF_QUANTITIES.get(function[f"{axis}_spec_data_type"], ("", "", ""))
     if label := _uff_text(function, f"{axis}_axis_units_lab"):
         return Channel(name, values, label)
@@ -264,7 +275,15 @@ def _uff_axis(
 
 
 class Format(NamedTuple):
-    """A format of recordings: its name, endings and pattern of the start of files, what reads them, and a hint."""
+    """Format of recordings.
+
+    Args:
+        name: of the format.
+        endings: of files.
+        sign: pattern of the first bytes.
+        read: function that returns the groups of channels.
+        hint: next step for a file without channels.
+    """
 
     name: str
     endings: tuple[str, ...]
@@ -273,7 +292,7 @@ class Format(NamedTuple):
     hint: str
 
 
-#: The formats of recordings.
+#: Formats of recordings.
 _FORMATS = (
     Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", matlab, _MATLAB_HINT),
     Format("TDMS", (".tdms",), rb"TDSm", tdms, _HINT),
@@ -287,61 +306,79 @@ RECORDINGS = tuple(ending for one in _FORMATS for ending in one.endings)
 
 
 def word_for_part(file: Path) -> str:
-    """What a part of a file is called that may hold a table: the group of a recording, the sheet of a workbook."""
+    """Word for a part of a file: "group" of a recording, or "sheet" of a workbook."""
     return "group" if file.suffix.lower() in RECORDINGS else "sheet"
 
 
 def format_of(data: bytes, file: Path) -> Format | None:
-    """The format of a recording by its first bytes; None where it is a text or a workbook.
+    """Determine the format of a recording by its first bytes.
+
+    Args:
+        data: bytes of the file.
+        file: path.
+
+    Returns:
+        Format; None for a text or a workbook.
 
     Raises:
         MeasurementError: the ending of the file is that of a recording, and its content is not.
     """
-    own = next((one for one in _FORMATS if re.match(one.sign, data)), None)
-    said = next((one for one in _FORMATS if file.suffix.lower() in one.endings), None)
-    if said and not own and said.read is not labview:  # LabVIEW also writes plain tables under this ending
+    by_content = next((recording for recording in _FORMATS if re.match(recording.sign, data)), None)
+    by_ending = next((recording for recording in _FORMATS if file.suffix.lower() in recording.endings), None)
+    if (
+        by_ending and not by_content and by_ending.read is not labview
+    ):  # LabVIEW also writes plain tables under this ending
         raise MeasurementError(
-            f"this is no {said.name} file",
+            f"this is no {by_ending.name} file",
             file=file,
             found="the first bytes of another file",
-            expected=f"a {said.name} file, as its ending {file.suffix} says",
+            expected=f"a {by_ending.name} file, as its ending {file.suffix} says",
             hint="export it again, or give it the ending of what it is, such as .csv",
         )
-    return own
+    return by_content
 
 
 @lru_cache(maxsize=1)
-def read_groups(data: bytes, file: Path, own: Format) -> tuple[Channels, ...] | MeasurementError:
-    """The groups of channels of one length in a recording, each with a name of its own if there are several.
+def read_groups(data: bytes, file: Path, recording: Format) -> tuple[Channels, ...] | MeasurementError:
+    """Read the groups of channels in a recording; the last result is cached, because an inspection reads several times.
 
-    Or else the error: no channels, a library that is not installed or cannot read it. The last answer is kept, because
-    to look at a file takes several passes.
+    Args:
+        data: bytes of the file.
+        file: path.
+        recording: its format.
+
+    Returns:
+        Channels of one length in each group, with unique titles if there are several; or the error if there are no
+        channels, a library is not installed, or it cannot read the file.
     """
     with _silenced():
         try:
-            found = [part for group in own.read(data, file) for part in _of_one_length(*group, own)]
-            problem, said = "holds no channels", {"expected": "numbers", "hint": own.hint}
+            groups = [part for group in recording.read(data, file) for part in _split_by_length(*group, recording)]
+            problem, details = "holds no channels", {"expected": "numbers", "hint": recording.hint}
         except MeasurementError as error:
             error.file = file
             return error
         except ImportError as error:
-            found, problem = [], "takes a package that is not installed"
-            said = {"found": f"no package {error.name}", "hint": 'pip install "bushfit[instruments]"'}
+            groups, problem = [], "takes a package that is not installed"
+            details = {"found": f"no package {error.name}", "hint": 'pip install "bushfit[instruments]"'}
         except Exception as error:  # libraries raise any kind for broken files, struct.error and KeyError among them
-            found, problem = [], "cannot be read"
-            said = {"found": str(error) or type(error).__name__, "hint": "it may be cut short: copy or export it again"}
-        if not found:
-            gc.collect()  # finalizers of what was half read run here, where they print nothing
-            return MeasurementError(f"the {own.name} file {problem}", file=file, **said)
-    titles = [part.sheet or ("top level" if len(found) > 1 else "") for part in found]
+            groups, problem = [], "cannot be read"
+            details = {
+                "found": str(error) or type(error).__name__,
+                "hint": "it may be cut short: copy or export it again",
+            }
+        if not groups:
+            gc.collect()  # finalizers of unfinished readers run here, where they print nothing
+            return MeasurementError(f"the {recording.name} file {problem}", file=file, **details)
+    titles = [part.sheet or ("top level" if len(groups) > 1 else "") for part in groups]
     counts = [titles[: index + 1].count(title) for index, title in enumerate(titles)]
     titles = [f"{title} ({count})" if count > 1 else title for title, count in zip(titles, counts, strict=True)]
-    return tuple(replace(part, sheet=title) for part, title in zip(found, titles, strict=True))
+    return tuple(replace(part, sheet=title) for part, title in zip(groups, titles, strict=True))
 
 
 @contextmanager
 def _silenced() -> Iterator[None]:
-    """Libraries neither warn, log nor print within, nor their finalizers: what cannot be read is an error."""
+    """Context in which libraries and their finalizers neither warn, log nor print."""
     before, hook = logging.root.manager.disable, sys.unraisablehook
     logging.disable(logging.CRITICAL)
     sys.unraisablehook = lambda _: None
@@ -354,12 +391,12 @@ def _silenced() -> Iterator[None]:
         sys.unraisablehook = hook
 
 
-def _of_one_length(
-    name: str, channels: Sequence[Channel], said: Sequence[tuple[Any, ...]], own: Format
+def _split_by_length(
+    name: str, channels: Sequence[Channel], properties: Sequence[tuple[Any, ...]], recording: Format
 ) -> Iterator[Channels]:
-    """The channels of a group that belong together: of one length, over one base, which goes before them.
+    """Channels of a group with one length and one base, which is the first channel unless another has its role.
 
-    Those without a base belong to all bases of their length. A base that is among them by its name is left out.
+    Channels without a base belong to all bases of their length.
     """
     lengths: dict[int, dict[bytes, list[Channel]]] = {}
     for channel in channels:
@@ -369,23 +406,22 @@ def _of_one_length(
     tables: list[list[Channel]] = []
     for bases in lengths.values():
         free = bases.pop(b"", [])
-        tables += [alike + free for alike in bases.values()] or [free]
-    labels = [tuple(map(str, label)) for label in said]
+        tables += [based + free for based in bases.values()] or [free]
+    labels = [tuple(map(str, label)) for label in properties]
     for table in tables:
         over = table[0].over
         _refuse_complex(table)
         several = sum(np.iscomplexobj(one.values) and bool(np.any(one.values.imag)) for one in table) > 1
         if over and over.name not in _BASES.roles([one.name for one in table]):
             table.insert(0, over)
-        plain = [part for one in table for part in _plain(one, several)]
-        if plain:
-            names, arrays, stated, _ = zip(*plain, strict=True)
+        if columns := [column for channel in table for column in _real_channels(channel, several)]:
+            names, arrays, unit_texts, _ = zip(*columns, strict=True)
             title = f"{name}, {len(arrays[0])} rows".strip(", ") if len(tables) > 1 else name
-            header = [f"{text} [{unit}]" if unit else text for text, unit in zip(names, stated, strict=True)]
+            header = [f"{text} [{unit}]" if unit else text for text, unit in zip(names, unit_texts, strict=True)]
             above = [Line(number, content) for number, content in enumerate([*labels, header], start=-len(labels))]
-            layout = Layout("", names, 0, stated, None, numbered=True)
+            layout = Layout("", names, 0, unit_texts, None, numbered=True)
             numeric = frozenset(index for index, values in enumerate(arrays) if values.dtype == float)
-            yield Channels(title, (), layout=layout, numeric=numeric, arrays=arrays, above=above, format=own.name)
+            yield Channels(title, (), layout=layout, numeric=numeric, arrays=arrays, above=above, format=recording.name)
 
 
 def _refuse_complex(channels: Sequence[Channel]) -> None:
@@ -406,8 +442,8 @@ def _refuse_complex(channels: Sequence[Channel]) -> None:
             )
 
 
-def _plain(channel: Channel, several: bool) -> Iterator[Channel]:
-    """A channel as floats or texts: a complex one as magnitude and phase, named if `several` are, times in seconds."""
+def _real_channels(channel: Channel, several: bool) -> Iterator[Channel]:
+    """Channel as floats or texts, with dates in seconds; a complex one as magnitude and phase, named if `several`."""
     values = channel.values
     if values.dtype.kind == "c" and not np.any(values.imag):
         values = values.real

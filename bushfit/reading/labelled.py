@@ -38,14 +38,14 @@ class Rows(NamedTuple):
     shared: bool = False
 
 
-def same_text(text: str, other: str) -> bool:
+def same_text(text: str, reference: str) -> bool:
     """Return True if two texts of a column are equal but for case and number signs: 17 and #17."""
-    return text.strip(" #").casefold() == other.strip(" #").casefold()
+    return text.strip(" #").casefold() == reference.strip(" #").casefold()
 
 
 @dataclass(frozen=True, eq=False)
 class LabelledCells(Cells):
-    """Cells of a table of which columns may assign the rows to several tests."""
+    """Cells of a table whose columns may assign the rows to several tests."""
 
     @cached_property
     def row_labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
@@ -57,8 +57,8 @@ class LabelledCells(Cells):
                 continue
             if texts := self._texts_of_tests(index):
                 if heading.role == "direction":
-                    known = {text: named_direction([text], short=True) for text in set(texts)}
-                    texts = [str(known[text] or text) for text in texts] if any(known.values()) else []
+                    directions = {text: named_direction([text], short=True) for text in set(texts)}
+                    texts = [str(directions[text] or text) for text in texts] if any(directions.values()) else []
                 labels |= {heading.role: (index, texts)} if texts else {}
         return labels
 
@@ -75,8 +75,10 @@ class LabelledCells(Cells):
             MeasurementError: there is no such row or column, the rows belong to several parts, or no column selects
                 the tests of a shared file.
         """
-        stated = {"direction": wanted.direction, "specimen_number": wanted.specimen_number}
-        chosen = [(*self.row_labels[key], text) for key, text in stated.items() if text and key in self.row_labels]
+        wanted_texts = {"direction": wanted.direction, "specimen_number": wanted.specimen_number}
+        chosen = [
+            (*self.row_labels[key], text) for key, text in wanted_texts.items() if text and key in self.row_labels
+        ]
         for header, text in wanted.texts.items():
             if header not in self.headers:
                 raise self.header_error(f'there is no column "{header}"', expected="headers, as keys of rows")
@@ -86,22 +88,23 @@ class LabelledCells(Cells):
             raise self.header_error("a file is listed twice", expected=expected)
         column, parts = self.row_labels.get("specimen_number", (0, ()))
         total = len(parts or (chosen[0][1] if chosen else ()))
-        kept = [n for n in range(total) if all(same_text(texts[n], text) for _, texts, text in chosen)]
-        several = len({parts[n] for n in kept}) > 1 if parts else False
-        if several or (chosen and not kept):
-            shown = [(column, parts, "one part")] if several else chosen
+        selected = [n for n in range(total) if all(same_text(texts[n], text) for _, texts, text in chosen)]
+        several = len({parts[n] for n in selected}) > 1 if parts else False
+        if several or (chosen and not selected):
+            conflicts = [(column, parts, "one part")] if several else chosen
             raise self.header_error(
                 "this file holds tests of several parts" if several else "no row is of this test",
                 found="; ".join(
-                    f'{", ".join(dict.fromkeys(texts))} in column "{self.headers[index]}"' for index, texts, _ in shown
+                    f'{", ".join(dict.fromkeys(texts))} in column "{self.headers[index]}"'
+                    for index, texts, _ in conflicts
                 ),
-                expected=" and ".join(text for *_, text in shown),
+                expected=" and ".join(text for *_, text in conflicts),
                 hint='state one of them, as specimen_number = "..."; bushfit init lists all tests of a file',
             )
-        if not chosen or len(kept) == total:
+        if not chosen or len(selected) == total:
             return self
         positions = [n for n, (*_, fault) in enumerate(self._all_rows()) if fault is None]
-        return replace(self, selected=frozenset(positions[n] for n in kept))
+        return replace(self, selected=frozenset(positions[n] for n in selected))
 
     def not_understood(self, selection: NDArray[np.intp] | None = None, *settled: Floats) -> Iterator[str]:
         """Sentences on columns that may separate tests and have no known meaning, and on rows left out.
@@ -110,11 +113,16 @@ class LabelledCells(Cells):
             selection: rows of a sweep, (n,); None for all.
             settled: frequency and level of these rows, (n,). A number that depends on both is a measured one; a text
                 that depends on one is its name. The numbers of a loop are channels.
+
+        Yields:
+            One sentence for each such column, and one for the rows left out.
         """
-        known = {column.index for column in self.roles.values()}
-        known |= {index for key, (index, texts) in self.row_labels.items() if key != "direction" or len({*texts}) == 1}
-        known |= {index for index, header in enumerate(self.headers) if header == "block"}
-        for index in (index for index in range(len(self.headers)) if index not in known):
+        understood = {column.index for column in self.roles.values()}
+        understood |= {
+            index for key, (index, texts) in self.row_labels.items() if key != "direction" or len({*texts}) == 1
+        }
+        understood |= {index for index, header in enumerate(self.headers) if header == "block"}
+        for index in (index for index in range(len(self.headers)) if index not in understood):
             is_number, header = self.holds_numbers(index), self.headers[index]
             if (is_number and not settled) or not (texts := self._texts_of_tests(index)):
                 continue

@@ -15,7 +15,15 @@ _LVM_END = "***End_of_Header***"
 
 
 def labview(data: bytes, file: Path) -> Iterator[Group]:
-    """Channels of each segment of a LabVIEW measurement file (.lvm), over their time."""
+    """Read the channels of a LabVIEW measurement file (.lvm) over their time.
+
+    Args:
+        data: bytes of the file.
+        file: path, for errors.
+
+    Yields:
+        A group of channels for each segment.
+    """
     lines = to_utf8(data, file)[0].decode().splitlines()
     head = dict(line.split(None, 1) for line in lines[:_LVM_HEAD] if len(line.split(None, 1)) == 2)
     mark = "," if head.get("Separator", "Tab").strip() == "Comma" else "\t"

@@ -105,7 +105,14 @@ class Layout:
 
 
 def split(content: Content, delimiter: str) -> list[str]:
-    """Cells of a line, without blanks around them and without empty cells at the end.
+    """Split a line into cells.
+
+    Args:
+        content: of the line.
+        delimiter: between cells; " " for runs of blanks.
+
+    Returns:
+        Cells, without blanks around them and without empty cells at the end.
 
     Raises:
         csv.Error: a line or a quoted cell is far too long.
@@ -170,14 +177,14 @@ def _candidates(
             if commented and isinstance(content, str):
                 content = content.lstrip().lstrip("#%/ " if delimiter == ";" else "#%/; ")
             for cells in header_cells(content, delimiter):
-                known = len(vocabulary.roles(cells))
-                known += sum(_is_unit_alone(cell, vocabulary) for cell in cells[:_MOST_HEADINGS])
-                if known > 1 and not any(is_like_number(cell) for cell in cells):
+                named_count = len(vocabulary.roles(cells))
+                named_count += sum(_is_unit_alone(cell, vocabulary) for cell in cells[:_MOST_HEADINGS])
+                if named_count > 1 and not any(is_like_number(cell) for cell in cells):
                     below = (split(line.content, delimiter) for line in _below(lines, index, delimiter))
                     width = next((len(row) for row in below if is_row(row)), 0)
                     shorter = delimiter != " " and len(cells) < 2 * width < 2 * len(cells)  # empty cells at the end
                     followed = 2 if width == len(cells) else int(shorter)
-                    yield (followed, known, index, -order), index, delimiter, cells
+                    yield (followed, named_count, index, -order), index, delimiter, cells
 
 
 def _is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
@@ -187,7 +194,15 @@ def _is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
 
 
 def header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
-    """Cells of a header, without empty ones at its end, for each way to separate them."""
+    """Split a header into cells in all plausible ways.
+
+    Args:
+        content: of the line.
+        delimiter: between cells; " " for runs of blanks.
+
+    Yields:
+        Cells, without empty ones at the end.
+    """
     if isinstance(content, str) and len(content := content.rstrip(f" \t{delimiter}")) > _LONGEST_HEADER:
         return
     content = _WIDE_GAP.sub("  ", content) if isinstance(content, str) else content

@@ -80,6 +80,9 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
         direction: of the bushing, or the specimen.
         test: what the file does not state; with a rate or a frequency, the time needs no column.
 
+    Returns:
+        Columns by role.
+
     Raises:
         MeasurementError: a column is missing, or displacement and force are swapped.
         UnitError: a unit that does not fit.

@@ -19,7 +19,7 @@ Complex = NDArray[np.complex128]
 Waveform = Literal["sine", "triangle"]
 #: Temperatures as near as this [K] are the same: chosen, chambers keep to less.
 SAME_TEMPERATURE = 2.0
-#: What changes from point to point of a run.
+#: Quantity that changes from point to point of a run.
 Stepped = Literal["frequency", "amplitude"]
 
 #: Share of the range by which a turning point of a loop stands out from its neighbours; chosen: noise stays below it.
@@ -28,13 +28,13 @@ _TURN_PROMINENCE = 0.1
 
 @dataclass(frozen=True)
 class Source:
-    """The provenance of a measurement.
+    """Provenance of a measurement.
 
     Args:
-        file: as the campaign names it.
-        sha256: of its content.
-        conditions: of the test that no fit uses, as the campaign states them, such as preload and date.
-        notes: a sentence for each of its columns that varies from row to row and was not understood.
+        file: path in the campaign.
+        sha256: of the file.
+        conditions: of the test that no fit uses, such as preload and date, as the campaign states them.
+        notes: sentences on the reading, such as columns that were not understood and rows left out.
     """
 
     file: Path
@@ -43,13 +43,13 @@ class Source:
     notes: tuple[str, ...] = ()
 
     def with_note(self, note: str) -> Source:
-        """The same provenance with one more note."""
+        """Add a note to the provenance."""
         return replace(self, notes=(*self.notes, note))
 
 
 @dataclass(frozen=True)
 class RecordPart:
-    """Where a loop stands in a record of several: its first row, from 0, and a sentence on what of it is left out."""
+    """Position of a loop in a record of several: its first row from 0, and a sentence on the rows left out."""
 
     first_row: int
     left_out: str | None = None
@@ -57,20 +57,22 @@ class RecordPart:
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A hysteresis loop, or any other record of time, displacement and force.
+    """Hysteresis loop, or any other record of time, displacement and force.
 
     Args:
-        name, source, weight: of the test: its name, the file it came from, and its weight in a fit relative to others.
-        direction: of the bushing, or the specimen tested in place of one.
+        name: of the test.
+        source: file of the test.
+        weight: of the test in a fit, relative to others.
+        direction: of the bushing, or the specimen.
         time: [s], (n,).
         displacement: [m or rad], or strain of a modulus test, (n,).
         force: [N or N m], or stress [Pa], (n,).
-        noise: standard deviation of the force relative to its half range, where the campaign states it.
-        timed: whether time was recorded; else it was rebuilt from the displacement.
-        part: where it stands in a record of several loops; None where the record is one loop.
-        softening: by how much its first cycle is stiffer than its last, relative to the last; None where no more than
-            noise and the memory of rubber make.
-        temperature: at which it was tested [K], where it is known.
+        noise: standard deviation of the force relative to its half range, if the campaign states it.
+        timed: True if time was recorded; otherwise it was rebuilt from the displacement.
+        part: position in a record of several loops; None if the record is one loop.
+        softening: excess stiffness of the first cycle relative to the last; None if noise and the memory of rubber
+            explain it.
+        temperature: of the test [K], if it is known.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -92,30 +94,30 @@ class Loop:
     def __post_init__(self) -> None:
         _check_lengths(self.name, self.time, self.displacement, self.force)
 
-    def at(self, rows: slice | NDArray[np.bool_]) -> Loop:
-        """The record of these rows alone."""
+    def select(self, rows: slice | NDArray[np.bool_]) -> Loop:
+        """Select rows of the record."""
         return replace(self, **{name: getattr(self, name)[rows] for name in ("time", "displacement", "force")})
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """A sweep: a complex dynamic stiffness for each of its operating points.
+    """Complex dynamic stiffness at several operating points.
 
-    Either the frequency is stepped and the amplitude held, or the amplitude is stepped and the frequency held, or
-    neither is held, as where a mass swings on a mount. What was recorded in one go is a run.
+    In a run, either the frequency is stepped at a constant amplitude, or the amplitude at a constant frequency. If a
+    mass swings on a mount, neither is constant.
 
     Args:
-        name, direction, source, weight: as of `Loop`.
+        name, direction, source, weight: as in `Loop`.
         frequency: [Hz], (n,).
-        amplitude: of the level, the same for all its points, zero-to-peak [m or rad, or strain], (n,).
+        amplitude: level of each point, zero-to-peak [m or rad, or strain], (n,).
         stiffness: complex [N/m or N m/rad, or Pa], (n,).
-        repeat: number of the repeat, (n,); all 1 unless given.
-        noise: standard deviation of the real and of the imaginary part relative to |K|, where the campaign states it.
-        reached: amplitude that each point really reached [m or rad], (n,); None where it is not known.
-        stepped: what changes from point to point of a run; the other is held. None where neither is.
+        repeat: number of the repeat, (n,); default 1.
+        noise: standard deviation of the real and of the imaginary part relative to |K|, if the campaign states it.
+        reached: amplitude that each point reached [m or rad], (n,); None if it is not known.
+        stepped: quantity that changes from point to point of a run; None if both change.
         relative_error: standard deviation of the real and of the imaginary part of each point relative to |K|, (n,),
-            where the file states it.
-        temperature: at which it was tested [K], or each point, (n,), where it is known.
+            if the file states it.
+        temperature: of the test, or of each point, (n,) [K], if it is known.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -142,19 +144,19 @@ class Sweep:
 
     @property
     def amplitude_reached(self) -> Floats:
-        """Amplitude that each point reached, or else that of its level [m or rad], (n,): a model is evaluated there."""
+        """Amplitude that each point reached, default its level [m or rad], (n,), at which a model is evaluated."""
         return self.amplitude if self.reached is None else self.reached
 
     @property
     def held(self) -> Floats:
-        """What every point of a run has in common, (n,): amplitude [m or rad] or frequency [Hz], or else its number."""
+        """Amplitude [m or rad] or frequency [Hz] that is constant in a run, default its number, (n,)."""
         if self.stepped is None:
             return self.repeat.astype(float)
         return self.amplitude if self.stepped == "frequency" else self.frequency
 
     @property
     def step(self) -> Floats:
-        """What changes from point to point of a run, (n,): frequency [Hz] or amplitude [m or rad]."""
+        """Frequency [Hz] or amplitude [m or rad] that changes from point to point of a run, (n,)."""
         return self.amplitude if self.stepped == "amplitude" else self.frequency
 
 
@@ -167,19 +169,20 @@ def _check_lengths(name: str, *columns: NDArray[np.generic]) -> None:
 def rebuild_time(
     displacement: Floats, *, rate: float | None = None, frequency: float | None = None, waveform: Waveform = "triangle"
 ) -> Floats:
-    """The time of each row of a loop that was recorded without it, by the place of the row on its stroke.
+    """Rebuild the time of a loop from its displacement and waveform.
 
     Args:
         displacement: [m or rad], (n,), any number of strokes, with a range above zero.
-        rate, frequency: speed [m/s or rad/s], or else cycles per time [Hz].
-        waveform: the course of the displacement in time.
+        rate: speed [m/s or rad/s].
+        frequency: [Hz], if no rate is given.
+        waveform: of the displacement.
 
     Returns:
         Time [s], (n,), strictly increasing from zero.
 
     Notes:
-        Rows need not be even in time, and noise does not make time run backwards. The strokes at the start and the end,
-        which the record may cut short, count as parts of a stroke over the whole range.
+        The position of a row on its stroke gives its time. Rows may be uneven in time. The first and the last stroke,
+        which the record may cut short, are parts of a stroke over the whole range.
     """
     edges = _stroke_edges(displacement)
     extremes = float(displacement.min()), float(displacement.max())
@@ -199,15 +202,15 @@ def rebuild_time(
         else:
             raise TypeError("rebuild_time needs a rate or a frequency")
         highest, row = np.maximum.accumulate(share), np.arange(share.size)
-        keep = np.append(highest[1:] > highest[:-1], True) & (highest > highest[0])
-        keep[0] = True
-        elapsed = np.interp(row, row[keep], highest[keep]) * duration  # in straight lines where it stands still
+        rises_on = np.append(highest[1:] > highest[:-1], True) & (highest > highest[0])
+        rises_on[0] = True
+        elapsed = np.interp(row, row[rises_on], highest[rises_on]) * duration  # linear while the motion stands still
         time[first : last + 1] = time[first] + elapsed - elapsed[0]
     return time
 
 
 def _stroke_edges(displacement: Floats) -> NDArray[np.intp]:
-    """The first row, the rows of the turning points, and the last row."""
+    """Indices of the first row, the turning points, and the last row."""
     from scipy.signal import find_peaks
 
     prominence = _TURN_PROMINENCE * np.ptp(displacement)
@@ -223,5 +226,5 @@ def _stroke_edges(displacement: Floats) -> NDArray[np.intp]:
 
 
 def loss_factor(stiffness: Complex) -> Floats:
-    """Loss over storage stiffness [-], (n,)."""
+    """Ratio of loss to storage stiffness [-], (n,)."""
     return np.imag(stiffness) / np.real(stiffness)

@@ -101,15 +101,15 @@ class Labels:
         fitting = [quantity for quantity in dict.fromkeys(self.quantities) if units.is_compatible(quantity.unit, unit)]
         return [quantity for quantity in fitting if quantity.is_marked] or fitting
 
-    def __or__(self, other: "Labels") -> "Labels":
+    def __or__(self, labels: "Labels") -> "Labels":
         """Labels of both; those on the left take precedence."""
         dimensions = [unit for unit in ("m", "rad", "1", "Hz") if self.of_dimension(unit)]
         added = (
             quantity
-            for quantity in other.quantities
+            for quantity in labels.quantities
             if not any(units.is_compatible(quantity.unit, unit) for unit in dimensions)
         )
-        values = {field.name: getattr(self, field.name) or getattr(other, field.name) for field in fields(self)}
+        values = {field.name: getattr(self, field.name) or getattr(labels, field.name) for field in fields(self)}
         return Labels(**{**values, "quantities": (*self.quantities, *added)})
 
 

@@ -1,7 +1,7 @@
-"""How numbers are written: decimal point or comma, and what parts thousands.
+"""Notation of numbers: decimal mark and thousands separator.
 
-"1.234" is one number with a decimal point and another with a thousands point. Which of them a table means, its other
-numbers tell; where all of them can be read both ways, that is an error and not a guess.
+"1.234" has one value with a decimal point and another with a thousands point. The other numbers of the table decide; if
+all of them can be read both ways, that is an error.
 """
 
 import re
@@ -10,27 +10,27 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
-#: Blanks that part thousands: plain, unbreakable and thin ones.
+#: Blanks that separate thousands: plain, unbreakable and thin ones.
 _BLANKS = " \u00a0\u2009\u202f"
-#: Apostrophes that part thousands.
+#: Apostrophes that separate thousands.
 _APOSTROPHES = "'\u2019"
-#: A sign before a number or an exponent; there are two minus signs.
+#: Sign before a number or an exponent; there are two minus signs.
 _SIGN = "[+\\-\u2212]"
-#: For each sign by which a user names what parts thousands, all that stand for it.
+#: Pattern of each thousands separator, by the sign with which a user states it.
 _SEPARATORS = {",": ",", ".": r"\.", " ": f"[{_BLANKS}]", "'": f"[{_APOSTROPHES}]"}
 #: Characters of the longest number; chosen: the largest float written out has 309 digits.
 _LONGEST_NUMBER = 400
-#: What has the characters of a number, in an order that numbers may have.
+#: Text with the characters of a number, in an order that numbers may have.
 _LIKE_NUMBER = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{_BLANKS}{_APOSTROPHES}]*(?:[eE]{_SIGN}?\d+)?", re.ASCII)
-#: A number in which the sign may part a single group of thousands, or be the decimal mark: 1.234.
+#: Number whose sign may separate thousands, or be the decimal mark: 1.234.
 _ONE_GROUP = re.compile(rf"{_SIGN}?[1-9]\d{{0,2}}([.,])\d{{3}}", re.ASCII)
-#: A number whose thousands nothing parts: 1234.5.
+#: Number without thousands separators: 1234.5.
 _UNGROUPED = re.compile(rf"{_SIGN}?\d{{4,}}(?:[.,]\d*)?", re.ASCII)
 
 
 @dataclass(frozen=True)
 class Numerals:
-    """A way to write numbers: decimal mark, and what parts thousands: ",", ".", " " (any blank), "'" or None."""
+    """Notation of numbers: decimal mark, and thousands separator ",", ".", " " (any blank), "'" or None."""
 
     decimal: str = "."
     thousands: str | None = None
@@ -44,11 +44,11 @@ class Numerals:
         return re.compile(rf"{_SIGN}?(?:{'|'.join(forms)})", re.ASCII)
 
     def allows(self, text: str) -> bool:
-        """Whether a cell, without blanks around it, is a number written in this way."""
+        """Return True if a cell, without blanks around it, is a number in this notation."""
         return len(text) <= _LONGEST_NUMBER and self._pattern.fullmatch(text) is not None
 
     def value(self, text: str) -> float | None:
-        """The number in a cell; None where it holds none."""
+        """Number in a cell; None if the cell is not one in this notation."""
         if not self.allows(text):
             return None
         if self.thousands:
@@ -56,7 +56,7 @@ class Numerals:
         return float(text.replace(self.decimal, ".").replace("\u2212", "-"))
 
 
-#: All ways to write numbers, the plainest first.
+#: All notations, the plainest first.
 ALL_NUMERALS = tuple(
     Numerals(decimal, thousands)
     for thousands, decimal in product((None, ",", ".", " ", "'"), ".,")
@@ -69,9 +69,12 @@ Place = tuple[int, int]
 
 @dataclass(frozen=True)
 class NumeralEvidence:
-    """What cells tell of the ways in which all their numbers may be written, the plainest first.
+    """Notations that fit the numbers of a table.
 
-    `unclear` is place and text of the first that has several values in them, `contrary` of the first written in none.
+    Args:
+        ways: notations that fit all numbers, the plainest first.
+        unclear: position and text of the first number with different values in these notations.
+        contrary: position and text of the first number that contradicts the others.
     """
 
     ways: tuple[Numerals, ...]
@@ -80,21 +83,25 @@ class NumeralEvidence:
 
 
 def is_like_number(text: str) -> bool:
-    """Whether a cell is a number in any way to write them."""
+    """Return True if a cell is a number in any notation."""
     return _LIKE_NUMBER.fullmatch(text) is not None and any(way.allows(text) for way in ALL_NUMERALS)
 
 
 def weigh(
     cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL_NUMERALS, *, all_cells: bool = False
 ) -> NumeralEvidence:
-    """Find the ways in which cells may write their numbers.
-
-    A file that parts thousands is taken to do so in all its numbers, unless the user states how it parts them.
+    """Find the notations that fit all numbers.
 
     Args:
-        cells: place and text of each; texts that are no numbers in any way do not count.
-        ways: in which the numbers may be written.
-        all_cells: whether to go on when the decimal mark is settled.
+        cells: position and text of each cell; texts that are no numbers are ignored.
+        ways: notations that are possible.
+        all_cells: True to continue after the decimal mark is settled.
+
+    Returns:
+        Notations, and the first number that is ambiguous or contradicts the others.
+
+    Notes:
+        A file with thousands separators is assumed to have them in all numbers, unless the user states the separator.
     """
     open_thousands = len({way.thousands for way in ways}) > 1
     unclear, ungrouped = None, False
@@ -109,12 +116,12 @@ def weigh(
         for mark in ".,":
             if mark in text and text.replace(mark, "", 1).isdecimal():
                 columns.setdefault(mark, set()).add(place[1])
-        left = tuple(way for way in ways if way.allows(text))
-        if not left:
+        fitting = tuple(way for way in ways if way.allows(text))
+        if not fitting:
             if is_like_number(text):
                 return NumeralEvidence(ways, contrary=(place, text))
             continue
-        ways = left
+        ways = fitting
         if group := _ONE_GROUP.fullmatch(text):
             grouped.setdefault(group[1], (place, text))
         if unclear is None and len({way.value(text) for way in ways}) > 1:

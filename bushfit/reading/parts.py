@@ -57,6 +57,9 @@ class OpenedFile:
         Args:
             is_usable: function that returns True if a part contains such a table.
 
+        Returns:
+            The only usable part.
+
         Raises:
             MeasurementError: no part, or more than one, is usable.
         """
@@ -74,12 +77,15 @@ class OpenedFile:
         )
 
 
-def open_file(file: Path, stated: FileFormat) -> OpenedFile:
+def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
     """Open a text in any encoding, a workbook or a recording.
 
     Args:
         file: path.
-        stated: format as the user states it; `sheet` selects a part.
+        file_format: format as the user states it; `sheet` selects a part.
+
+    Returns:
+        Content of the file.
 
     Raises:
         MeasurementError: the file cannot be read, or has no such part.
@@ -87,20 +93,20 @@ def open_file(file: Path, stated: FileFormat) -> OpenedFile:
     data = view_bytes(file, MeasurementError)
     checksum, parts = sha256(data), read_parts(data, file)
     if not parts:
-        if stated.sheet:
+        if file_format.sheet:
             expected = "a workbook, or a file with groups of channels"
             raise MeasurementError(
-                "this is no workbook", file=file, found=f'sheet = "{stated.sheet}"', expected=expected
+                "this is no workbook", file=file, found=f'sheet = "{file_format.sheet}"', expected=expected
             )
-        return OpenedFile(file, checksum, stated, [Text(*to_utf8(data, file, stated.encoding))])
-    if (name := stated.sheet) is None:
-        return OpenedFile(file, checksum, stated, [part for part, visible in parts if visible])
+        return OpenedFile(file, checksum, file_format, [Text(*to_utf8(data, file, file_format.encoding))])
+    if (name := file_format.sheet) is None:
+        return OpenedFile(file, checksum, file_format, [part for part, visible in parts if visible])
     names = [part.sheet for part, _ in parts]
     if name not in names:
         problem = f"there is no such {word_for_part(file)}"
         hint = did_you_mean(name, names)
         raise MeasurementError(problem, file=file, found=f'"{name}"', expected=_listed(names), hint=hint)
-    return OpenedFile(file, checksum, stated, [part for part, _ in parts if part.sheet == name])
+    return OpenedFile(file, checksum, file_format, [part for part, _ in parts if part.sheet == name])
 
 
 def parts_of(file: Path) -> Sequence[Sheet]:
@@ -131,12 +137,15 @@ def read_parts(data: bytes, file: Path) -> Sequence[tuple[Sheet, bool]]:
 
 
 def read_sheets(data: bytes, file: Path, kind: type[BushfitError] = MeasurementError) -> Sequence[tuple[Sheet, bool]]:
-    """Sheets of a workbook, each with True if it is visible; if none is visible, all count as such.
+    """Read the sheets of a workbook.
 
     Args:
         data: bytes of the file.
         file: path, for errors.
         kind: class of errors.
+
+    Returns:
+        Sheets, each with True if it is visible; if none is visible, all are.
 
     Raises:
         kind: no workbook, or one with more cells than can be read.
@@ -166,16 +175,18 @@ def _sheets(data: bytes) -> Sequence[tuple[Sheet, bool]]:
         contents = dict(_sheets_in_xml(data))
         _check_size(contents)
         book = calamine.load_workbook(io.BytesIO(data))
-        shown = {sheet.name for sheet in book.sheets_metadata if sheet.visible == calamine.SheetVisibleEnum.Visible}
-        sheets, left = [], _MOST_CELLS
+        visible_names = {
+            sheet.name for sheet in book.sheets_metadata if sheet.visible == calamine.SheetVisibleEnum.Visible
+        }
+        sheets, cells_left = [], _MOST_CELLS
         for name in book.sheet_names:
             sheet = book.get_sheet_by_name(name)
-            left -= sheet.height * sheet.width
-            if left < 0:
+            cells_left -= sheet.height * sheet.width
+            if cells_left < 0:
                 raise OverflowError(f'more, with sheet "{name}"')
             content = [_row(row) for row in sheet.to_python(skip_empty_area=False)]
             lacks_values = lambda: any(map(_NOT_COMPUTED.search, contents.values()))  # noqa: E731
-            sheets.append((Sheet(name, content, lacks_values), name in shown or not shown))
+            sheets.append((Sheet(name, content, lacks_values), name in visible_names or not visible_names))
         return sheets
     except (calamine.CalamineError, zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError) as error:
         raise ValueError(str(error)) from error

@@ -12,19 +12,19 @@ from bushfit.reading.headers import RESONANCE_COLUMNS, Column
 from bushfit.reading.measurement import Complex, Floats, Source
 from bushfit.reading.table import Table
 
-#: The columns that each make a transmissibility, in order of preference; a base acceleration may stand beside them.
-_WAYS = (
+#: Sets of columns that give a transmissibility, in order of preference.
+_COLUMN_SETS = (
     ("transmissibility", "phase"),
     ("transmissibility_real", "transmissibility_imaginary"),
     ("base_acceleration", "mass_acceleration", "base_phase", "mass_phase"),
     ("base_acceleration", "mass_acceleration", "phase"),
     ("base_real", "base_imaginary", "mass_real", "mass_imaginary"),
 )
-#: Roles that no other test has: a file with one of them is a resonance test.
-_TELLING = {role for role in RESONANCE_COLUMNS if role not in ("frequency", "phase")}
-#: Columns of which every value is above zero.
+#: Roles that only a resonance test has.
+_SPECIFIC = {role for role in RESONANCE_COLUMNS if role not in ("frequency", "phase")}
+#: Columns whose values must be positive.
 _POSITIVE = ("frequency", "base_acceleration", "mass_acceleration", "transmissibility")
-#: SI units by the end of a role; else a role is a ratio.
+#: SI unit by the end of a role; other roles are ratios.
 _UNITS = {"phase": "rad", "frequency": "Hz"} | dict.fromkeys(
     ("acceleration", "base_real", "base_imaginary", "mass_real", "mass_imaginary"), "m/s^2"
 )
@@ -34,13 +34,15 @@ FEWEST_ROWS = 12
 
 @dataclass(frozen=True, eq=False)
 class ResonanceTest:
-    """A mass on a mount whose base is shaken with a sine, by frequency.
+    """Test of a mass on a mount whose base is shaken by a sine of stepped frequency.
 
     Args:
-        name, direction, source: as of a `Loop`.
+        name: of the test.
+        direction: of the bushing, or specimen.
+        source: file of the test.
         frequency: [Hz], (n,), rising.
-        transmissibility: acceleration of the mass over that of the base, complex [-], (n,).
-        base_acceleration: amplitude, zero-to-peak [m/s^2], (n,).
+        transmissibility: complex ratio of the acceleration of the mass to that of the base [-], (n,).
+        base_acceleration: zero-to-peak [m/s^2], (n,).
     """
 
     name: str
@@ -52,22 +54,28 @@ class ResonanceTest:
 
 
 def is_resonance(table: Table) -> bool:
-    """Whether a table that was opened with RESONANCE_COLUMNS has a column that only a resonance test has."""
-    return not _TELLING.isdisjoint(table.roles)
+    """Return True if a table, opened with RESONANCE_COLUMNS, has a column that only a resonance test has."""
+    return not _SPECIFIC.isdisjoint(table.roles)
 
 
 def read_resonance(table: Table, direction: Place, base_acceleration: float | None = None) -> ResonanceTest:
-    """The resonance test in a table that was opened with RESONANCE_COLUMNS.
+    """Read a resonance test.
 
-    For a table without the amplitude of the base's acceleration, it is stated [m/s^2].
+    Args:
+        table: opened with RESONANCE_COLUMNS.
+        direction: of the bushing, or the specimen.
+        base_acceleration: zero-to-peak [m/s^2], for a table without a column for it.
+
+    Returns:
+        The test, by rising frequency.
 
     Raises:
         MeasurementError, UnitError: a column, unit or value that cannot be used.
     """
-    wanted = _wanted(table, stated=base_acceleration is not None)
+    wanted = _resonance_columns(table, has_stated_base=base_acceleration is not None)
     values = table.read(wanted, fewest_rows=FEWEST_ROWS)
     table.check_positive(_POSITIVE, wanted, values)
-    ratio, base = _ratio(values, base_acceleration)
+    ratio, base = _transmissibility(values, base_acceleration)
     bad = ~(np.isfinite(ratio) & (base > 0.0) & (ratio != 0.0))
     table.refuse(bad, wanted["frequency"], "base or mass stands still here", "two accelerations that are not zero")
     order = np.argsort(values["frequency"], kind="stable")
@@ -75,18 +83,18 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
     return ResonanceTest(table.file.stem, direction, values["frequency"][order], ratio[order], base[order], source)
 
 
-def _wanted(table: Table, *, stated: bool) -> dict[str, Column]:
-    """The frequency, and the columns of the first of _WAYS that a table has; the base's acceleration may be stated."""
-    way = next((way for way in _WAYS if set(way) <= set(table.roles)), None)
-    if way is None:
-        ways = ", or ".join(" and ".join(way) for way in _WAYS).replace("_", " ")
+def _resonance_columns(table: Table, *, has_stated_base: bool) -> dict[str, Column]:
+    """Frequency, and the columns of the first of _COLUMN_SETS in the table, with factors to SI."""
+    columns = next((columns for columns in _COLUMN_SETS if set(columns) <= set(table.roles)), None)
+    if columns is None:
+        alternatives = ", or ".join(" and ".join(columns) for columns in _COLUMN_SETS).replace("_", " ")
         raise table.header_error(
             "the columns give no complex transmissibility",
-            expected=f"frequency, and {ways}",
+            expected=f"frequency, and {alternatives}",
             hint='correct the header, or name the column: --column "mass_acceleration=..."',
         )
-    has_base = any(role.startswith("base") for role in way) or "base_acceleration" in table.roles
-    if has_base and stated:
+    has_base = any(role.startswith("base") for role in columns) or "base_acceleration" in table.roles
+    if has_base and has_stated_base:
         raise MeasurementError(
             "the acceleration of the base is stated twice",
             file=table.file,
@@ -94,13 +102,13 @@ def _wanted(table: Table, *, stated: bool) -> dict[str, Column]:
             expected="one of them",
             hint="leave --base-acceleration out",
         )
-    if not (has_base or stated):
+    if not (has_base or has_stated_base):
         raise table.header_error(
             "nothing says how strongly the base was shaken",
             expected="a column such as base acceleration [g]",
             hint='state it: --base-acceleration "0.1 g"',
         )
-    roles = dict.fromkeys(("frequency", *way, "base_acceleration"))
+    roles = dict.fromkeys(("frequency", *columns, "base_acceleration"))
     wanted = {}
     for role in (role for role in roles if role != "base_acceleration" or role in table.roles):
         unit = next((unit for end, unit in _UNITS.items() if role.endswith(end)), "1")
@@ -110,20 +118,16 @@ def _wanted(table: Table, *, stated: bool) -> dict[str, Column]:
     return wanted
 
 
-def _ratio(values: Mapping[str, Floats], stated: float | None) -> tuple[Complex, Floats]:
-    """Transmissibility and amplitude of the base's acceleration [m/s^2], (n,) each."""
-
-    def number(real: str, imaginary: str) -> Complex:
-        return values[real] + 1j * values[imaginary]
-
-    base = values.get("base_acceleration", np.full(values["frequency"].shape, stated or 0.0))
+def _transmissibility(values: Mapping[str, Floats], stated_base: float | None) -> tuple[Complex, Floats]:
+    """Transmissibility [-] and zero-to-peak acceleration of the base [m/s^2], (n,) each."""
+    base = values.get("base_acceleration", np.full(values["frequency"].shape, stated_base or 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         if "transmissibility" in values:
             return values["transmissibility"] * np.exp(1j * values["phase"]), base
         if "transmissibility_real" in values:
-            return number("transmissibility_real", "transmissibility_imaginary"), base
+            return values["transmissibility_real"] + 1j * values["transmissibility_imaginary"], base
         if "base_real" in values:
-            complex_base = number("base_real", "base_imaginary")
-            return number("mass_real", "mass_imaginary") / complex_base, np.abs(complex_base)
+            complex_base: Complex = values["base_real"] + 1j * values["base_imaginary"]
+            return (values["mass_real"] + 1j * values["mass_imaginary"]) / complex_base, np.abs(complex_base)
         phase = values["phase"] if "phase" in values else values["mass_phase"] - values["base_phase"]
         return values["mass_acceleration"] / base * np.exp(1j * phase), base

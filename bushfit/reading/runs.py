@@ -1,7 +1,7 @@
-"""Runs of a sweep: what is stepped in it and what is held, and the levels that amplitudes as reached belong to.
+"""Runs of a sweep: the stepped quantity, and the levels of amplitudes.
 
-A run is what was recorded in one go: either the frequency is stepped and the amplitude held, or the reverse, or, where
-a mass swings on a mount, neither is held. Rigs miss what they are asked for: 0.0987 mm and 0.1004 mm are one level.
+In a run, either the frequency is stepped at a constant amplitude, or the amplitude at a constant frequency. If a mass
+swings on a mount, neither is constant. Rigs do not reach amplitudes exactly: 0.0987 mm and 0.1004 mm are one level.
 """
 
 from __future__ import annotations
@@ -17,21 +17,28 @@ from bushfit.reading.measurement import Floats, Stepped
 _WIDEST_LEVEL = 0.08
 #: Distance in ln X from a level to the next over the span of a level, at least; chosen: below, they may be one.
 _LEAST_GAP = 3.0
-#: Span of the amplitudes of a pass over the frequencies in ln X, up to which it counts as held; chosen: a weak rig
-#: falls short by a third, and a mass on a mount moves through more.
+#: Largest span of a constant amplitude over the frequencies in ln X; chosen: a weak rig falls short by a third, and a
+#: mass on a mount moves through more.
 _WIDEST_PASS = 0.4
-#: Share of the rows, at least, with the frequency or the level of the row before, where one of them is held.
-_LEAST_HELD = 0.1
-#: The same share from which on the rows stand in the order in which they were recorded.
+#: Smallest share of rows that repeat the frequency or level of the row before if one of them is constant.
+_LEAST_CONSTANT = 0.1
+#: Smallest such share of rows in the order in which they were recorded.
 _IN_ORDER = 0.4
-#: Fewest values of what the order of rows tells to be stepped; chosen: tables of three amplitudes are often sorted.
+#: Fewest values of a quantity that the order of rows shows to be stepped; chosen: tables of three amplitudes are often
+#: sorted.
 _FEWEST_STEPS = 4
-#: Points of a run at least for its levels to be told by their place in it.
+#: Fewest points of a run whose levels are identified by their rank.
 _FEWEST_POINTS = 3
 
 
 class Runs(NamedTuple):
-    """What is stepped in a sweep, None where neither is held, and level and number of repeat (or run) of its points."""
+    """Runs of a sweep.
+
+    Args:
+        stepped: stepped quantity; None if neither frequency nor amplitude is constant in a run.
+        amplitude: level of each point, (n,).
+        repeat: number of the repeat of each point, or of its run, (n,).
+    """
 
     stepped: Stepped | None
     amplitude: Floats
@@ -41,25 +48,29 @@ class Runs(NamedTuple):
 def runs_of(
     frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None, stepped: Stepped | None = None
 ) -> Runs:
-    """The runs of a sweep, from its points in the order of the file: what its rows keep from one to the next is held.
-
-    Where rows stand in no order, or runs would be of a few points alone, as in a table that was sorted, the count
-    tells: what takes more values is stepped.
+    """Find the runs of a sweep.
 
     Args:
-        frequency: [Hz], (n,).
-        amplitude: as the file has it, nominal or as reached, (n,).
-        repeat: number of the repeat as the file has it, (n,); None where it has none: then what occurs again at a
+        frequency: [Hz] in the order of the file, (n,).
+        amplitude: nominal or reached, zero-to-peak [m or rad, or strain], (n,).
+        repeat: number of the repeat, (n,); None if the file does not state it, so that a point which occurs again at a
             frequency and level is a repeat.
-        stepped: what is stepped, where it is stated.
+        stepped: stepped quantity, if it is stated.
+
+    Returns:
+        Runs.
+
+    Notes:
+        The quantity that changes less often from row to row is constant in a run. If the rows are not in the order of
+        recording, or runs would have few points, as in a sorted table, the quantity with more values is stepped.
     """
     levels = nominal(amplitude)
     if (levels == amplitude).all() and repeat is None:
         levels = _by_frequency(frequency, amplitude)
     if (levels == amplitude).all():
         levels = _by_rank(frequency, amplitude, repeat)
-    kept_frequency, kept_level = (float(np.mean(np.diff(values) == 0.0)) for values in (frequency, levels))
-    if max(kept_frequency, kept_level) < _LEAST_HELD:
+    repeats_frequency, repeats_level = (float(np.mean(np.diff(values) == 0.0)) for values in (frequency, levels))
+    if max(repeats_frequency, repeats_level) < _LEAST_CONSTANT:
         steps = np.diff(frequency)
         turns = steps * np.median(steps) < 0.0
         if repeat is not None:
@@ -67,45 +78,50 @@ def runs_of(
         passes = np.cumsum(np.append(False, turns))
         if _group_spans(np.log(amplitude), passes).max() >= _WIDEST_PASS:
             return Runs(None, amplitude, passes + 1 if repeat is None else repeat)
-        levels = nominal(_group_medians(amplitude, passes))  # every pass over the frequencies nearly keeps to one
-        kept_frequency, kept_level = 0.0, 1.0
-    of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
+        levels = nominal(_group_medians(amplitude, passes))  # one level in each pass over the frequencies
+        repeats_frequency, repeats_level = 0.0, 1.0
+    frequency_count, level_count = (np.unique(values).size for values in (frequency, levels))
     if repeat is None:
         import pandas as pd
 
         points = pd.DataFrame({"frequency": frequency, "level": levels}).groupby(["frequency", "level"])
         repeat = np.asarray(points.cumcount(), dtype=np.int64) + 1
     if stepped is None:
-        by_order: Stepped = "amplitude" if kept_frequency > kept_level else "frequency"
-        in_order = max(kept_frequency, kept_level) >= _IN_ORDER
-        order_tells = in_order and (of_level if by_order == "amplitude" else of_frequency) >= _FEWEST_STEPS
-        stepped = by_order if order_tells else "amplitude" if of_level > of_frequency else "frequency"
+        by_order: Stepped = "amplitude" if repeats_frequency > repeats_level else "frequency"
+        by_count: Stepped = "amplitude" if level_count > frequency_count else "frequency"
+        in_order = max(repeats_frequency, repeats_level) >= _IN_ORDER
+        steps_in_order = level_count if by_order == "amplitude" else frequency_count
+        stepped = by_order if in_order and steps_in_order >= _FEWEST_STEPS else by_count
     return Runs(stepped, levels, repeat)
 
 
 def nominal(amplitude: Floats) -> Floats:
-    """The level of each amplitude, (n,): the median of those that lie together and far from all others.
+    """Find the level of each amplitude: the median of a narrow group that is far from all others.
 
-    Amplitudes that no gaps part into narrow levels of several points keep their own values.
+    Args:
+        amplitude: nominal or reached, above zero, (n,).
+
+    Returns:
+        Levels, (n,); the amplitudes themselves if gaps do not separate them into narrow groups of several points.
     """
-    distinct, place = np.unique(amplitude, return_inverse=True)
+    distinct, index = np.unique(amplitude, return_inverse=True)
     logs = np.log(distinct)
     gaps = np.diff(logs)
-    within = np.unique(gaps)
-    between = np.append(within[1:], np.inf)
-    parting = (within <= _WIDEST_LEVEL) & (between >= _LEAST_GAP * within)  # a level spans its widest gap or more
-    for gap, next_gap in zip(within[parting][::-1], between[parting][::-1], strict=True):
+    widths = np.unique(gaps)
+    next_widths = np.append(widths[1:], np.inf)
+    separates = (widths <= _WIDEST_LEVEL) & (next_widths >= _LEAST_GAP * widths)  # a level spans its widest gap or more
+    for gap, next_gap in zip(widths[separates][::-1], next_widths[separates][::-1], strict=True):
         group = np.append(0, np.cumsum(gaps > gap))
         span = float(_group_spans(logs, group).max())
         if span <= _WIDEST_LEVEL and next_gap >= _LEAST_GAP * span and np.median(np.bincount(group)) > 1:
-            return _group_medians(amplitude, group[place])
+            return _group_medians(amplitude, group[index])
     return amplitude
 
 
 def _by_frequency(frequency: Floats, amplitude: Floats) -> Floats:
-    """The level of each amplitude, (n,), where every frequency has as many levels, each of as many points.
+    """Levels of amplitudes, (n,), if all frequencies have equally many levels of equally many points, in any order.
 
-    Their order in the file does not count. Amplitudes keep their own values where a level reaches into the next.
+    The amplitudes themselves if the levels overlap.
     """
     rank = np.empty(amplitude.size, dtype=np.intp)
     shapes = set()
@@ -118,9 +134,9 @@ def _by_frequency(frequency: Floats, amplitude: Floats) -> Floats:
 
 
 def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None) -> Floats:
-    """The level of each amplitude by its place in its run, (n,), where all runs at all frequencies have as many.
+    """Levels of amplitudes by their rank in a run, (n,), if all runs at all frequencies have equally many points.
 
-    Amplitudes keep their own values where there is one run alone, or where a level reaches into the next.
+    The amplitudes themselves if there is one run, or if the levels overlap.
     """
     falls = np.append(False, (np.diff(amplitude) < 0.0) | (np.diff(frequency) != 0.0))
     run = np.cumsum(falls) if repeat is None else _group_numbers(frequency, repeat)
@@ -134,25 +150,25 @@ def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | N
 
 
 def _medians_if_separate(amplitude: Floats, rank: NDArray[np.intp]) -> Floats:
-    """The median of the points of each rank, (n,), all of as many; no change where one reaches into the next."""
+    """Median amplitude of each rank, (n,), with equally many points per rank; the amplitudes if ranks overlap."""
     levels = np.sort(amplitude[np.argsort(rank)].reshape(rank.max() + 1, -1), axis=1)
     return _group_medians(amplitude, rank) if (levels[:-1, -1] < levels[1:, 0]).all() else amplitude
 
 
 def rows_alike(*keys: Floats) -> list[NDArray[np.intp]]:
-    """The rows of each group that shares all keys, in order; each key (n,)."""
+    """Indices of the rows of each group with equal keys, (n,) each, in order."""
     group = _group_numbers(*keys)
     return np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1])
 
 
 def _group_spans(values: Floats, group: NDArray[np.intp]) -> Floats:
-    """From the least to the largest value of each group, (groups,)."""
+    """Range of the values in each group, (groups,)."""
     ordered, ends = values[np.lexsort((values, group))], np.cumsum(np.bincount(group))
     return ordered[ends - 1] - ordered[np.append(0, ends[:-1])]
 
 
 def _group_medians(values: Floats, group: NDArray[np.intp]) -> Floats:
-    """The median of the group of each value, (n,)."""
+    """Median of the group of each value, (n,)."""
     ordered, counts = values[np.lexsort((values, group))], np.bincount(group)
     starts = np.cumsum(counts) - counts
     medians = (ordered[starts + (counts - 1) // 2] + ordered[starts + counts // 2]) / 2.0
@@ -160,5 +176,5 @@ def _group_medians(values: Floats, group: NDArray[np.intp]) -> Floats:
 
 
 def _group_numbers(*keys: Floats | NDArray[np.int64]) -> NDArray[np.intp]:
-    """A number from 0 for each combination of keys, (n,)."""
+    """Number of the combination of keys in each row, from 0, (n,)."""
     return np.unique(np.stack(keys), axis=1, return_inverse=True)[1].ravel()

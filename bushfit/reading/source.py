@@ -156,12 +156,12 @@ class Text:
             return None
         return {index: frame[index].astype(object).tolist() for index in indices}
 
-    def suspicious(self, layout: Layout, most: float) -> list[tuple[int, int, int]] | None:
+    def suspicious(self, layout: Layout, largest_share: float) -> list[tuple[int, int, int]] | None:
         """Find lines below the header that have letters, dashes or an empty cell.
 
         Args:
             layout: header and delimiter.
-            most: share of such lines at most.
+            largest_share: share of such lines at most.
 
         Returns:
             Line number, start and end of each line; None if there are too many.
@@ -172,7 +172,7 @@ class Text:
         )
         place = self.offset(layout.lines_before_data)
         number, lines = layout.lines_before_data + 1, list[tuple[int, int, int]]()
-        limit = most * self.data.count(b"\n", place) + 20
+        limit = largest_share * self.data.count(b"\n", place) + 20
         counted = place
         while (match := pattern.search(self.data, place)) and len(lines) <= limit:
             start = self.data.rfind(b"\n", 0, match.start()) + 1

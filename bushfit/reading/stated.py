@@ -1,4 +1,4 @@
-"""The tables [[loops]] and [[sweeps]] of a campaign file: a file, what it does not say itself, and what was tested."""
+"""Tables [[loops]] and [[sweeps]] of a campaign file: a test file, its missing information, and what was tested."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,11 +27,11 @@ from bushfit.validation import (
     unknown_key,
 )
 
-#: Keys of a table that tell it.
+#: Keys of a table that state what was tested.
 PLACE_KEYS = ("direction", "specimen")
 #: Lists of tests in [simulate].
 _LISTS = ("loops", "sweeps", "resonances")
-#: Takes the direction of a specimen for none.
+#: Validator that replaces the direction of a specimen by None.
 _SHEAR = converter(lambda raw, _: None if raw == "shear" else raw, {"enum": [*Direction, "shear"]})
 
 
@@ -59,39 +59,54 @@ Displacement = Annotated[float, motion_quantity(), Field(gt=0)]
 
 
 def place_tested(specimen: object, direction: object, specimens: Sequence[Specimen]) -> Place:
-    """The direction or the specimen that the two keys of a test mean.
+    """Find the direction or specimen that was tested.
+
+    Args:
+        specimen: value of this key of a test; None if it is missing.
+        direction: value of this key; None if it is missing.
+        specimens: of the campaign.
+
+    Returns:
+        Direction of the bushing, or specimen.
 
     Raises:
         CampaignError: an unknown specimen, a bushing without a direction, or a specimen with one of the bushing's.
     """
-    known = {specimen.name: specimen for specimen in specimens}
+    by_name = {specimen.name: specimen for specimen in specimens}
     if specimen is None:
         if isinstance(direction, str) and direction in [*Direction]:
             return Direction(direction)
         expected = "direction = " + " or ".join(f'"{choice}"' for choice in Direction)
-        hint = f'or specimen = "{next(iter(known))}"' if known else None
+        hint = f'or specimen = "{next(iter(by_name))}"' if by_name else None
         found = "none" if direction is None else str(direction)
         raise CampaignError("a test without a direction", found=found, expected=expected, hint=hint)
-    if not isinstance(specimen, str) or specimen not in known:
+    if not isinstance(specimen, str) or specimen not in by_name:
         raise CampaignError(
             "this specimen is not in the campaign",
             found=str(specimen),
-            expected="one of " + ", ".join(known) if known else "a [[specimens]] table with this name",
+            expected="one of " + ", ".join(by_name) if by_name else "a [[specimens]] table with this name",
         )
     if direction not in (None, "shear"):
         expected = 'direction = "shear", or none: a specimen is tested in one way only'
         raise CampaignError("a specimen has no such direction", found=str(direction), expected=expected)
-    return known[specimen]
+    return by_name[specimen]
 
 
 def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
-    """A parsed [simulate] with the place itself for the keys that tell it; what is no table is left alone.
+    """Replace the keys direction and specimen in [simulate] by the direction or specimen itself.
+
+    Args:
+        tables: parsed [simulate] of a campaign file.
+        specimens: of the campaign.
+
+    Returns:
+        The tables with a direction or specimen under the key direction; values that are no tables are unchanged.
 
     Raises:
         CampaignError: as of `place_tested`.
     """
 
-    def placed(test: Any, place: str) -> Any:
+    def with_place(test: Any, place: str) -> Any:
         if not isinstance(test, dict):
             return test
         with error_location(place=place):
@@ -101,22 +116,22 @@ def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
     if not isinstance(tables, dict):
         return tables
     return {
-        key: [placed(test, f"{key} #{number}") for number, test in enumerate(table, 1)]
+        key: [with_place(test, f"{key} #{number}") for number, test in enumerate(table, 1)]
         if key in _LISTS and isinstance(table, list)
         else table
         for key, table in tables.items()
     }
 
 
-def _roles(known: Collection[str], what: str) -> BeforeValidator:
-    """A validator that refuses other keys than these roles of columns; `what` the file has of each."""
-    written = {"properties": {role: text(f"{what} of {role.replace('_', ' ')}") for role in known}}
+def _roles(roles: Collection[str], value_name: str) -> BeforeValidator:
+    """Validator that refuses keys other than known roles of columns; `value_name` names their values in the schema."""
+    written = {"properties": {role: text(f"{value_name} of {role.replace('_', ' ')}") for role in roles}}
     closed = {"type": "object", **written, "additionalProperties": False}
 
     def check_keys(raw: dict[str, Any]) -> dict[str, Any]:
         for role in raw:
-            if role not in known:
-                raise unknown_key(role, known)
+            if role not in roles:
+                raise unknown_key(role, roles)
         return raw
 
     return table(check_keys, closed)
@@ -124,19 +139,19 @@ def _roles(known: Collection[str], what: str) -> BeforeValidator:
 
 @dataclass(frozen=True)
 class TestFile(FileFormat):
-    """What [[loops]] and [[sweeps]] say alike: a file, what was tested in it, and under which conditions.
+    """Keys that [[loops]] and [[sweeps]] have in common.
 
     Args:
-        file: relative to the campaign file.
-        direction: of the bushing; a specimen has none, which may be written "shear".
-        specimen: by its name in [[specimens]]; the bushing unless stated.
-        noise: relative standard deviation of a point, where it is known.
-        weight: of the test in the fit, a share of the weight that its noise gives it.
-        temperature: [K]; it selects the rows of a file that has several, as direction and specimen_number do where a
-            column tells them.
-        rows: that make the test: for columns by their headers, the text there.
-        order: number of the test in the session; its place among all [[loops]], then all [[sweeps]], unless stated.
-        preload, date, operator, specimen_number: carried on to results as they are written.
+        file: path relative to the campaign file.
+        direction: of the bushing; None or "shear" for a specimen.
+        specimen: name in [[specimens]]; default the bushing.
+        noise: relative standard deviation of a point, if it is known.
+        weight: of the test in the fit, as a share of the weight by its noise.
+        temperature: [K]; selects the rows of a file with several temperatures. Direction and specimen_number select
+            rows too if a column states them.
+        rows: text, by header, that selects the rows of the test.
+        order: number of the test in the session; default its position among all [[loops]], then all [[sweeps]].
+        preload, date, operator, specimen_number: texts that are copied to the results.
     """
 
     __test__ = False
@@ -155,11 +170,22 @@ class TestFile(FileFormat):
     specimen_number: Text | None = None
 
     def source(self, sha256: str, temperature: float | None, notes: Iterable[str]) -> Source:
-        """The provenance of the test: its file, and the conditions that results carry on, a temperature [K] in degC."""
-        stated = {key: getattr(self, key) for key in ("order", "preload", "date", "operator", "specimen_number")}
+        """Create the provenance of the test.
+
+        Args:
+            sha256: of the file.
+            temperature: [K], if it is known; reported in degC.
+            notes: sentences on the reading.
+
+        Returns:
+            File, checksum, notes, and the conditions that are copied to the results.
+        """
+        conditions = {key: getattr(self, key) for key in ("order", "preload", "date", "operator", "specimen_number")}
         degrees = None if temperature is None else round(temperature - CELSIUS, 6)
-        known = {key: each for key, each in {**stated, "temperature_degC": degrees}.items() if each is not None}
-        return Source(Path(self.file), sha256, known, tuple(notes))
+        conditions = {
+            key: value for key, value in {**conditions, "temperature_degC": degrees}.items() if value is not None
+        }
+        return Source(Path(self.file), sha256, conditions, tuple(notes))
 
     def rows_of_test(self, *, shared: bool) -> Rows:
         """Selection of the rows that make the test; with `shared`, a column has to separate the tests of a file."""
@@ -168,15 +194,15 @@ class TestFile(FileFormat):
 
 @dataclass(frozen=True)
 class LoopFile(TestFile):
-    """[[loops]]: a file and what it does not say itself. See reading.read_loop.
+    """Table [[loops]]: a file and its missing information, for `loops.read_loop`.
 
     Args:
-        columns: by their headers, where these are not the usual names.
-        units: that the file does not carry.
-        force_sign: -1 where the load cell counts the other way round.
-        rate: of a file without time: speed of a triangle [m/s or rad/s].
-        frequency: of a file without time, with waveform [Hz].
-        waveform: of a file without time, with frequency.
+        columns: header or number of a column, by role, if its name is unusual.
+        units: by role, if the file does not state them.
+        force_sign: -1 if the load cell has the opposite sign.
+        rate: speed of a triangle [m/s or rad/s], for a file without time.
+        frequency: [Hz] of the waveform, for a file without time.
+        waveform: for a file without time.
     """
 
     columns: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS, "header")] = field(default_factory=dict)
@@ -198,7 +224,7 @@ class LoopFile(TestFile):
             )
 
     def clock(self, displacement: Floats) -> Floats:
-        """Time of each row [s], (n,), of a file without it; its motion is a triangle unless stated."""
+        """Time of each row of a file without time [s], (n,); the default waveform is a triangle."""
         return rebuild_time(
             displacement, rate=self.rate, frequency=self.frequency, waveform=self.waveform or "triangle"
         )
@@ -206,19 +232,18 @@ class LoopFile(TestFile):
 
 @dataclass(frozen=True)
 class SweepFile(TestFile):
-    """[[sweeps]]: a file and what it does not say itself. See reading.read_sweep.
+    """Table [[sweeps]]: a file and its missing information, for `sweeps.read_sweep`.
 
     Args:
-        columns: by their headers, where these are not the usual names.
-        units: that the file does not carry.
-        amplitude: how the file counts amplitudes; as its header says unless stated, else zero-to-peak.
-        at_amplitude: of a file without a column for it, with its unit: "0.1 mm", "0.15 %".
-        at_frequency: likewise [Hz].
-        stepped: what was stepped while the other was held, where the order of the rows does not tell it.
-        force_sign: -1 if the force counts the other way, which turns the phase by 180 deg; found in the phase unless
-            stated.
-        phase_sign: -1 if the loss counts the other way: as the phase of the displacement relative to the force; found
-            in the values unless stated.
+        columns: header or number of a column, by role, if its name is unusual.
+        units: by role, if the file does not state them.
+        amplitude: convention of the amplitudes; default that of the header, else zero-to-peak.
+        at_amplitude: amplitude of all rows with its unit, "0.1 mm" or "0.15 %", for a file without a column for it.
+        at_frequency: frequency of all rows [Hz], for a file without a column for it.
+        stepped: stepped quantity, if the order of the rows does not show it.
+        force_sign: -1 if the force has the opposite sign, which turns the phase by 180 deg; default automatic.
+        phase_sign: -1 if the loss has the opposite sign, as the phase of the displacement relative to the force;
+            default automatic.
     """
 
     columns: Annotated[Mapping[str, Text], _roles(SWEEP_COLUMNS, "header")] = field(default_factory=dict)

@@ -25,7 +25,13 @@ _DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissemen
 
 
 def stiffness_pair(table: Table) -> tuple[str, str]:
-    """First of PAIRS for which a table has columns.
+    """Find the first of PAIRS for which a table has columns.
+
+    Args:
+        table: of the sweep.
+
+    Returns:
+        The two roles.
 
     Raises:
         MeasurementError: there is none, or the damping can be read in two ways.
@@ -69,6 +75,9 @@ def force_amplitude_convention(table: Table, column: Column, of_motion: Amplitud
         table: of the sweep.
         column: of the amplitudes of the force.
         of_motion: convention of the amplitudes of the displacement.
+
+    Returns:
+        Convention of the amplitudes of the force.
 
     Raises:
         MeasurementError: only the header of the displacement states peak-to-peak or rms.
@@ -218,16 +227,18 @@ def check_agreement(table: Table, pair: tuple[str, str], values: Mapping[str, Fl
     Raises:
         MeasurementError: there is such a row.
     """
-    for other in AGREEING_PAIRS:
-        if other == pair or not set(other) <= set(values):
+    for redundant_pair in AGREEING_PAIRS:
+        if redundant_pair == pair or not set(redundant_pair) <= set(values):
             continue
-        redundant, _ = complex_stiffness(other, values)
+        redundant, _ = complex_stiffness(redundant_pair, values)
         distance = np.hypot(redundant.real - stiffness.real, np.abs(redundant.imag) - np.abs(stiffness.imag))
-        used, others = (" and ".join(f'"{table.roles[role].header}"' for role in both) for both in (pair, other))
+        used, redundant_headers = (
+            " and ".join(f'"{table.roles[role].header}"' for role in both) for both in (pair, redundant_pair)
+        )
         table.refuse(
             ~(distance <= _AGREEMENT * np.abs(stiffness)),
-            table.roles[other[1] if other[0] == pair[0] else other[0]],
+            table.roles[redundant_pair[1] if redundant_pair[0] == pair[0] else redundant_pair[0]],
             "the columns contradict each other",
-            f"the complex stiffness of {used}, within {100 * _AGREEMENT:g} %, in {others}",
+            f"the complex stiffness of {used}, within {100 * _AGREEMENT:g} %, in {redundant_headers}",
             "correct the columns that are wrong, or take them out",
         )

@@ -80,19 +80,19 @@ def read_sweep(
     rows = test.rows_of_test(shared=shared)
     table = Table.open(file, SWEEP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
     pair = stiffness_pair(table)
-    stated = {"frequency": test.at_frequency, "amplitude": at_amplitude}
-    held = {role: value for role, value in stated.items() if value is not None}
-    wanted = sweep_columns(table, direction, pair, held)
+    stated_values = {"frequency": test.at_frequency, "amplitude": at_amplitude}
+    constants = {role: value for role, value in stated_values.items() if value is not None}
+    wanted = sweep_columns(table, direction, pair, constants)
     convention = amplitude_convention(table, wanted.get("amplitude"), test.amplitude)
     to_peak = ZERO_TO_PEAK[convention]
     if at_amplitude is not None:  # counted like the column of the file
-        held["amplitude"] = (
+        constants["amplitude"] = (
             at_amplitude * strain_factor_of_files(direction) * ZERO_TO_PEAK[test.amplitude or "zero-to-peak"] / to_peak
         )
     values, notes = table.read_with_notes(wanted, fewest_rows=_FEWEST_SWEEP_ROWS)
     table = table.needing(wanted)
     table.check_positive(_POSITIVE, wanted, values)
-    for role, value in held.items():
+    for role, value in constants.items():
         values[role] = check_stated(table, wanted.get(role), values, value)
     if pair[0] == "force_amplitude":
         force_convention = force_amplitude_convention(table, wanted["force_amplitude"], convention)
@@ -103,35 +103,35 @@ def read_sweep(
     check_loss(table, wanted[pair[1]], loss_factor)
     check_agreement(table, pair, values, stiffness)
     repeat = repeat_numbers(table, wanted, values)
-    taken, temperature, degrees = rows_at_temperature(table, values, test.temperature)
-    frequency, level = values["frequency"][taken], to_peak * values["amplitude"][taken]
-    reached = values["amplitude_reached"][taken] if "amplitude_reached" in values else None
+    selected, temperature, degrees = rows_at_temperature(table, values, test.temperature)
+    frequency, level = values["frequency"][selected], to_peak * values["amplitude"][selected]
+    reached = values["amplitude_reached"][selected] if "amplitude_reached" in values else None
     if reached is not None:
         reached_convention = wanted["amplitude_reached"].convention
         reached = reached * (ZERO_TO_PEAK[reached_convention] if reached_convention else to_peak)
-    runs = runs_of(frequency, level, None if repeat is None else repeat[taken], test.stepped)
+    runs = runs_of(frequency, level, None if repeat is None else repeat[selected], test.stepped)
     if reached is None and not np.array_equal(runs.amplitude, level):
         reached = level
-    notes = (*notes, *more, *table.not_understood(taken, frequency, runs.amplitude))
+    notes = (*notes, *more, *table.not_understood(selected, frequency, runs.amplitude))
     return Sweep(
         name or file.stem,
         direction,
         frequency,
         runs.amplitude,
-        stiffness[taken],
+        stiffness[selected],
         runs.repeat,
         test.noise,
         test.source(table.sha256, temperature, notes),
         reached,
         runs.stepped,
-        values["relative_error"][taken] if "relative_error" in values else None,
+        values["relative_error"][selected] if "relative_error" in values else None,
         weight=test.weight,
         temperature=degrees,
     )
 
 
 def sweep_columns(
-    table: Table, direction: Place, pair: tuple[str, str], held: Mapping[str, float]
+    table: Table, direction: Place, pair: tuple[str, str], constants: Mapping[str, float]
 ) -> dict[str, Column]:
     """Columns of a sweep with their factors to SI, in the order in which they are checked.
 
@@ -139,7 +139,7 @@ def sweep_columns(
         table: of the sweep.
         direction: of the bushing, or the specimen.
         pair: of PAIRS.
-        held: frequency or amplitude that the campaign states, which then need no column.
+        constants: frequency or amplitude that the campaign states, which then need no column.
 
     Returns:
         Columns by role: those that are needed, those of other pairs if their units fit, and optional ones. A
@@ -151,14 +151,18 @@ def sweep_columns(
     units |= dict.fromkeys(("amplitude", "amplitude_reached"), motion.displacement_unit)
     units |= dict.fromkeys(("stiffness", "storage_stiffness", "loss_stiffness"), motion.stiffness_unit)
     units |= {"force_amplitude": motion.force_unit, "damping_coefficient": seconds}
-    needed = [role for role in ("frequency", "amplitude") if role in table.roles or role not in held]
+    needed = [role for role in ("frequency", "amplitude") if role in table.roles or role not in constants]
     degrees = table.roles.get("temperature")
     optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
     optional = [role for role in optional if role != "repeat" or table.holds_numbers(table.roles[role].index)]
     optional += ["temperature"] if degrees and degrees.unit and table.holds_numbers(degrees.index) else []
-    others = [role for other in AGREEING_PAIRS if set(other) <= set(table.roles) for role in other]
-    others = [role for role in others if units[role] == "1" or table.agrees(role, units[role])]
-    columns = {role: table.column(role, units[role], _HINTS.get(role)) for role in (*needed, *pair, *optional, *others)}
+    redundant = [
+        role for pair_of_roles in AGREEING_PAIRS if set(pair_of_roles) <= set(table.roles) for role in pair_of_roles
+    ]
+    redundant = [role for role in redundant if units[role] == "1" or table.agrees(role, units[role])]
+    columns = {
+        role: table.column(role, units[role], _HINTS.get(role)) for role in (*needed, *pair, *optional, *redundant)
+    }
     for role in ("amplitude", "amplitude_reached"):
         if role in columns:
             columns[role] = replace(columns[role], scale=strain_factor_of_files(direction) * columns[role].scale)
@@ -166,39 +170,42 @@ def sweep_columns(
 
 
 def amplitude_convention(
-    table: Table, column: Column | None, stated: AmplitudeConvention | None
+    table: Table, column: Column | None, stated_convention: AmplitudeConvention | None
 ) -> AmplitudeConvention:
-    """Convention of the amplitudes: that of the header, or else of the campaign; zero-to-peak if neither states one.
+    """Determine the convention of the amplitudes.
 
     Args:
         table: of the sweep.
         column: of the amplitude; None if there is none.
-        stated: in the campaign.
+        stated_convention: in the campaign.
+
+    Returns:
+        Convention in the header, or else in the campaign; zero-to-peak if neither states one.
 
     Raises:
         MeasurementError: header and campaign state different conventions.
     """
     if column is None:
-        return stated or "zero-to-peak"
-    if column.convention and stated and column.convention != stated:
+        return stated_convention or "zero-to-peak"
+    if column.convention and stated_convention and column.convention != stated_convention:
         raise table.header_error(
             "header and campaign count amplitudes differently",
             column=column,
-            found=f'{column.convention} in the header, amplitude = "{stated}" in the campaign',
+            found=f'{column.convention} in the header, amplitude = "{stated_convention}" in the campaign',
             expected="one convention",
             hint="correct one of them; what the header says needs no key in the campaign",
         )
-    return column.convention or stated or "zero-to-peak"
+    return column.convention or stated_convention or "zero-to-peak"
 
 
-def check_stated(table: Table, column: Column | None, values: Mapping[str, Floats], stated: float) -> Floats:
+def check_stated(table: Table, column: Column | None, values: Mapping[str, Floats], stated_value: float) -> Floats:
     """Amplitude or frequency of each row: its column, which must agree with the stated one, or else the stated one.
 
     Args:
         table: of the sweep.
         column: for the amplitude or frequency; None if there is none.
         values: in SI by role, (n,) each.
-        stated: amplitude or frequency in SI.
+        stated_value: amplitude or frequency in SI.
 
     Returns:
         Amplitude or frequency in SI, (n,).
@@ -207,26 +214,26 @@ def check_stated(table: Table, column: Column | None, values: Mapping[str, Float
         MeasurementError: the column does not agree.
     """
     if column is None:
-        return np.full(next(iter(values.values())).size, stated)
+        return np.full(next(iter(values.values())).size, stated_value)
     table.refuse(
-        np.abs(values[column.role] - stated) > _STATED_AGREEMENT * stated,
+        np.abs(values[column.role] - stated_value) > _STATED_AGREEMENT * stated_value,
         column,
         f"the {column.role} is not the one that is stated",
-        f"at_{column.role} as the campaign states it, {stated / column.scale:.6g} {column.unit}, within 10 %",
+        f"at_{column.role} as the campaign states it, {stated_value / column.scale:.6g} {column.unit}, within 10 %",
         f"take at_{column.role} out of the campaign: the file has a column for it",
     )
     return values[column.role]
 
 
 def rows_at_temperature(
-    table: Table, values: Mapping[str, Floats], stated: float | None
+    table: Table, values: Mapping[str, Floats], stated_temperature: float | None
 ) -> tuple[NDArray[np.intp], float | None, Floats | float | None]:
     """Select the rows at the temperature of a test.
 
     Args:
         table: of the sweep.
         values: by role, (n,) each; the temperature in its unit.
-        stated: temperature [K].
+        stated_temperature: temperature [K].
 
     Returns:
         Indices of the rows, temperature of the test [K], as stated or else the mean, and that of each row [K].
@@ -236,26 +243,27 @@ def rows_at_temperature(
     """
     rows = np.arange(values["frequency"].size)
     if "temperature" not in values:
-        return rows, stated, stated
+        return rows, stated_temperature, stated_temperature
     unit = table.roles["temperature"].unit
-    if unit is None and stated is None and np.ptp(values["temperature"]) <= ONE_TEST:
+    if unit is None and stated_temperature is None and np.ptp(values["temperature"]) <= ONE_TEST:
         return rows, None, None
     column = table.column("temperature", "K")
     celsius = values["temperature"] + (si.kelvin_scale(unit or "") or (1.0, 0.0))[1] - si.CELSIUS
     kelvin = celsius + si.CELSIUS
-    if stated is None:
+    if stated_temperature is None:
         if np.ptp(celsius) <= ONE_TEST:
             return rows, round(float(celsius.mean()), 2) + si.CELSIUS, kelvin
         problem, expected = "this file holds tests at several temperatures", "one temperature"
     else:
-        rows = np.flatnonzero(np.abs(kelvin - stated) <= SAME_TEMPERATURE)
+        rows = np.flatnonzero(np.abs(kelvin - stated_temperature) <= SAME_TEMPERATURE)
         if rows.size >= _FEWEST_SWEEP_ROWS:
-            return rows, stated, kelvin[rows]
+            return rows, stated_temperature, kelvin[rows]
         problem = "too few rows are near the temperature that is stated"
-        expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {SAME_TEMPERATURE:g} K of {stated - si.CELSIUS:.4g} degC"
+        degrees = f"{stated_temperature - si.CELSIUS:.4g} degC"
+        expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {SAME_TEMPERATURE:g} K of {degrees}"
     ordered = np.sort(celsius)
     means = [part.mean() for part in np.split(ordered, np.flatnonzero(np.diff(ordered) > SAME_TEMPERATURE) + 1)]
-    nearest = min(means, key=lambda mean: abs(mean + si.CELSIUS - (stated or 0.0)))
+    nearest = min(means, key=lambda mean: abs(mean + si.CELSIUS - (stated_temperature or 0.0)))
     raise table.error(
         problem,
         column=column,
@@ -268,12 +276,15 @@ def rows_at_temperature(
 def repeat_numbers(
     table: Table, columns: Mapping[str, Column], values: Mapping[str, Floats]
 ) -> NDArray[np.int64] | None:
-    """Repeat number of each row as its column states it, (n,), texts in their order; None without such a column.
+    """Read the repeat number of each row.
 
     Args:
         table: of the sweep.
         columns: by role.
         values: by role, (n,) each.
+
+    Returns:
+        Numbers, (n,), in order of appearance if the column contains texts; None without such a column.
 
     Raises:
         MeasurementError: a number that is no whole number.

@@ -67,7 +67,7 @@ class Table(LabelledCells):
         names: Mapping[str, Sequence[str]],
         columns: Mapping[str, str] | None = None,
         stated_units: Mapping[str, str] | None = None,
-        stated: FileFormat | None = None,
+        file_format: FileFormat | None = None,
         motion: Motion = TRANSLATION,
         rows: Rows | None = None,
     ) -> "Table":
@@ -79,7 +79,7 @@ class Table(LabelledCells):
             names: usual names of the columns by role: LOOP_COLUMNS, SWEEP_COLUMNS or RESONANCE_COLUMNS.
             columns: header, or number from 1, of the column of a role, if its name is unusual.
             stated_units: units by role that the file does not state.
-            stated: format of the file as the user states it.
+            file_format: format of the file as the user states it.
             motion: of what was tested; a test of strain and modulus has other names.
             rows: rows that make the test; default all.
 
@@ -91,17 +91,19 @@ class Table(LabelledCells):
                 no such rows.
             UnitError: two different units for one column.
         """
-        opened = file if isinstance(file, OpenedFile) else open_file(file, stated or FileFormat())
-        stated, columns = opened.stated, dict(columns or {})
+        opened = file if isinstance(file, OpenedFile) else open_file(file, file_format or FileFormat())
+        file_format, columns = opened.stated, dict(columns or {})
         numbered = {role: "\0" if text.isdecimal() else text for role, text in columns.items()}
         vocabulary = Vocabulary(of_motion(names, motion), numbered)
 
         def lay_out(source: RowSource) -> tuple[RowSource, Any, bool]:
-            delimiter = "" if isinstance(source, Sheet) else DELIMITERS[stated.delimiter] if stated.delimiter else None
+            """Return lines and layout of the table in a part of the file, and True if it was wide."""
+            delimiter = DELIMITERS[file_format.delimiter] if file_format.delimiter else None
+            delimiter = "" if isinstance(source, Sheet) else delimiter
             layout = source.layout or find_layout(
-                source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line
+                source.head(), vocabulary, delimiter=delimiter, header_line=file_format.header_line
             )
-            may_be_wide = "amplitude" in names and stated.header_line is None
+            may_be_wide = "amplitude" in names and file_format.header_line is None
             if may_be_wide and (wide := unpivot(source, opened.file, vocabulary, layout, delimiter)):
                 return *wide, True
             return *combined(source, layout, vocabulary), False
@@ -112,11 +114,11 @@ class Table(LabelledCells):
         except csv.Error as error:
             raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
         source, layout, is_wide = layouts[id(part)]
-        if stated.header_line not in (None, layout.header_line):
-            found = f"header_line = {stated.header_line}"
+        if file_format.header_line not in (None, layout.header_line):
+            found = f"header_line = {file_format.header_line}"
             problem, hint = "there is no header on this line", "lines count from 1"
             raise MeasurementError(problem, file=opened.file, found=found, hint=hint)
-        table = cls(opened.file, source, layout, stated, {}, opened.checksum, names, motion)
+        table = cls(opened.file, source, layout, file_format, {}, opened.checksum, names, motion)
         if len(table.headers) < 2:
             expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
             raise table.header_error("there is only one column", expected=expected)
@@ -175,7 +177,7 @@ class Table(LabelledCells):
             example = units.example_unit(expected)
             angular = expected == "Hz" and is_angular(column.header, "1/s")
             second = "rad/s" if angular else "rad" if expected == "rad" and role == "phase" else ""
-            other = f', or units = {{ {role} = "{second}" }}' if second else ""
+            alternative = f', or units = {{ {role} = "{second}" }}' if second else ""
             raise UnitError(
                 f"the {label} has no unit",
                 file=self.file,
@@ -183,11 +185,12 @@ class Table(LabelledCells):
                 found=f'"{column.header}"',
                 expected=f"{units.describe_unit(expected)}{', or an angular frequency, such as rad/s' * angular}",
                 hint=f'write "{column.header} [{"rad/s" if angular else example}]" in the header, '
-                f'or units = {{ {role} = "{example}" }} in the campaign{other}',
+                f'or units = {{ {role} = "{example}" }} in the campaign{alternative}',
             )
         unit = column.unit or "1"
-        others = ("m", "rad", "N/m", "N*m/rad") if self.motion is STRAINING else ("1", "Pa")
-        if role in OF_MOTION and "force" not in role and any(units.is_compatible(unit, other) for other in others):
+        foreign_units = ("m", "rad", "N/m", "N*m/rad") if self.motion is STRAINING else ("1", "Pa")
+        is_foreign = any(units.is_compatible(unit, foreign_unit) for foreign_unit in foreign_units)
+        if is_foreign and role in OF_MOTION and "force" not in role:
             self.refuse_other_motion(role, [column.header])
         with error_location(self.file, place):
             if expected == "Hz" and is_angular(column.header, unit):
@@ -207,6 +210,9 @@ class Table(LabelledCells):
             role: of the column.
             expected: its SI unit.
             hint: what else the user can do.
+
+        Returns:
+            The error.
         """
         self.refuse_other_motion(role)
         label = role.replace("_", " ")
@@ -217,11 +223,14 @@ class Table(LabelledCells):
         )
 
     def columns_key(self, role: str, unit: str) -> str:
-        """Key of a campaign that names the column of a role: each header without a role that has a fitting unit.
+        """Suggest keys of a campaign that name the column of a role.
 
         Args:
             role: of the column.
             unit: its SI unit.
+
+        Returns:
+            A key for each of the first three headers without a role that have a fitting unit, or one with "...".
         """
         usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
         free = [header for header in self.headers if header and usual.heading(header) is None]
@@ -245,12 +254,12 @@ class Table(LabelledCells):
             MeasurementError: there is such a header.
         """
         kinds = ("displacement and force or stiffness", "strain and modulus")
-        other, (expected, found) = STRAINING, kinds
+        other_motion, (expected, found) = STRAINING, kinds
         hint = 'write [[specimens]] with a name and kind = "modulus" in the campaign, and specimen = "its name" here'
         if self.motion is STRAINING:
-            other, (found, expected) = TRANSLATION, kinds
+            other_motion, (found, expected) = TRANSLATION, kinds
             hint = 'take specimen out of the campaign, or give it kind = "shear" with its area and thickness'
-        names = of_motion(self.names, other)
+        names = of_motion(self.names, other_motion)
         differs = role in names and names[role] is not of_motion(self.names, self.motion)[role]
         words = Vocabulary({role: names[role]} if differs else {}, {})
         for header in headers or filter(words.heading, self.headers):
@@ -327,8 +336,8 @@ class Table(LabelledCells):
             if role in values:
                 problem = f"the {role.replace('_', ' ')} is not positive"
                 self.refuse(values[role] <= 0.0, wanted[role], problem, "a number above zero")
-                least = f"{LEAST_VALUE / abs(wanted[role].scale):.3g} or more"
-                self.refuse(values[role] < LEAST_VALUE, wanted[role], "no rig records so little", least)
+                smallest = f"{LEAST_VALUE / abs(wanted[role].scale):.3g} or more"
+                self.refuse(values[role] < LEAST_VALUE, wanted[role], "no rig records so little", smallest)
 
     def refuse(
         self, bad: NDArray[np.bool_], column: Column, problem: str, expected: str, hint: str | None = None
@@ -360,8 +369,8 @@ class Table(LabelledCells):
         if self.selected is not None or self.clocks & set(scales):
             return None
         if isinstance(self.source, Channels):
-            known = self.source.values(scales)
-            return None if known is None else {role: known[column.index] for role, column in wanted.items()}
+            arrays = self.source.values(scales)
+            return None if arrays is None else {role: arrays[column.index] for role, column in wanted.items()}
         if not isinstance(self.source, Text):
             return None
         decimals = {way.decimal for way in weigh(islice(self.number_texts(), _FIRST), self.possible_numerals()).ways}

@@ -68,12 +68,12 @@ def are_day_numbers(values: Floats) -> bool:
         with steps below 0.1 ms that begins hours after zero.
     """
     low, high = _DAY_NUMBERS
-    within = values.size > 1 and low <= float(values.min()) and float(values.max()) <= high
-    return within and 0.0 < float(np.ptp(values)) < _LARGEST_DAY_STEP * values.size
+    in_range = values.size > 1 and low <= float(values.min()) and float(values.max()) <= high
+    return in_range and 0.0 < float(np.ptp(values)) < _LARGEST_DAY_STEP * values.size
 
 
 def without_midnight(seconds: Floats) -> Floats:
-    """Clock times [s], (n,), of which those after midnight count on."""
+    """Clock times [s], (n,), with a day added after each midnight."""
     return seconds + DAY * np.cumsum(np.append(0.0, np.diff(seconds) < -0.5 * DAY))
 
 

@@ -68,9 +68,9 @@ class _Meaning(NamedTuple):
     level_unit: str | None = None
     convention: AmplitudeConvention | None = None
 
-    def completed_by(self, other: "_Meaning") -> "_Meaning":
+    def completed_by(self, second: "_Meaning") -> "_Meaning":
         """This meaning, with what it does not state from another one."""
-        return other._replace(**{name: value for name, value in self._asdict().items() if value is not None})
+        return second._replace(**{name: value for name, value in self._asdict().items() if value is not None})
 
 
 class _Series(NamedTuple):

@@ -213,7 +213,7 @@ def _loops(loop: Loop, time: Floats, spans: Sequence[_SteadySpan], test: LoopFil
         ]
         sentence = left_out(gap_texts, (span.end - begin) / span.period) if any(gap_texts) else None
         part = replace(
-            loop.at(rows),
+            loop.select(rows),
             name=f"{loop.name}_part_{number}",
             part=RecordPart(rows.start, sentence),
             softening=_softening(loop, span, from_rest=number == 1),

@@ -49,7 +49,8 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
         MeasurementError: no steady sine in any of them, or one far off every level.
     """
     sound = [  # the fits need no even clock
-        one.at(~(lone_outliers(one.time, one.displacement) | lone_outliers(one.time, one.force))) for one in histories
+        one.select(~(lone_outliers(one.time, one.displacement) | lone_outliers(one.time, one.force)))
+        for one in histories
     ]
     outliers = sum(one.time.size for one in histories) - sum(one.time.size for one in sound)
     found = [_steps_of(history, fewest_cycles) for history in track("histories reduced", sound)]

@@ -187,7 +187,7 @@ def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_re
     """Three that differ, one of them radial and of a third as many rows, and three repeats of one."""
     campaign = load_campaign(root / "configs/cmp_15961.toml")
     (loop,) = campaign.loops
-    once = loop.at(slice(0, loop.time.size // 3 + 1))  # of three cycles
+    once = loop.select(slice(0, loop.time.size // 3 + 1))  # of three cycles
     made = [(loop, 1.0, 0), (loop, 0.5, 0), (loop, 1.0, 0), (loop, 1.0, 0), (loop, 1.0, 0), (once, 1.0, 1)]
     directions = Direction.AXIAL, Direction.RADIAL
     loops = tuple(

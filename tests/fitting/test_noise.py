@@ -217,7 +217,7 @@ def cycles_of(loop: Loop, cycles: int, noise: np.ndarray, rows: int = 1000) -> L
 def test_a_record_that_misses_its_last_cycle_by_rounding_tells_its_noise_from_all(rig: Rig) -> None:
     """Three cycles, whose frequency the motion's own noise puts off by a part in a million: half end too soon."""
     clean = rig(force_noise=0.0, displacement_noise=0.0).loops[0]
-    loop = cycles_of(clean.at(slice(None, None, 4)), 3, filtered(np.random.default_rng(0), 750, 0.98), rows=250)
+    loop = cycles_of(clean.select(slice(None, None, 4)), 3, filtered(np.random.default_rng(0), 750, 0.98), rows=250)
     drives = [
         drive_of(replace(loop, displacement=loop.displacement + 2e-7 * random.standard_normal(750)))
         for random in map(np.random.default_rng, range(6))

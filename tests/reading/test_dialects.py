@@ -113,7 +113,7 @@ def test_the_header_names_most_columns_unless_it_is_stated(
     text: str, stated: dict[str, Any], line: int, headers: tuple[str, ...], tmp_path: Path
 ) -> None:
     (tmp_path / "loop.csv").write_text(text)
-    found = Table.open(tmp_path / "loop.csv", LOOP_COLUMNS, stated=FileFormat(**stated)).layout
+    found = Table.open(tmp_path / "loop.csv", LOOP_COLUMNS, file_format=FileFormat(**stated)).layout
     assert (found.header_line, found.headers) == (line, headers)
 
 
@@ -155,7 +155,7 @@ def test_what_can_be_read_in_two_ways_is_refused(case: str, tmp_path: Path) -> N
     rows = [f"{n}.001;{n}.002;{n}.003" if "." in cells else f"{n},001;{n},002;{n},003" for n in range(2, 12)]
     file = tmp_path / "loop.csv"
     file.write_text("\n".join(["time [s];displacement [mm];force [N]", cells, *rows]))
-    table = Table.open(file, LOOP_COLUMNS, stated=FileFormat(**stated))  # type: ignore[arg-type]
+    table = Table.open(file, LOOP_COLUMNS, file_format=FileFormat(**stated))  # type: ignore[arg-type]
     wanted = {"force": table.column("force", "N")}
     if force is None:
         with pytest.raises(MeasurementError, match=r"two ways[\s\S]*decimal = "):

@@ -59,7 +59,7 @@ def test_every_step_has_the_stiffness_of_the_closed_form(
         # the 7th and 9th overtone fold onto the fundamental of 155 Hz
         "coarse, nearly 8 rows a cycle": np.arange(0, count, 4),
     }[kind]
-    reduction = reduce([clean if rows is None else clean.at(rows)])
+    reduction = reduce([clean if rows is None else clean.select(rows)])
     off = np.abs(off_truth(reduction, paper_model)).max()
     print(f"{kind}: {len(reduction.steps)} points, off by at most {off:.1e} of |K|, without noise")
     assert off < limit
