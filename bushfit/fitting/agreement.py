@@ -95,6 +95,9 @@ class LeaveOut:
             stepped: False where the fit is one to the rest already.
             clusters: number of the group of rows whose misfit is of one kind that each row belongs to, (all rows,).
 
+        Returns:
+            Residuals in units of noise, and whitened by the error of the prediction as well, (n,) each.
+
         Notes:
             The whitened ones have the covariance 1 + J C J^T before, with the robust covariance C of the fit to the
             rest: A^-1 M A^-1, where M adds what each cluster pulls at the parameters (Liang and Zeger 1986, sandwich).
@@ -131,7 +134,16 @@ class LeaveOut:
 
 
 def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = ()) -> tuple[Misfit, ...]:
-    """How well a model meets each test, and each run of those that have several; `left` are tests not fitted."""
+    """How well a model meets each test, and each run of those that have several.
+
+    Args:
+        model: fitted model.
+        fitted: tests that the model was fitted to.
+        unfitted: tests that were not fitted.
+
+    Returns:
+        One `Misfit` for each test, and one for each run of a test with several runs.
+    """
     pairs = [(data_set, True) for data_set in fitted] + [(data_set, False) for data_set in unfitted]
     return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.with_weight(), was_fitted=was))
 
@@ -143,6 +155,14 @@ def _misfits(model: Model, data_set: MeasuredTest, *, was_fitted: bool) -> Itera
     place, all_points, rows = str(data_set.direction), np.ones(data_set.frequency.size, dtype=bool), relative.size
 
     def figures(run: _Run, relative: Array, squares: Array, gain: Array) -> Misfit:
+        """Figures of one run.
+
+        Args:
+            run: run of the test, or all its points.
+            relative: size of the relative misfit, (n,).
+            squares: sum of squared residuals of each point, (n,).
+            gain: relative error of |K| at each operating point.
+        """
         named = data_set.name, place, was_fitted, run.held, run.value, run.unit
         counted = data_set.counted * relative.size / rows
         reduced = float(squares.sum()) / (counted * data_set.test.weight)
@@ -163,7 +183,15 @@ def usable(
     was not fitted is predicted anyway. Where fewer than half the points of a place are predicted so, all count as the
     fit has them.
 
-    The tests have the weights at which the solution is the least sum of squares; `left` are others.
+    The tests have the weights at which the solution is the least sum of squares.
+
+    Args:
+        solution: end of the fit.
+        data_sets: fitted tests, with the weights of the fit.
+        unfitted: tests that were not fitted.
+
+    Returns:
+        95 % quantile of the error of stiffness and loss factor, for each direction or specimen.
     """
     free = solution.moving
     whole, parts = LeaveOut.from_fit(solution.jacobian[free], solution.residual), list[_Part]()
@@ -182,7 +210,16 @@ def usable(
 
 
 def met_within(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest]) -> tuple[Usable, ...]:
-    """Usable range of a model whose fit is not at hand: residuals of the fitted tests stand for held-out ones."""
+    """Usable range of a model whose fit is not at hand: residuals of the fitted tests stand for held-out ones.
+
+    Args:
+        model: fitted model.
+        fitted: tests that the model was fitted to.
+        unfitted: tests that were not fitted.
+
+    Returns:
+        95 % quantile of the error of stiffness and loss factor, for each direction or specimen.
+    """
     return _by_place([*_as_modelled(model, fitted, predicted=False), *_as_modelled(model, unfitted, predicted=True)])
 
 

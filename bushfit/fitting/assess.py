@@ -58,7 +58,16 @@ class Process:
     freedom: float
 
     def moves(self, model: Model, data_sets: Sequence[MeasuredTest], influence: Array) -> Array:
-        """Covariance of parameters that it makes, (k, k), by the influence of whitened residuals on them, (k, n)."""
+        """Covariance of parameters that it makes, (k, k), by the influence of whitened residuals on them, (k, n).
+
+        Args:
+            model: fitted model.
+            data_sets: tests.
+            influence: of whitened residuals on the parameters, (k, n).
+
+        Returns:
+            Covariance in the coordinates of `influence`, (k, k).
+        """
         first, changes = 0, np.zeros((len(influence), len(self.shapes)))
         for data_set, rows in zip(data_sets, rows_of(data_sets), strict=True):
             shapes = self.shapes[:, first : first + data_set.frequency.size]
@@ -81,7 +90,10 @@ class FitStage:
 def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | None = None) -> Covariance:
     """Covariance of all parameters that a procedure estimated, each stage holding what the others found.
 
-    `held` is that of parameters which all stages held.
+    Args:
+        model: fitted model.
+        stages: fits of the procedure, in order.
+        fixed: covariance of parameters that all stages held.
 
     Returns:
         By parameter value. Where the residuals of a stage, or of one test of it, exceed its noise, the share of each
@@ -199,7 +211,13 @@ def _unsure(
 
 
 def reduced(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> tuple[float, int]:
-    """Reduced chi-square and its degrees of freedom."""
+    """Reduced chi-square and its degrees of freedom.
+
+    Args:
+        model: model to compare.
+        data_sets: tests.
+        parameters: number of fitted parameters.
+    """
     return _over_freedom(residual(model, data_sets), data_sets, parameters)
 
 
@@ -210,7 +228,16 @@ def _over_freedom(residuals: Array, data_sets: Sequence[MeasuredTest], parameter
 
 
 def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> Quality:
-    """How well a model meets data sets: NRMSE, reduced chi-square, number of residuals, relative noise."""
+    """How well a model meets data sets: NRMSE, reduced chi-square, number of residuals, relative noise.
+
+    Args:
+        model: fitted model.
+        data_sets: tests.
+        parameters: number of fitted parameters.
+
+    Returns:
+        Figures of the fit over all tests.
+    """
     relative = np.concatenate([data_set.relative(model) for data_set in data_sets])
     noise = np.repeat([data_set.relative_noise for data_set in data_sets], [data_set.counted for data_set in data_sets])
     loops, _ = split_by_kind(data_sets)
@@ -235,7 +262,13 @@ def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
 
 
 def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> float | None:
-    """Reduced chi-square where the model misses the data by more than their noise, else None."""
+    """Reduced chi-square where the model misses the data by more than their noise, else None.
+
+    Args:
+        model: fitted model.
+        data_sets: tests.
+        parameters: number of fitted parameters.
+    """
     return beyond_noise(*reduced(model, data_sets, parameters))
 
 
@@ -251,7 +284,17 @@ def beyond_noise(chi_square: float, freedom: int) -> float | None:
 
 
 def misfit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, advice: str = "") -> list[str]:
-    """A sentence, with advice, where the model misses all data, or one test, by more than the noise; else none."""
+    """A sentence, with advice, where the model misses all data, or one test, by more than the noise; else none.
+
+    Args:
+        model: fitted model.
+        data_sets: tests.
+        parameters: number of fitted parameters.
+        advice: end of the sentence.
+
+    Returns:
+        The sentence, or an empty list.
+    """
     together = lack_of_fit(model, data_sets, parameters)
     named = zip(data_sets, missed(model, data_sets), strict=True)
     by_test = {data_set.name: chi_square for data_set, chi_square in named if chi_square is not None}
@@ -269,7 +312,11 @@ def misfit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, adv
 
 
 def implausible(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[str]:
-    """Sentences on moduli that no rubber has, and on tests too far apart to be of one bushing: most often a unit."""
+    """Sentences on moduli that no rubber has, and on tests too far apart to be of one bushing: most often a unit.
+
+    Returns:
+        At most one sentence.
+    """
     moduli = {
         data_set.name: float(np.median(np.abs(data_set.measured))) / stiffness_per_modulus(bushing, data_set.direction)
         for data_set in data_sets
@@ -298,7 +345,11 @@ def refuse_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) ->
 
 
 def apart_in_temperature(model: Model, data_sets: Sequence[MeasuredTest]) -> list[str]:
-    """A sentence on tests whose temperatures, where they are known, lie too far apart for one model."""
+    """A sentence on tests whose temperatures, where they are known, lie too far apart for one model.
+
+    Returns:
+        At most one sentence.
+    """
     degrees = [(data_set.name, data_set.test.temperature) for data_set in data_sets]
     temperatures = sorted((float(np.mean(kelvin)) - CELSIUS, name) for name, kelvin in degrees if kelvin is not None)
     if (
@@ -341,7 +392,13 @@ def mixed_conditions(data_sets: Sequence[MeasuredTest]) -> list[str]:
 
 
 def unfitted(model: Model, data_sets: Sequence[MeasuredTest], advice: str) -> list[str]:
-    """A sentence on the tests of each place that a model was not fitted to and misses by more than their noise."""
+    """A sentence on the tests of each place that a model was not fitted to and misses by more than their noise.
+
+    Args:
+        model: fitted model.
+        data_sets: tests that were not fitted.
+        advice: end of each sentence.
+    """
     misses: dict[str, list[tuple[float, float, str]]] = {}
     for data_set in data_sets:
         if (misfit := lack_of_fit(model, [data_set], 0)) is not None:

@@ -120,7 +120,13 @@ def residual(model: Model, data_sets: Sequence[MeasuredTest]) -> Array:
 
 
 def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> Array:
-    """Derivatives of `residual` by parameter coordinate, (len(names), n)."""
+    """Derivatives of `residual` by parameter coordinate, (len(names), n).
+
+    Args:
+        model: model at whose values the derivatives are taken.
+        data_sets: tests.
+        names: k parameters.
+    """
     slopes = Coordinates.of_parameters(model, names).slopes(model.values)
     by_value = np.concatenate([data_set.jacobian(model, names) for data_set in data_sets], axis=-1)
     return together(data_sets, by_value * slopes[:, None])
@@ -137,7 +143,17 @@ def together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:
 def starting_point(
     model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], bounds: Bounds
 ) -> tuple[Coordinates, Array, Array, Array]:
-    """Coordinates of a fit, the model's own values in them, and the lower and upper bounds, (k,) each."""
+    """Coordinates of a fit, the model's own values in them, and the lower and upper bounds, (k,) each.
+
+    Args:
+        model: model with the start values.
+        data_sets: tests.
+        names: k parameters to fit.
+        bounds: limits inside the parameters' own [SI].
+
+    Returns:
+        Coordinates, the start point, and lower and upper bounds, (k,) each.
+    """
     points = sum(data_set.size for data_set in data_sets)
     if points <= len(names):
         raise FitError("too few points for the fit", found=f"{points} points for {len(names)} parameters")
@@ -148,7 +164,11 @@ def starting_point(
 
 
 def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
-    """Lower and upper bound of each coordinate, (k,) each."""
+    """Lower and upper bound of each coordinate, (k,) each.
+
+    Returns:
+        Lower and upper bounds, (k,) each.
+    """
     ends = []
     for name, parameter in zip(coordinates.names, coordinates.parameters, strict=True):
         limits = zip(parameter.bounds, bounds.get(name, (None, None)), strict=True)
@@ -163,7 +183,14 @@ def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, 
 
 
 def at_bound(names: Sequence[str], point: Array, low: Array, high: Array) -> dict[str, End]:
-    """The parameters that rest on a bound at a point, and on which, "min" or "max"."""
+    """The parameters that rest on a bound at a point, and on which, "min" or "max".
+
+    Args:
+        names: k parameters.
+        point: coordinates, (k,).
+        low: lower bounds, (k,).
+        high: upper bounds, (k,).
+    """
     near = _AT_BOUND * np.minimum(high - low, 1.0)
     rooms: dict[End, Array] = {"min": point - low, "max": high - point}
     return {name: end for end, room in rooms.items() for name, met in zip(names, room < near, strict=True) if met}
@@ -173,6 +200,13 @@ def anderson(inputs: Sequence[Array], outputs: Sequence[Array]) -> Array:
     """Next point of a fixed-point iteration, from the last two of its points and images (Anderson 1965).
 
     Plain passes gain little each where what is asked and what answers know little of each other, or swing to and fro.
+
+    Args:
+        inputs: points of the iteration so far, (k,) each.
+        outputs: their images, (k,) each.
+
+    Returns:
+        Next point, (k,).
     """
     points, images = np.array(inputs[-2:]), np.array(outputs[-2:])
     if len(points) < 2:

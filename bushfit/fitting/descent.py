@@ -101,6 +101,16 @@ class Descent:
     ) -> "Descent":
         """A fit of the named parameters, the others held, that has not yet left the model's own values.
 
+        Args:
+            model: model with the start values.
+            data_sets: tests.
+            names: parameters to fit.
+            bounds: limits inside the parameters' own [SI].
+            tolerance: relative fall of chi-square at which the fit ends; None for models that are compared.
+
+        Returns:
+            The fit before its first step.
+
         Raises:
             FitError: fewer data than parameters, or no finite response.
             ModelError: no response.
@@ -138,7 +148,11 @@ class Descent:
         )
 
     def stepped(self) -> "Descent":
-        """The fit one evaluation on: at a lower chi-square with less damping, or where it was with more."""
+        """The fit one evaluation on: at a lower chi-square with less damping, or where it was with more.
+
+        Returns:
+            The fit after one more evaluation of the model.
+        """
         damping = self.damping
         step, expected = self._step(damping)
         smallest_fall = _LEAST_FALL if self.tolerance is None else self.tolerance * self.chi_square

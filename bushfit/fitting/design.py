@@ -40,7 +40,10 @@ def designed(
 
     Args:
         plain: the same without the effects that are to be added, and with the branches that they replace.
-        held: parameters that do not move.
+        fixed: parameters that do not move.
+
+    Returns:
+        The better of the model itself and the one built up effect by effect.
     """
     added = [get_effect(name) for name in model.effects if name not in plain.effects]
     ends = []
@@ -60,6 +63,16 @@ def with_effect(
 ) -> Solution:
     """A fitted model with one effect more, or one in place of a branch: the best fit of several starts.
 
+    Args:
+        solution: end of the fit without the effect.
+        data_sets: tests.
+        effect: effect to add.
+        fixed: names of parameters that do not move.
+        bounds: limits inside the parameters' own [SI].
+
+    Returns:
+        End of the best fit.
+
     Raises:
         FitError: no start has a finite response.
     """
@@ -74,7 +87,14 @@ def with_effect(
 
 
 def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Descent:
-    """A fit of every parameter of a model but the held ones, from its own values, before its first step."""
+    """A fit of every parameter of a model but the held ones, from its own values, before its first step.
+
+    Args:
+        model: model with the start values.
+        data_sets: tests.
+        fixed: names of parameters that do not move.
+        bounds: limits inside the parameters' own [SI].
+    """
     return Descent.start(model, data_sets, _free(model, fixed), bounds)
 
 
@@ -101,7 +121,16 @@ def _starts(fitted: Model, data_sets: Sequence[MeasuredTest], effect: Effect) ->
 
 
 def probes(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter) -> Array:
-    """Values of a shape parameter that these tests could show, by what it is measured against."""
+    """Values of a shape parameter that these tests could show, by what it is measured against.
+
+    Args:
+        data_sets: tests.
+        model: fitted model.
+        parameter: shape parameter.
+
+    Returns:
+        Start values in the parameter's SI unit, (n,).
+    """
     frequencies, strains = operating_conditions(model.bushing, data_sets)
     match parameter.scale:
         case "period":

@@ -90,7 +90,11 @@ class FittedTests:
         return ErrorSubspace([(rows, None if loop is None else loop[0]) for rows, loop in pairs])
 
     def columns(self, shapes: Array) -> Array:
-        """Whitened residuals, as `seen`, by relative changes of the stiffness, complex (c, p) -> (c, d)."""
+        """Whitened residuals, as `seen`, by relative changes of the stiffness, complex (c, p) -> (c, d).
+
+        Returns:
+            Changes of the residuals within `subspace`, (c, d).
+        """
         columns, first, changes = [], 0, shapes * self._stiffness
         for data_set, loop in zip(self.data_sets, self._loops, strict=True):
             change = changes[:, first : first + data_set.frequency.size]
@@ -161,7 +165,17 @@ class Discrepancy:
     def over_tests(
         cls, tests: FittedTests, groups: Groups, lengths: tuple[float, float], maximum_nodes: int
     ) -> Discrepancy:
-        """The process over the points of some tests, with a number of nodes at most in each group."""
+        """The process over the points of some tests, with a number of nodes at most in each group.
+
+        Args:
+            tests: fitted model and tests.
+            groups: directions and specimens that share the process.
+            lengths: in ln frequency and ln strain.
+            maximum_nodes: number of nodes of a group at most.
+
+        Returns:
+            The process, not yet conditioned.
+        """
         nodes, shapes = [], []
         for group in groups:
             inside = np.flatnonzero(np.isin(tests.directions, group))
@@ -215,6 +229,9 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
     Between the nodes, and in sharing directions, it is as the likeliest, over lengths of the mean logarithm. Its sizes
     are known by few degrees of freedom: standard deviations are those by which a normal interval is as wide as
     Student's t has it.
+
+    Returns:
+        Correction at nodes, with its standard deviation, relative to the stiffness.
     """
     gains = np.array([process.best[0] for process in processes])
     share = np.exp(gains - gains.max())

@@ -152,7 +152,11 @@ class Drive:
         return response - np.average(self.at_rows(response), axis=-1, weights=self.weight)[..., None]
 
     def at_rows(self, response: Array) -> Array:
-        """A response over `history`, (..., samples), linearly interpolated at the rows, (..., n)."""
+        """A response over `history`, (..., samples), linearly interpolated at the rows, (..., n).
+
+        Returns:
+            Response at the rows, (..., n).
+        """
         length = response.shape[-1]
         if length not in self._places:
             position = self.phase * GRID
@@ -167,6 +171,9 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     """The cycles of a loop, its displacement cleared of noise, and its force with weights.
 
     Outliers of either column do not disturb that; `without_outliers`, rows whose force is one carry no weight.
+
+    Returns:
+        The loop made ready for the model.
 
     Raises:
         FitError: the displacement is not one whole cycle or more of a periodic motion, rows are missing, or the loop
@@ -311,7 +318,7 @@ def _at_reversal(drive: Drive) -> Array:
 def _rests(
     loop: Loop, found: LoopHarmonics, half_motion: float, half_force: float, noise: float, change: float
 ) -> tuple[bool, bool]:
-    """Whether the record begins at rest with nothing moved and no force, and whether at its mean, about a preload.
+    """True if the record begins at rest at zero, and true if it begins at rest at its mean, about a preload.
 
     A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle: `change`
     is the certain one of its force over the first.
@@ -328,7 +335,7 @@ def _rests(
 
 
 def _change(loop: Loop, frequency: float, noise: float, half_force: float) -> float:
-    """By how much the force at the start is another a cycle later [N or N m]; 0 where that may be chance."""
+    """Change of the force at the start over the first cycle [N or N m]; 0 if noise alone may explain the change."""
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
     comparable = np.searchsorted(clock, clock[-1] - 1.0 / frequency, side="right")  # a cycle later

@@ -94,6 +94,15 @@ def left_open(
     """Sentences on what the tests leave open of a fitted model; none where everything is determined.
 
     Each group of parameters that share open directions has a sentence, with the standard errors of the covariance.
+
+    Args:
+        model: fitted model.
+        data_sets: tests.
+        names: fitted parameters.
+        covariance: of the fitted parameters.
+
+    Returns:
+        Sentences; empty if the tests determine every parameter.
     """
     if not names:
         return []

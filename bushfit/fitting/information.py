@@ -51,7 +51,13 @@ class FisherInformation:
 
     @classmethod
     def from_tests(cls, model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> "FisherInformation":
-        """Information of data sets on the named parameters of a model at its values."""
+        """Information of data sets on the named parameters of a model at its values.
+
+        Args:
+            model: model at whose values the information is taken.
+            data_sets: tests.
+            names: k parameters.
+        """
         slope = jacobian(model, data_sets, names) * relative_sizes(model, names)[:, None]
         return cls(tuple(names), slope @ slope.T)
 
@@ -90,7 +96,16 @@ def percent(error: float) -> str:
 
 
 def further_test(model: Model, data_sets: Sequence[MeasuredTest], information: FisherInformation) -> list[str]:
-    """A sentence on the test that shrinks the worst standard error most, and to what; none where none helps."""
+    """A sentence on the test that shrinks the worst standard error most, and to what; none where none helps.
+
+    Args:
+        model: fitted model.
+        data_sets: tests of the campaign.
+        information: that these tests give.
+
+    Returns:
+        At most one sentence.
+    """
     before = information.errors()
     worst = int(np.argmax(before))
     bearable = max(_BEARABLE, measured_range(model, data_sets).strain[1])

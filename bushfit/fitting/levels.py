@@ -38,11 +38,14 @@ class LevelErrors(NamedTuple):
 def level_errors(
     data_sets: Sequence[MeasuredTest], residual: Array, absorbed: Array, maximum: tuple[float, float]
 ) -> LevelErrors:
-    """Errors of the levels of sweeps by restricted maximum likelihood, never below 0 and never beyond `most`.
+    """Errors of the levels of sweeps by restricted maximum likelihood, between 0 and `maximum`.
 
     Args:
         residual: whitened residuals at the end of a fit, (n,).
         absorbed: whitened residuals that the fit, or a fault, can make up for, (k, n).
+
+    Returns:
+        The errors, with the gain of the likelihood that they bring.
 
     Notes:
         Beside the noise counted already a level's error adds v u u^T to the covariance of the whitened residuals, u the
@@ -94,7 +97,11 @@ def level_errors(
 
 def level_columns(data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, tuple[float, float]]:
     """Whitened unit error of each level in gain and in phase, (c, n), which of the two it is, (c,), and the error that
-    is counted already."""
+    is counted already.
+
+    Returns:
+        Columns (c, n), 0 for gain or 1 for phase (c,), and the gain and phase error in the noise already.
+    """
     rows, kinds, before = [], [], (0.0, 0.0)
     size = sum(data_set.size for data_set in data_sets)
     for sweep, block in zip(data_sets, rows_of(data_sets), strict=True):

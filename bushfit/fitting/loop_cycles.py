@@ -64,6 +64,9 @@ class SteadyCycles(NamedTuple):
 def steady_cycles(loop: Loop) -> SteadyCycles:
     """The steady cycles of a loop: of one with holes, those of the longest part without.
 
+    Returns:
+        The steady part, its frequency and number of cycles, and a note.
+
     Raises:
         FitError: it does not hold a whole cycle, or it has a hole in which nobody knows how many turns were made.
     """
@@ -199,7 +202,7 @@ def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, 
 
 
 def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[float, float]:
-    """As `_fundamental`, of a loop that crosses its middle but once in either sense, at the times `across` [s]."""
+    """Frequency [Hz] and number of cycles of a loop that crosses its middle once each way, at times `across` [s]."""
     rows, motion = loop.time.size, loop.displacement
     duration = float(loop.time[-1] - loop.time[0])
     closed = duration * rows / (rows - 1)
@@ -291,7 +294,11 @@ def waveform(coefficients: Array) -> str:
 
 
 def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
-    """A sentence where a loop's time was made from its motion, but not as its rows lie; else None."""
+    """A sentence where a loop's time was made from its motion, but not as its rows lie; else None.
+
+    Returns:
+        The sentence, or None.
+    """
     if loop.timed:
         return None
     motion = loop.displacement

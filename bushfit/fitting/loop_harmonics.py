@@ -69,6 +69,14 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
     The noise holds what does not repeat from cycle to cycle and what is too fast for the rubber, but not what changes
     slowly from one cycle to the next, which is settling or drift.
+
+    Args:
+        loop: steady cycles.
+        frequency: [Hz].
+        cycles: number of cycles, whole and broken.
+
+    Returns:
+        Harmonics, noise and outliers.
     """
     chosen = spread_rows(loop.time.size, MOST_ROWS)
     phase = (loop.time[chosen] - loop.time[0]) * frequency
@@ -120,7 +128,11 @@ def _triangle(mean: complex, fundamental: complex) -> Array:
 
 
 def less_slow(phase: Array, residual: Array) -> tuple[Array, int]:
-    """Residuals of the force less the slow part of each cycle's own, (n,), and how many unknowns that took."""
+    """Residuals of the force less the slow part of each cycle's own, (n,), and how many unknowns that took.
+
+    Returns:
+        Residuals, (n,), and number of fitted unknowns.
+    """
     number = np.floor(phase).astype(np.intp)
     size, unknowns = 2 * _SLOW_HARMONICS + 1, 0
     remainder = residual.copy()
@@ -137,6 +149,11 @@ def residual_limit(solution: Array, residual: Array, rows: int) -> float:
     """Distance from its harmonics within which a row is no outlier, in units of the column of so many rows.
 
     Noise takes part of it, and the corners of a triangle, which these harmonics, (2 order + 1,), round off, the rest.
+
+    Args:
+        solution: harmonics of the column, (2 order + 1,).
+        residual: of the fitted rows, (n,).
+        rows: number of rows of the column.
     """
     corner = _CORNER / (solution.size // 2) * abs(as_complex(solution)[1])
     return outlier_limit(rows, 1, np.inf) * _spread(residual) + corner
@@ -196,6 +213,16 @@ def phase_bins(
 
     A bin is a GRID-th of a cycle. The first few cycles have bins of their own, and later ones share bins in ever larger
     groups, unless `each_cycle` has its own. The clock [s], (n,), rises from the first row.
+
+    Args:
+        clock: time of each row [s], (n,).
+        force: of each row [N or N m], (n,).
+        frequency: [Hz].
+        cycles: number of cycles.
+        each_cycle: True for bins of its own in every cycle.
+
+    Returns:
+        Phase [cycles], force and number of rows, (k,) each.
     """
     number = np.arange(int(cycles) + 2)
     separate_cycles, growth = (
@@ -209,7 +236,11 @@ def phase_bins(
     edges = np.append(np.arange(int(cycles * GRID) + 1) / (frequency * GRID), np.inf)
 
     def sums(bins: slice) -> Array:
-        """Of some bins the filled ones, (k,), their rows, and sums of phase in bins and of force over these, (4, k)."""
+        """Sums over the filled ones among some bins.
+
+        Returns:
+            Number of the bin, number of rows, sum of the phase within the bin, and sum of the force, (4, k).
+        """
         start, stop = np.searchsorted(clock, edges[[bins.start, bins.stop]])
         first = np.searchsorted(clock[start:stop], edges[bins])
         filled = np.flatnonzero(np.diff(first, append=stop - start))

@@ -55,7 +55,11 @@ def can_shift(sweep: Sweep) -> bool:
 
 
 def law(result: Result, temperature: Array) -> tuple[Array, Array]:
-    """ln a_T of a fitted law at temperatures [K], and its standard errors; nan where these are not known."""
+    """ln a_T of a fitted law at temperatures [K], and its standard errors; nan where these are not known.
+
+    Returns:
+        ln a_T and its standard error, (n,) each.
+    """
     value, error = result.model.values[SHIFT], result.covariance.stderr(SHIFT)
     step = _APART * (error or np.nan)
 

@@ -146,6 +146,11 @@ class MeasuredLoop(MeasuredBase):
         """Change of the whitened residuals, (..., size), by a small change of the model's stiffness at the operating
         points, complex (..., n) [N/m or N m/rad], with another stiffness beside the model's; a loop changes by its
         first harmonic.
+
+        Args:
+            change: of the model's stiffness, complex (..., n) [N/m or N m/rad].
+            model: model that the change is added to.
+            added: further stiffness at the points, complex (n,) [N/m or N m/rad].
         """
         return np.concatenate((change.real, change.imag), axis=-1) @ self._unit_changes
 
@@ -156,6 +161,12 @@ class MeasuredLoop(MeasuredBase):
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
         """Derivatives of `residual_with` by parameter: what is added stays as it is, or stays the same share of the
         model's.
+
+        Args:
+            added: stiffness added to the model's, complex (n,) [N/m or N m/rad].
+            model: model at whose values the derivatives are taken.
+            names: k parameters.
+            as_share: True if the added stiffness stays the same share of the model's.
         """
         slopes = self.jacobian(model, names)
         if as_share:

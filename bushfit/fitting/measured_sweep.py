@@ -307,10 +307,25 @@ class MeasuredSweep(MeasuredBase):
         return self.whiten(self._deviation_of(self.stiffness(model) + added))
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
+        """Derivatives of the whitened residuals by parameter, with a stiffness added, (k, 2 n).
+
+        Args:
+                    added: stiffness added to the model's, complex (n,) [N/m or N m/rad].
+                    model: model at whose values the derivatives are taken.
+                    names: k parameters.
+                    as_share: True if the added stiffness stays the same share of the model's.
+        """
         grown = 1.0 + added / self.stiffness(model) if as_share else 1.0
         return self.residual_change(grown * self._slopes(model, names), model, added)
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
+        """Change of the whitened residuals by a small change of the model's stiffness.
+
+        Args:
+            change: of the model's stiffness, complex (..., n) [N/m or N m/rad].
+            model: model that the change is added to.
+            added: further stiffness at the points, complex (n,) [N/m or N m/rad].
+        """
         return self.whiten(self._relative(change, self.stiffness(model) + added))
 
     def _relative(self, change: Array, stiffness: Array) -> Array:
@@ -365,7 +380,11 @@ class MeasuredSweep(MeasuredBase):
             yield Outlier(self.name, file, row, "stiffness", noise_units)
 
     def lines(self, model: Model) -> list[LineMisfit]:
-        """Mean misfit of each line over its repeats."""
+        """Mean misfit of each line over its repeats.
+
+        Returns:
+            One record for each value held.
+        """
         ratio, lines = self.measured / self.stiffness(model) - 1.0, []
         for held_value in np.unique(self.held):
             chosen = self.held == held_value

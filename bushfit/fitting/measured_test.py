@@ -70,11 +70,25 @@ class MeasuredBase(ABC):
 
 
 def cache_last(answer: Callable[..., Array]) -> Callable[..., Array]:
-    """Keeps what a data set answered to the last model; of values in place of the model's own nothing is kept."""
+    """Keeps what a data set answered to the last model; of values in place of the model's own nothing is kept.
+
+    Returns:
+        The method, with a cache of its last result.
+    """
     place = f"_last_{answer.__name__}"
 
     @wraps(answer)
     def cached(data_set: Any, model: Model, argument: Sequence[str] | Values | None = None) -> Array:
+        """Result of the method, from the cache if model and argument are those of the last call.
+
+        Args:
+            data_set: test that the method belongs to.
+            model: model that the result belongs to.
+            argument: names of parameters, or values in place of the model's.
+
+        Returns:
+            Result, read-only.
+        """
         if isinstance(argument, Mapping):
             return answer(data_set, model, argument)
         question = () if argument is None else (tuple(argument),)

@@ -79,6 +79,9 @@ def with_model_error(
         bounds: limits of parameters inside their own.
         rig: the class of the rig, whose errors may explain a misfit.
         smooth: whether only something smooth counts as a lack of fit.
+
+    Returns:
+        The fit, and its discrepancy or None.
     """
     if not found.solution.coordinates.names or not (
         (not smooth and _exceeds_noise(found, rig)) or _is_smooth(found, rig)
@@ -106,6 +109,9 @@ def closest_fit(found: WeightedFit, bounds: Bounds) -> tuple[Solution, float]:
     """Least squares with the noise and an independent model error, and the relative size of this.
 
     Size and parameters follow each other: the size of the largest restricted likelihood, then the parameters.
+
+    Returns:
+        End of the fit, and the relative size of the model error.
     """
     tests, names = found.minimised, found.solution.coordinates.names
     starts = [found.solution.model, *_restarted(found.solution, tests)]
@@ -127,6 +133,14 @@ def closest_fit(found: WeightedFit, bounds: Bounds) -> tuple[Solution, float]:
 def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> float:
     """Relative size of an independent model error of the largest restricted likelihood, the parameters near a model's.
 
+    Args:
+        model: model near the minimum.
+        data_sets: tests.
+        names: k fitted parameters.
+
+    Returns:
+        Size relative to the stiffness.
+
     Notes:
         The logarithm is -(ln|S| + r^T P r + ln|J S^-1 J^T|)/2 with S the covariance of noise and model error, J the
         derivatives, (k, n), and P = S^-1 - S^-1 J^T (J S^-1 J^T)^-1 J S^-1.
@@ -135,6 +149,11 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
     scale = np.append(1.0, Coordinates.of_parameters(model, names).slopes(model.values))
 
     def cost(log_size: float) -> float:
+        """Cost of a model error, by the logarithm of its size.
+
+        Returns:
+            Minus twice the log likelihood.
+        """
         products, log_sizes = zip(*(test.with_size(float(np.exp(log_size))) for test in products_by_test), strict=True)
         both = np.sum(products, axis=0) * np.outer(scale, scale)
         units = np.sqrt(np.maximum(np.diag(both)[1:], np.finfo(float).tiny))
@@ -156,7 +175,10 @@ def log_likelihood(found: WeightedFit, prior_precision: Mapping[str, float]) -> 
 
     Args:
         found: the fit.
-        known: prior precision of parameters, by coordinate; of the others it is 0.
+        prior_precision: prior precision of parameters, by coordinate; of the others it is 0.
+
+    Returns:
+        Natural logarithm of the likelihood.
     """
     size, names = max(data_set.model_error for data_set in found.minimised), found.solution.coordinates.names
     bare = [replace(data_set, model_error=0.0) for data_set in _thinned(found.minimised)]

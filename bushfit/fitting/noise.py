@@ -68,7 +68,13 @@ class SweepNoise:
     beyond: Mapping[str, str] = field(default_factory=dict)
 
     def scatter(self, name: str, held_values: Array, step: Array) -> Array:
-        """Standard deviation from point to point of gain and phase at points of a sweep, (2, n)."""
+        """Standard deviation from point to point of gain and phase at points of a sweep, (2, n).
+
+        Args:
+            name: of the sweep.
+            held_values: value held at each point, (n,).
+            step: value stepped at each point, (n,).
+        """
         of_lines = {line: self.random[name, float(line)] for line in np.unique(held_values)}
         exponent, reference = self.slopes.get(name, (0.0, 1.0))
         return np.array([of_lines[line] for line in held_values]).T * (step / reference) ** exponent
@@ -88,6 +94,9 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     Without repeats the random part is the scatter about a smooth curve in the logarithm of what is stepped, and the
     shared part is what the rig's class states, else ASSUMED. With repeats, what is stated is an error of each level,
     which they cannot show. A `noise` stated in the campaign, or in the file for each point, replaces the random part.
+
+    Returns:
+        Noise of all sweeps together.
 
     Notes:
         With D the difference of ln K between two repeats at one step, the mean square of what D changes by from one

@@ -44,19 +44,39 @@ def outlier_limit(rows: int, parts: int, freedom: float) -> float:
     """Distance from the truth, in units of noise, that noise alone reaches in one of a hundred tests of so many rows.
 
     A row has so many `parts`: 1 for a force, 2 for a complex stiffness. Infinite freedom is a noise that is known.
+
+    Args:
+        rows: number of rows of the test.
+        parts: numbers that make up a row.
+        freedom: degrees of freedom behind the noise.
     """
     return float(np.sqrt(parts * fdtri(parts, min(freedom, _KNOWN), 1.0 - _CHANCE / max(rows, 1))))
 
 
 def from_neighbours(values: Array, rows: Array, window: int = NEIGHBOURS) -> Array:
-    """Distance of some rows from the median over their neighbours and themselves, (len(rows),)."""
+    """Distance of some rows from the median over their neighbours and themselves, (len(rows),).
+
+    Args:
+        values: of all rows, (n,).
+        rows: indices of the rows to compare.
+        window: number of rows of the median.
+    """
     width = min(window, values.size)
     first = np.clip(rows - width // 2, 0, values.size - width)
     return values[rows] - median(sliding_window_view(values, width)[first], axis=1)
 
 
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
-    """Mask of rows that lie farther than a limit off a curve, by `residual`, and off neighbours, or are stuck, (n,)."""
+    """Mask of rows that lie farther than a limit off a curve, by `residual`, and off neighbours, or are stuck, (n,).
+
+    Args:
+        residual: distance from the curve, (n,).
+        recorded: values of the channel, (n,).
+        limit: in the unit of the residual.
+
+    Returns:
+        Mask, (n,).
+    """
     far = np.abs(residual) > limit
     if not far.any():
         return far
@@ -69,6 +89,9 @@ def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
 
 def are_stuck(recorded: Array) -> Array:
     """Mask of rows that repeat the one before over and over, where the channel has noise that forbids it, (n,).
+
+    Returns:
+        Mask, (n,).
 
     Notes:
         The chance that two neighbours are equal, by the resolution of the record, is counted outside such runs. A run
@@ -89,6 +112,9 @@ def gross_rows(values: Array) -> Array:
     """Rows of a periodic motion that lie far off the median of those around them, before its period is known, (k,).
 
     None where these are many, even with a median over few rows: then the motion turns within so few rows.
+
+    Returns:
+        Row numbers, (k,).
     """
     from scipy.ndimage import median_filter
 
@@ -127,10 +153,13 @@ def outlying_points(
 
     Args:
         deviation: of each point from the model, gain and phase, complex (n,).
-        apart: length of deviations in units of noise; `shared=False` leaves in what blocks share.
+        distance_of: function for the length of deviations in units of noise; `shared=False` keeps the blocks' errors.
         starts: index of the first point of each block.
         points: frequency and amplitude, (2, n); where both agree, points are repeats.
         freedom: degrees of freedom behind the noise; inf where it is known.
+
+    Returns:
+        Point numbers, (k,).
     """
     distance = distance_of(deviation)
     by_noise = outlier_limit(deviation.size, 2, freedom)
@@ -155,7 +184,11 @@ def outlying_points(
 
 def contradictions(stiffness: Array, place: Array) -> list[tuple[float, int, int]]:
     """The two points of each place, (n,), that lie farthest apart in |K| or in phase, the worst first: how far, as a
-    share of |K|, from _UNLIKE on, and their numbers. Points of one `place` repeat each other."""
+    share of |K|, from _UNLIKE on, and their numbers. Points of one `place` repeat each other.
+
+    Returns:
+        For each contradiction the distance relative to |K| and two point numbers.
+    """
     value, ends, worst = np.log(stiffness), np.cumsum(np.bincount(place)), dict[int, tuple[float, int, int]]()
     for part in (value.real, value.imag):
         order = np.lexsort((part, place))
@@ -211,7 +244,12 @@ def _median_of_others(values: Array, place: Array, counts: Array) -> Array:
 def least_absolute(basis: Array, values: Array, smallest: float) -> Array:
     """Coefficients of a curve, (n, k), with the least sum of distances to points, (n, m) -> (k, m).
 
-    It hardly follows outliers. Distances of less than the relative one of the median and `least` count alike.
+    It hardly follows outliers. Distances of less than the relative one of the median and `smallest` count alike.
+
+    Args:
+        basis: functions at the points, (n, k).
+        values: points, (n, m).
+        smallest: distance below which points count alike.
     """
     root_weight = np.ones((len(values), 1))
     for _ in range(25):  # chosen: nine of ten curves have then come within a third of the noise of where they end

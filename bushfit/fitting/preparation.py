@@ -46,7 +46,13 @@ _Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep)
 def prepare_loops(
     loops: Sequence[Loop], rig: RigSettings = UNSTATED, *, without_outliers: bool = False
 ) -> list[MeasuredLoop]:
-    """One data set per loop; rows that are outliers carry no weight where they are to be left out."""
+    """One data set per loop; rows that are outliers carry no weight where they are to be left out.
+
+    Args:
+        loops: measured loops.
+        rig: class of the rig.
+        without_outliers: True to give outlying rows no weight.
+    """
     drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
     found = [MeasuredLoop(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
     return with_gain_errors(with_contradictions(found, [_first_alike(found)]), rig)
@@ -95,7 +101,16 @@ def group_repeats(loops: Sequence[MeasuredLoop]) -> list[list[MeasuredLoop]]:
 def prepare_sweeps(
     sweeps: Sequence[Sweep], residuals: Residuals = "complex", rig: RigSettings = UNSTATED
 ) -> list[MeasuredSweep]:
-    """One data set per sweep; the noise of those of one rig, the bushing's or a specimen's, is estimated together."""
+    """One data set per sweep; the noise of those of one rig, the bushing's or a specimen's, is estimated together.
+
+    Args:
+        sweeps: measured sweeps.
+        residuals: definition of the residuals, complex or magnitude and loss factor.
+        rig: class of the rig.
+
+    Returns:
+        Measured sweeps with their noise, in the order given.
+    """
     rigs = [sweep.direction if isinstance(sweep.direction, Specimen) else None for sweep in sweeps]
     noises = {
         direction: sweep_noise(
@@ -115,7 +130,15 @@ def prepare_sweeps(
 
 def with_contradictions(found: Sequence[_Kind], conditions: Sequence[Array]) -> list[_Kind]:
     """Loops, or sweeps, each with a sentence on the earlier one whose points it repeats and lies farthest from; points
-    repeat one another where all of `at`, (n,) each, and their temperatures are the same."""
+    repeat one another where all of `at`, (n,) each, and their temperatures are the same.
+
+    Args:
+        found: loops, or sweeps.
+        conditions: values that repeats have in common, (n,) each, over all operating points.
+
+    Returns:
+        The tests, with `contradiction` set where one contradicts an earlier test.
+    """
     if len(found) < 2:
         return list(found)
     owner = np.repeat(np.arange(len(found)), [one.measured.size for one in found])
@@ -148,6 +171,11 @@ def with_level_errors(
 ) -> tuple[MeasuredSweep, ...]:
     """Sweeps with gain and phase errors [rad] that all runs of a level share, known by so many degrees of freedom; 0
     where they count as exact.
+
+    Args:
+        sweeps: measured sweeps.
+        error: standard deviation of gain and of phase [rad].
+        freedom: degrees of freedom behind the error; 0 if it is exact.
     """
     noises = {id(sweep.noise): replace(sweep.noise, level=error, level_freedom=freedom) for sweep in sweeps}
     return tuple(replace(sweep, noise=noises[id(sweep.noise)]) for sweep in sweeps)
@@ -174,7 +202,13 @@ def operating_conditions(bushing: Bushing | None, data_sets: Iterable[MeasuredTe
 
 
 def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Array:
-    """Derivatives of ln K of a model at the operating points of a test by parameter, complex (len(names), n)."""
+    """Derivatives of ln K of a model at the operating points of a test by parameter, complex (len(names), n).
+
+    Args:
+        model: model at whose values the derivatives are taken.
+        data_set: test of n operating points.
+        names: parameters.
+    """
     test = data_set.direction, data_set.frequency, data_set.amplitude
     stiffness, slopes = stiffness_and_slopes(model, *test, names, data_set.kind, data_set.circumstances)
     return slopes / stiffness
@@ -203,6 +237,9 @@ def new_loop(
         frequency: [Hz].
         amplitude: zero-to-peak [m or rad].
         noise: standard deviation of one row, relative to half the force range.
+
+    Returns:
+        Loop without noise in its force, with the standard deviation `noise`.
     """
     phase, nil = cycles * np.arange(rows) / rows, np.zeros(rows)
     motion = amplitude * np.sin(2.0 * np.pi * phase)

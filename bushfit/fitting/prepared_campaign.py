@@ -50,6 +50,9 @@ class PreparedCampaign:
     def from_campaign(cls, campaign: Campaign) -> "PreparedCampaign":
         """The data sets of a campaign as its [fit] asks for them.
 
+        Returns:
+            The campaign with its measured tests.
+
         Raises:
             FitError: a loop is not one whole cycle or more, lacks rows, or gives energy; a strain that no rubber bears.
             ModelError: [fit] effects has an unknown effect, or one twice.
@@ -101,7 +104,14 @@ class PreparedCampaign:
     def require_tests(
         self, tests: Sequence[_Kind], message: str, hint: str, found: str = "no [[loops]] and no [[sweeps]]"
     ) -> Sequence[_Kind]:
-        """Return the tests, or raise a FitError where there is none."""
+        """Return the tests, or raise a FitError where there is none.
+
+        Args:
+            tests: loops or sweeps.
+            message: of the error.
+            hint: next step for the user.
+            found: what the campaign has instead.
+        """
         if not tests:
             raise FitError(message, file=self.campaign.path, found=found, hint=hint)
         return tests
@@ -138,7 +148,16 @@ class PreparedCampaign:
         self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], stage_fixed: Mapping[str, float]
     ) -> Model:
         """A model to fit to some tests: with the values that the campaign gives to start from, or, where those meet the
-        tests worse, with what is read off them."""
+        tests worse, with what is read off them.
+
+        Args:
+            effects: names of the model's effects.
+            data_sets: tests to fit.
+            stage_fixed: values of parameters that this stage holds [SI].
+
+        Returns:
+            Model with start values.
+        """
         fixed = {name: value for name, value in self.given_values.items() if not self.free((name,))}
         bushing, candidates = self.campaign.bushing, list[tuple[Model, dict[str, float]]]()
         for values_given in (self.given_values, fixed):
@@ -179,6 +198,9 @@ class PreparedCampaign:
         """Data sets of the places of these names; by default the axial ones, as in the paper, and the specimens'.
 
         Where no loop of the bushing is axial, all loops are taken by default, and so with sweeps.
+
+        Returns:
+            Loops, then sweeps.
 
         Raises:
             FitError: there is none.

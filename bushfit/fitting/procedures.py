@@ -80,6 +80,9 @@ def fit_joint(
         directions: and specimens whose tests to use; see `PreparedCampaign.select_tests`.
         profile: whether to add 95 % intervals by profile likelihood.
 
+    Returns:
+        The fitted model with its uncertainty and quality.
+
     Raises:
         FitError: no test in those directions, or data that cannot support the fit.
     """
@@ -147,6 +150,9 @@ def given_static(data: PreparedCampaign) -> Result | None:
 @lru_cache(maxsize=1)  # `run` asks for it, and so does what its static fit says of the springpot
 def fit_two_step(data: PreparedCampaign) -> TwoStep:
     """Static and dynamic fit in turn, each holding what the other found, until they agree.
+
+    Returns:
+        Values after each pass, and the last result.
 
     Raises:
         FitError: a test is missing, or the passes do not settle.
@@ -255,7 +261,18 @@ def _moving(step: WeightedFit) -> tuple[str, ...]:
 
 
 def cautions(model: Model, step: WeightedFit, bounds: Bounds, covariance: Covariance, advice: str = "") -> list[str]:
-    """Warnings on the loops of a fit, and on what its data do not determine: bounds met, what stays open, a misfit."""
+    """Warnings on the loops of a fit, and on what its data do not determine: bounds met, what stays open, a misfit.
+
+    Args:
+        model: fitted model.
+        step: fit of one stage.
+        bounds: limits that the campaign gives [SI].
+        covariance: of the fitted parameters.
+        advice: end of the sentence on a misfit.
+
+    Returns:
+        Sentences for the user.
+    """
     solution, data_sets = step.solution, step.data_sets
     names, at_bound = solution.coordinates.names, solution.at_bound
     notes = [f"{data_set.name}: {note}" for data_set in data_sets for note in data_set.notes]

@@ -113,6 +113,12 @@ def profile95(
     estimated, a model that misses the data) widens the profile by the same factor as the symmetric interval:
     chi-square may rise to the square of that interval's half width over the linear standard error.
 
+    Args:
+        best: end of the fit.
+        data_sets: tests, with the weights of the fit.
+        covariance: of the fitted parameters.
+        bounds: limits inside the parameters' own [SI].
+
     Returns:
         Lower and upper end by name; None where the data leave that side open up to the bound, or
         hold it only far away, by another parameter's bound.
@@ -140,8 +146,16 @@ def profile95(
 
 
 def limit95(best: Solution, data_sets: Sequence[MeasuredTest], name: str, bounds: Bounds) -> float | None:
-    """How far a parameter that came to rest on a bound can go from there: its one-sided 95 % limit, None where the data
-    set none. A model that misses the data may miss them by as much more."""
+    """One-sided 95 % limit of a parameter that came to rest on a bound; None if the data set no limit.
+
+    A model that misses the data may miss them by as much more.
+
+    Args:
+        best: end of the fit.
+        data_sets: tests, with the weights of the fit.
+        name: parameter at a bound.
+        bounds: limits inside the parameters' own [SI].
+    """
     i = best.coordinates.names.index(name)
     start, inward = best.coordinates.point(best.model.values)[i], int(best.at_bound[name] == "min")
     profile = _Profile(name, best, data_sets, bounds, {start: best})

@@ -70,6 +70,15 @@ class LineNoise:
 def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed: Collection[float] = ()) -> LineNoise:
     """Estimate the noise of one line of a sweep without disturbed steps: by pairs of repeats, or about a smooth curve
     where there is no pair.
+
+    Args:
+        sweep: measured sweep.
+        log_stiffness: ln K of its points, complex (n,).
+        held_value: value that the line holds.
+        disturbed: steps to leave out.
+
+    Returns:
+        Noise of the line.
     """
     chosen = (sweep.held == held_value) & ~np.isin(sweep.step, [*disturbed])
     steps, column = np.unique(sweep.step[chosen], return_inverse=True)
@@ -144,7 +153,11 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
 
 def disturbed(lines: Iterable[LineNoise]) -> list[float]:
     """Steps at which lines without repeats scatter far more than elsewhere, such as frequencies near that of the mains:
-    there it is no noise of the rig."""
+    there it is no noise of the rig.
+
+    Returns:
+        Frequencies [Hz] or amplitudes [m or rad].
+    """
     points: dict[float, list[float]] = defaultdict(list)
     for line in lines:
         for step, square in line.squared_distances.items():
@@ -180,6 +193,9 @@ def at_nominal(sweep: Sweep) -> Array:
 
     From the amplitude that was reached it is carried there along a smooth surface over ln f and ln X, which tells how K
     goes with amplitude; without two levels or more there is none.
+
+    Returns:
+        ln K, complex (n,).
     """
     value = np.log(sweep.stiffness)
     log_ratio = np.log(sweep.amplitude_reached / sweep.amplitude)

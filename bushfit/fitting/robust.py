@@ -56,7 +56,13 @@ class WeightedFit:
 def outliers_at(
     model: Model, data_sets: Sequence[MeasuredTest], outlying: Sequence[Array] | None = None
 ) -> tuple[Outlier, ...]:
-    """Outliers of some data sets by file and row: those whose numbers are given, else those that the model sees."""
+    """Outliers of some data sets by file and row: those whose numbers are given, else those that the model sees.
+
+    Args:
+        model: fitted model.
+        data_sets: tests.
+        outlying: numbers of the outlying points of each test; None to find them with the model.
+    """
     numbers = outlying or [data_set.outlying(model) for data_set in data_sets]
     pairs = zip(data_sets, numbers, strict=True)
     return tuple(entry for data_set, points in pairs for entry in data_set.outliers(points, model))
@@ -76,6 +82,17 @@ def estimate(
     soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1) over the distances z of the points in units of noise.
     The covariance is that of least squares with all weights at (E psi')^2/E psi^2 of normal noise, psi the loss's
     slope. Outliers of loops have no weight from the start, see `drive`.
+
+    Args:
+        model: model with the start values.
+        data_sets: tests.
+        names: parameters to fit.
+        bounds: limits inside the parameters' own [SI].
+        robust: True for soft_l1.
+        solver: function that minimises the sum of squares.
+
+    Returns:
+        The fit and the data behind it.
     """
     if not robust:
         solution, unchanged = solver(model, data_sets, names, bounds), tuple(data_sets)
@@ -120,6 +137,9 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
     """A sentence on the outliers that the fit follows and one on those left out, the first of each test by row.
 
     A displacement that is an outlier is never followed, see `drive`.
+
+    Returns:
+        At most two sentences.
     """
     excluded = [entry for entry in outliers if robust or entry.column == "displacement"]
     followed = [entry for entry in outliers if not robust and entry.column != "displacement"]

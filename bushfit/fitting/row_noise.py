@@ -74,6 +74,9 @@ class RowNoise:
     def counting(self, weight: Array) -> Array:
         """Mask of the whitened rows that count, (n,): those that have weight, as have all from which their noise is
         known.
+
+        Returns:
+            Mask, (n,).
         """
         counts = weight > 0.0
         counting = counts.copy()
@@ -85,7 +88,11 @@ class RowNoise:
         return counting
 
     def whiten(self, rows: Array) -> Array:
-        """Rows in units of noise, (..., n), as independent numbers of unit variance."""
+        """Rows in units of noise, (..., n), as independent numbers of unit variance.
+
+        Returns:
+            Whitened rows, (..., n).
+        """
         white = self.filter[0] * rows
         for k in range(1, self.order + 1):
             white[..., k:] += self.filter[k] * rows[..., :-k]
@@ -97,6 +104,9 @@ class RowNoise:
 
     def unsure(self, influence: Array) -> list[Array]:
         """Reactions of an estimator to each parameter of the noise, (k, n) each, as `MeasuredTest.unsure`.
+
+        Returns:
+            One array (k, n) for each parameter of the noise.
 
         Notes:
             Of V = L^-1 L^-T, L the filter, the whitened derivative is -(G + G^T) with G = dL L^-1.
@@ -144,6 +154,9 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
         residual: force less its harmonics; of a lone cycle less its mean, its first three and all odd ones, (n,).
         settled: the same less what changes slowly from one cycle to the next, (n,).
         cycles: whole cycles that the rows make up.
+
+    Returns:
+        Noise of unit variance, and the standard deviation of one row [N or N m].
     """
     number = np.arange(residual.size // 2 + 1)
     between = number % cycles > 0 if cycles > 1 else of_a_lone_cycle(number)

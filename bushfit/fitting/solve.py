@@ -50,6 +50,9 @@ def solve(
         tolerance: relative change of chi-square at which the fit stops.
         strict: whether a fit that has used up its evaluations is an error, unless chi-square is flat where it is.
 
+    Returns:
+        End of the fit.
+
     Raises:
         FitError: fewer data than parameters, no finite response, or no convergence.
     """
@@ -70,6 +73,12 @@ def solve_with_lmfit(
     model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], bounds: Bounds | None = None
 ) -> Solution:
     """Fit by lmfit's MINPACK, as the paper's procedure, static and dynamic fit in turn, is made.
+
+    Args:
+        model: model with the start values.
+        data_sets: tests.
+        names: parameters to fit.
+        bounds: limits inside the parameters' own [SI].
 
     Raises:
         FitError: as of `solve`, which goes on where a step leaves the bounds or MINPACK comes to no end.

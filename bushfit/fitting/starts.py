@@ -38,9 +38,17 @@ _ALPHA_RANGE = (0.1, 0.6)
 def start_values(
     bushing: Bushing | None, data_sets: Sequence[MeasuredTest], fixed: Mapping[str, float]
 ) -> dict[str, float]:
-    """Values of mu, m, alpha, sigma_fmax, eps_half to start from; `known` ones are kept and allowed for.
+    """Values of mu, m, alpha, sigma_fmax, eps_half to start from; fixed values are kept and allowed for.
 
     What lies beyond the bounds of its parameter is moved to them.
+
+    Args:
+        bushing: None for specimens alone.
+        data_sets: tests.
+        fixed: known values, kept as they are [SI].
+
+    Returns:
+        Values by parameter name [SI].
 
     Raises:
         FitError: it lies there, and the moduli of the tests are those of no rubber.

@@ -166,6 +166,9 @@ class Whitening:
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
         """Reactions of an estimator to each variance of the noise, (k, 2 n) each, as `MeasuredTest.unsure`.
 
+        Returns:
+            Reactions by variance, (k, 2 n) each.
+
         Notes:
             Within a block V has the derivatives I by s^2 and 1 1^T by t^2, whitened W^2 and (W 1)(W 1)^T. The estimate
             of t^2 is a mean of `freedom` squares that expect t^2 + s^2/n, and scatters no further down than to 0. So

@@ -1,4 +1,4 @@
-"""What a fit found: a model, how uncertain its values are, and how well it meets the tests."""
+"""Result of a fit: a model, the uncertainty of its values, and its agreement with the tests."""
 
 import re
 from collections.abc import Mapping
@@ -269,12 +269,12 @@ class Result:
 
     @property
     def name(self) -> str:
-        """Of the bushing, or of the first specimen where there is none."""
+        """Name of the bushing, or of the first specimen if the result has no bushing."""
         return self.specimens[0].name if self.specimens and not self.model.bushing else self.model.name
 
     @property
     def left_open(self) -> str:
-        """What the first line on a result has to say of parameters that are unknown by 100 %; "" without any."""
+        """Sentence on the parameters that are unknown by 100 % or more; "" if every parameter is known."""
         return self.covariance.left_open(self.model.values)
 
     @property
@@ -294,6 +294,9 @@ class Result:
 
     def interval(self, name: str) -> tuple[float, float] | None:
         """95 % interval of a parameter [its SI unit], cut at its bounds; None where it was held at an exact value.
+
+        Returns:
+            Lower and upper end [SI], or None.
 
         Notes: symmetric in the logarithm for strictly positive parameters, and in the value for others.
 
@@ -318,6 +321,9 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
     """The compound of a fitted model in another bushing, and a sentence on what stayed behind.
 
     What belongs to the material is kept, and the factors of specimens of it.
+
+    Returns:
+        Result for the other bushing, and the sentence.
     """
     names = [specimen.name for specimen in result.specimens]
 

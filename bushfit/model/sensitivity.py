@@ -41,6 +41,18 @@ def stiffness_and_slopes(
 
     Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each.
 
+    Args:
+        model: model at whose values the derivatives are taken.
+        direction: direction or specimen.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad], (n,).
+        names: k parameters.
+        kind: of test, "loop" or "sweep".
+        under: circumstances of the points.
+
+    Returns:
+        Stiffness, complex (n,), and derivatives, complex (k, n).
+
     >>> _, slopes = stiffness_and_slopes(paper, "axial", np.array([5.0]), np.array([1e-4]), ["mu"])
     >>> slopes.round(4)
     array([[0.3634+0.j]])
@@ -59,7 +71,18 @@ def force_and_slopes(
     model: Model, direction: Place, displacement: History, names: Sequence[str], under: Circumstances = UNKNOWN
 ) -> tuple[Array, Array]:
     """The force of a loop along a history of displacement, (n,) [N or N m], and its derivatives by parameters, (k, n)
-    [per unit]."""
+    [per unit].
+
+    Args:
+        model: model at whose values the derivatives are taken.
+        direction: direction or specimen.
+        displacement: history [m or rad] of n samples.
+        names: k parameters.
+        under: circumstances of the test.
+
+    Returns:
+        Force, (n,), and derivatives, (k, n).
+    """
     respond = partial(model.force, direction, displacement, kind="loop", under=under)
     if not model.only_branches:
         return _differences_at(direction, model, names, lambda values: respond(values=values))
@@ -95,7 +118,7 @@ def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tup
 def _differences_at(
     place: Place, model: Model, names: Sequence[str], respond: Callable[[Values], Array]
 ) -> tuple[Array, Array]:
-    """As `differences`; parameters that belong to another place are not moved, as nothing comes of it here."""
+    """Call `differences` for the parameters of this direction; the derivatives by the others are 0."""
     local = [i for i, name in enumerate(names) if place_suffix(name) in (None, str(place))]
     response, local_slopes = differences(model, [names[i] for i in local], respond)
     slopes = np.zeros((len(names), response.size), dtype=response.dtype)
@@ -107,6 +130,14 @@ def differences(model: Model, names: Sequence[str], respond: Callable[[Values], 
     """Any response, (n,), and its derivatives by parameters, as one-sided differences away from the bounds, (k, n).
 
     `respond` gives the response, (..., n), for values with leading axes; it is called once.
+
+    Args:
+        model: model at whose values the derivatives are taken.
+        names: k parameters.
+        respond: function of values with leading axes.
+
+    Returns:
+        Response, (n,), and derivatives, (k, n).
     """
     count = len(names)
     stacked: dict[str, Value] = dict(model.values)
