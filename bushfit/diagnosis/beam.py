@@ -181,13 +181,18 @@ class Search:
         proposed = [each.proposal for each in weighed.effects if each.name in names]
         start = asked.start if not state.effects and state.evidence.reduced > _BENT else {}
         grown: dict[str, Weighed] = {}
-        for columns in (None, weighed.fitted_beside) if weighed.bent else (None,):  # by noise alone, and beside it
+        columns = weighed.fitted_beside
+        while proposed:
             fits = refitted(state.evidence, proposed, start, asked.held, asked.bounds, columns)
             for name, evidence in fits.items():
                 one = self._weigh(self._with_effect(state, name, evidence, depth))
                 self._note_state(one)
                 if name not in grown or one.log_posterior > grown[name].log_posterior:
                     grown[name] = one
+            if columns is None:
+                break
+            columns = None  # by noise alone where nothing of the deviation is left beside the effect
+            proposed = [each for each in proposed if each.name not in grown or not grown[each.name].bent]
         return list(grown.values())
 
     def _with_effect(self, state: State, name: str, evidence: Evidence, depth: int) -> State:

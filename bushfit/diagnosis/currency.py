@@ -279,14 +279,17 @@ class LinearModel:
         return float(logsumexp(self._solved.base[beyond])) if beyond.any() else -np.inf
 
     def likely(self, far: float) -> Array:
-        """Numbers of the nodes at which a group may count: those so near the best in ln evidence; without a deviation
-        of the compound also those that one makes likely, since a group may do the same."""
+        """Numbers of the nodes at which a group may count: those that nothing more, or one of the groups, brings so
+        near the best in ln evidence; without a deviation of the compound also those that one makes likely, since a
+        group may do the same."""
         base, plain, own = self._solved.base, self._plain, self.rig.combination[self._at]
         base = np.where(plain | self._bent, base, -np.inf)
         best = np.full(own.max() + 1, -np.inf)
         np.maximum.at(best, own, base)
-        near = base > base.max() - far
-        return self._at[near | (plain & ((base > base[plain].max() - far) | (best[own] > best.max() - far)))]
+        near = (base > base.max() - far) | (plain & (base > base[plain].max() - far))
+        beside = np.max([base, *(evidence.by_node for evidence in self.group_evidence)], axis=0)
+        led = (best[own] > best.max() - far) | (beside > beside[plain].max() - far)
+        return self._at[near | (plain & led)]
 
     def chance(self, *, bent: bool = False) -> float:
         """Probability that tests of this model and rig leave more than these do, over the nodes as likely as they are;

@@ -236,11 +236,16 @@ class Weighed:
         every = [each for each in (*self.effects, *self.state.tests.fixed) if each.group is not None]
         return list(zip(every, self.group_evidence_of(every), strict=True))
 
+    @cached_property
+    def _nodes(self) -> Array:
+        """Numbers of the nodes that nothing more, a deviation of the compound, or something smooth makes likely."""
+        smooth = [each.group for each in self.state.tests.fixed if each.group and each.kind == "unnamed"]
+        curves = replace(self.first, groups=smooth, compound=None)
+        return np.union1d(self.first.likely(_NEAR), curves.likely(_NEAR))
+
     def group_evidence_of(self, every: Sequence[Explanation]) -> Sequence[GroupEvidence]:
         """Evidence for explanations that have columns."""
-        return replace(self.first, at=self.first.likely(_NEAR)).group_evidence_of(
-            [each.group for each in every if each.group]
-        )
+        return replace(self.first, at=self._nodes).group_evidence_of([each.group for each in every if each.group])
 
     def with_(self, each: Explanation, worth: GroupEvidence, log_odds: float) -> list[Hypothesis]:
         """This state with an explanation more, counted linearly; and beside a deviation of the compound."""

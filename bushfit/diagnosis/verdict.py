@@ -96,7 +96,8 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
     if common and all(part.startswith("place: ") for part in common):  # whatever else there is, this has to go first
         return Finding("unexplained", nothing, tuple(told[:MOST_TOLD]), leads)
     nameless = sum(each.probability for each in told if each.parts == {"unnamed"})
-    if len(told) <= MOST_TOLD and nameless < 0.5:
+    fits = first.best.claim is not None or first.best.chance >= DOES_NOT_FIT
+    if len(told) <= MOST_TOLD and nameless < 0.5 and fits:
         return Finding("ambiguous", nothing, tuple(told))
     names = tuple(name for name in first.names if sum(e.probability for e in compositions if name in e.names) >= NAMED)
     if names and first.unnamed:  # whatever the compound does beside them
