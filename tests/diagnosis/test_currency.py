@@ -214,6 +214,15 @@ def test_nodes_that_nothing_more_makes_likely_are_kept(seed: int, far: float) ->
     assert all(node in kept for node, value in near if value > within - far + 1e-6 and not node.wide)
 
 
+@given(SEEDS)
+def test_nodes_that_a_group_makes_likely_are_kept(seed: int) -> None:
+    """They are others than nothing more makes likely: what a group explains is no error of the rig."""
+    of = ledger(seed)
+    best = int(np.argmax([each.log_evidence for each in of.group_evidence]))
+    kept = replace(of, at=of.likely(8.0)).group_evidence[best].log_evidence
+    assert kept == pytest.approx(of.group_evidence[best].log_evidence, abs=0.1)
+
+
 def test_columns_that_move_together_change_what_their_sum_does_where_it_is_largest() -> None:
     """Of gain and phase the length; of patterns that meet at a point their sum, however small each is elsewhere."""
     plain = ledger(3)
