@@ -35,6 +35,7 @@ _USES: dict[str, str] = tomllib.loads(Path(__file__).with_name("uses.toml").read
 #: Beginnings or words of these meanings, the most important first.
 _RANKS = (
     "^Do not use",
+    "include this error",
     "^Find out|^Look",
     "^For .*estimate|^Values",
     "^Use|^For|^Settle",
