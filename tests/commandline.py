@@ -36,7 +36,7 @@ def call(folder: Path, *arguments: object, program: click.Command = cli) -> Done
         contextlib.chdir(folder),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
-        mock.patch.dict(os.environ),
+        mock.patch.dict(os.environ, {"COLUMNS": "80"}),  # whatever the terminal of the tests
         mock.patch.object(sys, "argv", ["bushfit", *map(str, arguments)]),
         pytest.raises(SystemExit) as left,
     ):
