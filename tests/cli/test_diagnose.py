@@ -150,10 +150,11 @@ def test_look_alikes_are_told_with_their_odds(work: Path, bushfit: Run) -> None:
     assert 0.97 <= sum(shares) <= 1.0
     page = html.unescape((work / "alike/report.html").read_text(encoding="utf-8"))
     assert "bushfit diagnose looks for" not in run.stderr + (work / "alike/model.json").read_text(encoding="utf-8")
-    for each in written["odds"]:
-        line = f"{100 * each['probability']:.0f} %: {each['words']}"
+    lines = [f"{100 * entry['probability']:.0f} %: {entry['words']}" for entry in written["odds"]]
+    assert len(lines) > 1
+    for line in lines:
         assert f"  {line}\n" in run.stderr
-        assert f"<li>{line}</li>" in page
+    assert f"<p>Probabilities: {'; '.join(lines)}" in page
     assert f"<b>Next test:</b> {written['next_test']}." in page
 
 

@@ -7,7 +7,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pytest
 from commandline import call
@@ -58,10 +57,16 @@ def test_it_says_what_the_document_says(documents: dict[str, Any], compared: Pat
     for words in (*said, *document["warnings"][:12], document["command"], "numpy", "Limits of this comparison"):
         assert words in text
     table = pd.read_csv(compared / name / "parameters.csv").set_index(["parameter", "other"])
-    low, high = (100 * table.loc[("mu", "B"), f"difference, {end}"] for end in ("low", "high"))
-    shown = re.search(r"mu ([\d.]+) ([\d.]+) ([-+][\d.]+) % ([-+][\d.]+) to ([-+][\d.]+)", text)
+    row = table.loc[("mu", "B")]
+    expected = [row["reference value"] / 1e6, row["other value"] / 1e6]
+    expected += [100 * row[f"difference{end}"] for end in ("", ", low", ", high")]
+    shown = re.search(r"μ ([\d.]+) ([\d.]+) ([-+][\d.]+) % ([-+][\d.]+) to ([-+][\d.]+)", text)
     assert shown is not None
-    np.testing.assert_allclose([float(shown[4]), float(shown[5])], [low, high], rtol=3e-4, atol=0.06)
+    width = expected[4] - expected[3]
+    for number, value in zip(shown.groups(), expected, strict=True):
+        half_digit = 0.5001 * 10.0 ** -len(number.partition(".")[2])
+        assert abs(float(number) - value) <= half_digit
+    assert 10.0 ** -len(shown[5].partition(".")[2]) < 0.1 * width, "the interval keeps two digits of its width"
 
 
 @pytest.mark.parametrize("name", HARMFUL)
