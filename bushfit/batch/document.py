@@ -26,7 +26,17 @@ class Estimate:
 
     @classmethod
     def finite(cls, value: float, low: float | None, high: float | None, stderr: float | None, unit: str) -> "Estimate":
-        """An estimate in which numbers that are not finite are None."""
+        """Make an estimate whose numbers are None where they are not finite.
+
+        Args:
+            value: the value, in `unit`.
+            low, high: ends of the 95 % interval, in `unit`.
+            stderr: standard error, in `unit`.
+            unit: SI unit.
+
+        Returns:
+            The estimate.
+        """
         low, high, stderr = (x if x is not None and math.isfinite(x) else None for x in (low, high, stderr))
         return cls(value, low, high, stderr, unit)
 

@@ -169,7 +169,12 @@ def run_rows(
                     raise BatchError("no Dask worker is left", place="--scheduler", found=workers.place, hint=hint)
             while queue and len(out) < (1 if failures else width):  # a row that failed runs alone
                 number = queue.popleft()
-                out[_submit(executor, work, rows[number])] = number
+                try:
+                    future = executor.submit(work, rows[number])
+                except (OSError, RuntimeError) as error:  # the pool has just broken
+                    future = Future[Outcome]()
+                    future.set_exception(error)
+                out[future] = number
             for future in wait(out, timeout=_LOOK_SECONDS, return_when=FIRST_COMPLETED).done:
                 number = out.pop(future)
                 try:
@@ -194,16 +199,6 @@ def run_rows(
             future.cancel()
         executor.shutdown(wait=False)
         workers.close()
-
-
-def _submit(executor: Executor, work: Callable[[Task], Outcome], row: Task) -> Future[Outcome]:
-    """Hand a row to the executor; if its pool has just broken, the future has the error."""
-    try:
-        return executor.submit(work, row)
-    except (OSError, RuntimeError) as error:
-        future = Future[Outcome]()
-        future.set_exception(error)
-        return future
 
 
 def _count(workers: Workers) -> int:

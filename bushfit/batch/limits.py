@@ -29,9 +29,9 @@ from bushfit.batch.quantities import (
     FIT_QUALITY,
     LOSS_FACTOR,
     STIFFNESS,
+    PartQuantity,
     Point,
     PointText,
-    Quantity,
     point_quantity,
 )
 from bushfit.campaign.quantities import with_sizes
@@ -179,26 +179,26 @@ class Limits:
     guard: Annotated[bool, Field(strict=True)] = False
 
     def __post_init__(self) -> None:
-        for name, count in Counter(name for name, _ in self._at_points).items():
+        for name, count in Counter(name for name, _ in self.at_points).items():
             if count > 1:
                 problem = CampaignError(f"{count} tables for one point", found=name, hint="put them in one table")
                 raise ValueError(problem)
 
     @property
-    def _at_points(self) -> list[tuple[str, StiffnessBounds | LossFactorBounds]]:
+    def at_points(self) -> list[tuple[str, StiffnessBounds | LossFactorBounds]]:
         pairs = ((STIFFNESS, self.stiffness), (LOSS_FACTOR, self.loss_factor))
         return [(point_quantity(bounds.at, name).name, bounds) for name, tables in pairs for bounds in tables]
 
     @property
     def points(self) -> tuple[Point, ...]:
-        return tuple(dict.fromkeys(bounds.at for _, bounds in self._at_points))
+        return tuple(dict.fromkeys(bounds.at for _, bounds in self.at_points))
 
     @property
     def bounds(self) -> dict[str, Bounds]:
         """Limits by the name of the quantity."""
         largest = {quantity.name: getattr(self, key) for key, quantity in FIT_QUALITY.items()}
         of_fit = {name: Bounds(max=limit) for name, limit in largest.items() if limit is not None}
-        return {**self.parameters, **dict(self._at_points), **of_fit}
+        return {**self.parameters, **dict(self.at_points), **of_fit}
 
 
 def read_limits(path: Path) -> Limits:
@@ -260,7 +260,7 @@ class Judgement:
 
 
 def judge_part(
-    record: RowFile, limits: Limits, allowed: Mapping[str, tuple[float, float]], quantities: Mapping[str, Quantity]
+    record: RowFile, limits: Limits, allowed: Mapping[str, tuple[float, float]], quantities: Mapping[str, PartQuantity]
 ) -> Judgement:
     """Judge a part by the limits.
 
@@ -273,35 +273,30 @@ def judge_part(
     Returns:
         The worst result, and sentences on the limits that are missed or doubtful.
     """
-    poor, results = describe_poor_fit(record, limits), list[LimitResult]()
-    misses, doubtful = dict[str, str](), dict[str, str]()
-    missed_from = RESULTS.index("conditional pass" if limits.guard else "conditional fail")
-
-    def add(name: str, result: LimitResult, sentence: str) -> None:
-        results.append(result)
-        if result == "not judged" or 0 < RESULTS.index(result) < missed_from:
-            doubtful[name] = sentence
-        elif result != "pass":
-            misses[name] = sentence
-
+    poor, outcomes = describe_poor_fit(record, limits), dict[str, tuple[LimitResult, str]]()
     for name in dict.fromkeys((*allowed, *record.at_bound)):
         low, high = allowed.get(name, (-math.inf, math.inf))
         estimate, bound, source = record.quantities.get(name), record.at_bound.get(name), ""
         if estimate is None:
-            add(name, "fail", f"{name} is not known")
+            outcomes[name] = "fail", f"{name} is not known"
             continue
         if poor and name not in FIT_NAMES:
             if name not in record.measured:
-                add(name, "not judged", f"{name} not judged: poor fit")
+                outcomes[name] = "not judged", f"{name} not judged: poor fit"
                 continue
             estimate, bound, source = record.measured[name], None, "measured "
         result = judge_value(estimate, low, high)
         if bound:
             result = max(result, "conditional pass", key=RESULTS.index)
-        add(name, result, source + _limit_sentence(quantities[name], estimate, (low, high), result, bound))
+        outcomes[name] = result, source + _limit_sentence(quantities[name], estimate, (low, high), result, bound)
     if limits.verdicts and record.verdict not in limits.verdicts:
-        add("verdict", "fail", f"verdict {record.verdict or 'not known'}, allowed {', '.join(limits.verdicts)}")
-    return Judgement(max(results, key=RESULTS.index, default="pass"), misses, doubtful)
+        sentence = f"verdict {record.verdict or 'not known'}, allowed {', '.join(limits.verdicts)}"
+        outcomes["verdict"] = "fail", sentence
+    tolerated = RESULTS[1 : RESULTS.index("conditional pass" if limits.guard else "conditional fail")]
+    doubtful = {name: text for name, (result, text) in outcomes.items() if result in ("not judged", *tolerated)}
+    misses = {name: text for name, (result, text) in outcomes.items() if result != "pass" and name not in doubtful}
+    worst = max((result for result, _ in outcomes.values()), key=RESULTS.index, default=RESULTS[0])
+    return Judgement(worst, misses, doubtful)
 
 
 def judge_value(estimate: Estimate, low: float, high: float) -> LimitResult:
@@ -312,7 +307,7 @@ def judge_value(estimate: Estimate, low: float, high: float) -> LimitResult:
         low, high: lowest and highest allowed value in the unit of the estimate; either may be infinite.
 
     Returns:
-        One of the four results; "not judged" is none of them.
+        "pass", "conditional pass", "conditional fail" or "fail".
     """
     lower, upper = (estimate.value if end is None else end for end in (estimate.low, estimate.high))
     if low <= estimate.value <= high:
@@ -321,7 +316,7 @@ def judge_value(estimate: Estimate, low: float, high: float) -> LimitResult:
 
 
 def _limit_sentence(
-    quantity: Quantity, estimate: Estimate, allowed: tuple[float, float], result: LimitResult, bound: str | None
+    quantity: PartQuantity, estimate: Estimate, allowed: tuple[float, float], result: LimitResult, bound: str | None
 ) -> str:
     """Value, interval and the nearer limit in words: "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail"."""
     displayed = quantity.displayed(estimate.value)

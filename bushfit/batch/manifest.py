@@ -59,8 +59,8 @@ Candidates = Annotated[tuple[Annotated[str, converter(partial(_check_name, get_c
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
-    """Settings of a row; None where the row leaves a setting to the manifest, and the manifest to the default.
+class RowSettings:
+    """RowSettings of a row; None where the row leaves a setting to the manifest, and the manifest to the default.
 
     Args:
         commands: run alone, or any of fit, diagnose, predict [fit].
@@ -78,14 +78,14 @@ class Settings:
     tolerance: Share | None = None
     model: Text | None = None
 
-    def with_defaults(self, defaults: Settings) -> Settings:
+    def with_defaults(self, defaults: RowSettings) -> RowSettings:
         """These settings, with those of `defaults` where they are None."""
         return replace(defaults, **{key: value for key, value in vars(self).items() if value is not None})
 
     @property
-    def settings(self) -> Settings:
+    def settings(self) -> RowSettings:
         """The settings of a row or manifest without its other keys."""
-        return Settings(**{setting.name: getattr(self, setting.name) for setting in fields(Settings)})
+        return RowSettings(**{setting.name: getattr(self, setting.name) for setting in fields(RowSettings)})
 
     @property
     def predicts(self) -> bool:
@@ -99,7 +99,7 @@ class Settings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entry(Settings):
+class Entry(RowSettings):
     """[[bushings]], or a line of a CSV manifest.
 
     Args:
@@ -114,7 +114,7 @@ class Entry(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ManifestFile(Settings):
+class ManifestFile(RowSettings):
     """A TOML manifest; its settings hold for rows that state none of their own.
 
     Args:
@@ -145,7 +145,7 @@ class Row:
     folder: str
     listed: str
     campaign: str
-    settings: Settings
+    settings: RowSettings
     subgroup: str | None = None
 
 
@@ -158,7 +158,7 @@ class Manifest:
     points: tuple[Point, ...] = ()
 
 
-def read_manifest(source: str, settings: Settings, *more: str) -> Manifest:
+def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
     """Read a manifest, or make one of a pattern or of campaigns listed one by one.
 
     Args:
@@ -180,7 +180,12 @@ def read_manifest(source: str, settings: Settings, *more: str) -> Manifest:
     if more or (_PATTERN.search(source) and not _exists(path)):
         title, base, entries = "batch", Path(), [Entry(campaign=name) for name in (source, *more)]
     elif path.suffix.lower() == ".toml":
-        content = _read_toml_manifest(path)
+        try:
+            content = read_toml(path, ManifestFile, description="a manifest", largest=_LARGEST_MANIFEST)
+        except CampaignError as error:
+            if error.found not in ('"bushing"', '"specimens"'):
+                raise
+            content = ManifestFile(bushings=(Entry(campaign=path.name),))  # a campaign is a batch of one
         settings, points = settings.with_defaults(content.settings), content.at
         entries = list(content.bushings)
     elif path.suffix.lower() in (".csv", ".tsv", ".txt"):
@@ -198,16 +203,6 @@ def read_manifest(source: str, settings: Settings, *more: str) -> Manifest:
 
 def _exists(path: Path) -> bool:
     return os.path.exists(path)  # noqa: PTH110 - Path.exists raises for names that are too long and locked folders
-
-
-def _read_toml_manifest(path: Path) -> ManifestFile:
-    """Read a TOML manifest; a campaign in its place is a batch of one."""
-    try:
-        return read_toml(path, ManifestFile, description="a manifest", largest=_LARGEST_MANIFEST)
-    except CampaignError as error:
-        if error.found not in ('"bushing"', '"specimens"'):
-            raise
-        return ManifestFile(bushings=(Entry(campaign=path.name),))
 
 
 def _read_csv_manifest(path: Path) -> Iterator[Entry]:
@@ -268,7 +263,7 @@ def _expand_patterns(entries: Iterable[Entry], base: Path, source: str) -> Itera
         yield from (replace(entry, campaign=match) for match in matches)
 
 
-def _make_rows(entries: Sequence[Entry], base: Path, settings: Settings, source: str) -> list[Row]:
+def _make_rows(entries: Sequence[Entry], base: Path, settings: RowSettings, source: str) -> list[Row]:
     """Rows with a name and a folder each.
 
     A part is called as the entry says, else as its file; files of the same name, as their folders. A folder is the name
@@ -300,10 +295,16 @@ def _make_rows(entries: Sequence[Entry], base: Path, settings: Settings, source:
     return rows
 
 
-def _check_used(settings: Settings, rows: Collection[tuple[Command, ...]], source: str) -> None:
+def _check_used(settings: RowSettings, rows: Collection[tuple[Command, ...]], source: str) -> None:
     """Raise a CampaignError for a setting that no command of these rows uses."""
     for name, users in _COMMANDS_USING.items():
-        if getattr(settings, name) is not None and not any(_uses(commands, name) for commands in rows):
+        used_by = [
+            # predict then uses the fitted model
+            {"diagnose"} if name == "model" and "fit" in commands else set(users)
+            for commands in rows
+        ]
+        is_used = any(not names.isdisjoint(commands) for names, commands in zip(used_by, rows, strict=True))
+        if getattr(settings, name) is not None and not is_used:
             another = "" if ("run",) in rows else f"--command {users[0]} too, or "
             raise CampaignError(
                 "this setting does nothing here",
@@ -315,14 +316,8 @@ def _check_used(settings: Settings, rows: Collection[tuple[Command, ...]], sourc
             )
 
 
-def _uses(commands: tuple[Command, ...], name: str) -> bool:
-    if name == "model" and "fit" in commands:  # predict then uses the fitted model
-        return "diagnose" in commands
-    return not set(commands).isdisjoint(_COMMANDS_USING[name])
-
-
-def _complete(row_settings: Settings, defaults: Settings, base: Path, source: str) -> Settings:
-    """Settings of a row with every default filled in, checked against each other."""
+def _complete(row_settings: RowSettings, defaults: RowSettings, base: Path, source: str) -> RowSettings:
+    """RowSettings of a row with every default filled in, checked against each other."""
     settings = row_settings.with_defaults(defaults)
     commands = settings.commands or _DEFAULT_COMMANDS
     if "run" in commands and set(commands) != {"run"}:

@@ -82,19 +82,19 @@ PointText = Annotated[Point, converter(lambda raw, _: parse_point(raw) if isinst
 
 
 @dataclass(frozen=True)
-class Quantity:
+class PartQuantity:
     """A quantity of a part: its name, a unit, and the factor from SI to that unit."""
 
     name: str
     unit: str
     factor: float = 1.0
 
-    def displayed(self, value: float) -> Quantity:
+    def displayed(self, value: float) -> PartQuantity:
         """The quantity in the unit in which engineers write a value of that magnitude [SI]."""
-        return Quantity(self.name, *display_unit(self.unit, self.factor, value))
+        return PartQuantity(self.name, *display_unit(self.unit, self.factor, value))
 
     @property
-    def tabled(self) -> Quantity:
+    def tabled(self) -> PartQuantity:
         """The quantity as tables write it: a parameter in the unit of its typical value, the same in every batch."""
         return self.displayed(get_parameter(self.name).typical) if is_parameter(self.name) else self
 
@@ -105,23 +105,23 @@ class Quantity:
 
 #: Quality of the fit: NRMSE is the relative root mean square difference of model and tests, reduced chi-square the mean
 #: square residual in units of noise. The keys are those of a limits file.
-FIT_QUALITY = {"nrmse": Quantity("NRMSE", "-"), "reduced_chi_square": Quantity("reduced chi-square", "-")}
+FIT_QUALITY = {"nrmse": PartQuantity("NRMSE", "-"), "reduced_chi_square": PartQuantity("reduced chi-square", "-")}
 FIT_NAMES = frozenset(quantity.name for quantity in FIT_QUALITY.values())
 #: Quantities at an operating point: |K|, and K''/K'.
 STIFFNESS, LOSS_FACTOR = "stiffness", "loss factor"
 
 
-def point_quantity(point: Point, name: str) -> Quantity:
+def point_quantity(point: Point, name: str) -> PartQuantity:
     """Stiffness or loss factor at an operating point."""
     unit, factor = point.motion.display.stiffness if name == STIFFNESS else ("-", 1.0)
-    return Quantity(f"{name} {point}", unit, factor)
+    return PartQuantity(f"{name} {point}", unit, factor)
 
 
-def list_quantities(names: Collection[str], points: Iterable[Point]) -> dict[str, Quantity]:
+def list_quantities(names: Collection[str], points: Iterable[Point]) -> dict[str, PartQuantity]:
     """Quantities by name: parameters among the known ones in the order of the library, quality of the fit, points."""
     in_order = dict.fromkeys([*parameter_names(), *sorted(filter(is_parameter, names))])
     units = {name: get_parameter(name).unit for name in in_order if name in names}
-    parameters = [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
+    parameters = [PartQuantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
     at_points = [point_quantity(point, name) for point in points for name in (STIFFNESS, LOSS_FACTOR)]
     return {quantity.name: quantity for quantity in (*parameters, *FIT_QUALITY.values(), *at_points)}
 
@@ -164,15 +164,17 @@ def measured_curve(sweeps: Iterable[Sweep]) -> dict[str, float]:
         |K| [SI] by operating point, at most twelve points.
     """
     for sweep in sweeps:
-        held, step = (np.array([float(f"{x:.3g}") for x in values]) for values in (sweep.held, sweep.step))
-        levels = [level for level in np.unique(held) if sweep.stepped and np.unique(step[held == level]).size >= 3]
+        constant, step = (np.array([float(f"{x:.3g}") for x in values]) for values in (sweep.held, sweep.step))
+        levels = [
+            level for level in np.unique(constant) if sweep.stepped and np.unique(step[constant == level]).size >= 3
+        ]
         if levels:
             level = levels[(len(levels) - 1) // 2]
-            steps = np.unique(step[held == level])
+            steps = np.unique(step[constant == level])
             curve = {}
             for x in steps[np.linspace(0, steps.size - 1, min(steps.size, _CURVE_POINTS)).round().astype(int)].tolist():
                 frequency, amplitude = (x, float(level)) if sweep.stepped == "frequency" else (float(level), x)
                 point = Point(str(sweep.direction), frequency, amplitude, sweep.direction.motion.displacement_unit)
-                curve[str(point)] = float(np.abs(sweep.stiffness[(held == level) & (step == x)]).mean())
+                curve[str(point)] = float(np.abs(sweep.stiffness[(constant == level) & (step == x)]).mean())
             return curve
     return {}

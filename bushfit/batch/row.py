@@ -9,7 +9,7 @@ from typing import Any
 
 from bushfit.batch import store
 from bushfit.batch.document import Estimate, RowFile
-from bushfit.batch.manifest import Row, Settings
+from bushfit.batch.manifest import Row, RowSettings
 from bushfit.batch.quantities import (
     FIT_QUALITY,
     LOSS_FACTOR,
@@ -28,7 +28,7 @@ from bushfit.effects import get_effect
 from bushfit.errors import BatchError, BushfitError, ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.file import load_result
-from bushfit.model.result import End, Result
+from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.stiffness import Band
 from bushfit.prediction.stiffness import predict as predict_stiffness
@@ -40,7 +40,7 @@ from bushfit.version import __version__
 
 @dataclass(frozen=True)
 class RowTask:
-    """Settings that all rows of a batch share.
+    """RowSettings that all rows of a batch share.
 
     Args:
         output: folder of the batch.
@@ -70,8 +70,8 @@ class RowTask:
             raise BatchError("a worker runs another bushfit", found=__version__, expected=self.version, hint=hint)
         _limit_threads()
         key = store.row_key(row, self.points, self.formats)
-        if self.resume and (kept := store.load_row(self.output, row, key)):
-            return kept, True
+        if self.resume and (earlier := store.load_row(self.output, row, key)):
+            return earlier, True
         start = time.perf_counter()
         files: Mapping[str, bytes] = {}
         try:
@@ -128,24 +128,28 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
     values, warnings = estimate_quantities(result, points)
     noise = result.quality.noise if result.quality else 0.0
     measured = [measured_at(campaign.sweeps, point, noise) for point in points]
+    alternatives = list[str]()
+    if diagnosis:
+        alternatives += [name for effect in diagnosis.effects for name in effect.alternatives]
+        alternatives += [twin for name in diagnosis.result.unresolved for twin in get_effect(name).twins]
     record = RowFile(
         status="done",
         inputs=inputs,
         campaign_name=campaign.name,
         verdict=diagnosis.verdict if diagnosis else None,
         effects=[effect.label for effect in diagnosis.effects] if diagnosis else (),
-        alternatives=_alternatives(diagnosis) if diagnosis else (),
+        alternatives=alternatives,
         warnings=warnings_of(result, warnings, diagnosis.notes if diagnosis else ()),
         quantities=values,
         measured={name: estimate for table in measured for name, estimate in table.items()},
-        at_bound=_parameters_at_bound(result),
+        at_bound={name: end for name, end in result.at_bound.items() if not is_zero_effect(result, name)},
         curve=measured_curve(campaign.sweeps),
     )
     return record, files
 
 
 def _run_commands(
-    campaign: Campaign, settings: Settings, formats: Formats
+    campaign: Campaign, settings: RowSettings, formats: Formats
 ) -> tuple[Result, Diagnosis | None, dict[str, bytes]]:
     """Run those of fit, diagnose and predict that the row states, each from the result before; or the whole chain."""
     commands, with_tables = settings.commands or (), replace(formats, tables=True)
@@ -175,21 +179,11 @@ def _run_commands(
     return result, diagnosis, files
 
 
-def _alternatives(diagnosis: Diagnosis) -> list[str]:
-    """Effects that the tests cannot distinguish from those that were named."""
-    named = [name for effect in diagnosis.effects for name in effect.alternatives]
-    return named + [twin for name in diagnosis.result.unresolved for twin in get_effect(name).twins]
-
-
-def _parameters_at_bound(result: Result) -> dict[str, End]:
-    """Parameters at a bound of their fit, except an added effect whose size is zero, which is an answer."""
-    parameters, values = result.model.parameters, result.model.values
-
-    def is_zero(name: str) -> bool:
-        neutral = parameters[name].neutral if "." in name else None
-        return neutral is not None and abs(values[name] - neutral) <= 1e-3 * parameters[name].typical
-
-    return {name: end for name, end in result.at_bound.items() if not is_zero(name)}
+def is_zero_effect(result: Result, name: str) -> bool:
+    """True for a parameter of an added effect whose amount is zero, which is a result and not a bound."""
+    parameter = result.model.parameters[name]
+    neutral = parameter.neutral if "." in name else None
+    return neutral is not None and abs(result.model.values[name] - neutral) <= 1e-3 * parameter.typical
 
 
 def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[str, Estimate], list[Sequence[str]]]:

@@ -1,5 +1,7 @@
 """A whole batch: rows to the workers, their records to the disk, then table, picture, summary and page."""
 
+from __future__ import annotations
+
 import shutil
 import time
 from collections import Counter
@@ -8,11 +10,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
+
+import numpy as np
 
 from bushfit.batch import store
 from bushfit.batch.document import RowFile
 from bushfit.batch.executor import Workers, run_rows
+from bushfit.batch.junit import junit_report
 from bushfit.batch.row import failed_row
 from bushfit.batch.summary import BatchPlan, BatchResult
 from bushfit.errors import OutputError
@@ -31,6 +36,9 @@ from bushfit.report.results import (
     write_files,
 )
 from bushfit.validation import to_json_data
+
+if TYPE_CHECKING:
+    from bushfit.report.plots.batch import Panel
 
 #: Files of the whole batch, in whatever form.
 FILES = [*(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture))), "index.html"]
@@ -100,12 +108,12 @@ def run_batch(
         with store.batch_folder(output):
             for name in FILES:  # they belong to the results that are about to be replaced
                 (output / name).unlink(missing_ok=True)
-            result = _run_rows(plan, workers, warn)
-            files = encode_all(_files(result), plan.formats)
+            result = run_parts(plan, workers, warn)
+            files = encode_all(batch_files(result), plan.formats)
             before_writing(result)
             if plan.junit:
                 with _naming_junit(plan.junit):
-                    write_files(plan.junit.parent, {plan.junit.name: result.junit()})
+                    write_files(plan.junit.parent, {plan.junit.name: junit_report(result)})
             for name, content in files.items():
                 staged = output / store.STAGE / name
                 staged.write_bytes(content)
@@ -115,7 +123,17 @@ def run_batch(
         raise unwritable(output, error) from error
 
 
-def _run_rows(plan: BatchPlan, workers: Workers, warn: Callable[[str], object]) -> BatchResult:
+def run_parts(plan: BatchPlan, workers: Workers, warn: Callable[[str], object]) -> BatchResult:
+    """Do all rows, and remove or report the results of rows of an earlier batch.
+
+    Args:
+        plan: the batch.
+        workers: of this machine or of a cluster.
+        warn: called with a sentence when a cluster has no workers.
+
+    Returns:
+        Results of all rows.
+    """
     start, count, notes = time.perf_counter(), len(plan.rows), list[str]()
     if folders := store.list_earlier(plan.task.output, plan.rows):
         outcome = "are still in bushings/ (--force removes them)" if plan.task.resume else "were removed from bushings/"
@@ -124,24 +142,56 @@ def _run_rows(plan: BatchPlan, workers: Workers, warn: Callable[[str], object]) 
                 shutil.rmtree(folder)
         notes = [f"results of {len(folders)} bushings of an earlier batch, no rows of this one, {outcome}"]
     records: list[RowFile] = [failed_row("")] * count
-    kept, failed = 0, Counter[bool]()
+    kept_count, failed = 0, Counter[bool]()
     finished = run_rows(plan.rows, plan.task, lambda why: (failed_row(why), False), workers, warn)
     for number, (record, was_kept) in track(
         "bushings", finished, count, lambda: f"{failed[True]} failed" if failed[True] else ""
     ):
         records[number] = replace(record, inputs={}, files={})  # only a later run asks for these
-        kept += was_kept
+        kept_count += was_kept
         failed[record.status == "failed"] += 1
-    return BatchResult.from_records(plan, records, kept, time.perf_counter() - start, notes)
+    return BatchResult.from_records(plan, records, kept_count, time.perf_counter() - start, notes)
 
 
-def _files(result: BatchResult) -> list[ResultFile]:
-    """Document, table, picture and page of the whole batch."""
+def batch_files(result: BatchResult) -> list[ResultFile]:
+    """Files of the whole batch.
+
+    Args:
+        result: of the batch.
+
+    Returns:
+        Document, table, and picture and page if they are wanted.
+    """
     from bushfit.report.page.index import page_of
     from bushfit.report.plots.batch import batch_figure
 
-    plan, panels = result.plan, result.panels() if result.plan.formats.pictures else []
+    plan, panels = result.plan, make_panels(result) if result.plan.formats.pictures else []
     names = [row.name for row in plan.rows]
     files = [json_file("batch", to_json_data(result.document, BatchFile)), table_file("batch", result.table)]
     files += [page_file("index", page_of(plan.task.output), files[:1])] if plan.formats.pages else []
     return files + ([figure_file("batch", partial(batch_figure, panels, plan.title, names))] if panels else [])
+
+
+def make_panels(result: BatchResult) -> list[Panel]:
+    """Panels of the picture: one for each quantity that has limits or is known of at least three parts.
+
+    Args:
+        result: of the batch.
+
+    Returns:
+        Panels in the order of the table, in the units in which engineers write the values.
+    """
+    from bushfit.report.plots.batch import Panel
+
+    panels = []
+    for name, quantity in result.quantities.items():
+        figures, allowed = result.figures.get(name, np.full((4, 1), np.nan)), result.allowed.get(name, ())
+        is_known = np.isfinite(figures[0])
+        if is_known.sum() >= (1 if allowed else 3):
+            displayed = quantity.displayed(float(np.median(figures[0, is_known])))
+            judgements = enumerate(result.judgements)
+            missed = {k for k, judged in judgements if judged and name in judged.misses and is_known[k]}
+            limits, ends = tuple(limit * displayed.factor for limit in allowed), figures[1:3] * displayed.factor
+            interval = ends if np.isfinite(ends).all(axis=0).any() else None
+            panels.append(Panel(displayed.header, figures[0] * displayed.factor, limits, missed, interval))
+    return panels

@@ -1,4 +1,4 @@
-"""The results of a batch: the document of `batch.json`, the table, the picture and the JUnit report."""
+"""The results of a batch: the document of `batch.json`, the table and the picture."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bushfit.batch.comparison import FEWEST, capability, find_outliers, smallest
 from bushfit.batch.document import RowFile
 from bushfit.batch.limits import Judgement, Limits, describe_poor_fit, judge_part, resolve_limits
 from bushfit.batch.manifest import Row
-from bushfit.batch.quantities import FIT_NAMES, STIFFNESS, Quantity, list_quantities, parse_point, point_quantity
+from bushfit.batch.quantities import FIT_NAMES, STIFFNESS, PartQuantity, list_quantities, parse_point, point_quantity
 from bushfit.batch.row import RowTask
 from bushfit.batch.store import ROWS_FOLDER
 from bushfit.effects import is_parameter
@@ -31,8 +31,6 @@ from bushfit.validation import to_json_data
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from bushfit.report.plots.batch import Panel
 
 #: Endings of the columns of a quantity, with the row of `BatchResult.figures` that they show.
 _PARAMETER_COLUMNS = {"": 0, ", std error": 3, ", low": 1, ", high": 2}
@@ -71,7 +69,7 @@ class BatchResult:
     Args:
         plan: the batch.
         records: of the rows, in the order of the manifest.
-        kept: how many were kept from an earlier run.
+        kept_count: number of rows kept from an earlier run.
         seconds: that the run took [s].
         figures: value, low and high end of the 95 % interval, and standard error by quantity [SI], (4, n); NaN if
             unknown.
@@ -89,10 +87,10 @@ class BatchResult:
 
     plan: BatchPlan
     records: Sequence[RowFile]
-    kept: int
+    kept_count: int
     seconds: float
     figures: Mapping[str, Array]
-    quantities: Mapping[str, Quantity]
+    quantities: Mapping[str, PartQuantity]
     allowed: Mapping[str, tuple[float, float]]
     judgements: Sequence[Judgement | None]
     poor_fits: Sequence[str]
@@ -105,16 +103,19 @@ class BatchResult:
 
     @classmethod
     def from_records(
-        cls, plan: BatchPlan, records: Sequence[RowFile], kept: int, seconds: float, notes: Sequence[str]
+        cls, plan: BatchPlan, records: Sequence[RowFile], kept_count: int, seconds: float, notes: Sequence[str]
     ) -> BatchResult:
         """Judge the parts by the limits and compare them with each other.
 
         Args:
             plan: the batch.
             records: of the rows, in the order of the manifest.
-            kept: how many were kept from an earlier run.
+            kept_count: number of rows kept from an earlier run.
             seconds: that the run took [s].
             notes: on results of an earlier batch in the folder.
+
+        Returns:
+            The results, with each part's judgement and its deviation from the other parts.
         """
         figures, limits = dict[str, Array](), plan.limits
         for index, record in enumerate(records):
@@ -130,7 +131,12 @@ class BatchResult:
             for record in records
         ]
         poor_fits = [describe_poor_fit(record, limits) for record in records]
-        curves = _shared_curve(records)
+        curves, shared = dict[str, Array](), Counter(tuple(record.curve) for record in records if record.curve)
+        points, sharing = max(shared.items(), key=lambda item: item[1], default=((), 0))
+        for point in points if sharing >= FEWEST else ():  # measured |K| at the points that most parts have
+            header = point_quantity(parse_point(point), STIFFNESS)
+            measured = np.array([record.curve.get(point, np.nan) for record in records])
+            curves[f"measured {header.header}"] = header.factor * measured
         logarithms = np.log([*curves.values()])
         deviation = logarithms - np.nanmedian(logarithms, axis=1, keepdims=True) if curves else np.empty((0, 0))
         curve_deviation = np.expm1(deviation.mean(axis=0)) if curves else np.full(len(records), np.nan)
@@ -144,7 +150,7 @@ class BatchResult:
         compared[_CURVE] = curve_deviation, np.full(len(records), np.nan)
         compared = {name: pair for name, pair in compared.items() if np.isfinite(pair[0]).sum() >= FEWEST}
         return cls(
-            plan, records, kept, seconds, figures, quantities, allowed, judgements, poor_fits, curves,
+            plan, records, kept_count, seconds, figures, quantities, allowed, judgements, poor_fits, curves,
             curve_deviation, compared, *find_outliers(compared), [*idle, *notes],
         )  # fmt: skip
 
@@ -153,7 +159,7 @@ class BatchResult:
         """The results as `batch.json` has them."""
         columns = {name: quantity.tabled for name, quantity in self.quantities.items() if name in self.figures}
         labels = self.labels
-        parts = [self._part(index, columns, labels) for index in range(len(self.records))]
+        parts = [self.part_table(index, columns, labels) for index in range(len(self.records))]
         count = int(max((np.isfinite(values).sum() for values, _ in self.compared.values()), default=0))
         names = {
             "failed": [part.name for part in parts if part.error],
@@ -172,10 +178,10 @@ class BatchResult:
             conditional=names["conditional"],
             not_judged=names["not judged"],
             differ=names["differ"],
-            headline=self._headline(names),
-            warnings=self._warnings(),
+            headline=self.headline(names),
+            warnings=self.warnings(),
             detectable=smallest_deviation(count, len(self.compared)),
-            quantities={column.header: self._quantity(name, column) for name, column in columns.items()},
+            quantities={column.header: self.quantity_table(name, column) for name, column in columns.items()},
             curve_points=[*self.curves],
             parts=parts,
         )
@@ -183,13 +189,22 @@ class BatchResult:
     @property
     def summary(self) -> Mapping[str, Any]:
         """The document with the effort of this run, as `--json` prints it."""
-        whole = replace(self.document, kept=self.kept, seconds=round(self.seconds, 3))
+        whole = replace(self.document, kept=self.kept_count, seconds=round(self.seconds, 3))
         return cast("Mapping[str, Any]", to_json_data(whole, BatchFile))
 
-    def _quantity(self, name: str, column: Quantity) -> QuantityTable:
+    def quantity_table(self, name: str, column: PartQuantity) -> QuantityTable:
+        """Compute the scatter, limits and capability of one quantity over the parts.
+
+        Args:
+            name: of the quantity.
+            column: the quantity in the unit of its column.
+
+        Returns:
+            Entry of `batch.json`, in the unit of the column.
+        """
         values = self.figures[name][0] * column.factor
-        known = values[np.isfinite(values)]
-        median, sigma = scatter(known)
+        finite_values = values[np.isfinite(values)]
+        median, sigma = scatter(finite_values)
         detectable = None
         if name in self.compared:
             usual = values[np.isfinite(self.compared[name][0]) & ~self.outliers[name]]
@@ -198,21 +213,39 @@ class BatchResult:
         low, high = (end * column.factor for end in self.allowed.get(name, (-np.inf, np.inf)))
         fixed = self.plan.limits.bounds[name].fixed if self.plan.limits and name in self.allowed else (-np.inf, np.inf)
         fixed = fixed if name not in FIT_NAMES else (-np.inf, np.inf)
-        cp, cpk = capability(known, *(end * column.factor for end in fixed))
-        ends = (end if np.isfinite(end) else None for end in (low, high))
-        least, most = ends
+        cp, cpk = capability(finite_values, *(end * column.factor for end in fixed))
+        minimum, maximum = (end if np.isfinite(end) else None for end in (low, high))
         return QuantityTable(
-            parts=known.size, median=median, sigma=sigma, detectable=detectable, min=least, max=most, cp=cp, cpk=cpk
+            parts=finite_values.size,
+            median=median,
+            sigma=sigma,
+            detectable=detectable,
+            min=minimum,
+            max=maximum,
+            cp=cp,
+            cpk=cpk,
         )
 
-    def _part(self, index: int, columns: Mapping[str, Quantity], labels: Mapping[str, Sequence[str]]) -> PartTable:
+    def part_table(
+        self, index: int, columns: Mapping[str, PartQuantity], labels: Mapping[str, Sequence[str]]
+    ) -> PartTable:
+        """Make the entry of one part in `batch.json`.
+
+        Args:
+            index: number of the part.
+            columns: quantities by name, in the units of their columns.
+            labels: texts of all parts, by column.
+
+        Returns:
+            Result, deviations from the other parts, and values.
+        """
         row, record, judgement = self.plan.rows[index], self.records[index], self.judgements[index] or Judgement(None)
-        beyond = {
+        outlying = {
             name: float(self.deviations[name][index]) for name, differs in self.outliers.items() if differs[index]
         }
-        beyond = dict(sorted(beyond.items(), key=lambda item: (not is_parameter(item[0]), -abs(item[1]))))
+        outlying = dict(sorted(outlying.items(), key=lambda item: (not is_parameter(item[0]), -abs(item[1]))))
         relative = {_CURVE: self.curve_deviation[index]}
-        for name in beyond.keys() - {_CURVE}:
+        for name in outlying.keys() - {_CURVE}:
             relative[name] = self.figures[name][0, index] / np.nanmedian(self.figures[name][0]) - 1.0
         values = [self.figures[name][0, index] * column.factor for name, column in columns.items()]
         curve = [float(column[index]) for column in self.curves.values()]
@@ -224,8 +257,8 @@ class BatchResult:
             misses=judgement.misses,
             doubtful=judgement.doubtful,
             poor_fit=self.poor_fits[index],
-            deviations={name: round(z, 2) for name, z in beyond.items()},
-            differs="; ".join(f"{name} {number(100.0 * relative[name], 3, '+')} %" for name in beyond),
+            deviations={name: round(z, 2) for name, z in outlying.items()},
+            differs="; ".join(f"{name} {number(100.0 * relative[name], 3, '+')} %" for name in outlying),
             warnings=record.warnings,
             labels={name: texts[index] for name, texts in labels.items()},
             values=[float(value) if np.isfinite(value) else None for value in values],
@@ -246,7 +279,15 @@ class BatchResult:
         labels["subgroup"] = [row.subgroup or "" for row in self.plan.rows]
         return labels
 
-    def _headline(self, names: Mapping[str, Sequence[str]]) -> str:
+    def headline(self, names: Mapping[str, Sequence[str]]) -> str:
+        """Write the sentence on the number of parts that pass, fail or differ.
+
+        Args:
+            names: of the parts that failed, missed a limit, were not judged or differ, by kind.
+
+        Returns:
+            Such as "2 of 40 parts fail; 1 differs from the others".
+        """
         count, missed, failed = len(self.records), len(names["missed"]), len(names["failed"])
         parts = "1 part" if count == 1 else f"{count} parts"
         if self.plan.limits is None:
@@ -263,10 +304,14 @@ class BatchResult:
         clauses += [f"{number} {words}" for words, number in counted.items() if number]
         return "; ".join(clauses).replace("1 differ from", "1 differs from")
 
-    def _warnings(self) -> list[str]:
-        """Warnings of the whole batch, the important ones first."""
+    def warnings(self) -> list[str]:
+        """Warnings of the whole batch, the important ones first.
+
+        Returns:
+            Sentences that name the parts.
+        """
         names = [row.name for row in self.plan.rows]
-        beyond = [any(BEYOND in line for line in record.warnings) for record in self.records]
+        outside = [any(BEYOND in line for line in record.warnings) for record in self.records]
         at_bound = dict[str, list[str]]()
         for name, record in zip(names, self.records, strict=True):
             for parameter in record.at_bound:
@@ -280,11 +325,9 @@ class BatchResult:
         if at_bound:
             clauses = [f"{parameter} of {_listed(parts)}" for parameter, parts in at_bound.items()]
             warnings.append(f"at a bound of the fit, which the tests do not determine: {'; '.join(clauses)}")
-        if any(beyond):
-            outside = [name for name, is_beyond in zip(names, beyond, strict=True) if is_beyond]
-            warnings.append(
-                f"a point is outside the tested range, where no test confirms the model: {_listed(outside)}"
-            )
+        if any(outside):
+            parts = [name for name, is_outside in zip(names, outside, strict=True) if is_outside]
+            warnings.append(f"a point is outside the tested range, where no test confirms the model: {_listed(parts)}")
         return warnings
 
     def table(self) -> pd.DataFrame:
@@ -335,69 +378,7 @@ class BatchResult:
             {**as_objects(texts), **numbers, **as_objects(ending_texts), **deviations, **curve, **self.curves}
         )
 
-    def panels(self) -> list[Panel]:
-        """Panels of the picture.
-
-        Returns:
-            One for each quantity with limits or known of at least three parts.
-        """
-        from bushfit.report.plots.batch import Panel
-
-        panels = []
-        for name, quantity in self.quantities.items():
-            figures, allowed = self.figures.get(name, np.full((4, 1), np.nan)), self.allowed.get(name, ())
-            known = np.isfinite(figures[0])
-            if known.sum() >= (1 if allowed else 3):
-                shown = quantity.displayed(float(np.median(figures[0, known])))
-                missed = {
-                    k for k, judged in enumerate(self.judgements) if judged and name in judged.misses and known[k]
-                }
-                limits, ends = tuple(limit * shown.factor for limit in allowed), figures[1:3] * shown.factor
-                interval = ends if np.isfinite(ends).all(axis=0).any() else None
-                panels.append(Panel(shown.header, figures[0] * shown.factor, limits, missed, interval))
-        return panels
-
-    def junit(self) -> bytes:
-        """Make the JUnit report for continuous integration.
-
-        Returns:
-            XML with an error for a row that failed, and a failure for a limit that is missed or not judged.
-        """
-        from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
-
-        suite = TestSuite(self.plan.title)
-        for part, record in zip(self.document.parts, self.records, strict=True):
-            case = TestCase(_printable(part.name), suite.name, record.seconds)
-            reasons = [*part.misses.values(), *(part.doubtful.values() if part.result == "not judged" else ())]
-            if record.error or reasons:
-                text = _printable(record.error or "\n".join(reasons))
-                line = text.partition("\n")[0] if record.error else "; ".join(text.splitlines())
-                result = Error(line, "failed") if record.error else Failure(line, "limits")
-                result.text = text
-                case.result = [result]
-            suite.add_testcase(case)
-        report = JUnitXml("bushfit batch")
-        report.add_testsuite(suite)
-        report.update_statistics()  # type: ignore[no-untyped-call]
-        return b'<?xml version="1.0" encoding="utf-8"?>\n' + report.tostring()  # type: ignore[no-untyped-call]
-
-
-def _shared_curve(records: Sequence[RowFile]) -> dict[str, Array]:
-    """Measured |K| at each point of the curve that most parts share, by column; empty if fewer than five share one."""
-    shared = Counter(tuple(record.curve) for record in records if record.curve).most_common(1)
-    curves = dict[str, Array]()
-    for point in shared[0][0] if shared and shared[0][1] >= FEWEST else ():
-        column = point_quantity(parse_point(point), STIFFNESS)
-        values = np.array([record.curve.get(point, np.nan) for record in records])
-        curves[f"measured {column.header}"] = column.factor * values
-    return curves
-
 
 def _listed(names: Sequence[str]) -> str:
     more = f" and {len(names) - _NAMES_LISTED} more" if len(names) > _NAMES_LISTED else ""
     return ", ".join(names[:_NAMES_LISTED]) + more
-
-
-def _printable(text: str) -> str:
-    """The text without control characters, which XML cannot hold."""
-    return "".join(letter if letter.isprintable() or letter == "\n" else " " for letter in text)

@@ -35,7 +35,12 @@ _MOST_SHOWN = 10
     ),
     place_option("Tests to fit, as in bushfit fit."),
     effect_option("Add an effect, as in bushfit fit."),
-    option("--at", "POINT", 'Stiffness and loss factor at "axial 25 Hz 0.1 mm"; may be given again.', multiple=True),
+    option(
+        "--at operating_points",
+        "POINT",
+        'Stiffness and loss factor at "axial 25 Hz 0.1 mm"; may be given again.',
+        multiple=True,
+    ),
 )
 @under(
     "Limits",
@@ -60,7 +65,7 @@ def command(
     commands: tuple[Command, ...],
     directions: tuple[str, ...],
     effects: tuple[str, ...],
-    at: tuple[str, ...],
+    operating_points: tuple[str, ...],
     limits: Path | None,
     junit: Path | None,
     jobs: int | None,
@@ -89,7 +94,7 @@ def command(
     # Workers import their modules while this process reads the manifest.
     workers = local_workers(jobs or os.cpu_count() or 1) if scheduler is None else dask_workers(scheduler)
     from bushfit.batch.limits import check_limits, read_limits
-    from bushfit.batch.manifest import Settings, read_manifest
+    from bushfit.batch.manifest import RowSettings, read_manifest
     from bushfit.batch.quantities import parse_point
     from bushfit.batch.row import RowTask
     from bushfit.batch.run import check_output, run_batch
@@ -97,13 +102,13 @@ def command(
     from bushfit.effects import get_effect
 
     names = tuple(get_effect(name).name for name in effects)
-    settings = Settings(commands=commands or None, directions=directions or None, effects=names or None)
+    settings = RowSettings(commands=commands or None, directions=directions or None, effects=names or None)
     listed = read_manifest(manifest[0], settings, *manifest[1:])
     judged_by = read_limits(limits) if limits else None
     if limits and judged_by:
         check_limits(judged_by, limits, listed.rows)
     with error_location(place="--at"):
-        points = (*listed.points, *map(parse_point, at), *(judged_by.points if judged_by else ()))
+        points = (*listed.points, *map(parse_point, operating_points), *(judged_by.points if judged_by else ()))
     formats = replace(output.formats, tables=tables, pictures=plots and output.formats.pictures, pages=reports)
     folder = output.folder(listed.title)
     task = RowTask(folder.absolute(), tuple(dict.fromkeys(points)), formats, resume)
@@ -136,11 +141,11 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
             if part.name in document.conditional
         ],
     }
-    for what, lines in sentences.items():
+    for attention, lines in sentences.items():
         for line in lines[:_MOST_SHOWN]:
             output.print(line)
         if len(lines) > _MOST_SHOWN:
-            output.print(f"... and {len(lines) - _MOST_SHOWN} more that {what}: see {table}")
+            output.print(f"... and {len(lines) - _MOST_SHOWN} more that {attention}: see {table}")
     output.warn(document.warnings)
     rows = []
     for header, quantity in document.quantities.items():
@@ -149,14 +154,14 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
         indices = ["" if index is None else number(index[0], 3) for index in (quantity.cp, quantity.cpk)]
         rows.append((name, format_aligned([quantity.median], 4)[0], scatter, unit or "-", *indices))
     columns = ("quantity", "median", "robust std dev", "unit", "Cp", "Cpk")
-    shown = len(columns) if any(row[-1] for row in rows) else 4
+    column_count = len(columns) if any(row[-1] for row in rows) else 4
     if rows:
         counted = f"{document.title}: {document.done} bushing{'s' * (document.done > 1)}"
-        output.print_table(counted, columns[:shown], [row[:shown] for row in rows])
-    kept = f", {result.kept} of them from before" if result.kept else ""
+        output.print_table(counted, columns[:column_count], [row[:column_count] for row in rows])
+    from_before = f", {result.kept_count} of them from before" if result.kept_count else ""
     rate = len(parts) / max(result.seconds, 1e-9)
     output.print(
-        f"{document.done} done{kept}, {len(document.failed)} failed; {result.seconds:.1f} s, {rate:.1f} a second"
+        f"{document.done} done{from_before}, {len(document.failed)} failed; {result.seconds:.1f} s, {rate:.1f} a second"
     )
     if document.limits:
         output.print("limits: " + ", ".join(f"{count} {word}" for word, count in document.limits.items()))

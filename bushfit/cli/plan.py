@@ -104,15 +104,15 @@ def command(
         "rivals": _names(rivals),
         "targets": dict(map(_target, targets)),
     }
-    opened, beside = load_source(source), load_campaign(campaign) if campaign else None
-    if beside and isinstance(opened, Campaign):
+    opened, settings_campaign = load_source(source), load_campaign(campaign) if campaign else None
+    if settings_campaign and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' goes with MODEL.json.")
     folder = output.free_folder(opened.name, "plan.json", form="plan {}")
     with error_location(source):
-        outcome = plan(opened, beside, **settings)
+        outcome = plan(opened, settings_campaign, **settings)
     _print_plan(output, outcome)
     if count and outcome.plan.planned.tests:
-        outcome = with_check(outcome, _checked(output, outcome, count, seed))
+        outcome = with_check(outcome, _simulate_plan(output, outcome, count, seed))
     output.write(folder, outcome.files, outcome.document, [source, *([campaign] if campaign else [])])
     if outcome.plan.planned.tests:
         output.print(f"next: make the tests in the order of {folder / output.formats.table('plan')}")
@@ -128,14 +128,14 @@ def _names(text: str | None) -> tuple[str, ...]:
 
 def _target(text: str) -> tuple[str, float]:
     """Name and size of a target such as "stiffness.axial=1 %"."""
-    name, parted, size = text.rpartition("=")
-    if not parted:
+    name, equals, size = text.rpartition("=")
+    if not equals:
         raise click.BadParameter(f"'{text}' is no name, '=' and size, such as \"mu=2 %\".", param_hint="'--target'")
     return name.strip(), positive(size.strip(), "--target", "1") or 0.0
 
 
 def _print_plan(output: Output, outcome: PlanOutput) -> None:
-    """The tests, what they would tell beside the standard programme, and what a user must know."""
+    """Print the tests, the expected errors beside those of the standard programme, and the warnings."""
     document = outcome.document
     hours = number(document["hours_planned"], 3)
     gains = (
@@ -146,17 +146,22 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
     output.print(f"known before: {document['source']}")
     _print_tests(output, outcome)
     standard = f"standard, {number(document['hours_standard'], 3)} h"
-    columns = ("of", "before", f"plan, {number(document['hours_planned'], 3)} h", standard)
+    error_columns = ("of", "before", f"plan, {number(document['hours_planned'], 3)} h", standard)
     rows = {**document["parameters"], **{f"stiffness, {place}": row for place, row in document["stiffness"].items()}}
     rows |= {f"loss factor, {place} [0.01]": row for place, row in document["loss_factor"].items()}
     title = "standard errors [%]: known before, by the plan, and by the standard programme of tests"
-    output.print_table(title, columns, _percents(rows, ("before", "planned", "standard")))
-    _print_targets(output, document)
+    output.print_table(title, error_columns, _percents(rows, ("before", "planned", "standard")))
+    if targets := document["targets"]:
+        sizes = _percents(targets, ("asked", "before", "planned", "standard"))
+        met = ("met" if target["met"] else "not met" for target in targets.values())
+        columns = ("of", "asked for", "before", "plan", "standard", "")
+        title = "targets: 95 % interval either way, the widest [%]"
+        output.print_table(title, columns, [(*row, verdict) for row, verdict in zip(sizes, met, strict=True)])
     _print_effects(output, document)
     if rivals := document["rivals"]:
-        apart = ", ".join(f"{number(rivals[key], 3)} by the {key} tests" for key in ("planned", "standard"))
+        chi_squares = ", ".join(f"{number(rivals[key], 3)} by the {key} tests" for key in ("planned", "standard"))
         output.print(
-            f"{' and '.join(rivals['effects'])}: {apart} apart in expected chi-square; from "
+            f"{' and '.join(rivals['effects'])}: {chi_squares} apart in expected chi-square; from "
             f"{number(rivals['enough'], 3)} on they are told apart in nine of ten cases"
         )
     if document["enough"]:
@@ -165,7 +170,7 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
 
 
 def _print_tests(output: Output, outcome: PlanOutput) -> None:
-    """Each test with the number of its runs; the sheet has them in their order."""
+    """Print each test with the number of its runs; plan.csv has the runs in their order."""
     from bushfit.campaign.schema import SimulatedLoop
     from bushfit.planning.contract import motions
 
@@ -173,69 +178,59 @@ def _print_tests(output: Output, outcome: PlanOutput) -> None:
     for test, runs in Counter(programme.tests).items():
         unit, factor = test.direction.display.displacement
         sizes, rates = motions(test)
-        what = f"loop, {test.cycles} cycles" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}"
+        kind = f"loop, {test.cycles} cycles" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}"
         motion = f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0)
-        rows.append((str(test.direction), what, *motion, str(runs)))
+        rows.append((str(test.direction), kind, *motion, str(runs)))
     columns = ("direction", "test", "amplitude", "frequency [Hz]", "runs")
     output.print_table(f"{len(programme.tests)} runs", columns, rows, text_columns=4)
 
 
 def _listed(values: Sequence[float], factor: float) -> str:
-    """Few values in full, many as their ends."""
+    """Few values in full, many as the first and the last."""
     words = [number(factor * value, 3) for value in values]
     return ", ".join(words) if len(words) <= _MOST_VALUES else f"{words[0]} to {words[-1]} ({len(words)})"
 
 
 def _percents(rows: Mapping[str, Mapping[str, Any]], keys: Sequence[str]) -> list[tuple[str, ...]]:
-    """Each name with the shares that its row has under some keys, in percent."""
+    """Rows of a table: each name with some of its values in percent."""
     return [(name, *(number(100.0 * row[key], 2) for key in keys)) for name, row in rows.items()]
 
 
-def _print_targets(output: Output, document: PlanFile) -> None:
-    """Each target beside what is reached now, by the plan and by the standard programme."""
-    targets = document["targets"]
-    sizes = _percents(targets, ("asked", "before", "planned", "standard"))
-    rows = [(*row, "met" if target["met"] else "not met") for row, target in zip(sizes, targets.values(), strict=True)]
-    if rows:
-        columns = ("of", "asked for", "before", "plan", "standard", "")
-        output.print_table("targets: 95 % interval either way, the widest [%]", columns, rows)
-
-
 def _print_effects(output: Output, document: PlanFile) -> None:
-    """The smallest amounts of effects that the plan finds, those first that it shows least well beside the standard."""
+    """Print the smallest detectable amounts of effects, those first that the plan shows least well."""
 
-    def least_well(shown: Shown) -> float:
-        return (shown["standard"] or math.inf) / (shown["planned"] or math.inf)
+    def ratio(amounts: Shown) -> float:
+        return (amounts["standard"] or math.inf) / (amounts["planned"] or math.inf)
 
-    ranked = sorted(document["visible"].items(), key=lambda item: least_well(item[1]))
-    kept = ranked if output.verbose else ranked[:_MOST_EFFECTS]
-    title = f"smallest amounts found in nine of ten cases, {len(kept)} of {len(ranked)} effects"
+    ranked = sorted(document["visible"].items(), key=lambda item: ratio(item[1]))
+    printed = ranked if output.verbose else ranked[:_MOST_EFFECTS]
+    title = f"smallest amounts found in nine of ten cases, {len(printed)} of {len(ranked)} effects"
     rows = []
-    for name, shown in kept:
-        sizes = [shown["planned"], shown["standard"]]
-        unit, factor = display_unit(shown["unit"], 1.0, next(filter(None, sizes), 1.0))
+    for name, amounts in printed:
+        sizes = [amounts["planned"], amounts["standard"]]
+        unit, factor = display_unit(amounts["unit"], 1.0, next(filter(None, sizes), 1.0))
         words = ["none" if size is None else number(size * factor, 3) for size in sizes]
-        rows.append((name, shown["parameter"], *words, unit))
+        rows.append((name, amounts["parameter"], *words, unit))
     output.print_table(title, ("effect", "amount", "plan", "standard", "unit"), rows, text_columns=2)
 
 
-def _checked(output: Output, outcome: PlanOutput, count: int, seed: int) -> Check:
-    """The plan simulated, with a table of what was predicted and found."""
+def _simulate_plan(output: Output, outcome: PlanOutput, count: int, seed: int) -> Check:
+    """Simulate the plan and print a table of predicted and observed standard errors."""
     from bushfit.batch.executor import local_workers, run_rows
-    from bushfit.planning.campaign import Found, check
+    from bushfit.planning.campaign import RelativeErrors, check
     from bushfit.progress import track
 
-    def every(seeds: Sequence[int], work: Callable[[int], Found]) -> Iterator[tuple[int, Found]]:
-        come = run_rows(seeds, work, lambda _: None, local_workers(os.cpu_count() or 1))
-        return track("campaigns simulated and fitted", come, count)
+    def run_all(seeds: Sequence[int], work: Callable[[int], RelativeErrors]) -> Iterator[tuple[int, RelativeErrors]]:
+        finished = run_rows(seeds, work, lambda _: None, local_workers(os.cpu_count() or 1))
+        return track("campaigns simulated and fitted", finished, count)
 
-    found = check(outcome.plan, count, seed, every)
-    title = f"{len(found.deviations)} simulated campaigns from seed {found.seed} on: standard errors [%]"
-    rows, (low, high) = [], found.interval
-    for name, *sizes in zip(found.names, found.predicted, found.found, low, high, strict=True):
-        predicted, scatter, *ends = (number(100.0 * size, 3) for size in sizes)
-        rows.append((name, predicted, scatter, " to ".join(ends)))
+    result = check(outcome.plan, count, seed, run_all)
+    title = f"{len(result.deviations)} simulated campaigns from seed {result.seed} on: standard errors [%]"
+    rows, (low, high) = [], result.interval
+    for name, *sizes in zip(result.names, result.predicted, result.observed, low, high, strict=True):
+        predicted, observed, *ends = (number(100.0 * size, 3) for size in sizes)
+        rows.append((name, predicted, observed, " to ".join(ends)))
     output.print_table(title, ("of", "predicted", "found", "95 %"), rows)
-    if found.failed:
-        output.print(f"{found.failed} could not be fitted")
-    return found
+    if result.failed:
+        output.print(f"{result.failed} could not be fitted")
+    return result

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import chain
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -24,15 +25,14 @@ from bushfit.planning.contract import (
     Aim,
     Knowledge,
     Plan,
+    PlanRequest,
     Points,
-    Programme,
     Target,
     Test,
-    Wanted,
     motions,
     operating_points,
 )
-from bushfit.planning.knowledge import guess, of_campaign, of_result, rig_of
+from bushfit.planning.knowledge import from_campaign, from_result, guess_parameters, rig_of
 from bushfit.planning.offer import RIVALS_APART
 from bushfit.planning.plan import plan as choose_tests
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
@@ -122,7 +122,7 @@ class PlanFile(TypedDict):
     """plan.json: the tests of a plan and their expected results."""
 
     schema: Annotated[str, Field(description="Name and version of this schema.")]
-    source: Annotated[str, Field(description="Origin of what is known before further tests.")]
+    source: Annotated[str, Field(description="Origin of what is knowledge before further tests.")]
     aim: Annotated[Aim, Field(description="Aim of the plan.")]
     hours: Annotated[float, Field(description="Largest duration on the rig [h].")]
     tests: Annotated[list[PlannedRun], Field(description="Runs of the rig in their order.")]
@@ -182,19 +182,31 @@ class PlanOutput:
     @cached_property
     def document(self) -> PlanFile:
         """Content of plan.json."""
-        plan, wanted, names = self.plan, self.plan.wanted, self.plan.knowledge.names
+        plan, request, names = self.plan, self.plan.request, self.plan.knowledge.names
         programmes = (plan.before, plan.planned, plan.standard)
+        halves = zip(*(programme.halves for programme in programmes), strict=True)
+        rivals: Rivalry | None = None
+        if plan.planned.rival_chi_square is not None and plan.standard.rival_chi_square is not None:
+            rivals = {
+                "effects": [rival.model.effects[-1] for rival in plan.knowledge.rivals],
+                "planned": plan.planned.rival_chi_square,
+                "standard": plan.standard.rival_chi_square,
+                "enough": RIVALS_APART,
+            }
         return {
             "schema": "bushfit/plan/1",
             "source": plan.knowledge.source,
-            "aim": wanted.aim,
-            "hours": wanted.hours,
+            "aim": request.aim,
+            "hours": request.hours,
             "tests": [_run(*pair) for pair in zip(plan.planned.tests, plan.planned.minutes.tolist(), strict=True)],
             "hours_planned": plan.planned.hours,
             "hours_standard": plan.standard.hours,
-            "hours_left": wanted.hours - plan.planned.hours,
+            "hours_left": request.hours - plan.planned.hours,
             "enough": plan.enough,
-            "targets": dict(self._targets()),
+            "targets": {
+                str(target): {"asked": target.half, **_reached(half), "met": reason is None, "why": reason}
+                for target, reason, half in zip(request.targets, plan.missed, halves, strict=True)
+            },
             "parameters": {
                 name: _reached([programme.errors[index] for programme in programmes])
                 for index, name in enumerate(names)
@@ -203,37 +215,26 @@ class PlanOutput:
             "loss_factor": dict(self._root_mean_squares([programme.loss for programme in programmes])),
             "visible": dict(self._smallest_amounts()),
             "drift": {"planned": plan.planned.drift, "standard": plan.standard.drift},
-            "rivals": self._rivalry(plan.planned, plan.standard),
+            "rivals": rivals,
             "check": _checked(self.check) if self.check else None,
             "warnings": list(plan.notes),
         }
 
-    def _targets(self) -> Iterator[tuple[str, TargetEntry]]:
-        """Name and result of each target."""
-        plan = self.plan
-        halves = (plan.before.halves, plan.planned.halves, plan.standard.halves)
-        for target, why, *reached in zip(plan.wanted.targets, plan.missed, *halves, strict=True):
-            yield str(target), {"asked": target.half, **_reached(reached), "met": why is None, "why": why}
-
     def _root_mean_squares(self, errors: Sequence[Array]) -> Iterator[tuple[str, Reached]]:
         """Root mean square of errors at the points of each direction, for each programme."""
-        points = self.plan.wanted.points
+        points = self.plan.request.points
         ends = np.cumsum([part.frequency.size for part in points])[:-1]
         for part, *errors_there in zip(points, *(np.split(error, ends) for error in errors), strict=True):
             yield str(part.place), _reached([float(np.sqrt(np.mean(np.square(error)))) for error in errors_there])
 
     def _smallest_amounts(self) -> Iterator[tuple[str, Shown]]:
         """Smallest detectable amount of each effect."""
-        for planned, standard in zip(self.plan.planned.visible, self.plan.standard.visible, strict=True):
-            amounts = [shown.amount if np.isfinite(shown.amount) else None for shown in (planned, standard)]
-            shown = Shown(parameter=planned.parameter, unit=planned.unit, planned=amounts[0], standard=amounts[1])
-            yield planned.effect, shown
-
-    def _rivalry(self, planned: Programme, standard: Programme) -> Rivalry | None:
-        if planned.apart is None or standard.apart is None:
-            return None
-        effects = [rival.model.effects[-1] for rival in self.plan.knowledge.rivals]
-        return {"effects": effects, "planned": planned.apart, "standard": standard.apart, "enough": RIVALS_APART}
+        for planned, standard in zip(self.plan.planned.detectable, self.plan.standard.detectable, strict=True):
+            amounts = [item.amount if np.isfinite(item.amount) else None for item in (planned, standard)]
+            yield (
+                planned.effect,
+                Shown(parameter=planned.parameter, unit=planned.unit, planned=amounts[0], standard=amounts[1]),
+            )
 
 
 def plan(
@@ -270,30 +271,34 @@ def plan(
         torsion_amplitudes: zero-to-peak rotations [rad] of them.
         strain_amplitudes: zero-to-peak strains of them.
 
+    Returns:
+        Tests in their order with their expected results, and the result files.
+
     Raises:
         CampaignError: nothing is known of the rubber.
         FitError: tests that cannot support a fit.
         ModelError: a parameter that is not fitted, a direction without a body, or no tests for this aim.
     """
-    known = _knowledge(source, rivals if aim == "rivals" else None)
+    knowledge = _knowledge(source, rivals if aim == "rivals" else None)
     campaign = source if isinstance(source, Campaign) else campaign
     for name in parameters:
-        if name not in known.names:
+        if name not in knowledge.names:
             raise ModelError(
                 "this parameter is not among those that tests are to tell",
                 place="--parameters",
                 found=name,
-                expected=", ".join(known.names),
-                hint=did_you_mean(name, known.names),
+                expected=", ".join(knowledge.names),
+                hint=did_you_mean(name, knowledge.names),
             )
-    default = [Direction.AXIAL, Direction.RADIAL] if known.model.bushing else list(known.specimens)
-    places = tuple(get_place(name, known.specimens) for name in test_directions) or tuple(default)
+    default = [Direction.AXIAL, Direction.RADIAL] if knowledge.model.bushing else list(knowledge.specimens)
+    places = tuple(get_place(name, knowledge.specimens) for name in test_directions) or tuple(default)
     grid = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
-    points = tuple(_wanted_points(Result(known.model, specimens=known.specimens), grid, campaign, default))
-    rig = rig_of(campaign.rig if campaign else RigSettings(), known.noise)
-    wanted_targets = [one for name, half in (targets or {}).items() for one in _target(name, half, known, points)]
-    wanted = Wanted(aim, hours, rig, places, points, tuple(parameters) or known.names, tuple(wanted_targets))
-    return PlanOutput(choose_tests(known, wanted))
+    points = tuple(_wanted_points(Result(knowledge.model, specimens=knowledge.specimens), grid, campaign, default))
+    rig = rig_of(campaign.rig if campaign else RigSettings(), knowledge.noise)
+    named = (_targets(name, half, knowledge, points) for name, half in (targets or {}).items())
+    wanted = tuple(chain.from_iterable(named))
+    request = PlanRequest(aim, hours, rig, places, points, tuple(parameters) or knowledge.names, wanted)
+    return PlanOutput(choose_tests(knowledge, request))
 
 
 def with_check(output: PlanOutput, check: Check) -> PlanOutput:
@@ -306,12 +311,12 @@ def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | No
     if isinstance(source, Knowledge):
         return source
     if isinstance(source, Result):
-        return of_result(source)
+        return from_result(source)
     if source.loops or source.sweeps:
-        return of_campaign(prepare_tests(source), rivals)
+        return from_campaign(prepare_tests(source), rivals)
     if source.bushing and source.compound:
-        return guess(source.bushing, source.compound)
-    return of_result(Result(model_of(source), specimens=source.specimens))
+        return guess_parameters(source.bushing, source.compound)
+    return from_result(Result(model_of(source), specimens=source.specimens))
 
 
 def _wanted_points(
@@ -327,9 +332,9 @@ def _wanted_points(
         yield Points(place, frequency.ravel(), amplitude.ravel())
 
 
-def _target(name: str, half: float, known: Knowledge, points: Sequence[Points]) -> list[Target]:
+def _targets(name: str, half: float, knowledge: Knowledge, points: Sequence[Points]) -> list[Target]:
     """Targets of a name: a parameter, or a quantity at one direction or at all where predictions are wanted."""
-    possible = {parameter: [Target(parameter, half)] for parameter in known.names}
+    possible = {parameter: [Target(parameter, half)] for parameter in knowledge.names}
     for quantity in PREDICTED:
         targets = [Target(quantity, half, part.place) for part in points]
         possible |= {quantity: targets, **{str(target): [target] for target in targets}}
@@ -343,11 +348,17 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
     """Sheet for the operator of the rig: a row for each run in its order, with zero-to-peak amplitudes.
 
     The force, moment or stress is the largest that the model expects, to choose a load cell.
+
+    Args:
+        plan: with its tests in order.
+
+    Returns:
+        Table of texts, with durations [min].
     """
     tests = plan.planned.tests
-    counts, seen, rows = Counter(tests), Counter[Test](), []
+    counts, repeats, rows = Counter(tests), Counter[Test](), []
     for order, (test, minutes) in enumerate(zip(tests, plan.planned.minutes, strict=True), start=1):
-        seen[test] += 1
+        repeats[test] += 1
         (frequency, amplitude), (length, force, _) = operating_points(test), test.direction.display
         stiffness = np.abs(plan.knowledge.model.stiffness(test.direction, frequency, amplitude))
         largest = number(force.factor * float(np.max(stiffness * amplitude)), 2)
@@ -359,7 +370,7 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
                 "amplitude": f"{_distinct(length.factor * amplitude)} {length.name}",
                 "frequency [Hz]": _distinct(frequency),
                 "cycles": str(test.cycles) if isinstance(test, SimulatedLoop) else "until steady",
-                "repeat": f"{seen[test]} of {counts[test]}",
+                "repeat": f"{repeats[test]} of {counts[test]}",
                 "force up to": f"{largest} {force.name}",
                 "minutes": round(float(minutes), 1),
                 "minutes so far": round(float(np.sum(plan.planned.minutes[:order])), 1),
@@ -402,6 +413,6 @@ def _checked(check: Check) -> Checked:
         "failed": check.failed,
         "seed": check.seed,
         "predicted": dict(zip(check.names, check.predicted.tolist(), strict=True)),
-        "found": dict(zip(check.names, check.found.tolist(), strict=True)),
+        "found": dict(zip(check.names, check.observed.tolist(), strict=True)),
         "ci95": {name: list(ends) for name, *ends in zip(check.names, low.tolist(), high.tolist(), strict=True)},
     }

@@ -1,9 +1,8 @@
-"""A plan on the virtual rig: the campaign that `bushfit simulate` runs, and whether the plan keeps what it promises.
+"""A plan on the virtual rig: the campaign that `bushfit simulate` runs, and a check of the predicted errors.
 
 Notes:
-    For that it is simulated many times, and each campaign is fitted anew. What is simulated is all that a fit would
-    see: noise that it has to estimate from the repeats, errors of runs and levels, start values read off the data.
-    The fit is given the class of the rig only, which a campaign states too.
+    The check simulates the plan many times and fits each campaign. The fit estimates the noise from the repeats and its
+    start values from the data, as for a measured campaign; it receives only the class of the rig.
 """
 
 from collections import Counter
@@ -36,7 +35,7 @@ _SETTINGS = (
     "seed", "noise", "force_noise", "force_correlation",
     "gain_error", "phase_error", "level_gain_error", "level_phase_error",
 )  # fmt: skip
-#: By key of [simulate] and its tests, the unit that a number is written with; the displacement's stands for None.
+#: Unit of each number in [simulate] and its tests, by key; None for the unit of the displacement.
 _UNITS: Mapping[str, str | None] = {
     "phase_error": "rad",
     "level_phase_error": "rad",
@@ -45,18 +44,26 @@ _UNITS: Mapping[str, str | None] = {
     "amplitude": None,
     "amplitudes": None,
 }
-#: Of one campaign what was found less the truth, (k,); None where no fit was possible.
-Found = Array | None
-#: Does work(seeds) for parts of the seeds, in some order, and gives the number and the result of each.
-Every = Callable[[Sequence[int], Callable[[int], Found]], Iterable[tuple[int, Found]]]
+#: Relative errors of the k parameters fitted to one simulated campaign, (k,); None if no fit was possible.
+RelativeErrors = Array | None
+#: Calls a function for all seeds in any order; returns the number and the result of each.
+SeedRunner = Callable[[Sequence[int], Callable[[int], RelativeErrors]], Iterable[tuple[int, RelativeErrors]]]
 
 
 def settings_of(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateSettings:
-    """Settings of the virtual rig for planned tests, each with as many repeats as the plan has runs of it.
+    """Settings of the virtual rig for planned tests, with as many repeats of a sweep as the plan has runs.
+
+    Args:
+        tests: runs of the plan.
+        noise: of the rig.
+        seed: of the random numbers.
+
+    Returns:
+        Settings of [simulate].
 
     Notes:
-        Rows of a loop are correlated as those of a filter with one time constant, AR(1) with r; n of them tell as much
-        as n (1 - r)/(1 + r) independent ones.
+        The rows of a loop are correlated like the output of a first-order filter, AR(1) with coefficient r: n rows
+        have the information of n (1 - r)/(1 + r) independent ones.
     """
     counts = Counter(tests)
     return SimulateSettings(
@@ -74,13 +81,21 @@ def settings_of(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateS
 
 
 def campaign_toml(plan: Plan, seed: int = 0) -> str:
-    """The planned tests as a campaign file for `bushfit simulate`."""
+    """Write the planned tests as a campaign file for `bushfit simulate`.
+
+    Args:
+        plan: tests and model.
+        seed: of the random numbers.
+
+    Returns:
+        Text of the TOML file.
+    """
     knowledge, settings = plan.knowledge, settings_of(plan.planned.tests, plan.knowledge.noise, seed)
     tested = [test.direction for test in plan.planned.tests]
     lines = [
         "# Planned by bushfit plan; bushfit simulate makes these tests of the model below. No rubber was tested.",
         "# All repeats of a sweep follow each other here; the order on the rig is that of the sheet.",
-        *body_lines(knowledge.model.bushing, dict.fromkeys(each for each in tested if isinstance(each, Specimen))),
+        *body_lines(knowledge.model.bushing, dict.fromkeys(place for place in tested if isinstance(place, Specimen))),
         *("", "[simulate]", *(_line(key, getattr(settings, key)) for key in _SETTINGS)),
         *("", "[simulate.parameters]"),
     ]
@@ -93,15 +108,15 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
     for kind, tests in (("loops", settings.loops), ("sweeps", settings.sweeps)):
         for test in tests:
             lines += ["", f"[[simulate.{kind}]]", place_line(test.direction)]
-            for each in fields(test):  # what it states other than the default
-                value = getattr(test, each.name)
-                if each.name not in ("direction", "temperature") and value != each.default:
-                    lines.append(_line(each.name, value, test))
+            for key in fields(test):  # values other than the default
+                value = getattr(test, key.name)
+                if key.name not in ("direction", "temperature") and value != key.default:
+                    lines.append(_line(key.name, value, test))
     return "\n".join(lines) + "\n"
 
 
 def _line(key: str, value: Any, test: Test | None = None) -> str:
-    """One key with its value, which has a unit where the file wants one."""
+    """Line of one key and its value, with a unit if the key needs one."""
     if key not in _UNITS:
         share = isinstance(value, float)
         return f"{key} = {toml_value(f'{_number(100.0 * value)} %') if share else toml_value(value)}"
@@ -109,24 +124,24 @@ def _line(key: str, value: Any, test: Test | None = None) -> str:
     if unit is None and test:
         unit, factor = test.direction.display.displacement
     values: Iterable[float] = value if isinstance(value, tuple) else (value,)
-    texts = [toml_value(f"{_number(factor * each)} {unit}") for each in values]
+    texts = [toml_value(f"{_number(factor * number)} {unit}") for number in values]
     return f"{key} = [{', '.join(texts)}]" if isinstance(value, tuple) else f"{key} = {texts[0]}"
 
 
 def _number(value: float) -> str:
-    """A number to twelve digits, in which no rounding of a unit is left."""
+    """Number with twelve digits, without the rounding errors of units."""
     return f"{value:.12g}"
 
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """Standard errors of relative changes of k parameters: those promised, and those that simulated campaigns show.
+    """Predicted and simulated standard errors of relative changes of k parameters.
 
     Args:
         names: of the parameters.
-        predicted: by the plan, (k,).
-        deviations: found less true values of each campaign, relative, (campaigns, k).
-        failed: campaigns that could not be fitted.
+        predicted: standard errors by the plan, (k,).
+        deviations: fitted less true values of each campaign, relative, (campaigns, k).
+        failed: number of campaigns that could not be fitted.
         seed: of the first campaign; the others count on.
     """
 
@@ -137,45 +152,61 @@ class Check:
     seed: int
 
     @property
-    def found(self) -> Array:
-        """Standard deviation of what the campaigns show about the truth, (k,)."""
+    def observed(self) -> Array:
+        """Root mean square deviation of the fitted from the true values, (k,)."""
         return np.sqrt(np.mean(np.square(self.deviations), axis=0))
 
     @property
     def interval(self) -> tuple[Array, Array]:
-        """95 % interval of each standard error found, (k,) each: of n campaigns, n found^2 / chi-square of n."""
+        """95 % interval of each observed standard error, (k,) each: n observed^2 / chi-square of n, n campaigns."""
         n = len(self.deviations)
-        low, high = (self.found * np.sqrt(n / chdtri(n, p)) for p in (0.025, 0.975))
+        low, high = (self.observed * np.sqrt(n / chdtri(n, p)) for p in (0.025, 0.975))
         return low, high
 
 
-def check(plan: Plan, count: int, seed: int, every: Every) -> Check:
-    """Simulate and fit a plan `count` times.
+def check(plan: Plan, count: int, seed: int, run_all: SeedRunner) -> Check:
+    """Simulate and fit a plan several times.
 
-    A plan that adds to tests of a campaign is simulated with those, as it will be fitted with them.
+    A plan that continues a campaign is simulated with the tests of the campaign, because they are fitted together.
 
     Args:
+        plan: to be simulated.
+        count: number of campaigns.
         seed: of the first campaign; the others count on.
-        every: gives work(seed) of each seed with its number, in any order: as `batch.executor.run_rows` on all cores.
+        run_all: calls a function for all seeds, such as `batch.executor.run_rows` on all cores.
+
+    Returns:
+        Predicted and observed standard errors.
 
     Raises:
         FitError: none of the campaigns could be fitted.
     """
     knowledge = plan.knowledge
     settings = settings_of((*knowledge.tests, *plan.planned.tests), knowledge.noise)
-    work = partial(_fit_one, undisturbed(knowledge.model, settings), settings, plan.wanted.rig, knowledge.names)
-    found = dict(every(range(seed, seed + count), work))
-    fitted = [row for _, row in sorted(found.items()) if row is not None]
+    work = partial(fit_campaign, undisturbed(knowledge.model, settings), settings, plan.request.rig, knowledge.names)
+    errors = [row for _, row in sorted(run_all(range(seed, seed + count), work), key=lambda pair: pair[0])]
+    fitted = [row for row in errors if row is not None]
     if not fitted:
         raise FitError("no simulated campaign of this plan could be fitted", found=f"{count} campaigns")
     predicted = plan.planned.errors if knowledge.tests else plan.planned.alone
     return Check(knowledge.names, predicted, np.array(fitted), count - len(fitted), seed)
 
 
-def _fit_one(
+def fit_campaign(
     clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str], seed: int
-) -> Found:
-    """Relative errors of the parameters that are fitted to one simulated campaign; None without a fit."""
+) -> RelativeErrors:
+    """Simulate one campaign and fit it.
+
+    Args:
+        clean: tests without noise.
+        settings: of the virtual rig.
+        rig: class of the rig, which the fit receives.
+        names: of the k parameters.
+        seed: of the random numbers.
+
+    Returns:
+        Relative errors of the fitted parameters, (k,); None if no fit was possible.
+    """
     truth = clean.truth
     coordinates, sizes = Coordinates.of_parameters(truth, names), relative_sizes(truth, names)
     with threadpool_limits(1), suppress(FitError):

@@ -148,16 +148,17 @@ class Target:
 
 
 @dataclass(frozen=True, eq=False)
-class Wanted:
-    """Aim of a plan.
+class PlanRequest:
+    """Aim of a plan, with the hours and limits of the rig.
 
     Args:
+        aim: quantity whose errors the plan minimises, or "rivals" to separate models.
+        hours: largest duration on the rig [h].
+        rig: limits of the rig, and its time for a point and for a set-up.
+        places: directions or specimens that the rig can test.
+        points: points at which the stiffness is wanted; the plan reports its errors there whatever the aim.
         parameters: names whose errors count, of aim "parameters".
-        targets: of aim "targets": once they are met, no further test is planned.
-        points: where the stiffness is wanted; the plan reports its errors there whatever the aim.
-        hours: of the rig, at most.
-        rig: its limits, and its time for a point and for a set-up.
-        places: directions, or specimens, in which it can test.
+        targets: of aim "targets": no further test is planned once they are met.
     """
 
     aim: Aim
@@ -170,14 +171,14 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Visible:
-    """The smallest amount of an effect that a programme finds.
+class DetectableAmount:
+    """Smallest amount of an effect that a programme detects in 90 % of the cases, by a test at the 5 % level.
 
     Args:
-        effect: of the library, that the model lacks.
-        parameter: whose amount it is.
-        unit: of the amount, SI.
-        amount: that is found in nine of ten cases (by a test that a sound model fails in one of twenty).
+        effect: name of an effect that the model lacks.
+        parameter: name of the parameter that the amount is of.
+        unit: SI unit of the amount.
+        amount: in that unit.
     """
 
     effect: str
@@ -197,10 +198,10 @@ class Programme:
         alone: the errors by these tests alone, (k,).
         stiffness: standard error of |K| at the points wanted, relative, all points of all directions, (n,).
         loss: the same of the loss factor, in loss factor, (n,).
-        apart: expected chi-square between the two nearest rivals that can be separated, after the best refit of
-            either; None without rivals.
+        rival_chi_square: expected chi-square between the two nearest rivals that can be separated, after the best
+            refit of either; None without rivals.
         halves: half of the 95 % interval of each target over its value, the widest of all points.
-        visible: of the effects that the standard programme can show, the smallest amount found.
+        detectable: smallest detectable amount of each effect that the standard programme can show.
         drift: largest shift of a parameter, over its standard error, by a drift of the gain of 1 % over the session.
     """
 
@@ -210,9 +211,9 @@ class Programme:
     alone: Array
     stiffness: Array
     loss: Array
-    apart: float | None
+    rival_chi_square: float | None
     halves: tuple[float, ...]
-    visible: tuple[Visible, ...]
+    detectable: tuple[DetectableAmount, ...]
     drift: float
 
     @property
@@ -229,14 +230,16 @@ class Plan:
         before: a programme without tests.
         planned: the tests chosen.
         standard: the paper's tests, as often as the same hours allow.
-        purposes: of each test with all its repeats, what would be lost without it, in words.
-        missed: by what the planned tests fail each target, in words; None where they meet it.
-        enough: why hours stay free, in words; None where they are used.
+        knowledge: before the tests.
+        request: aim of the plan.
+        purposes: sentence on the loss without a test and all its repeats, by test.
+        missed: reason why the planned tests miss each target; None where they meet it.
+        enough: reason why hours stay free; None if they are used.
         notes: warnings and limits of the plan.
     """
 
     knowledge: Knowledge
-    wanted: Wanted
+    request: PlanRequest
     before: Programme
     planned: Programme
     standard: Programme

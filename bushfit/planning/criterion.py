@@ -13,265 +13,320 @@ from bushfit.planning.contract import Knowledge
 from bushfit.planning.sensitivity import Grid, Information, relative_slopes
 from bushfit.progress import track
 
-#: Fall of the logarithm of the variance that a run, or an exchange, is worth; chosen: a quarter per cent of the error.
-_WORTH = 5e-3
-#: Weight of what the parameters take of a drift, beside what shows of it; chosen: orders then keep it below a fifth of
-#: a standard error for 1 % over the session.
-_STEADY = 100.0
+#: Smallest useful decrease of the logarithm of the variance by a run or an exchange; chosen: 0.25 % of the error.
+_USEFUL_DECREASE = 5e-3
+#: Weight of the shift of the parameters by a drift beside the visibility of the drift; chosen: orders then keep the
+#: shift below a fifth of a standard error for a drift of 1 % over the session.
+_SHIFT_WEIGHT = 100.0
 
 
 @dataclass(frozen=True, eq=False)
-class View:
-    """Information of tests on the parameters of one model, and on further columns beside these.
+class ModelInformation:
+    """Information of candidate tests on the k parameters of one model, and on e further columns.
 
     Args:
-        information: of every candidate test, made once.
-        prior: information on relative changes of the parameters before, (k, k).
-        level: error that all runs of a test share, gain and phase, (tests, 2).
-        bounded: so many of the parameters, the last, are at rest on a bound.
+        runs: information of one run of each candidate test.
+        prior: information on relative changes of the parameters before the tests, (k, k).
+        level: standard deviations of the gain and phase errors that all runs of a test share, (tests, 2).
+        bounded: number of parameters at a bound, which are the last ones.
     """
 
-    information: Information
+    runs: Information
     prior: Array
     level: Array
     bounded: int = 0
 
     @classmethod
-    def of(cls, grid: Grid, knowledge: Knowledge, further: Array | None = None) -> View:
-        """Information of the tests of a grid on the parameters of a model, and on further columns, (e, n)."""
+    def from_grid(cls, grid: Grid, knowledge: Knowledge, further: Array | None = None) -> ModelInformation:
+        """Compute the information of the tests of a grid.
+
+        Args:
+            grid: candidate tests.
+            knowledge: the model and its parameters.
+            further: further columns over the residuals of the grid, (e, n).
+
+        Returns:
+            Information on the parameters and the further columns.
+        """
         slopes = relative_slopes(knowledge, grid.data_sets)
         columns = np.empty((0, slopes.shape[-1])) if further is None else further
         return cls(grid.information(slopes, columns), knowledge.precision, grid.level, len(knowledge.bounded))
 
-    def together(self, counts: Array) -> Information:
-        """Information of the given number of runs of each test, (tests,), with the knowledge before, (1, ...)."""
-        total = self._each(counts).total()
-        return replace(total, own=total.own + self.prior)
+    def total(self, counts: Array) -> Information:
+        """Information of a number of runs of each test, (tests,), and of the prior, (1, ...)."""
+        total = self.runs.scaled(counts).with_line_error(self.level).summed()
+        return replace(total, parameters=total.parameters + self.prior)
 
-    def one_more(self, counts: Array) -> Information:
-        """Information with one run more of each test in turn, (tests, ...)."""
-        return self.together(counts) + (self._each(counts + 1) - self._each(counts))
+    def with_one_more(self, counts: Array) -> Information:
+        """Information with one more run of each test in turn, (tests, ...)."""
+        now, more = (self.runs.scaled(runs).with_line_error(self.level) for runs in (counts, counts + 1))
+        return self.total(counts) + (more - now)
 
-    def error_covariance(self, found: Information) -> Array:
-        """Expected squares and products of what a fit to such tests finds less the truth, (..., k, k).
+    def error_covariance(self, information: Information) -> Array:
+        """Compute the expected squares and products of the errors of the parameters.
+
+        Args:
+            information: of the tests and the prior.
+
+        Returns:
+            Covariance of relative changes, (..., k, k).
 
         Notes:
-            Of a parameter whose true value is on its bound, noise would take half of the fits beyond it. There it stays
-            on the bound, and the others are found as if it were held: so half of what it adds to their squares is gone.
+            If the true value of a parameter is at its bound, noise would take half of the fits beyond the bound. In
+            these the parameter stays there, and the others are fitted with it fixed, so half of its contribution to
+            their squares is absent.
         """
-        free = np.linalg.inv(found.own)
+        free = np.linalg.inv(information.parameters)
         first = free.shape[-1] - self.bounded
-        own = free[..., first:]
-        return free - 0.5 * own @ np.linalg.inv(own[..., first:, :]) @ own.mT
-
-    def _each(self, counts: Array) -> Information:
-        """Information of the given number of runs of each test on the parameters, test by test."""
-        return self.information.times(counts).beside(self.level)
+        bounded = free[..., first:]
+        return free - 0.5 * bounded @ np.linalg.inv(bounded[..., first:, :]) @ bounded.mT
 
 
 @dataclass(frozen=True, eq=False)
 class Criterion:
-    """Criterion that a choice of tests makes small.
+    """Criterion of a choice of tests; the smaller, the better.
 
     Args:
-        views: the likeliest model's, whose further columns are effects that it lacks; then those of its rivals.
-        weight: of the parameters' covariance in the variance that is wanted small, (k, k); None where rivals are to be
-            told apart.
-        odds: of the rivals, as probable as they are now, (rivals,).
-        least: noncentrality of each effect that the tests are to reach at least, (e,); 0 where none is asked for.
-        penalty: weight of the logarithm of each lack of it, beside the logarithm of the variance that is wanted small.
+        models: information on the likeliest model, whose further columns are effects that it lacks; then on its rivals.
+        weight: weight of the parameters' covariance in the variance to minimise, (k, k); None to separate rivals.
+        probabilities: present probabilities of the rivals, (rivals,).
+        minimum_noncentrality: smallest wanted noncentrality of each effect, (e,); 0 where none is wanted.
+        penalty: weight of the logarithm of each shortfall beside the logarithm of the variance.
     """
 
-    views: Sequence[View]
+    models: Sequence[ModelInformation]
     weight: Array | None
-    odds: Array
-    least: Array
+    probabilities: Array
+    minimum_noncentrality: Array
     penalty: float
 
-    def together(self, counts: Array) -> float:
-        """Criterion of the given number of runs of each test, (tests,)."""
-        return float(self._of([view.together(counts) for view in self.views])[0])
+    def value(self, counts: Array) -> float:
+        """Criterion of a number of runs of each test, (tests,)."""
+        return float(self.values([model.total(counts) for model in self.models])[0])
 
-    def one_more(self, counts: Array) -> Array:
-        """Criterion with one run more of each test in turn, (tests,)."""
-        return self._of([view.one_more(counts) for view in self.views])
+    def values_with_one_more(self, counts: Array) -> Array:
+        """Criterion with one more run of each test in turn, (tests,)."""
+        return self.values([model.with_one_more(counts) for model in self.models])
 
-    def _of(self, found: Sequence[Information]) -> Array:
+    def values(self, informations: Sequence[Information]) -> Array:
+        """Compute the criterion of several choices.
+
+        Args:
+            informations: information of the choices on each model, (choices, ...).
+
+        Returns:
+            Criterion, (choices,).
+        """
         if self.weight is None:
-            aim = np.log(np.maximum(entropy_left(self.odds, distances(found[1:])), np.finfo(float).tiny))
+            entropy = entropy_left(self.probabilities, rival_chi_squares(informations[1:]))
+            aim = np.log(np.maximum(entropy, np.finfo(float).tiny))
         else:
-            aim = np.log(np.einsum("tij,ij->t", self.views[0].error_covariance(found[0]), self.weight))
-        asked = self.least > 0.0
-        reached = noncentrality_of(found[0])[:, asked] / self.least[asked]
-        return aim - self.penalty * np.sum(np.log(np.clip(reached, 1e-12, 1.0)), axis=1)  # finite
+            aim = np.log(np.einsum("tij,ij->t", self.models[0].error_covariance(informations[0]), self.weight))
+        wanted = self.minimum_noncentrality > 0.0
+        share = noncentralities(informations[0])[:, wanted] / self.minimum_noncentrality[wanted]
+        return aim - self.penalty * np.sum(np.log(np.clip(share, 1e-12, 1.0)), axis=1)  # finite
 
 
-def noncentrality_of(found: Information) -> Array:
-    """Noncentrality of each further column beside the parameters, (tests, e): chi-square that a unit of it makes."""
-    return np.maximum(found.size - np.sum(found.cross * np.linalg.solve(found.own, found.cross), axis=-2), 0.0)
+def noncentralities(information: Information) -> Array:
+    """Expected chi-square by one unit of each further column after a refit of the parameters, (tests, e)."""
+    fitted = np.linalg.solve(information.parameters, information.cross)
+    return np.maximum(information.squares - np.sum(information.cross * fitted, axis=-2), 0.0)
 
 
-def distances(found: Sequence[Information]) -> Array:
+def rival_chi_squares(informations: Sequence[Information]) -> Array:
     """Expected chi-square between any two rivals after the best refit of either, (tests, rivals, rivals)."""
-    each = [noncentrality_of(one) for one in found]
-    one_way = np.stack([np.insert(row, place, 0.0, axis=1) for place, row in enumerate(each)], axis=1)
+    rows = [np.insert(noncentralities(rival), index, 0.0, axis=1) for index, rival in enumerate(informations)]
+    one_way = np.stack(rows, axis=1)
     return np.minimum(one_way, np.swapaxes(one_way, 1, 2))
 
 
-def root_of(information: Array) -> Array:
-    """A root of the covariance that an information leaves, R R^T, (k, k)."""
+def covariance_root(information: Array) -> Array:
+    """Root R of the covariance R R^T that belongs to an information matrix, (k, k)."""
     return np.linalg.inv(np.linalg.cholesky(information)).T
 
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """Duration and limits of tests.
+    """Durations and limits of the candidate tests.
 
     Args:
-        minutes: of each test, (tests,).
-        place: number of the place of each test, (tests,).
-        line: number of what each test holds, (tests,): of tests that hold the same, one is chosen.
-        runs: of each test at most, (tests,); 0 where it may not be chosen.
-        setup: minutes to mount the bushing at a place, once for each place that is tested.
-        most: minutes in all.
+        minutes: duration of one run of each test, (tests,).
+        place: number of the direction of each test, (tests,).
+        line: number of the quantity that each test holds constant, (tests,); one test of a line is chosen.
+        maximum_runs: largest number of runs of each test, (tests,); 0 where it may not be chosen.
+        setup_minutes: time to mount the bushing, once for each direction that is tested.
+        maximum_minutes: largest duration in all.
     """
 
     minutes: Array
     place: Array
     line: Array
-    runs: Array
-    setup: float
-    most: float
+    maximum_runs: Array
+    setup_minutes: float
+    maximum_minutes: float
 
     def spent(self, counts: Array) -> float:
-        """Minutes of so many runs of each test, (tests,)."""
-        return float(self.minutes @ counts) + self.setup * np.unique(self.place[counts > 0]).size
+        """Minutes of a number of runs of each test, (tests,)."""
+        return float(self.minutes @ counts) + self.setup_minutes * np.unique(self.place[counts > 0]).size
 
-    def further(self, counts: Array) -> Array:
-        """Minutes that one run more of each test adds, (tests,); beyond all limits where it may not be chosen."""
-        more = self.minutes + self.setup * ~np.isin(self.place, self.place[counts > 0])
-        barred = np.isin(self.line, self.line[counts > 0]) & (counts == 0) | (counts >= self.runs)
-        return np.where(barred | (self.spent(counts) + more > self.most), np.inf, more)
+    def minutes_of_one_more(self, counts: Array) -> Array:
+        """Minutes that one more run of each test adds, (tests,); infinite where it may not be chosen."""
+        more = self.minutes + self.setup_minutes * ~np.isin(self.place, self.place[counts > 0])
+        barred = np.isin(self.line, self.line[counts > 0]) & (counts == 0) | (counts >= self.maximum_runs)
+        return np.where(barred | (self.spent(counts) + more > self.maximum_minutes), np.inf, more)
 
 
-def best_runs(criterion: Criterion, budget: Budget, start: Array, kept: Array) -> Array:
-    """Number of runs of each test within the budget, (tests,), with a small criterion; at least those `kept`.
+def best_runs(criterion: Criterion, budget: Budget, start: Array, minimum_runs: Array) -> Array:
+    """Search for the number of runs of each test that makes the criterion small.
 
-    Notes: greedy from `start` by what the logarithm falls per minute; then exchanges (Fedorov 1972): one run of each
-    test, and all of them, are given up for the best that can be had in their time, as long as that helps.
+    Args:
+        criterion: to be made small.
+        budget: durations and limits of the tests.
+        start: number of runs of each test to start from, (tests,).
+        minimum_runs: smallest number of runs of each test, (tests,).
+
+    Returns:
+        Number of runs of each test within the budget, (tests,).
+
+    Notes:
+        Greedy by the decrease of the criterion per minute; then exchanges (Fedorov 1972): one run of a test, or all of
+        them, are replaced by the best runs in the same time, as long as that helps.
     """
-    counts = filled(criterion, budget, start)
-    best = criterion.together(counts)
+    counts = add_runs(criterion, budget, start)
+    best = criterion.value(counts)
     for _ in range(8):  # nearly all plans take three
         before = best
         for test in track("tests of the plan exchanged", np.flatnonzero(counts).tolist()):
-            for fewer in {1, int(counts[test] - kept[test])} - {0}:
-                if counts[test] - fewer < kept[test]:
+            for removed in {1, int(counts[test] - minimum_runs[test])} - {0}:
+                if counts[test] - removed < minimum_runs[test]:
                     continue
-                less = counts - fewer * (np.arange(counts.size) == test)
-                other = filled(criterion, budget, less)
-                value = criterion.together(other)
-                if value < best - _WORTH:
-                    counts, best = other, value
+                exchanged = add_runs(criterion, budget, counts - removed * (np.arange(counts.size) == test))
+                value = criterion.value(exchanged)
+                if value < best - _USEFUL_DECREASE:
+                    counts, best = exchanged, value
                     break
-        if before - best < _WORTH:
+        if before - best < _USEFUL_DECREASE:
             break
     return counts
 
 
-def filled(
+def add_runs(
     criterion: Criterion, budget: Budget, counts: Array, enough: Callable[[Array], bool] = lambda _: False
 ) -> Array:
-    """Runs added one after the other, each the best per minute, as long as time is left and they are not `enough`."""
-    counts, so_far = counts.copy(), criterion.together(counts)
-    while not enough(counts) and np.isfinite(further := budget.further(counts)).any():
-        values = criterion.one_more(counts)
-        fall = (so_far - values) / further
-        best = int(np.argmax(np.where(np.isfinite(further), fall, -np.inf)))
-        if so_far - values[best] <= _WORTH:
+    """Add runs one after the other, the best per minute first.
+
+    Args:
+        criterion: to be made small.
+        budget: durations and limits of the tests.
+        counts: number of runs of each test to start from, (tests,).
+        enough: returns true for a number of runs of each test after which no more are added.
+
+    Returns:
+        Number of runs of each test, (tests,).
+    """
+    counts, value = counts.copy(), criterion.value(counts)
+    while not enough(counts) and np.isfinite(minutes := budget.minutes_of_one_more(counts)).any():
+        values = criterion.values_with_one_more(counts)
+        decrease = (value - values) / minutes
+        best = int(np.argmax(np.where(np.isfinite(minutes), decrease, -np.inf)))
+        if value - values[best] <= _USEFUL_DECREASE:
             break
         counts[best] += 1
-        so_far = values[best]
+        value = values[best]
     return counts
 
 
 @dataclass(frozen=True, eq=False)
-class Drifting:
-    """Effect of a drift of the gain over the session on a given number of runs of each test.
-
-    Its noncentrality beside the parameters, with S1 and S2 the sums of t and of t^2 over the runs of each test, is
-    sum(seen S2 - shared S1^2) - |sum(S1 pull)|^2; t is the turn of a run, from -1/2 to 1/2 over the session.
+class DriftEffect:
+    """Effect of a drift of the gain over the session on a number of runs of each test.
 
     Args:
-        seen: square of what a unit of gain makes of one run of each test, in units of noise, (tests,).
-        shared: the part of it that an error of the level may be, (tests,).
-        pull: what the parameters take of it, (tests, k).
+        gain_information: square of the change of one run by a unit of gain, in units of noise, (tests,).
+        level_share: part of it that may be an error of the level, (tests,).
+        shift_root: shift of the parameters by a unit of gain, in standard errors, (tests, k).
+
+    Notes:
+        With S1 and S2 the sums of t and t^2 over the runs of each test, where t is the turn of a run from -1/2 to 1/2
+        over the session, the noncentrality of a unit drift after a refit of the parameters is
+        sum(gain_information S2 - level_share S1^2) - |sum(S1 shift_root)|^2.
     """
 
-    seen: Array
-    shared: Array
-    pull: Array
+    gain_information: Array
+    level_share: Array
+    shift_root: Array
 
-    def noncentrality(self, runs: Sequence[int]) -> float:
-        """Noncentrality of a drift of 1 over runs in their order, by the numbers of their tests."""
-        first, second = self._sums(np.array(runs, dtype=int))
-        shift = first @ self.pull
-        return float(self.seen @ second - self.shared @ first**2 - shift @ shift)
-
-    def shift(self, runs: Sequence[int]) -> Array:
-        """Shift of the parameters by a drift of 1, (k,)."""
-        return self._sums(np.array(runs, dtype=int))[0] @ self.pull
-
-    def _sums(self, runs: Array) -> tuple[Array, Array]:
-        first, second = (np.bincount(runs, turns(runs.size) ** power, self.seen.size) for power in (1, 2))
+    def turn_sums(self, runs: Sequence[int] | Array) -> tuple[Array, Array]:
+        """Sums of the turns and of their squares over the runs of each test, (tests,) each."""
+        tests = np.array(runs, dtype=int)
+        first, second = (np.bincount(tests, turns(tests.size) ** power, self.gain_information.size) for power in (1, 2))
         return first, second
 
-    def exchanged(self, runs: Array) -> Array:
-        """Growth of the noncentrality if two runs change places, (runs, runs).
+    def noncentrality(self, runs: Sequence[int] | Array) -> float:
+        """Noncentrality of a unit drift over runs in their order, given by the numbers of their tests."""
+        first, second = self.turn_sums(runs)
+        shift = first @ self.shift_root
+        return float(self.gain_information @ second - self.level_share @ first**2 - shift @ shift)
 
-        The shift of the parameters is weighted by _STEADY.
+    def shift(self, runs: Sequence[int] | Array) -> Array:
+        """Shift of the parameters by a unit drift over runs in their order, (k,)."""
+        return self.turn_sums(runs)[0] @ self.shift_root
+
+    def exchange_gains(self, runs: Array) -> Array:
+        """Compute the growth of the noncentrality if two runs change places.
+
+        Args:
+            runs: numbers of the tests in their order, (runs,).
+
+        Returns:
+            Growth for each pair of runs, (runs, runs); the shift of the parameters counts with _SHIFT_WEIGHT.
         """
         turn = turns(runs.size)
-        first = self._sums(runs)[0]
-        moved, squared = turn - turn[:, None], turn**2 - turn[:, None] ** 2  # of the run in the row
-        seen, shared, pull, sums = self.seen[runs], self.shared[runs], self.pull[runs], first[runs]
-        levels = shared[:, None] * (2.0 * sums[:, None] + moved) * moved - shared * (2.0 * sums - moved) * moved
-        change = moved[..., None] * (pull[:, None] - pull)
-        pulled = np.sum((2.0 * (first @ self.pull) + change) * change, axis=-1)
-        return np.where(runs[:, None] == runs, 0.0, (seen[:, None] - seen) * squared - levels - _STEADY * pulled)
+        first = self.turn_sums(runs)[0]
+        step, squared = turn - turn[:, None], turn**2 - turn[:, None] ** 2  # of the run in the row
+        gain, shared, root = self.gain_information[runs], self.level_share[runs], self.shift_root[runs]
+        sums = first[runs]
+        levels = shared[:, None] * (2.0 * sums[:, None] + step) * step - shared * (2.0 * sums - step) * step
+        change = step[..., None] * (root[:, None] - root)
+        shifts = np.sum((2.0 * (first @ self.shift_root) + change) * change, axis=-1)
+        return np.where(runs[:, None] == runs, 0.0, (gain[:, None] - gain) * squared - levels - _SHIFT_WEIGHT * shifts)
 
 
 def turns(count: int) -> Array:
-    """The turn of each run of a session, from -1/2 to 1/2, (count,)."""
+    """Turn of each run of a session, from -1/2 to 1/2, (count,)."""
     return np.arange(count) / max(count - 1, 1) - 0.5
 
 
-def ordered(counts: Array, places: Array, drifting: Drifting) -> list[int]:
-    """Order of the runs, place by place; each place begins and ends with the same test if one is repeated.
+def order_runs(counts: Array, places: Array, drift: DriftEffect) -> list[int]:
+    """Order the runs direction by direction; each begins and ends with the same test if one is repeated.
 
     Args:
-        counts: (tests,).
-        places: number of the place of each test, in the order in which they are mounted, (tests,).
+        counts: number of runs of each test, (tests,).
+        places: number of the direction of each test, in the order in which they are mounted, (tests,).
+        drift: effect of a drift on these runs.
 
-    Notes: the others are mirrored about the middle, then the two runs of one place that show the drift best when they
-    change places do so, as long as two do.
+    Returns:
+        Numbers of the tests in the order of the runs.
+
+    Notes:
+        The inner runs are mirrored about the middle. Then the two runs of one direction whose exchange makes the drift
+        most visible change places, as long as any exchange does.
     """
-    order, held = list[int](), list[int]()
+    order, ends = list[int](), list[int]()
     for place in np.unique(places[counts > 0]):
         chosen = np.where(places == place, counts, 0)
-        twice = np.flatnonzero(chosen > 1)
-        ends = [int(twice[np.argmax(drifting.seen[twice])])] if twice.size else []
-        chosen[ends] -= 2
+        repeated = np.flatnonzero(chosen > 1)
+        outer = [int(repeated[np.argmax(drift.gain_information[repeated])])] if repeated.size else []
+        chosen[outer] -= 2
         inner = np.repeat(np.arange(chosen.size), chosen).tolist()
-        if ends:
-            held += [len(order), len(order) + len(inner) + 1]
-        order += [*ends, *inner[::2], *inner[1::2][::-1], *ends]
-    runs, free = np.array(order), ~np.isin(np.arange(len(order)), held)
+        if outer:
+            ends += [len(order), len(order) + len(inner) + 1]
+        order += [*outer, *inner[::2], *inner[1::2][::-1], *outer]
+    runs, free = np.array(order), ~np.isin(np.arange(len(order)), ends)
     for _ in range(100):  # nearly all orders take twenty
-        together = (places[runs][:, None] == places[runs]) & free[:, None] & free
-        gain = np.where(together, drifting.exchanged(runs), 0.0)
-        one, other = np.unravel_index(int(np.argmax(gain)), gain.shape)
-        if gain[one, other] <= 1e-9 * abs(drifting.noncentrality(runs.tolist())):
+        exchangeable = (places[runs][:, None] == places[runs]) & free[:, None] & free
+        gains = np.where(exchangeable, drift.exchange_gains(runs), 0.0)
+        i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
+        if gains[i, j] <= 1e-9 * abs(drift.noncentrality(runs)):
             break
-        runs[[one, other]] = runs[[other, one]]
+        runs[[i, j]] = runs[[j, i]]
     return runs.tolist()

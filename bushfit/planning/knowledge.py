@@ -1,4 +1,4 @@
-"""Knowledge before tests are planned: from a campaign and its diagnosis, a model, or hardness and filler."""
+"""Knowledge before the tests of a plan: from a campaign and its diagnosis, a model, or hardness and filler."""
 
 from collections import defaultdict
 from collections.abc import Container, Iterable, Iterator, Sequence
@@ -37,7 +37,7 @@ _DENSITY = {"natural": 0.92, "SBR": 0.94, "EPDM": 0.86, "NBR": 1.0, "CR": 1.23, 
 _PAPER_FILLER = 27.0
 #: Angular frequency that a reading of a durometer after 3 s stands for [rad/s]: its inverse.
 _READING = 1.0 / 3.0
-#: Angular frequency at which the springpot is held against the spring, 10 Hz [rad/s]: the middle of usual sweeps.
+#: Angular frequency at which springpot and spring are compared, 10 Hz [rad/s]: the middle of usual sweeps.
 _MIDDLE = 2.0 * np.pi * 10.0
 #: Springpot over spring at 10 Hz [1], from Table 1: 0.2/2 62.8^0.24/1.09.
 _SPRINGPOT = 0.25
@@ -64,20 +64,29 @@ _OTHER_ERRORS = np.array([0.7, 0.5, 0.7, 0.5])
 _NETWORK_ERROR = 1.0
 
 
-def of_result(result: Result, noise: Noise | None = None, source: str = "") -> Knowledge:
-    """Knowledge from a fitted model; values of a model that was not fitted are within a factor of 2.7."""
+def from_result(result: Result, noise: Noise | None = None, source: str = "") -> Knowledge:
+    """Make knowledge from a fitted model; values of a model that was not fitted are within a factor of 2.7.
+
+    Args:
+        result: model and covariance.
+        noise: of the rig; None for an assumed rig.
+        source: origin of the knowledge, as a phrase; empty for a standard one.
+
+    Returns:
+        Knowledge of the parameters that have a standard error, or of all if the model was not fitted.
+    """
     model, fitted = result.model, result.covariance
     names = tuple(name for name in fitted.names if fitted.stderr(name)) or tuple(model.parameters)
-    covariance, words = np.eye(len(names)) / 4.0, "values given by hand, taken as right within a factor of 2.7"
+    covariance, origin = np.eye(len(names)) / 4.0, "values given by hand, taken as right within a factor of 2.7"
     if fitted.names:
         size = Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names)
-        covariance, words = fitted.restricted(names).matrix / np.outer(size, size), "a fitted model"
+        covariance, origin = fitted.restricted(names).matrix / np.outer(size, size), "a fitted model"
     strain = result.measured.strain[1] if result.measured else None
     return Knowledge(
         model,
         names,
         covariance,
-        source or words,
+        source or origin,
         noise or Noise(),
         strain=strain,
         specimens=result.specimens,
@@ -86,68 +95,72 @@ def of_result(result: Result, noise: Noise | None = None, source: str = "") -> K
     )
 
 
-def of_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -> Knowledge:
+def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -> Knowledge:
     """Knowledge from the tests of a campaign, fitted together, and with each rival effect added in turn.
 
-    The class of the rig counts as noise, stated or not, as it does in what is planned. Beside rivals the model has
-    what a diagnosis is sure of, and the leaders of its other sets of look-alikes.
+    The errors of the class of the rig are noise, whether [rig] states them or not, as in the planned tests. If there
+    are rivals, the model also has the effects that a diagnosis named for certain, and the first effect of each other
+    set that the diagnosis cannot separate.
 
     Args:
+        data: tests of the campaign.
         rivals: names of effects; empty for those that a diagnosis of these tests cannot separate, None for no
             rivals.
+
+    Returns:
+        Knowledge of the likeliest model, with its rivals.
 
     Raises:
         FitError: data that cannot support the fit.
         ModelError: effects that these tests could not show, or a diagnosis without rivals.
     """
     _check_rivals(rivals or (), LIBRARY)
-    found = None if rivals is None else diagnose(data)
+    diagnosis = None if rivals is None else diagnose(data)
     noise = noise_of(data)
     data = PreparedCampaign.from_campaign(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
     data_sets = data.data_sets
     model = data.starting_model(data.effects, data_sets, {})
-    held = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
+    fixed = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
     source = f"the tests of {data.campaign.name}"
 
     def knowledge(evidence: Evidence) -> Knowledge:
         result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
-        strain = max(float(np.max(each.amplitude)) * model.unit_strain(each.direction) for each in data_sets)
-        plain = replace(of_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
+        strain = max(float(np.max(tests.amplitude)) * model.unit_strain(tests.direction) for tests in data_sets)
+        plain = replace(from_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
         bounded = tuple(evidence.solution.at_bound)
         return _with_bounded(plain, bounded, data_sets) if bounded else plain
 
-    if found is None or rivals is None:
-        return knowledge(fit(model, data_sets, held, data.bounds))
-    sets = look_alikes(found)
+    if diagnosis is None or rivals is None:
+        return knowledge(fit(model, data_sets, fixed, data.bounds))
+    sets = look_alikes(diagnosis)
     names = list(dict.fromkeys(twins_of(name)[0] for name in rivals or next(iter(sets), ())))
     if not names:
         raise ModelError(
             "there are no rivals to be told apart",
             file=data.campaign.path,
-            found=f"the diagnosis of these tests is {found.verdict}",
+            found=f"the diagnosis of these tests is {diagnosis.verdict}",
             expected="ambiguous",
             hint="name effects with --rivals, or plan for parameters or predictions",
         )
-    sure = [name for name in found.result.model.effects if name not in model.effects]
-    leaders = [others[0] for others in sets if not {*names} & {*others}]
-    plain = fit(model, data_sets, held, data.bounds)
-    for name in (*sure, *leaders):
+    certain = [name for name in diagnosis.result.model.effects if name not in model.effects]
+    leaders = [effects[0] for effects in sets if not {*names} & {*effects}]
+    plain = fit(model, data_sets, fixed, data.bounds)
+    for name in (*certain, *leaders):
         if name not in names:
-            plain = _each_added(plain, [name], held, data.bounds).get(name, plain)
-    rivalling = _each_added(plain, names, held, data.bounds)
-    _check_rivals(names, rivalling)
-    told = zip(found.odds.labels, found.odds.told, strict=True)
-    odds = defaultdict[str, float](float)
-    for label, (_, share) in told:
+            plain = _add_effects(plain, [name], fixed, data.bounds).get(name, plain)
+    fits = _add_effects(plain, names, fixed, data.bounds)
+    _check_rivals(names, fits)
+    probabilities = defaultdict[str, float](float)
+    for label, (_, share) in zip(diagnosis.odds.labels, diagnosis.odds.told, strict=True):
         for name in label.split(" + "):
-            odds[name] += share
-    least = min(odds.values(), default=1.0)
-    every = [replace(knowledge(rivalling[name]), probability=odds[name] or least) for name in names]
-    return replace(every[0], rivals=tuple(every))
+            probabilities[name] += share
+    smallest = min(probabilities.values(), default=1.0)
+    models = [replace(knowledge(fits[name]), probability=probabilities[name] or smallest) for name in names]
+    return replace(models[0], rivals=tuple(models))
 
 
 def _check_rivals(names: Iterable[str], possible: Container[str]) -> None:
-    """Refuse effects that are none, which costs no diagnosis, or that these tests could not show."""
+    """Raise a ModelError for names that are no effect, or that these tests could not show."""
     if unknown := [name for name in names if name not in possible]:
         raise ModelError(
             "this is no rival in these tests",
@@ -159,70 +172,86 @@ def _check_rivals(names: Iterable[str], possible: Container[str]) -> None:
 
 
 def _with_bounded(knowledge: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[MeasuredTest]) -> Knowledge:
-    """Knowledge in which parameters at a bound count as free, except those that the tests do not show.
+    """Knowledge that treats parameters at a bound as free, except those that the tests do not show.
 
-    Noise beyond the one that was counted is taken from the errors of the other parameters."""
+    The excess of noise over the assumed noise follows from the errors of the other parameters.
+    """
     k = len(knowledge.names)
     slopes = relative_slopes(replace(knowledge, bounded=bounded), data_sets)
-    own, others = slopes[:k], slopes[k:]
-    answer = -np.linalg.lstsq(own.T, others.T)[0]
-    beside = others + answer.T @ own
-    seen = np.linalg.norm(beside, axis=1) > 1e-6 * np.linalg.norm(others, axis=1)  # of rounding
-    if not seen.any():
+    free, at_bound = slopes[:k], slopes[k:]
+    response = -np.linalg.lstsq(free.T, at_bound.T)[0]
+    remainder = at_bound + response.T @ free
+    is_visible = np.linalg.norm(remainder, axis=1) > 1e-6 * np.linalg.norm(at_bound, axis=1)  # of rounding
+    if not is_visible.any():
         return knowledge
-    information = own @ own.T
+    information = free @ free.T
     live = np.diag(information) > 0.0
     excess = float(np.mean(np.diag(knowledge.covariance @ information)[live])) if live.any() else 1.0
-    answer, beside = answer[:, seen], beside[seen]
-    alone = excess * np.linalg.inv(beside @ beside.T)
-    shared = answer @ alone
-    covariance = np.block([[knowledge.covariance + shared @ answer.T, shared], [shared.T, alone]])
-    return replace(knowledge, bounded=tuple(np.array(bounded)[seen].tolist()), covariance=covariance)
+    response, remainder = response[:, is_visible], remainder[is_visible]
+    alone = excess * np.linalg.inv(remainder @ remainder.T)
+    shared = response @ alone
+    covariance = np.block([[knowledge.covariance + shared @ response.T, shared], [shared.T, alone]])
+    return replace(knowledge, bounded=tuple(np.array(bounded)[is_visible].tolist()), covariance=covariance)
 
 
-def _each_added(plain: Evidence, names: Sequence[str], held: Sequence[str], bounds: Bounds) -> dict[str, Evidence]:
+def _add_effects(plain: Evidence, names: Sequence[str], fixed: Sequence[str], bounds: Bounds) -> dict[str, Evidence]:
     """The fit with each of these effects added in turn, by name; without those that the tests could not show."""
-    proposed = [proposal for proposal in proposals(plain, (), held) if proposal.name in names]
-    return refitted(plain, proposed, {}, held, bounds)
+    proposed = [proposal for proposal in proposals(plain, (), fixed) if proposal.name in names]
+    return refitted(plain, proposed, {}, fixed, bounds)
 
 
-def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:
+def look_alikes(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
     """Sets of effects that a diagnosis cannot separate, without mistakes and faults, which no test separates.
 
-    Effects that all explanations of a set share are left out."""
-    sets, every = [], [each.name for each in found.effects]
-    for named in found.effects:
-        if named.alternatives and not named.test and not named.alternatives[0].startswith("fault:"):
-            others = [label.split(" + ") for label in named.alternatives]
-            own = every if max(map(len, others)) > 1 else [named.name]
-            names = [name for name in dict.fromkeys(chain(own, *others)) if name.partition(".")[0] in LIBRARY]
-            sets.append(tuple(name for name in names if not all(name in each for each in (own, *others))))
+    Args:
+        diagnosis: of a campaign.
+
+    Returns:
+        Names of the effects of each set, without those that all explanations of the set share.
+    """
+    sets, all_named = [], [effect.name for effect in diagnosis.effects]
+    for effect in diagnosis.effects:
+        if effect.alternatives and not effect.test and not effect.alternatives[0].startswith("fault:"):
+            labels = [label.split(" + ") for label in effect.alternatives]
+            explanations = [all_named if max(map(len, labels)) > 1 else [effect.name], *labels]
+            names = [name for name in dict.fromkeys(chain(*explanations)) if name.partition(".")[0] in LIBRARY]
+            sets.append(tuple(name for name in names if not all(name in effects for effects in explanations)))
     return [names for names in sets if len(names) > 1]
 
 
 def noise_of(data: PreparedCampaign) -> Noise:
-    """Noise of the rig of a campaign, from its tests where they show it, else assumed."""
+    """Estimate the noise of the rig of a campaign.
+
+    Args:
+        data: tests of the campaign.
+
+    Returns:
+        Noise as the tests show it; assumed where they do not.
+    """
     loops, sweeps = split_by_kind(data.data_sets)
-    found = replace(Noise(), level=of_class(data.campaign.rig))
+    estimate = replace(Noise(), level=of_class(data.campaign.rig))
     if sweeps:
         noise = sweeps[0].noise
         gain, phase = np.sqrt(np.mean(np.square(list(noise.random.values())), axis=0)).tolist()
-        found = replace(found, scatter=(gain, phase), shared=noise.shared)
+        estimate = replace(estimate, scatter=(gain, phase), shared=noise.shared)
     if loops:
         rows = [loop.test.time.size / loop.drive.cycles for loop in loops]
-        each = [loop.relative_noise * np.sqrt(ROWS_PER_CYCLE / count) for loop, count in zip(loops, rows, strict=True)]
+        forces = [
+            loop.relative_noise * np.sqrt(ROWS_PER_CYCLE / count) for loop, count in zip(loops, rows, strict=True)
+        ]
         as_one = float(np.mean([loop.drive.row_noise.rows_as_one for loop in loops]))
-        found = replace(found, force=float(np.sqrt(np.mean(np.square(each)))), rows_as_one=as_one)
-    return found
+        force = float(np.sqrt(np.mean(np.square(forces))))
+        estimate = replace(estimate, force=force, rows_as_one=as_one)
+    return estimate
 
 
 def rig_of(rig: RigSettings, noise: Noise) -> RigSettings:
-    """The rig with its class stated as a plan counts it."""
+    """Settings of the rig with its class as a plan assumes it."""
     return replace(rig, gain_error=noise.level[0], phase_error=noise.level[1], displacement_error=None)
 
 
 def _tests(data: PreparedCampaign) -> Iterator[Test]:
-    """The runs of a campaign, as a plan has them; what swings free is none."""
+    """Runs of a campaign as a plan has them, without free oscillations."""
     for loop in data.loops:
         yield SimulatedLoop(
             loop.direction, loop.drive.amplitude, loop.drive.frequency, max(round(loop.drive.cycles), 1)
@@ -231,8 +260,8 @@ def _tests(data: PreparedCampaign) -> Iterator[Test]:
         stepped = sweep.sweep.stepped
         for block in np.split(np.arange(sweep.frequency.size), sweep.block_starts[1:]) if stepped else ():
             steps = tuple(sweep.step[block].tolist())
-            held = (float(sweep.held[block[0]]),)
-            amplitudes, frequencies = (held, steps) if stepped == "frequency" else (steps, held)
+            level = (float(sweep.held[block[0]]),)
+            amplitudes, frequencies = (level, steps) if stepped == "frequency" else (steps, level)
             yield SimulatedSweep(sweep.direction, amplitudes, frequencies, stepped or "frequency")
 
 
@@ -241,29 +270,38 @@ def gent_modulus(shore: float) -> float:
     return 1e6 * 0.0981 * (56.0 + 7.66 * shore) / (0.137505 * (254.0 - 2.54 * shore)) / 3.0
 
 
-def guess(bushing: Bushing, compound: Compound) -> Knowledge:
-    """Guess of the parameters of a rubber that was not tested, from hardness and filler, with its uncertainty.
+def guess_parameters(bushing: Bushing, compound: Compound) -> Knowledge:
+    """Guess the parameters of a rubber that was not tested, with their uncertainty, from hardness and filler.
 
-        E   = 0.0981 (56 + 7.66 S) / (0.137505 (254 - 2.54 S)) MPa, S in Shore A               (Gent 1958)
-        G   = E/3 = mu + Re m/2 (i omega_S)^alpha        a durometer is read some seconds after it is put down
-        phi = (n/1.8) / (n/1.8 + 100/density)            volume share of n phr of carbon black
-        X   = 1 + 2.5 phi + 14.1 phi^2                   strain of the rubber between particles   (Guth 1945)
-        q   = m/2 omega_0^alpha / mu = 0.25, alpha = 0.24               omega_0 = 2 pi 10 Hz
-        r   = sigma_fmax/(2 eps_half mu) = 0.51 (phi/phi_0)^3.5 X_0/X                             (Payne effect)
-        eps_half = 0.013 X_0/X
+    Args:
+        bushing: geometry.
+        compound: hardness [Shore A], carbon black [phr] and polymer.
 
-    The numbers are those of the paper's bushing (natural rubber, phi_0 of 27 phr, Table 1). Three laws carry them to
-    another compound: a filler network stiffens with phi^3.5, filler amplifies strain by X, and it amplifies spring and
-    springpot alike, so that their ratio q stays.
-
-    Sources: A. N. Gent, Rubber Chemistry and Technology 31 (1958) 896-906, whose relation is quoted with 7.66, as here,
-    or with 7.62336, which makes 0.5 % less; E. Guth, J. Applied Physics 16 (1945) 20-25; G. Heinrich, M. Klueppel,
-    Advances in Polymer Science 160 (2002) 1-44, for phi^3.5; Garcia Tarrago et al. 2007, Table 1.
+    Returns:
+        Knowledge of the five parameters.
 
     Notes:
+        The laws of the guess:
+
+            E   = 0.0981 (56 + 7.66 S) / (0.137505 (254 - 2.54 S)) MPa, S in Shore A               (Gent 1958)
+            G   = E/3 = mu + Re m/2 (i omega_S)^alpha        a durometer is read some seconds after it is put down
+            phi = (n/1.8) / (n/1.8 + 100/density)            volume share of n phr of carbon black
+            X   = 1 + 2.5 phi + 14.1 phi^2                   strain of the rubber between particles   (Guth 1945)
+            q   = m/2 omega_0^alpha / mu = 0.25, alpha = 0.24               omega_0 = 2 pi 10 Hz
+            r   = sigma_fmax/(2 eps_half mu) = 0.51 (phi/phi_0)^3.5 X_0/X                             (Payne effect)
+            eps_half = 0.013 X_0/X
+
+        The numbers are those of the paper's bushing (natural rubber, phi_0 of 27 phr, Table 1). Three laws apply them
+        to another compound: a filler network stiffens with phi^3.5, filler amplifies strain by X, and filler amplifies
+        spring and springpot equally, so their ratio q is the same.
+
+        Sources: A. N. Gent, Rubber Chemistry and Technology 31 (1958) 896-906, whose relation is quoted with 7.66, as
+        here, or with 7.62336, which gives 0.5 % less; E. Guth, J. Applied Physics 16 (1945) 20-25; G. Heinrich,
+        M. Klueppel, Advances in Polymer Science 160 (2002) 1-44, for phi^3.5; Garcia Tarrago et al. 2007, Table 1.
+
         ln G, ln q, ln alpha, ln r and ln eps_half are guessed independently, each with a standard deviation above.
-        These are chosen: one compound that was published and one that was measured lie inside, which tests/planning
-        asks for, and two compounds prove little. Where stiffness follows a power of frequency over four decades, as
+        These are chosen: one published and one measured compound lie inside (tests/planning), and two compounds prove
+        little. Where stiffness follows a power of frequency over four decades, as
         that of the measured one does, mu falls to nothing in a fit, and no guess of a spring holds it.
     """
     share, paper = _filled(compound.filler, _DENSITY[compound.rubber]), _filled(_PAPER_FILLER, _DENSITY["natural"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import pathlib
 import tracemalloc
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.limits import RESULTS, Limits, judge_part, judge_value, read_limits, resolve_limits
-from bushfit.batch.manifest import Manifest, Settings, read_manifest
+from bushfit.batch.manifest import Manifest, RowSettings, read_manifest
 from bushfit.batch.quantities import list_quantities, measured_at, parse_point
 from bushfit.batch.row import estimate_quantities
 from bushfit.errors import BatchError, CampaignError, ModelError, UnitError
@@ -31,8 +32,8 @@ def written(folder: Path, text: str, name: str = "m.toml") -> str:
     return str(folder / name)
 
 
-def read(folder: Path, text: str, name: str = "m.toml", given_: Settings | None = None) -> Manifest:
-    return read_manifest(written(folder, text, name), given_ or Settings())
+def read(folder: Path, text: str, name: str = "m.toml", given_: RowSettings | None = None) -> Manifest:
+    return read_manifest(written(folder, text, name), given_ or RowSettings())
 
 
 def test_toml_rows_take_what_they_do_not_say_from_the_top(tmp_path: Path) -> None:
@@ -58,13 +59,13 @@ def test_toml_rows_take_what_they_do_not_say_from_the_top(tmp_path: Path) -> Non
 def test_csv_of_any_delimiter_with_a_byte_order_mark(tmp_path: Path, delimiter: str) -> None:
     lines = [["campaign", "name", "commands"], ["a.toml", "A", "fit predict"], [], ["b.toml", "", ""]]
     text = "\ufeff" + "\r\n".join(delimiter.join(line) for line in lines)
-    manifest = read(tmp_path, text, "m.csv", Settings(directions=(Direction.RADIAL,)))
+    manifest = read(tmp_path, text, "m.csv", RowSettings(directions=(Direction.RADIAL,)))
     assert [(row.name, row.settings.commands) for row in manifest.rows] == [("A", ("fit", "predict")), ("b", ("fit",))]
     assert {row.settings.directions for row in manifest.rows} == {("radial",)}
 
 
 def test_a_pattern_takes_every_match_and_names_by_folder_where_files_share_a_name(shop: Path) -> None:
-    manifest = read_manifest(str(shop / "bushings/*/bushing.toml"), Settings())
+    manifest = read_manifest(str(shop / "bushings/*/bushing.toml"), RowSettings())
     assert [row.name for row in manifest.rows] == ["b0", "b1", "b2", "b3", "b4"]
     inside = read(shop, '[[bushings]]\ncampaign = "bushings/b[0-2]/*.toml"\n[[bushings]]\ncampaign = "x.toml"\n')
     assert [row.name for row in inside.rows] == ["b0", "b1", "b2", "x"]
@@ -85,11 +86,6 @@ def test_a_quote_that_swallows_rows_is_an_error(
     with pytest.raises(CampaignError, match=problem) as error:
         read(tmp_path, "\n".join(["campaign,name", *lines]), "m.csv")
     assert error.value.place == place
-
-
-def test_two_columns_of_one_name_are_an_error(tmp_path: Path) -> None:
-    with pytest.raises(CampaignError, match='two columns are called "campaign"'):
-        read(tmp_path, "campaign,name,campaign\na.toml,A,b.toml\n", "m.csv")
 
 
 @given(st.lists(st.text(min_size=1), min_size=1, max_size=8))
@@ -115,23 +111,17 @@ def test_a_manifest_of_many_rows_is_read_once_and_small(tmp_path: Path) -> None:
     text = "campaign,name\n" + "".join(f"bushings/{n:05}/campaign.toml,bushing {n}\n" for n in range(count))
     source = written(tmp_path, text, "many.csv")
     tracemalloc.start()
-    rows = read_manifest(source, Settings()).rows
-    held, _ = tracemalloc.get_traced_memory()
+    rows = read_manifest(source, RowSettings()).rows
+    # parts of paths are interned, and the table of all interned words of this process grows by megabytes at a time
+    traces = tracemalloc.take_snapshot().filter_traces([tracemalloc.Filter(False, pathlib.__file__)])
     tracemalloc.stop()
+    held = sum(trace.size for trace in traces.statistics("filename"))
     print(f"{held / count:.0f} bytes a row")
     assert len({id(row.settings) for row in rows}) == 1
     assert held / count < 1000
 
 
 finite = st.floats(-1e3, 1e3)
-
-
-@pytest.mark.parametrize(
-    ("value", "half", "result"),
-    [(1.0, 0.5, "pass"), (1.8, 0.5, "conditional pass"), (2.2, 0.5, "conditional fail"), (-0.6, 0.5, "fail")],
-)
-def test_four_results(value: float, half: float, result: str) -> None:
-    assert judge_value(Estimate(value, value - half, value + half), 0.0, 2.0) == result
 
 
 @given(finite, st.floats(0, 1e3), finite, st.floats(0, 1e3))

@@ -22,7 +22,7 @@ from trees import PATTERN, command, kept, list_many, stamps, tree, wait_for
 
 from bushfit.batch import store
 from bushfit.batch.executor import local_workers, run_rows
-from bushfit.batch.manifest import Row, Settings, read_manifest
+from bushfit.batch.manifest import Row, RowSettings, read_manifest
 from bushfit.batch.quantities import parse_point
 from bushfit.batch.row import RowTask, failed_row
 from bushfit.errors import BatchError
@@ -109,7 +109,7 @@ def test_only_what_changed_or_is_torn_is_done_again(typed: Callable[..., Any], s
 
 
 def test_the_key_changes_with_all_that_the_answer_depends_on(shop: Path) -> None:
-    row = read_manifest(str(shop / PATTERN), Settings()).rows[0]
+    row = read_manifest(str(shop / PATTERN), RowSettings()).rows[0]
     other, plain = replace(row, settings=replace(row.settings, effects=("inertia",))), Formats(pictures=False)
     points = (parse_point("axial 25 Hz 0.1 mm"),)
     asked = [(row, (), plain), (row, points, plain), (row, (), Formats()), (other, (), plain)]
@@ -187,7 +187,7 @@ def test_workers_that_die_between_rows_are_replaced(tmp_path: Path) -> None:
 
 
 def test_a_worker_of_another_version_or_none_that_lives_ends_the_batch(tmp_path: Path) -> None:
-    row = Row("a", "a", "a.toml", "a.toml", Settings())
+    row = Row("a", "a", "a.toml", "a.toml", RowSettings())
     task = RowTask(tmp_path, (), Formats(False, False), resume=False, version="0.0.0")
     with pytest.raises(BatchError, match=r"another bushfit[\s\S]*0\.0\.0"):
         list(run_rows([row], task, lambda why: (failed_row(why), False), local_workers(1)))

@@ -20,7 +20,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from bushfit.batch.executor import local_workers
-from bushfit.batch.manifest import Settings, read_manifest
+from bushfit.batch.manifest import RowSettings, read_manifest
 from bushfit.batch.row import RowTask
 from bushfit.batch.run import run_batch
 from bushfit.batch.summary import BatchPlan
@@ -62,7 +62,7 @@ def manifest(bushings: Path, count: int, name: str = "campaign") -> Path:
 
 
 def plan_of(bushings: Path, count: int, folder: Path) -> BatchPlan:
-    rows, none = read_manifest(str(manifest(bushings, count)), Settings()).rows, Formats(False, False, False)
+    rows, none = read_manifest(str(manifest(bushings, count)), RowSettings()).rows, Formats(False, False, False)
     return BatchPlan("benchmark", rows, RowTask(folder, (), none, resume=False), None, None, none)
 
 

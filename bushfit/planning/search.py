@@ -1,0 +1,324 @@
+"""Search for the tests of a plan within some hours: their number, repeats for drift and scatter, and the programme."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bushfit.campaign.schema import SimulatedSweep
+from bushfit.effects import qualified_name
+from bushfit.effects.contract import Array
+from bushfit.fitting.repeats import FEWEST_STEPS
+from bushfit.geometry import Place, Specimen
+from bushfit.planning.contract import DetectableAmount, Programme, Test
+from bushfit.planning.criterion import (
+    Budget,
+    Criterion,
+    DriftEffect,
+    best_runs,
+    covariance_root,
+    noncentralities,
+    order_runs,
+)
+from bushfit.planning.offer import DETECTABLE, RIVALS_APART, PlanningProblem, smallest_amount, standard_tests
+from bushfit.planning.sensitivity import Information
+from bushfit.planning.targets import Goal, describe_untested
+from bushfit.reading.measurement import loss_factor
+
+#: Weight of the logarithm of each lack of power beside the logarithm of the variance, and the weight that is used if
+#: the first leaves a lack; chosen.
+_PENALTY, _STRICT_PENALTY = 3.0, 30.0
+#: Wanted degrees of freedom of the scatter of sweeps; chosen: with five, errors are a tenth larger than planned.
+_SCATTER_FREEDOM = 10
+
+
+@dataclass(frozen=True, eq=False)
+class PlanSearch:
+    """Search for the best candidate tests within some hours; counts are numbers of runs of each test, (tests,).
+
+    Args:
+        problem: candidate tests with their information.
+        hours: of the rig.
+    """
+
+    problem: PlanningProblem
+    hours: float
+
+    @cached_property
+    def budget(self) -> Budget:
+        """Durations of the tests within the hours."""
+        return replace(self.problem.budget, maximum_minutes=60.0 * self.hours)
+
+    @cached_property
+    def counts(self) -> Array:
+        """Number of runs of each test, (tests,); zero for all if no test fits into the hours.
+
+        If possible, all effects show as well as in the standard programme.
+        """
+        required, criterion = self.required_runs, self.criterion(_PENALTY)
+        counts = best_runs(criterion, self.budget, required, required)
+        if self.less_visible_effects(counts):
+            standard = np.minimum(self.count(self.standard_runs), self.budget.maximum_runs)
+            starts = [counts, *([] if required.any() else [standard])]
+            choices = (best_runs(self.strict, self.budget, start, required) for start in starts)
+            counts = min(choices, key=self.strict.value)
+        return self.with_scatter(self.with_repeats(counts))
+
+    @property
+    def reaches_aim(self) -> bool:
+        """True if the tests separate the rivals with a margin of two, or meet the targets that can be met."""
+        problem = self.problem
+        if problem.request.aim == "rivals":
+            return problem.nearest_rivals(self.counts) >= 2.0 * RIVALS_APART
+        covariance = problem.error_covariance(self.counts)
+        reached = all(goal.reached(covariance, problem.limit_covariance) for goal in problem.goals)
+        testable = [goal for goal in problem.goals if goal.target.place in problem.request.places]
+        return bool(problem.goals) and reached and not any(self.untested(goal, self.counts) for goal in testable)
+
+    @property
+    def sound(self) -> bool:
+        """True if all effects show as in the standard programme, and repeats determine the scatter."""
+        return not self.less_visible_effects(self.counts) and self.determines_scatter(self.counts)
+
+    @cached_property
+    def required_runs(self) -> Array:
+        """One run in each direction whose stiffness is a target and that was not tested, (tests,).
+
+        Tests in other directions do not determine the error of the stiffness formula. Zero if the runs do not fit into
+        the hours.
+        """
+        none = np.zeros(len(self.problem.tests), dtype=int)
+        required, values = none.copy(), self.strict.values_with_one_more(none) if self.problem.goals else none
+        for goal in self.problem.goals:
+            chosen = np.array([test.direction == goal.target.place for test in self.problem.tests])
+            chosen &= self.budget.maximum_runs > 0
+            if chosen.any() and (not self.tested_places(required) or self.untested(goal, required)):
+                required[int(np.argmin(np.where(chosen, values, np.inf)))] = 1
+        return required if self.budget.spent(required) <= self.budget.maximum_minutes else none
+
+    def tested_places(self, counts: Array) -> list[str]:
+        """Directions and specimens of the tests so far and of those planned."""
+        planned = (self.problem.tests[test] for test in np.flatnonzero(counts))
+        return [str(test.direction) for test in (*self.problem.knowledge.tests, *planned)]
+
+    def untested(self, goal: Goal, counts: Array) -> str | None:
+        """Sentence on the error that a goal's interval lacks because its direction is not tested; None without one."""
+        place = goal.target.place
+        return describe_untested(self.problem.knowledge, place, self.tested_places(counts)) if place else None
+
+    def with_repeats(self, counts: Array) -> Array:
+        """Replace the least useful runs until a drift shows as in the standard programme in each direction.
+
+        A test of each direction with more than two tests is repeated.
+
+        Args:
+            counts: number of runs of each test, (tests,).
+
+        Returns:
+            Number of runs of each test, (tests,).
+        """
+        standard = self.drift_effect(self.count(self.standard_runs)).noncentrality(self.standard_runs)
+        for place in np.unique(self.budget.place[counts > 0]):
+            chosen = np.flatnonzero((counts > 0) & (self.budget.place == place))
+            drift = self.drift_effect(counts)
+            if chosen.size > 2 and (
+                counts[chosen].max() < 2 or drift.noncentrality(order_runs(counts, self.budget.place, drift)) < standard
+            ):
+                repeatable = chosen[self.budget.maximum_runs[chosen] > 1]
+                quickest = repeatable[np.argsort(self.budget.minutes[repeatable])][:4]
+                counts = min(self.repeated(counts, quickest), key=self.strict.value, default=counts)
+        return counts
+
+    def with_scatter(self, counts: Array) -> Array:
+        """Repeat sweeps until a fit can separate their scatter from the differences of repeats.
+
+        Args:
+            counts: number of runs of each test, (tests,).
+
+        Returns:
+            Number of runs of each test, (tests,), at a cost of at most a twentieth of the error unless there are
+            targets.
+        """
+        largest = np.inf if self.problem.goals else self.strict.value(counts) + 0.1  # a twentieth of the error
+        while not self.determines_scatter(counts):
+            freedom = self.scatter_freedom(counts)
+            sweeps = [test for test in np.flatnonzero(counts).tolist() if scatter_differences(self.problem.tests[test])]
+            choices = [
+                runs
+                for runs in self.repeated(counts, sweeps)
+                if self.scatter_freedom(runs) > freedom and self.strict.value(runs) <= largest
+            ]
+            if not choices:
+                break
+            counts = min(choices, key=self.strict.value)
+        return counts
+
+    def repeated(self, counts: Array, tests: Iterable[int]) -> Iterator[Array]:
+        """Repeat each of some tests in turn, where that fits into the hours.
+
+        Tests that are made once are dropped, the least useful first, until the repeat fits.
+
+        Args:
+            counts: number of runs of each test, (tests,).
+            tests: numbers of the tests.
+
+        Returns:
+            Iterator over numbers of runs of each test, (tests,).
+        """
+        one = np.eye(len(self.problem.tests), dtype=int)
+        for test in tests:
+            runs = counts + one[test]
+            while (
+                self.budget.spent(runs) > self.budget.maximum_minutes
+                and (single := (runs == 1) & (self.required_runs == 0)).any()
+            ):
+                runs = min((runs - one[dropped] for dropped in np.flatnonzero(single)), key=self.strict.value)
+            if self.budget.spent(runs) <= self.budget.maximum_minutes:
+                yield runs
+
+    def scatter_freedom(self, counts: Array) -> list[int]:
+        """Degrees of freedom of the scatter of sweeps by repeats, with the tests so far.
+
+        Args:
+            counts: number of runs of each test, (tests,).
+
+        Returns:
+            Degrees of freedom for the bushing and for each specimen up to the wanted number, the fewest first.
+        """
+        runs = Counter(self.problem.knowledge.tests)
+        runs.update({test: int(n) for test, n in zip(self.problem.tests, counts, strict=True) if n})
+        freedom = Counter[Place | None]()
+        for test, count in runs.items():
+            if isinstance(test, SimulatedSweep):
+                specimen = test.direction if isinstance(test.direction, Specimen) else None
+                freedom[specimen] += scatter_differences(test) * (count - 1)
+        return sorted(min(n, _SCATTER_FREEDOM) for n in freedom.values())
+
+    def determines_scatter(self, counts: Array) -> bool:
+        """True if repeats determine the scatter of sweeps, of the bushing and of each specimen."""
+        return self.scatter_freedom(counts) >= [_SCATTER_FREEDOM]
+
+    def criterion(self, penalty: float) -> Criterion:
+        """Criterion with a weight of effects that show less than in the standard programme."""
+        probabilities = np.array([rival.probability for rival in self.problem.knowledge.rivals])
+        return Criterion(self.problem.models, self.problem.weight, probabilities, self.minimum_noncentrality, penalty)
+
+    @cached_property
+    def strict(self) -> Criterion:
+        """Criterion with more weight on effects that show less than in the standard programme."""
+        return self.criterion(_STRICT_PENALTY)
+
+    def count(self, runs: Sequence[int]) -> Array:
+        """Number of runs of each test, (tests,), among runs given by the numbers of their tests."""
+        return np.bincount(np.array(runs, dtype=int), minlength=len(self.problem.tests))
+
+    def less_visible_effects(self, counts: Array) -> list[str]:
+        """Effects that these runs show less well than the standard programme."""
+        reached = noncentralities(self.problem.models[0].total(counts))[0]
+        short = np.sqrt(reached) < 0.995 * np.sqrt(self.minimum_noncentrality)  # numerical accuracy
+        return list(dict.fromkeys(self.problem.grid.columns[i].effect.name for i in np.flatnonzero(short)))
+
+    @cached_property
+    def standard_runs(self) -> list[int]:
+        """Numbers of the tests of the standard programme, repeated within the hours and ordered by direction."""
+        problem = self.problem
+        tests = [problem.tests.index(test) for test in standard_tests(problem.knowledge, problem.request)]
+        counts, runs = np.zeros(len(problem.tests), dtype=int), list[int]()
+        while tests:
+            counts[test := tests[len(runs) % len(tests)]] += 1
+            if self.budget.spent(counts) > self.budget.maximum_minutes:
+                break
+            runs.append(test)
+        return sorted(runs, key=lambda test: self.budget.place[test])
+
+    @cached_property
+    def minimum_noncentrality(self) -> Array:
+        """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
+        reached = noncentralities(self.problem.models[0].total(self.count(self.standard_runs)))[0]
+        amounts = np.array([column.maximum_amount for column in self.problem.grid.columns])
+        return np.where(amounts * np.sqrt(reached) >= DETECTABLE, reached, 0.0)
+
+    def drift_effect(self, counts: Array) -> DriftEffect:
+        """Compute the effect of a drift of the gain.
+
+        Args:
+            counts: number of runs of each test, (tests,).
+
+        Returns:
+            Effect of a unit drift on these runs.
+        """
+        model, knowledge = self.problem.models[0], self.problem.knowledge
+        k = len(knowledge.names) + len(knowledge.bounded)
+        products, gain = model.runs.parameters, model.runs.parameters[:, k, k]
+        by_gain = Information(products * counts[:, None, None], products[..., k : k + 1], gain[:, None])  # of one run
+        level = np.square(model.level[:, 0])
+        root = covariance_root(model.total(counts).parameters[0])
+        shift_root = by_gain.with_line_error(model.level).cross[..., 0] @ root
+        return DriftEffect(gain, level * gain**2 / (1.0 + counts * level * gain), shift_root)
+
+    def programme(self, runs: Sequence[int]) -> Programme:
+        """Compute the expected results of runs in their order.
+
+        Args:
+            runs: numbers of the tests.
+
+        Returns:
+            The tests with their durations, errors, detectable amounts and the shift by a drift.
+        """
+        problem, counts, places = self.problem, self.count(runs), self.budget.place[list(runs)]
+        model, k, drift = problem.models[0], len(problem.knowledge.names), self.drift_effect(counts)
+        information = model.total(counts)
+        covariance, free_covariance = (
+            model.error_covariance(information)[0],
+            np.linalg.inv(information.parameters[0]),
+        )
+        gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", problem.slopes, covariance, problem.slopes))
+        stiffness = [
+            problem.knowledge.model.stiffness(points.place, points.frequency, points.amplitude)
+            for points in problem.request.points
+        ]
+        loss = loss_factor(np.concatenate(stiffness))
+        shift = covariance_root(information.parameters[0]) @ drift.shift(runs) / np.sqrt(np.diag(free_covariance))
+        # tests alone leave combinations open whose information is rounding; without tests no error is of use
+        values, vectors = np.linalg.eigh(information.parameters[0] - model.prior)
+        alone = vectors / np.sqrt(np.maximum(values, max(1e-14 * float(values.max()), 1e-12)))
+        return Programme(
+            tuple(problem.tests[run] for run in runs),
+            self.budget.minutes[list(runs)] + self.budget.setup_minutes * (np.diff(places, prepend=-1) != 0),
+            np.sqrt(np.diag(covariance))[:k],
+            np.linalg.norm(alone, axis=1)[:k],
+            np.hypot(gain, problem.model_error[0]),
+            np.hypot(phase * (1.0 + np.square(loss)), problem.model_error[1]),
+            problem.nearest_rivals(counts) if problem.knowledge.rivals else None,
+            tuple(goal.half_width(covariance) for goal in problem.goals),
+            tuple(self.detectable_amounts(noncentralities(information)[0], drift.noncentrality(runs))),
+            0.01 * float(np.abs(shift[:k]).max()),
+        )
+
+    def detectable_amounts(self, reached: Array, drift: float) -> Iterator[DetectableAmount]:
+        """Smallest detectable amount of each effect that the standard programme shows, in its most visible shape.
+
+        Args:
+            reached: noncentrality of each effect column, (e,).
+            drift: noncentrality of a unit drift of the gain.
+
+        Returns:
+            Iterator over the amounts, that of the drift last.
+        """
+        columns = self.problem.grid.columns
+        for effect in dict.fromkeys(column.effect for column in columns):
+            shapes = [i for i, column in enumerate(columns) if column.effect is effect]
+            best = shapes[int(np.argmax(self.minimum_noncentrality[shapes]))]
+            if self.minimum_noncentrality[best] > 0.0:
+                parameter = effect.amount
+                name, amount = qualified_name(effect, parameter), parameter.typical * smallest_amount(reached[best])
+                yield DetectableAmount(effect.name, name, parameter.unit, amount)
+        yield DetectableAmount("drift", "drift.gain", "1", smallest_amount(drift))
+
+
+def scatter_differences(test: Test) -> int:
+    """Degrees of freedom of the scatter that a repeat of a test adds."""
+    steps = len(test.steps) if isinstance(test, SimulatedSweep) else 0
+    return steps - 1 if steps >= FEWEST_STEPS else 0
