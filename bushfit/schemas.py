@@ -48,7 +48,10 @@ _ARG = re.compile(r"^    (\S[^:]*): +(.*?)(?=^    \S|\Z)", re.MULTILINE | re.DOT
 
 
 def schema(name: str) -> dict[str, Any]:
-    """The JSON Schema of this name.
+    """JSON Schema of a file that bushfit reads or writes.
+
+    Returns:
+        The schema, as JSON data.
 
     Raises:
         BushfitError: there is none.

@@ -250,6 +250,11 @@ def format_aligned(values: Sequence[float], digits: int, minimum_digits: int = 0
 def regular_steps(start: float, stop: float, step: float) -> tuple[float, ...]:
     """Regular values from start to stop, both included.
 
+    Args:
+        start: first value.
+        stop: last value.
+        step: distance between values, in the unit of start and stop.
+
     Returns:
         The values; empty if start, stop or step is not positive, if stop is below start, or for 100 000 steps or more.
     """

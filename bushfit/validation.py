@@ -79,6 +79,9 @@ def converter(
     Args:
         convert: function of the raw value and the validation info.
         written: JSON Schema of the raw value in the file; by default the schema of the converted value.
+
+    Returns:
+        Validator for an Annotated type.
     """
 
     def run(raw: Any, info: ValidationInfo) -> Any:

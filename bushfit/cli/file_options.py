@@ -1,4 +1,4 @@
-"""What the commands on test files share: options for what a file does not say itself, and errors that name them."""
+"""Options of the commands on test files for metadata that the files do not contain, and errors that name them."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence

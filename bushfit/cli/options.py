@@ -1,4 +1,4 @@
-"""What options are made of: types, those of several commands, what Tab offers for them, and commands with examples."""
+"""Option types, options shared by several commands, shell completion, and commands with examples."""
 
 import json
 import re

@@ -196,6 +196,9 @@ def compare(
         strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
         command: command that the document states.
 
+    Returns:
+        Differences of parameters and of predicted stiffness from the reference, with tables, figure and page.
+
     Raises:
         BushfitError: too few results or too many, or directions and points that one of them cannot be predicted at.
     """
@@ -223,6 +226,9 @@ def compared_result(
         name: file or folder that the source was read from.
         sha256: SHA-256 of the model file.
         directions: directions of a campaign whose tests are fitted.
+
+    Returns:
+        The fitted result with its name, and the sweeps of a campaign.
     """
     if isinstance(source, ComparedResult):
         return source

@@ -76,6 +76,9 @@ def diagnose(
         tolerance: gap below which model and tests agree, as a share of the stiffness magnitude.
         joint: plain fit of the campaign, if it was made before.
 
+    Returns:
+        Verdict, gap, candidates and the model to use, with the result files.
+
     Raises:
         BushfitError: tests or settings that cannot support the diagnosis.
     """
@@ -101,7 +104,16 @@ def diagnose(
 
 
 def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -> list[ResultFile]:
-    """Tables of the gap and of the candidates, and the figure of the gap."""
+    """Tables of the gap and of the candidates, and the figure of the gap.
+
+    Args:
+        diagnosis: the diagnosis.
+        document: content of diagnosis.json.
+        title: title of the figure.
+
+    Returns:
+        Files gap.csv, gap.png and candidates.csv, not yet rendered.
+    """
     gap = table_file("gap", partial(tables.gap_table, diagnosis))
     figure = figure_file("gap", lambda: plots.gap.gap_figure(gap.make(), diagnosis.result, document, title))
     return [gap, figure, table_file("candidates", partial(tables.candidates_table, diagnosis))]

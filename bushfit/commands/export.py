@@ -93,6 +93,9 @@ def export(
         grid: directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes and temperature, as of
             `predict`; all directions share one list of frequencies.
 
+    Returns:
+        Predictions, the content for each format with its losses, and the result files.
+
     Raises:
         ModelError: a model that a format cannot hold, or a grid that it cannot have.
     """

@@ -61,6 +61,9 @@ def fit(
         profile: whether to add 95 % intervals by profile likelihood, which takes some seconds.
         loss: "soft_l1" reduces the weight of distant points and leaves outliers out; default the campaign's.
 
+    Returns:
+        Fitted result with its covariance, and the result files.
+
     Raises:
         BushfitError: tests or settings that cannot support the fit.
     """
@@ -102,6 +105,9 @@ def fit_dynamic(
             its loops.
         loss: "soft_l1" or "linear"; default the campaign's.
 
+    Returns:
+        Fitted result, preceded by the static fit if one was necessary, and the result files.
+
     Raises:
         FitError: no result, no values in the campaign, and no loops.
     """
@@ -142,6 +148,14 @@ def campaign_files(
     """Tables and figures of the tests beside the model; outliers that the fit left out have no weight.
 
     Sweeps at several temperatures add a master curve, if the model has the effect of temperature.
+
+    Args:
+        data: campaign, prepared for a fit.
+        result: fit of the campaign.
+        kinds: kinds of tests to show: "loop", "sweep".
+
+    Returns:
+        Tables and figures, not yet rendered.
     """
     marked, model = data.without(result.outliers), result.model
     title = model.name if model.bushing else data.campaign.name
@@ -158,7 +172,16 @@ def campaign_files(
 
 
 def temperature_files(data: PreparedCampaign, result: Result, title: str) -> list[ResultFile]:
-    """Master curve and shift factors of sweeps at several temperatures, each a table and a figure."""
+    """Master curve and shift factors of sweeps at several temperatures, each a table and a figure.
+
+    Args:
+        data: campaign, prepared for a fit.
+        result: fit of the campaign with the effect of temperature.
+        title: title of the figures.
+
+    Returns:
+        Two tables and two figures, not yet rendered.
+    """
     sweeps, model = data.without(result.outliers).sweeps, result.model
     shifted = cache(partial(master_curve, result, sweeps))
     return [

@@ -39,6 +39,9 @@ def load_model(path: str | Path) -> Result:
 def model_file(path: Path) -> Path:
     """Model file that a path names: the file itself, or model.json of a results folder.
 
+    Returns:
+        Path of the model file; any other path is returned unchanged.
+
     Raises:
         ModelError: a campaign, a test file, or a folder without a model.
     """

@@ -131,6 +131,9 @@ def predict(
         arms: largest relative error of Maxwell arms, which are added if it is given.
         notes: further warnings.
 
+    Returns:
+        Predictions by direction, resonances and Maxwell arms, with the result files.
+
     Raises:
         ModelError: a direction, frequency, amplitude or temperature that the model cannot have.
     """
@@ -259,7 +262,17 @@ def _files(output: PredictionOutput, at_temperature: Sequence[MeasuredSweep], *,
 def prediction_figure(
     result: Result, prediction: Prediction, sweeps: Sequence[MeasuredSweep], notes: Sequence[str]
 ) -> Figure:
-    """Figure of a prediction with the measured sweeps."""
+    """Figure of a prediction with the measured sweeps.
+
+    Args:
+        result: fitted result.
+        prediction: stiffness and loss factor of one direction or specimen.
+        sweeps: measured sweeps; those of the same direction or specimen are shown.
+        notes: further warnings for the figure.
+
+    Returns:
+        The figure.
+    """
     place = prediction.direction
     measured = [sweep for sweep in sweeps if sweep.direction == place]
     table = tables.sweeps_table(result.model, measured) if measured else None
@@ -282,7 +295,16 @@ def _suffixed_tables(
 
 
 def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) -> list[ResultFile]:
-    """Table of Maxwell arms, and figure of their modulus and its error; nothing without arms."""
+    """Table of Maxwell arms, and figure of their modulus and its error; nothing without arms.
+
+    Args:
+        result: fitted result.
+        arms: Maxwell arms of each part of the model.
+        places: directions or specimens of the table.
+
+    Returns:
+        Files arms.csv and arms.png, not yet rendered.
+    """
     if not arms:
         return []
     return [
@@ -292,7 +314,11 @@ def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) ->
 
 
 def measured_files(result: Result, sweeps: Sequence[MeasuredSweep]) -> list[ResultFile]:
-    """Table of the measured sweeps beside the model; nothing without sweeps."""
+    """Table of the measured sweeps beside the model; nothing without sweeps.
+
+    Returns:
+        File measured.csv, not yet rendered, or an empty list.
+    """
 
     def table() -> pd.DataFrame:
         fitted, others = split_by_fit(result, sweeps)

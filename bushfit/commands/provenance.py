@@ -27,6 +27,9 @@ def campaign_document(data: PreparedCampaign, command: str, options: Iterable[st
         data: the campaign, prepared for a fit.
         command: name of the command.
         options: words of the options that change the numbers.
+
+    Returns:
+        JSON data of the campaign: name, file, hash, command, tests and report head.
     """
     campaign = data.campaign
     loss = () if campaign.fit.loss == "linear" else ("--loss", campaign.fit.loss)
@@ -51,6 +54,9 @@ def option_words(**options: str | bool | Iterable[str] | None) -> list[str]:
 
     Args:
         options: value of each option by its key: a text, several texts, or whether a flag is set; None leaves it out.
+
+    Returns:
+        Words such as ["--effect", "inertia", "--profile"].
     """
     words = list[str]()
     for key, value in options.items():

@@ -83,6 +83,9 @@ def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> R
     Args:
         campaign: the campaign, or a campaign prepared by `prepare_tests`.
         loss: "soft_l1" or "linear"; default the campaign's.
+
+    Returns:
+        Static, two-step and joint fits, diagnosis and prediction, with the result files.
     """
     data = prepare_tests(campaign, loss)
     static = fit_static(data) if data.loops else None

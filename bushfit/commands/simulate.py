@@ -48,6 +48,9 @@ def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "cs
         truth: the model; its correction without a name is left out, since it has no law in time.
         settings: tests, noise and errors of the rig.
         form: format of the tables.
+
+    Returns:
+        Simulated tests, the files of the campaign, and warnings.
     """
     warnings = []
     if truth.unnamed:
@@ -70,6 +73,9 @@ def simulate(
         folder: folder for campaign.toml, the test files, and the model behind them in truth.json.
         force: whether to replace files of an earlier simulation.
         settings: further keys of [simulate], such as noise = 0.005, repeats = 3 or seed = 1.
+
+    Returns:
+        The simulated campaign, loaded from the folder.
 
     Raises:
         BushfitError: no model, or files that would be replaced.

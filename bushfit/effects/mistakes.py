@@ -104,11 +104,14 @@ class Mistake(Effect):
         return fits and doubtful and not (self.swaps and other_direction(place) is None)
 
     def explains(self, test: Loop | Sweep, modulus: float, strain: float) -> bool:
-        """Whether a rubber could have given a test only with this power of 1000; True for mistakes of another kind.
+        """Test if a recording that no rubber could give becomes plausible once this power of 1000 is corrected.
 
         Args:
             modulus: shear modulus that the test as stated implies [Pa].
             strain: largest strain amplitude as stated [-].
+
+        Returns:
+            True if it does, and for mistakes other than a wrong power of 1000.
         """
         if not self.scales:
             return True

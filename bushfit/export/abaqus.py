@@ -45,7 +45,14 @@ _FORM = Form(lambda f, k: (k.real, k.imag / (2.0 * np.pi * f)), lambda f, a, b: 
 
 
 def export(order: Order) -> Exported:
-    """Write a connector behavior per amplitude, and the compound at the strains of the first direction."""
+    """Write a connector behavior per amplitude, and the compound at the strains of the first direction.
+
+    Args:
+        order: model, predictions and settings.
+
+    Returns:
+        Content of bushing.inp, and the losses of the format.
+    """
     units = order.units or MM_T_S_N
     losses = tuple(table_losses(order, _FORM))
     if has_material := _LONG_TERM in order.result.model.values:

@@ -92,7 +92,14 @@ class _Element(NamedTuple):
 
 
 def export(order: Order) -> Exported:
-    """Write one file for Adams Car and one for Adams Car Ride."""
+    """Write one file for Adams Car and one for Adams Car Ride.
+
+    Args:
+        order: model, predictions and settings.
+
+    Returns:
+        Content of bushing_car.bus and bushing_ride.bus, and the losses of the format.
+    """
     predictions = exported_directions(order)
     elements = [_element(stiffness_tables(prediction)) for prediction in predictions]
     shared = [line for prediction in predictions for line in band_losses(prediction)] + list(common_losses(order))

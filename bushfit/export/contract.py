@@ -40,6 +40,9 @@ class UnitSystem:
     def parse(cls, text: str) -> UnitSystem:
         """System of a text such as "mm t s N", with the units in any order.
 
+        Returns:
+            The system, each unit with its factor from SI.
+
         Raises:
             UnitError: a missing, doubled or unknown unit, or units that are not consistent.
         """
@@ -78,7 +81,11 @@ class UnitSystem:
         return Unit(f"{self.force.name}/{self.length.name}^2", self.force.factor / self.length.factor**2)
 
     def display(self, motion: Motion) -> Display:
-        """Units of displacement, force and stiffness of a kind of motion; angles are in rad."""
+        """Units of displacement, force and stiffness of a kind of motion; angles are in rad.
+
+        Returns:
+            Units with their factors from SI.
+        """
         length, force = self.length, self.force
         if motion is STRAINING:
             return Display(Unit("-", 1.0), self.stress, self.stress)

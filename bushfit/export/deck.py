@@ -50,6 +50,9 @@ AmplitudeLevel = tuple[StiffnessTable, ...]
 def exported_directions(order: Order) -> list[Prediction]:
     """Predictions of the directions of the bushing, without specimens.
 
+    Returns:
+        One prediction per direction, all on one list of frequencies [Hz].
+
     Raises:
         ModelError: there is no direction, or the frequencies of the directions differ.
     """
@@ -139,6 +142,9 @@ def heading(order: Order, units: str, losses: Iterable[str]) -> list[str]:
         order: model and settings.
         units: description of the units.
         losses: properties that the deck cannot represent.
+
+    Returns:
+        Lines without comment signs.
     """
     bushing, source = order.result.model.bushing, order.source
     sizes = (bushing.inner_radius, bushing.outer_radius, bushing.length) if bushing else ()
@@ -198,7 +204,15 @@ def encode_deck(lines: Iterable[str]) -> bytes:
 
 
 def table_losses(order: Order, form: Form) -> Iterator[str]:
-    """Sentences on the losses of linear tables over frequency with one set per amplitude, with their errors."""
+    """Sentences on the losses of linear tables over frequency with one set per amplitude, with their errors.
+
+    Args:
+        order: model, predictions and settings.
+        form: quantities that the tables interpolate.
+
+    Returns:
+        Sentences, those of each direction first.
+    """
     model = order.result.model.without(EffectLevel.INSTRUMENT)
     for prediction in exported_directions(order):
         tables, place = stiffness_tables(prediction), prediction.direction
@@ -218,7 +232,11 @@ def table_losses(order: Order, form: Form) -> Iterator[str]:
 
 
 def common_losses(order: Order) -> Iterator[str]:
-    """Sentences on the losses of every deck: time, coupling and motions that the model does not contain."""
+    """Sentences on the losses of every deck: time, coupling and motions that the model does not contain.
+
+    Returns:
+        Sentences.
+    """
     yield NO_LOOPS
     yield "each direction answers by itself: what motion in one does to another is not in it"
     present = {prediction.direction for prediction in exported_directions(order)}

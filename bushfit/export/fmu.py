@@ -132,7 +132,11 @@ def compile_library(sources: Mapping[str, bytes], name: str) -> tuple[str, bytes
 
 
 def model_header(model: TimeModel, guid: str) -> str:
-    """C header with the sizes of the lists and the GUID of the FMU."""
+    """C header with the sizes of the lists and the GUID of the FMU.
+
+    Returns:
+        C source text of the header.
+    """
     sizes = {
         "VALUES": _OFFSET + len(model.values),
         "CONSTANTS": _OFFSET + sum(not value.settable for value in model.values),
@@ -145,7 +149,11 @@ def model_header(model: TimeModel, guid: str) -> str:
 
 
 def model_source(model: TimeModel) -> str:
-    """C source with the values, directions and Maxwell arms of a model."""
+    """C source with the values, directions and Maxwell arms of a model.
+
+    Returns:
+        Content of model.c.
+    """
     values, reference = model.values, {value.name: index for index, value in enumerate(model.values, start=_OFFSET)}
     lists = {
         "start": [0.0, 1.0, *(value.value for value in values)],
@@ -176,6 +184,9 @@ def model_description(order: Order, model: TimeModel, name: str, guid: str) -> b
         model: the model as lists.
         name: model identifier.
         guid: identifier that ties the description to the library.
+
+    Returns:
+        The XML in UTF-8.
     """
     about = f"Rubber bushing, displacement in and force out, of {order.source.file} (SHA-256 {order.source.sha256})"
     about = "; ".join([about, *map(": ".join, order.remarks(model.losses))])

@@ -75,6 +75,9 @@ class TimeModel:
 def time_model(order: Order) -> TimeModel:
     """Convert the model of an order to lists.
 
+    Returns:
+        Values, fields and lever of each direction, Maxwell arms in time, and the losses.
+
     Raises:
         ModelError: an effect without a law in time or without a law in the C sources, or no arms within the accuracy.
     """

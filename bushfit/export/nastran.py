@@ -36,7 +36,14 @@ _DIALECTS = {
 
 
 def export(order: Order) -> Exported:
-    """Write the bulk data of the bushing, without elements."""
+    """Write the bulk data of the bushing, without elements.
+
+    Args:
+        order: model, predictions and settings.
+
+    Returns:
+        Content of the deck, and the losses of the format.
+    """
     (names, form, file), units = _DIALECTS[order.dialect], order.units or MM_T_S_N
     losses = tuple(table_losses(order, form))
     usage = (

@@ -1,4 +1,4 @@
-"""Parameters that tests leave open, in words: the reason, what is known all the same, and the best further test.
+"""Sentences on parameters that the tests do not determine: the reason, known combinations, and the best further test.
 
 A direction is an eigenvector of the Fisher information, with parameters scaled by their size; its standard error is one
 over the root of the eigenvalue, which is a singular value of the Jacobian scaled by noise and size.

@@ -88,6 +88,16 @@ def fitted_arms(
 ) -> Arms:
     """The fewest arms that have a modulus [Pa], given over rad/s, within a relative error over a band [Hz].
 
+    Args:
+        modulus: complex modulus [Pa] at angular frequencies [rad/s], (n,) -> (n,).
+        band: lowest and highest frequency [Hz].
+        accuracy: largest relative error of the modulus.
+        stands_for: names of the effects that the arms replace.
+        size: qualified name of the parameter that scales the modulus.
+
+    Returns:
+        Arms by ascending relaxation time, with their largest relative error.
+
     Raises:
         ModelError: no passive arms come as near, or an accuracy that is none.
 
@@ -126,6 +136,15 @@ def model_arms(
     """Arms for each part of a model that fades with memory, the springpot first, at the model's values.
 
     Effects that share a size, as the springpot and the spring in series with it, are one part. A size of 0 is none.
+
+    Args:
+        model: the model.
+        band: lowest and highest frequency [Hz].
+        accuracy: largest relative error of each modulus.
+        under: test conditions, such as the temperature.
+
+    Returns:
+        Arms of each part.
     """
     parts: dict[str, list[str]] = {}
     for branch in model.viscoelastic:
@@ -141,7 +160,7 @@ def model_arms(
 
 
 def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
-    """What each spring stands for, its modulus [Pa] and relaxation time [s]; first, without one, what is elastic.
+    """Springs of the arms: the part of each, its modulus [Pa] and relaxation time [s]; the elastic spring first.
 
     >>> [row[0] for row in arm_rows(paper, model_arms(paper, (5.0, 155.0)))]
     ['elastic', 'springpot', 'springpot', 'springpot', 'springpot']
@@ -160,7 +179,17 @@ def qualified_size(branch: Branch) -> str:
 
 
 def part_modulus(model: Model, size: str, omega: Array, under: Circumstances = UNKNOWN) -> Array:
-    """mu^ [Pa] of the branches of one size at angular frequencies [rad/s], (n,)."""
+    """mu^ [Pa] of the branches of one size at angular frequencies [rad/s], (n,).
+
+    Args:
+        model: the model.
+        size: qualified name of the parameter that scales the branches.
+        omega: angular frequencies [rad/s], (n,).
+        under: test conditions, such as the temperature.
+
+    Returns:
+        Complex modulus [Pa], (n,).
+    """
     still, values, reduced = np.zeros_like(omega), values_under(model, under), omega * model.shift_factor(under)
     own = (branch for branch in model.viscoelastic if qualified_size(branch) == size)
     return np.asarray(sum(branch.modulus(seen_by(branch, values), reduced, still) for branch in own))

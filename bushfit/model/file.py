@@ -78,7 +78,11 @@ def from_document(document: object, file: Path | None = None) -> Result:
 
 
 def to_document(result: Result) -> dict[str, Any]:
-    """Convert a result to the JSON data of a model file."""
+    """Convert a result to the JSON data of a model file.
+
+    Returns:
+        Content of the model file, as dictionaries, lists, texts and numbers.
+    """
     model, covariance = result.model, result.covariance
     inputs = (InputTable(str(source.file), source.sha256, dict(source.conditions)) for source in result.inputs)
     matrices = [tuple(map(tuple, matrix.tolist())) for matrix in (covariance.matrix, *covariance.spread)]

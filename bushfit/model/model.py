@@ -85,22 +85,22 @@ class Model:
 
     @property
     def only_branches(self) -> bool:
-        """Whether the response is the plain sum of the branches, without modifiers and layers."""
+        """True if the response is the plain sum of the branches, without modifiers and layers."""
         return len(self._structure.branches) == len(self.records)
 
     @property
     def knows_circumstances(self) -> bool:
-        """Whether the response depends on what a test was made under besides its motion."""
+        """True if the response depends on test conditions other than the motion, such as the temperature."""
         return any(effect.under for effect in self.records)
 
     @property
     def knows_temperature(self) -> bool:
-        """Whether it depends on the temperature of the rubber."""
+        """True if the response depends on the temperature of the rubber."""
         return any("temperature" in effect.under for effect in self.records)
 
     @property
     def name(self) -> str:
-        """Of the bushing; "compound" where there is none."""
+        """Name of the bushing; "compound" for a model without a bushing."""
         return self.bushing.name if self.bushing else "compound"
 
     def unit_strain(self, place: Place) -> float:
@@ -112,7 +112,7 @@ class Model:
         return geometry.stiffness_per_modulus(self.bushing, place)
 
     def with_values(self, values: Mapping[str, float]) -> "Model":
-        """The same model with some values replaced."""
+        """Copy of the model with some values replaced."""
         return replace(self, values={**self.values, **values})
 
     @classmethod
@@ -124,6 +124,15 @@ class Model:
         unnamed: Unnamed | None = None,
     ) -> "Model":
         """A model with the values given; other parameters have their neutral value, or a typical one.
+
+        Args:
+            bushing: geometry, or None for a compound.
+            effects: names of the effects.
+            values: parameter values [SI] by qualified name.
+            unnamed: data of the correction without a name, if it is among the effects.
+
+        Returns:
+            The model.
 
         >>> Model.with_defaults(paper.bushing, ["elastic", "viscous"], {"mu": 1e6}).values["viscous.eta"]
         0.0
@@ -150,7 +159,11 @@ class Model:
         return Model.with_defaults(self.bushing, (*kept, name), known, self.unnamed)
 
     def starts(self, effect: Effect) -> list[dict[str, float]]:
-        """Where a fit of an effect may begin in place of the branch that it replaces; of any other, with no values."""
+        """Start values for a fit of an effect, derived from the branch that it replaces.
+
+        Returns:
+            Parameter values [SI] of each start by qualified name; one empty start if the effect replaces no branch.
+        """
         if effect.replaces not in self.effects or not effect.in_place_of:
             return [{}]
         own = [(qualified_name(effect, each), each) for each in effect.parameters]
@@ -160,7 +173,11 @@ class Model:
         ]
 
     def with_twin(self, name: str) -> "Model":
-        """The model with that effect in place of its twins, of the same values; as it is where it has none of them."""
+        """Replace the twins of an effect by the effect itself, with the same values.
+
+        Returns:
+            The changed model, or the same model if it has no twin of the effect.
+        """
         twins = [effect for effect in self.records if effect.name in twins_of(name) and effect.name != name]
         effects = [effect.name for effect in self.records if effect not in twins]
         moved = {
@@ -184,6 +201,9 @@ class Model:
 
     def equation(self) -> str:
         """The model as text: the formula of its first-harmonic stiffness, other effects, and values in common units.
+
+        Returns:
+            Lines of text: stiffness formula, other effects, then parameter values.
 
         >>> print(paper.equation().splitlines()[1])
           mu = 1.09 MPa
@@ -216,6 +236,9 @@ class Model:
             values: parameter values in place of the model's own; arrays whose last axis has length 1 add
                 leading axes to the result.
             under: what the test was made under.
+
+        Returns:
+            Complex stiffness, in the common shape of frequency and amplitude.
 
         Notes:
             The rubber has k = G mu^(omega, e0), with G of Eqs. 10, 11, 12 and e0 of Eqs. 7, 8 (Eqs. 6 to 12); the
@@ -250,6 +273,16 @@ class Model:
 
         The other arguments are as of `stiffness`.
 
+        Args:
+            direction: direction or specimen, or the name of a direction.
+            displacement: history of displacement [m] or rotation [rad], (..., n).
+            kind: kind of record; only effects of the instrument differ between loop and sweep.
+            values: parameter values in place of the model's own.
+            under: test conditions, such as the temperature.
+
+        Returns:
+            Force [N] or moment [N m], (..., n).
+
         >>> motion = History.steady(1e-3 * np.sin(np.linspace(0.0, 2.0 * np.pi, 256)), 0.1)
         >>> round(float(paper.force("axial", motion).max()), 1)
         458.1
@@ -259,7 +292,16 @@ class Model:
         return respond(displacement)
 
     def setting(self, place: Place | str, kind: Kind = "sweep", under: Circumstances = UNKNOWN) -> Setting:
-        """The test of a place, or of one by its name, that a response belongs to."""
+        """Setting of a test.
+
+        Args:
+            place: direction or specimen, or the name of a direction.
+            kind: kind of record, "loop" or "sweep".
+            under: test conditions, such as the temperature.
+
+        Returns:
+            Geometry, direction and test conditions that a response depends on.
+        """
         direction = Direction(place) if isinstance(place, str) else place
         return Setting(self.bushing, direction, kind, under, self.unnamed)
 
@@ -274,6 +316,15 @@ class Model:
         self, place: Place, frequency: float, amplitude: float, under: Circumstances = UNKNOWN
     ) -> dict[str, float]:
         """All values as the modifiers leave them at an operating condition [Hz, m or rad].
+
+        Args:
+            place: direction or specimen.
+            frequency: [Hz].
+            amplitude: zero-to-peak displacement [m] or rotation [rad].
+            under: test conditions, such as the temperature.
+
+        Returns:
+            Parameter values [SI] by qualified name.
 
         >>> model = paper.with_effect("rate_dependent_friction", {"rate_dependent_friction.n": 0.1})
         >>> round(model.values_at("axial", 50.0, 1e-3)["sigma_fmax"])
@@ -302,7 +353,23 @@ class Model:
         }
 
         def below(count: int) -> StiffnessBelow:
+            """Response of the rubber and the innermost `count` groups of layers.
+
+            Returns:
+                Stiffness and steady-cycle force of these layers.
+            """
+
             def cycle(omega: Array, motion: Array, points: Any) -> Array:
+                """Force over one steady cycle of the rubber and these layers.
+
+                Args:
+                    omega: angular frequencies [rad/s], (..., k).
+                    motion: displacement [m] or rotation [rad] over a cycle, (..., k, n).
+                    points: index of the operating points among those of the test.
+
+                Returns:
+                    Force [N] or moment [N m], (..., k, n).
+                """
                 cycles = replace(setting, under=setting.under.select(points).select((..., None)))
                 force = self._stack_force(cycles, per_sample, [layer for group in groups[:count] for layer in group])
                 return force(History.steady(motion, cast(float, omega[..., None] / (2.0 * np.pi))))
@@ -324,6 +391,11 @@ class Model:
         structure, known = self._structure, dict[int, tuple[Any, Array]]()
 
         def rubber(displacement: History) -> Array:
+            """Force of the rubber alone over a history of displacement.
+
+            Returns:
+                Force [N] or moment [N m], (..., n).
+            """
             strain, base = displacement.scaled(per_displacement), values
             if structure.modifiers:
                 omega = np.atleast_1d(displacement.omega)
@@ -338,7 +410,16 @@ class Model:
             return factor * sum(stresses, start=np.zeros(1))
 
         def modulus(omega: Array, base: Values, strain: History) -> Array:
-            """Of the linear branches, (..., harmonics), kept for the next motion at the same times."""
+            """Modulus [Pa] of the linear branches at harmonics, cached for motions with the same time step.
+
+            Args:
+                omega: angular frequencies of the harmonics [rad/s].
+                base: parameter values [SI].
+                strain: history of strain.
+
+            Returns:
+                Complex moduli, twice their sum, (..., harmonics).
+            """
             count, step = strain.value.shape[-1], strain.step
             if base is values and count in known and known[count][0] is step:
                 return known[count][1]

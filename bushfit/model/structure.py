@@ -1,4 +1,4 @@
-"""What a model is built of: its effects by kind, their parameters, and the values that each of them reads."""
+"""Structure of a model: its effects by kind, their parameters, and the values that each effect reads."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,7 +35,11 @@ class Structure:
     @classmethod
     @lru_cache(maxsize=256)
     def of(cls, names: tuple[str, ...]) -> "Structure":
-        """The structure of a model with these effects, in any order; kept, because a fit makes thousands of models."""
+        """The structure of a model with these effects, in any order; kept, because a fit makes thousands of models.
+
+        Returns:
+            Effects by kind, from the rubber outward, and their parameters.
+        """
         doubles = {name for name in names if names.count(name) > 1}
         if doubles:
             raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
