@@ -31,7 +31,7 @@ def track(description: str, items: Iterable[Item], total: int = 0, remark: Calla
         remark: called after each item; returns a short text about the state of the work.
 
     Yields:
-        The items; an item counts as finished when the next one is requested.
+        The items; an item is finished when the next one is requested.
     """
     listener, total = _LISTENER.get(), len(items) if isinstance(items, Collection) else total
     listener(description, 0, total, "")

@@ -65,18 +65,18 @@ def schema(name: str) -> dict[str, Any]:
             expected="one of " + ", ".join(DESCRIBED),
             hint=did_you_mean(name, DESCRIBED),
         )
-    asked = DESCRIBED[name]
-    module, _, kind = asked.type.rpartition(".")
+    described = DESCRIBED[name]
+    module, _, kind = described.type.rpartition(".")
     adapter = TypeAdapter[Any](getattr(importlib.import_module(f"bushfit.{module}"), kind))
-    made = adapter.json_schema(
-        mode="serialization" if asked.way == "written" else "validation", schema_generator=_generator(asked.way)
+    generated = adapter.json_schema(
+        mode="serialization" if described.way == "written" else "validation", schema_generator=_generator(described.way)
     )
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": f"urn:bushfit:schema:{name}",
-        "title": f"bushfit {name}: {asked.files}",
+        "title": f"bushfit {name}: {described.files}",
     }
-    return {**head, **{key: value for key, value in _tidied(made).items() if key != "title"}}
+    return {**head, **{key: value for key, value in _tidied(generated).items() if key != "title"}}
 
 
 def _generator(way: str) -> Any:
@@ -102,26 +102,26 @@ def _generator(way: str) -> Any:
     return Generator
 
 
-def _explained(made: dict[str, Any], kind: type) -> dict[str, Any]:
+def _explained(table_schema: dict[str, Any], kind: type) -> dict[str, Any]:
     """The schema of a table with what its type says of it and of its keys."""
     from bushfit.validation import inline_fields
 
-    properties: dict[str, Any] = made["properties"]
-    told = _beside_keys(kind) if is_typeddict(kind) else {}
-    for each in reversed(kind.__mro__):
-        told |= _arguments(inspect.cleandoc(each.__doc__ or ""))
-    for key in properties.keys() & told.keys():
-        properties[key] = {**properties[key], "description": told[key]}
+    properties: dict[str, Any] = table_schema["properties"]
+    descriptions = _beside_keys(kind) if is_typeddict(kind) else {}
+    for base in reversed(kind.__mro__):
+        descriptions |= _arguments(inspect.cleandoc(base.__doc__ or ""))
+    for key in properties.keys() & descriptions.keys():
+        properties[key] = {**properties[key], "description": descriptions[key]}
     for field, keys in (inline_fields(kind) if is_dataclass(kind) else {}).items():
         value = properties.pop(field)
         inner = value.get("additionalProperties", value)
-        made["required"] = [key for key in made.get("required", ()) if key != field]
-        said = {key: {"description": told[key]} for key in keys() if key in told}
-        made["properties"] |= {key: inner | said.get(key, {}) for key in keys()}
+        table_schema["required"] = [key for key in table_schema.get("required", ()) if key != field]
+        description_of = {key: {"description": descriptions[key]} for key in keys() if key in descriptions}
+        table_schema["properties"] |= {key: inner | description_of.get(key, {}) for key in keys()}
         if inner is not value:  # places, such as specimens, have parameters that the library does not list
-            made["additionalProperties"] = inner
+            table_schema["additionalProperties"] = inner
     words = inspect.cleandoc(kind.__doc__ or "").partition("\n\nArgs:")[0]
-    return {**made, "description": " ".join(words.split())}
+    return {**table_schema, "description": " ".join(words.split())}
 
 
 def _arguments(docstring: str) -> dict[str, str]:
@@ -135,13 +135,13 @@ def _beside_keys(kind: type) -> dict[str, str]:
     """Description of each key of a TypedDict."""
     hints = get_type_hints(kind, include_extras=True)
     parts = ((key, part) for key, hint in hints.items() for part in (hint, *get_args(hint)))  # as in NotRequired[...]
-    beside = ((key, each) for key, part in parts for each in getattr(part, "__metadata__", ()))
-    return {key: each.documentation for key, each in beside if isinstance(each, Doc)}
+    metadata = ((key, item) for key, part in parts for item in getattr(part, "__metadata__", ()))
+    return {key: item.documentation for key, item in metadata if isinstance(item, Doc)}
 
 
 def _tidied(node: Any) -> Any:
     """A schema without what is no keyword of it, and without defaults that say nothing."""
     if isinstance(node, Mapping):
-        said = (key for key, value in node.items() if key not in _NO_KEYWORDS and (key, value) != ("default", None))
-        return {key: _tidied(node[key]) for key in said}
-    return [_tidied(each) for each in node] if isinstance(node, list) else node
+        keywords = (key for key, value in node.items() if key not in _NO_KEYWORDS and (key, value) != ("default", None))
+        return {key: _tidied(node[key]) for key in keywords}
+    return [_tidied(item) for item in node] if isinstance(node, list) else node

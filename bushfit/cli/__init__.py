@@ -109,7 +109,7 @@ def main(command: click.Command = cli) -> None:
 
 
 def _status(command: click.Command) -> int:
-    """Exit status of a command as it is typed; what went wrong is said."""
+    """Run a command from its command line, print its errors, and return its exit status."""
     try:
         status = command.main(prog_name=command.name, standalone_mode=False)
         sys.stdout.flush()
@@ -117,12 +117,12 @@ def _status(command: click.Command) -> int:
     except (click.exceptions.Abort, KeyboardInterrupt):
         message = "aborted"
     except click.ClickException as error:
-        where = error.ctx if isinstance(error, click.UsageError) else None
+        context = error.ctx if isinstance(error, click.UsageError) else None
         text = " ".join(error.format_message().split())
         if wrong := re.search(r"'([^']*)' is not one of (.*)\.$", text):
             near = did_you_mean(wrong[1], re.findall(r"'([^']*)'", wrong[2]))
             text = f"{text[:-1]}; {near}" if near else text
-        message = printable(f"error: {text}  ({where.command_path if where else 'bushfit'} -h tells more)")
+        message = printable(f"error: {text}  ({context.command_path if context else 'bushfit'} -h tells more)")
     except BushfitError as error:
         message = f"error: {error}"
     except MemoryError:
@@ -146,8 +146,7 @@ def _status(command: click.Command) -> int:
 class _Stream:
     """A standard stream that nobody may read any more, because it is closed or its disk is full.
 
-    Where what is written `is_needed`, as a result is, that is an error; what people are told besides is not, and the
-    work goes on without.
+    Output that `is_needed`, such as a result, then raises an error. Other messages are dropped, and the work continues.
     """
 
     def __init__(self, stream: TextIO | None, *, is_needed: bool) -> None:

@@ -117,8 +117,8 @@ def _print_parameters(output: Output, compared: ComparisonOutput) -> None:
     """Print the parameters of each result beside those of the first."""
     from bushfit.report.compared import chance, parameter_cells
 
-    first, *others = compared.labels
-    for label, comparison in zip(others, compared.comparisons, strict=True):
+    first, *labels = compared.labels
+    for label, comparison in zip(labels, compared.comparisons, strict=True):
         title = f"parameters of {label} against {first}; p: chance of such a difference, by Holm over all of them"
         columns = ("parameter", first, label, "difference", "95 % interval", "p", "unit")
         output.print_table(title, columns, map(parameter_cells, comparison.parameters))

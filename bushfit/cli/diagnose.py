@@ -64,7 +64,7 @@ def command(
 
     All tests are used, in every direction. The verdict is consistent (nothing is missing), named (what was added, or
     one test recorded wrongly, closes the gap), ambiguous (look-alikes: all are listed, none is added), described (no
-    name, but a smooth correction), partly (a little remains) or unexplained. Mistakes are told, and mended by --adopt.
+    name, but a smooth correction), partly (a little remains) or unexplained. --adopt corrects a mistake.
 
     Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv, gap.png, report.html.
     """

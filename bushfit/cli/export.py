@@ -51,8 +51,8 @@ def command(
 ) -> None:
     """Write a fitted model for other programs: a solver, a multibody code, a spreadsheet.
 
-    MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. What a format cannot carry, and what
-    that costs, is said. Effects of the rig are left out. z is the bushing's axis.
+    MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. The command lists properties
+    that a format cannot represent, with their errors. Effects of the rig are left out. z is the bushing's axis.
 
     Writes bushing.bdf, .fem, .inp or .xlsx, bushing_car.bus and bushing_ride.bus (adams), a CSV file a table, or an
     .fmu with arms.csv and arms.png, its Maxwell arms.

@@ -62,44 +62,44 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
     Beside loops there are `sweeps`, with all keys of a campaign, or else resonance tests, with those of any file.
     """
     keys = _OF_TESTS if sweeps else {}
-    told = ("direction", "force_sign", *keys, *_AS_WRITTEN)
+    option_keys = ("direction", "force_sign", *keys, *_AS_WRITTEN)
 
-    def known() -> tuple[str, ...]:
+    def column_roles() -> tuple[str, ...]:
         from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 
         return tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
 
     def decorate(function: Function) -> Function:
         @wraps(function)
-        def wrapped(columns: Sequence[str], units: Sequence[str], **given: Any) -> Any:
-            stated = {key: given.pop(key) for key in told}
-            stated["columns"] = _pairs(columns, "--column", "force=Kraft", known())
-            stated["units"] = _pairs(units, "--unit", "force=kN", known())
-            return function(test_options={key: value for key, value in stated.items() if value}, **given)
+        def wrapped(columns: Sequence[str], units: Sequence[str], **arguments: Any) -> Any:
+            test_options = {key: arguments.pop(key) for key in option_keys}
+            test_options["columns"] = _pairs(columns, "--column", "force=Kraft", column_roles())
+            test_options["units"] = _pairs(units, "--unit", "force=kN", column_roles())
+            return function(test_options={key: value for key, value in test_options.items() if value}, **arguments)
 
         return in_order(
             wrapped,
             click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
             under(
                 "What the files do not say",
-                _stated("direction", "DIRECTION", "axial, radial or torsion [names, columns]."),
+                _metadata_option("direction", "DIRECTION", "axial, radial or torsion [names, columns]."),
                 option("--unit units", "ROLE=UNIT", 'Of a column: "force=kN".', multiple=True),
                 option(
                     "--column columns", "ROLE=HEADER", 'Which it is, "force=Fz"; a wrong ROLE lists all.', multiple=True
                 ),
-                _stated("force_sign", "-1", "If the load cell counts the other way."),
-                *(_stated(key, metavar, words) for key, (metavar, words) in keys.items()),
+                _metadata_option("force_sign", "-1", "If the load cell counts the other way."),
+                *(_metadata_option(key, metavar, words) for key, (metavar, words) in keys.items()),
             ),
             under(
                 "How they are written, where it is not detected",
-                *(_stated(key, metavar) for key, metavar in _AS_WRITTEN.items()),
+                *(_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items()),
             ),
         )
 
     return decorate
 
 
-def _stated(key: str, metavar: str, words: str | None = None) -> Parameter:
+def _metadata_option(key: str, metavar: str, words: str | None = None) -> Parameter:
     """The option of a key of a campaign."""
     return option(option_of(key), metavar, words, type=TYPES.get(key))
 
@@ -145,17 +145,17 @@ def direction_error(file: Path, sheet: str | None = None) -> MeasurementError:
     )
 
 
-def _pairs(texts: Sequence[str], option: str, example: str, known: Sequence[str]) -> Mapping[str, str]:
+def _pairs(texts: Sequence[str], option: str, example: str, roles: Sequence[str]) -> Mapping[str, str]:
     pairs = {}
     for text in texts:
         role, equals, value = text.partition("=")
         role = role.strip().replace(" ", "_").replace("-", "_")
-        if not (equals and value.strip() and role in known):
+        if not (equals and value.strip() and role in roles):
             raise MeasurementError(
                 "not a column's role with a value",
                 place=option,
                 found=f'"{text}"',
-                expected=f'such as "{example}"; roles: {", ".join(known)}',
+                expected=f'such as "{example}"; roles: {", ".join(roles)}',
             )
         pairs[role] = value.strip()
     return pairs

@@ -89,8 +89,8 @@ def fit(
 
     This is the fit to use: bushfit predict takes its model. Without axial loops, or axial sweeps, it takes those of all
     directions. Tests that were not fitted are shown as predictions. Where [fit] of the campaign holds all five
-    (vary = false) nothing is fitted, and it is said how well the values given meet the tests. --profile is right also
-    where a parameter is hardly determined and the interval from the standard error is not.
+    (vary = false) nothing is fitted, and the command reports how well these values agree with the tests. --profile is
+    right also where a parameter is hardly determined and the interval from the standard error is not.
 
     Writes model.json, and of loops and sweeps a table and a plot each.
     """

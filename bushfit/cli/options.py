@@ -46,13 +46,13 @@ def _named(ctx: click.Context, tables: str, key: str) -> Iterator[str]:
             yield from (str(entry[key]) for entry in entries if isinstance(entry, dict) and key in entry)
 
 
-def _offered(known: Callable[[click.Context], Iterable[str]], between: str = "") -> Offer:
-    """Offers what is known, of a list with certain signs `between` its names for the last."""
+def _offered(list_names: Callable[[click.Context], Iterable[str]], between: str = "") -> Offer:
+    """Shell completion from a list of names; with `between`, for the last name of a list separated by these signs."""
 
     def offer(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
         typed = re.match(f"(?:.*[{between}])?", incomplete) if between else None
         before = typed[0] if typed else ""
-        return [before + name for name in known(ctx) if name.startswith(incomplete[len(before) :])]
+        return [before + name for name in list_names(ctx) if name.startswith(incomplete[len(before) :])]
 
     return offer
 
@@ -163,15 +163,15 @@ class Folder(click.Path):
 
 
 class Size(NumberType):
-    """A number above zero and below or at `most`, called by what it is of; a share also in per cent."""
+    """Positive number up to `maximum`, also in per cent; error messages use the name of the quantity."""
 
-    def __init__(self, name: str, most: float) -> None:
-        self.name, self._most = name, most
+    def __init__(self, name: str, maximum: float) -> None:
+        self.name, self._maximum = name, maximum
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         text = str(value).strip()
         with suppress(ValueError):
-            if 0.0 < (size := float(text.removesuffix("%")) * (0.01 if "%" in text else 1.0)) <= self._most:
+            if 0.0 < (size := float(text.removesuffix("%")) * (0.01 if "%" in text else 1.0)) <= self._maximum:
                 return size
         return self.fail(f"{text} is no {self.name}", param, ctx)
 
@@ -198,10 +198,10 @@ def under(heading: str, *parameters: Parameter) -> Parameter:
     """Options that stand under a heading of the help, in this order."""
 
     def decorate(function: Function) -> Function:
-        made: list[Any] = vars(function).setdefault("__click_params__", [])
-        before = len(made)
+        command_parameters: list[Any] = vars(function).setdefault("__click_params__", [])
+        before = len(command_parameters)
         in_order(function, *parameters)
-        for parameter in made[before:]:
+        for parameter in command_parameters[before:]:
             parameter.heading = heading
         return function
 

@@ -121,13 +121,13 @@ class Output:
         from bushfit.prediction.caveats import by_importance, use_of
 
         warnings = by_importance(self._warnings)
-        shown = warnings if self.verbose else warnings[:_MOST_WARNINGS]
-        for warning in shown:
+        printed = warnings if self.verbose else warnings[:_MOST_WARNINGS]
+        for warning in printed:
             self.console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
             if (use := use_of(warning)) != use_of(""):  # which is said of warnings of no known kind
                 self.print(f"  {use}")
-        if left := len(warnings) - len(shown):
-            self.print(f"{left} more warning{'s' * (left > 1)}: -v prints all, the result files hold them")
+        if remaining := len(warnings) - len(printed):
+            self.print(f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all, the result files hold them")
         self._warnings.clear()
 
     def print_table(
@@ -175,7 +175,7 @@ class Output:
             folder: results folder.
             files: result files.
             document: content of --json.
-            inputs: files that the command has read, none of which is replaced.
+            inputs: files that the command has read and must not replace.
         """
         self.print_warnings()
         written = write_results(folder, files, self.formats, overwrite=self.force, inputs=inputs)
@@ -271,13 +271,13 @@ def _progress(console: Console) -> Iterator[None]:
     bar = Progress(*columns, console=console, transient=True, redirect_stdout=False)
     lines, patient = dict[str, tuple[float, Any]](), True
 
-    def update(what: str, done: int | None, total: int, remark: str) -> None:
+    def update(description: str, done: int | None, total: int, remark: str) -> None:
         if done is None:
-            bar.remove_task(lines.pop(what)[1])
+            bar.remove_task(lines.pop(description)[1])
         else:
-            if what not in lines:
-                lines[what] = monotonic(), bar.add_task(what, total=total, rate="", remark="")
-            start, line = lines[what]
+            if description not in lines:
+                lines[description] = monotonic(), bar.add_task(description, total=total, rate="", remark="")
+            start, line = lines[description]
             bar.update(line, completed=done, rate=_rate(done, total, monotonic() - start), remark=remark)
         show()
 

@@ -57,7 +57,9 @@ def print_result(output: Output, title: str, result: Result) -> None:
         pair for pair in result.covariance.correlations() if output.verbose or abs(pair[2]) > _STRONG_CORRELATION
     ]
     if correlations:
-        output.print("correlation: " + ", ".join(f"{one}/{other} {value:+.2f}" for one, other, value in correlations))
+        output.print(
+            "correlation: " + ", ".join(f"{first}/{second} {value:+.2f}" for first, second, value in correlations)
+        )
 
 
 def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usable]) -> None:
@@ -73,9 +75,9 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usab
             figures = (number(100 * test.nrmse, 2), number(test.reduced_chi_square, 2), gain)
             rows.append((name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted"))
         output.print_table(title, columns, rows, text_columns=2)
-    if left := len(tests) - len(worst):
+    if count := len(tests) - len(worst):
         output.print(
-            f"and {left} more {'test, which is' if left == 1 else 'tests, which are'} met better; -v shows them"
+            f"and {count} more {'test, which is' if count == 1 else 'tests, which are'} met better; -v shows them"
         )
     for place in usable:
         how = "each predicted from other runs" if place.held_out else "as fitted"

@@ -78,13 +78,13 @@ def print_run(output: Output, name: str, outcome: RunOutput) -> None:
 
 def _model_to_use(folder: Path, outcome: RunOutput) -> str:
     """Sentence on which of the model files to use."""
-    which = "the joint fit"
+    description = "the joint fit"
     if outcome.diagnosed and outcome.added:
         effects = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
-        which = f"with {effects}; joint.json is without"
+        description = f"with {effects}; joint.json is without"
     elif outcome.diagnosed and outcome.diagnosed.diagnosis.changed:  # a mistake in the record is named
-        which = "the joint fit to the tests as they are: put the record right first, then run again"
-    return f"the model to use: {folder / 'model.json'}, {which}"
+        description = "the joint fit to the tests as they are: put the record right first, then run again"
+    return f"the model to use: {folder / 'model.json'}, {description}"
 
 
 def _print_range(output: Output, outcome: RunOutput) -> None:
@@ -111,21 +111,28 @@ def two_step_line(two_step: TwoStep, joint: Result) -> str:
     """Line that compares the two-step procedure with the joint fit; at a bound, errors do not count."""
     found = two_step.result
     errors = {name: (found.covariance.stderr(name), joint.covariance.stderr(name)) for name in joint.fitted}
-    known = {name: (error, least) for name, (error, least) in errors.items() if error and least}
-    off = {n: abs(found.model.values[n] - joint.model.values[n]) / error for n, (error, _) in known.items()}
-    ratio = {name: error / least for name, (error, least) in known.items()}
+    standard_errors = {
+        name: (two_step_error, joint_error)
+        for name, (two_step_error, joint_error) in errors.items()
+        if two_step_error and joint_error
+    }
+    difference = {
+        n: abs(found.model.values[n] - joint.model.values[n]) / two_step_error
+        for n, (two_step_error, _) in standard_errors.items()
+    }
+    ratio = {name: two_step_error / joint_error for name, (two_step_error, joint_error) in standard_errors.items()}
     passes = len(two_step.passes)
     parts = [f"{passes} pass{'es' * (passes > 1)}"]
     if found.at_bound:
         parts.append(f"came to rest on a bound: {', '.join(found.at_bound)}")
-    elif off:
-        far, unsure = (max(sizes, key=sizes.__getitem__) for sizes in (off, ratio))
-        count = max(1, math.ceil(round(off[far], 1)))
+    elif difference:
+        far, unsure = (max(sizes, key=sizes.__getitem__) for sizes in (difference, ratio))
+        count = max(1, math.ceil(round(difference[far], 1)))
         parts.append(
             f"agrees with the joint fit within {count} standard error{'s' * (count > 1)}"
             if count <= _AGREED
-            else f"{far} is {off[far]:.1f} standard errors off the joint fit"
-            if off[far] <= _COUNTED
+            else f"{far} is {difference[far]:.1f} standard errors off the joint fit"
+            if difference[far] <= _COUNTED
             else f"does not agree with the joint fit: {far} is farthest off"
         )
         times = number(ratio[unsure], 2)
@@ -168,11 +175,22 @@ def _print_cost(output: Output, two_step: Result, joint: Result) -> None:
     columns = ("parameter", "two-step", "std error", "joint", "std error", "unit", "difference", "error ratio")
     rows = []
     for name in (name for name in joint.fitted if name in two_step.model.values):
-        one, other = two_step.model.values[name], joint.model.values[name]
+        two_step_value, joint_value = two_step.model.values[name], joint.model.values[name]
         errors = two_step.covariance.stderr(name), joint.covariance.stderr(name)
         ratio = f"{errors[0] / errors[1]:.1f}" if errors[0] and errors[1] else ""
-        unit, factor = display_unit(joint.model.parameters[name].unit, 1.0, other)
-        shown = ["" if error is None else format_aligned([error * factor], 2)[0] for error in errors]
-        second, first = format_aligned([other * factor, one * factor], 4, minimum_digits=2)
-        rows.append((name, first, shown[0], second, shown[1], unit, f"{100 * (one / other - 1):+.1f} %", ratio))
+        unit, factor = display_unit(joint.model.parameters[name].unit, 1.0, joint_value)
+        error_texts = ["" if error is None else format_aligned([error * factor], 2)[0] for error in errors]
+        second, first = format_aligned([joint_value * factor, two_step_value * factor], 4, minimum_digits=2)
+        rows.append(
+            (
+                name,
+                first,
+                error_texts[0],
+                second,
+                error_texts[1],
+                unit,
+                f"{100 * (two_step_value / joint_value - 1):+.1f} %",
+                ratio,
+            )
+        )
     output.print_table("what the two-step procedure costs", columns, rows)

@@ -25,16 +25,24 @@ def command(name: str | None, output: Output) -> None:
     from bushfit.schemas import DESCRIBED, schema
 
     with error_location(place="NAME"):
-        made = {each: schema(each) for each in ([name] if name else DESCRIBED if output.output else ())}
+        documents = {
+            schema_name: schema(schema_name) for schema_name in ([name] if name else DESCRIBED if output.output else ())
+        }
     document: dict[str, Any] = (
-        made[name] if name else {**made} or {each: described.files for each, described in DESCRIBED.items()}
+        documents[name]
+        if name
+        else {**documents} or {schema_name: described.files for schema_name, described in DESCRIBED.items()}
     )
     if output.output:
-        output.write(output.output, [json_file(f"{each}.schema", text) for each, text in made.items()], document)
+        output.write(
+            output.output,
+            [json_file(f"{schema_name}.schema", text) for schema_name, text in documents.items()],
+            document,
+        )
         return
     if name:
         output.print(f"{name} describes: {DESCRIBED[name].files}")
     else:
-        rows = ((each, described.files) for each, described in DESCRIBED.items())
+        rows = ((schema_name, described.files) for schema_name, described in DESCRIBED.items())
         output.print_table("schemas", ("name", "describes"), rows, text_columns=2)
     replace(output, as_json=output.as_json or name is not None).print_json(document)

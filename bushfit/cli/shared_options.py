@@ -72,12 +72,12 @@ def open_campaign(campaigns: Sequence[Path]) -> Campaign:
     """
     from bushfit.campaign.campaign import load_campaign, refuse_tests
 
-    first, *others = campaigns
-    if others:
+    first, *excess = campaigns
+    if excess:
         refuse_tests(campaigns)
-        extra = "argument" if len(others) == 1 else "arguments"
+        extra = "argument" if len(excess) == 1 else "arguments"
         raise click.UsageError(
-            f"Got unexpected extra {extra} ({' '.join(map(str, others))}). bushfit batch takes several campaigns.",
+            f"Got unexpected extra {extra} ({' '.join(map(str, excess))}). bushfit batch takes several campaigns.",
             click.get_current_context(),
         )
     return load_campaign(first)

@@ -72,12 +72,12 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
 
 def _with_options(tests: SimulateSettings, settings: dict[str, Any]) -> SimulateSettings:
     changes = {name: value for name, value in settings.items() if value is not None}
-    for name, given in changes.items():
-        if isinstance(given, str):
+    for name, value in changes.items():
+        if isinstance(value, str):
             with error_location(place=option_of(name)):
-                changes[name] = parse_quantity(given, "rad" if name == "phase_error" else "1")
+                changes[name] = parse_quantity(value, "rad" if name == "phase_error" else "1")
                 if not 0.0 <= changes[name] < 1.0:
-                    raise UnitError("impossible size", found=given, expected="0 up to 100 %, or below 1 rad")
+                    raise UnitError("impossible size", found=value, expected="0 up to 100 %, or below 1 rad")
     return replace(tests, **changes)
 
 
@@ -85,9 +85,9 @@ def _with_effect(model: Model, text: str) -> Model:
     from bushfit.effects import effect_name_of, get_effect, is_parameter, qualified_name
 
     name, found, value = text.replace(" ", "").partition("=")
-    known = "." in name and is_parameter(name)
-    effect = get_effect(effect_name_of(name) if known else name.partition(".")[0])
-    if not (found and known):
+    is_known = "." in name and is_parameter(name)
+    effect = get_effect(effect_name_of(name) if is_known else name.partition(".")[0])
+    if not (found and is_known):
         raise ModelError(
             "not an effect with a value",
             place="--effect",

@@ -124,8 +124,8 @@ class ComparisonOutput:
         for label, entry, predicted in zip(self.labels, self.entries, predictions, strict=True):
             for line in warnings_of(entry.result, [prediction.warnings for prediction in predicted]):
                 labels_of.setdefault(line, []).append(label)
-        own = [f"{', '.join(labels)}: {line}" for line, labels in labels_of.items()]
-        return [*self.notes, *self._shared_tests(), *own]
+        result_warnings = [f"{', '.join(labels)}: {line}" for line, labels in labels_of.items()]
+        return [*self.notes, *self._shared_tests(), *result_warnings]
 
     def _shared_tests(self) -> list[str]:
         """Warnings that results were fitted to the same files."""
@@ -164,11 +164,11 @@ class ComparisonOutput:
     @cached_property
     def files(self) -> Sequence[ResultFile]:
         """Document, tables, figure and page."""
-        shown = SideBySide.from_document(self.document)
+        comparison = SideBySide.from_document(self.document)
         names = ("parameters", *(["families"] if self.families else []), "differences")
         files = [json_file("compare", self.document)]
-        files += [table_file(name, partial(lambda name: shown.tables()[name], name)) for name in names]
-        files.append(figure_file("compare", lambda: plots.batch.comparison_figure(shown)))
+        files += [table_file(name, partial(lambda name: comparison.tables()[name], name)) for name in names]
+        files.append(figure_file("compare", lambda: plots.batch.comparison_figure(comparison)))
         return [*files, page_file("compare", comparison_page, files)]
 
 
@@ -267,11 +267,15 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
     """Directions and specimens to compare, each as every result has it; the compound if none is common to all."""
     if names:
         return [[result.place(name) for result in results] for name in names]
-    known = [_fitted_places(result) for result in results]
-    common = [name for name in known[0] if all(name in names for names in known)]
+    fitted_places = [_fitted_places(result) for result in results]
+    common = [name for name in fitted_places[0] if all(name in names for names in fitted_places)]
     places = [[result.place(name) for result in results] for name in common]
-    same = [place for place in places if all(one.motion is other.motion for one, other in combinations(place, 2))]
-    return same or [[_COMPOUND] * len(results)]
+    matching = [
+        place
+        for place in places
+        if all(place_a.motion is place_b.motion for place_a, place_b in combinations(place, 2))
+    ]
+    return matching or [[_COMPOUND] * len(results)]
 
 
 def _fitted_places(result: Result) -> list[str]:
@@ -323,8 +327,8 @@ def _family_to_use(families: Sequence[FittedFamily], entries: Sequence[ComparedR
         points = np.repeat(middle[:, None], _POINTS, axis=1)
         values = points[axis] = np.geomspace(low / _BEYOND, high * _BEYOND, _POINTS)
         moduli = np.abs([model.stiffness(_COMPOUND, *points) for model in models])
-        apart = values[moduli.max(axis=0) > (1.0 + _AGREED) * moduli.min(axis=0)]
-        below, above = apart[apart < middle[axis]], apart[apart > middle[axis]]
+        differing = values[moduli.max(axis=0) > (1.0 + _AGREED) * moduli.min(axis=0)]
+        below, above = differing[differing < middle[axis]], differing[differing > middle[axis]]
         reach.append((below.max(initial=values[0]), above.min(initial=values[-1])))
     frequencies, strains = format_range("Hz", *reach[0]), format_range("%", *(100.0 * end for end in reach[1]))
     return (

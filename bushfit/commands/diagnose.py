@@ -137,6 +137,6 @@ def _with_plan(diagnosis: Diagnosis, campaign: Campaign) -> Diagnosis:
     path = campaign.path
     if diagnosis.verdict != "ambiguous" or path.suffix != ".toml" or not (sets := look_alikes(diagnosis)):
         return diagnosis
-    shown = Path(path.name) if path.is_absolute() else path  # results hold no path of a machine
-    command = f"bushfit plan {quote_path(shown)} --rivals {','.join(sets[0])}"
+    printed_path = Path(path.name) if path.is_absolute() else path  # results hold no path of a machine
+    command = f"bushfit plan {quote_path(printed_path)} --rivals {','.join(sets[0])}"
     return replace(diagnosis, next_test=f"{diagnosis.next_test}; {command} chooses tests that tell them apart")

@@ -148,8 +148,8 @@ def predict(
             expected="a model with the effect of temperature",
             hint="fit tests at several temperatures with --effect temperature",
         )
-    asked = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
-    settings, sweeps = grid_settings(asked, campaign), campaign.sweeps if campaign else ()
+    requested = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
+    settings, sweeps = grid_settings(requested, campaign), campaign.sweeps if campaign else ()
     measured = _predictable_sweeps(result, campaign) if campaign else []
     at_temperature = [sweep for sweep in measured if _is_at(result, sweep, temperature)]
     places = _places(result, campaign, settings)
@@ -180,7 +180,7 @@ def predict(
 
 
 def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
-    """Grid of a prediction, of which None is left to its default.
+    """Grid of a prediction; None selects the default of an axis.
 
     Args:
         directions: directions or specimens by name.
@@ -321,11 +321,11 @@ def measured_files(result: Result, sweeps: Sequence[MeasuredSweep]) -> list[Resu
     """
 
     def table() -> pd.DataFrame:
-        fitted, others = split_by_fit(result, sweeps)
-        shown = tables.sweeps_table(result.model, [*fitted, *others])
-        counts = [sum(sweep.frequency.size for sweep in part) for part in (fitted, others)]
-        shown["fitted"] = np.repeat(["yes", "no"], counts)
-        return shown
+        fitted, not_fitted = split_by_fit(result, sweeps)
+        rows = tables.sweeps_table(result.model, [*fitted, *not_fitted])
+        counts = [sum(sweep.frequency.size for sweep in part) for part in (fitted, not_fitted)]
+        rows["fitted"] = np.repeat(["yes", "no"], counts)
+        return rows
 
     return [table_file("measured", table)] if sweeps else []
 

@@ -84,9 +84,9 @@ def save(
 
 def _content(output: CommandOutput, name: str, kind: Kind) -> Any:
     """Content of a result file."""
-    known = {file.name: file for file in output.files if file.kind == kind}
-    if name not in known:
+    files = {file.name: file for file in output.files if file.kind == kind}
+    if name not in files:
         word = {"figure": "picture"}.get(kind, kind)
-        expected = "one of " + ", ".join(known) if known else f"an outcome with a {word}"
-        raise BushfitError(f"there is no such {word}", found=name, expected=expected, hint=did_you_mean(name, known))
-    return known[name].make()
+        expected = "one of " + ", ".join(files) if files else f"an outcome with a {word}"
+        raise BushfitError(f"there is no such {word}", found=name, expected=expected, hint=did_you_mean(name, files))
+    return files[name].make()

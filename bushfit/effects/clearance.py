@@ -41,9 +41,9 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     each_twice = np.tile(np.arange(omega.shape[-1]), 2)
     motions = np.concatenate((reach[..., None] * wave, bent), axis=-2)
     answers = below.cycle(omega[..., each_twice], motions, (..., each_twice)) @ FIRST
-    round_, seen = np.split(answers, 2, axis=-1)
-    round_, seen = round_ / np.where(crossed, reach, 1.0), seen / np.where(crossed, amplitude, 1.0)
-    return below(omega, reach) * share + (seen - share * round_) * crossed
+    sine, path = np.split(answers, 2, axis=-1)
+    sine, path = sine / np.where(crossed, reach, 1.0), path / np.where(crossed, amplitude, 1.0)
+    return below(omega, reach) * share + (path - share * sine) * crossed
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:

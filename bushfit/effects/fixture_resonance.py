@@ -52,7 +52,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     if history.periodic:
         return below(history) + history.response(partial(fixture, p))
     row_by_row = np.vectorize(_mode, signature="(),(),(n),()->(n)")
-    frequency, damping, step = (np.atleast_1d(each)[..., 0] for each in (p["frequency"], p["damping"], history.step))
+    frequency, damping, step = (np.atleast_1d(value)[..., 0] for value in (p["frequency"], p["damping"], history.step))
     return below(history) + p["mass"] * row_by_row(2.0 * np.pi * frequency, damping, history.acceleration, step)
 
 

@@ -40,8 +40,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     if not near.any():
         return inside
     sine = dead_zone((inside[..., near, None] * motion[..., near, :] * wave).real, level)
-    beyond = dead_zone(below.cycle(omega[..., near], motion[..., near, :] * wave.real, near), level)
-    bent = (beyond - sine) @ FIRST
+    excess = dead_zone(below.cycle(omega[..., near], motion[..., near, :] * wave.real, near), level)
+    bent = (excess - sine) @ FIRST
     rest = np.zeros((*bent.shape[:-1], first.shape[-1]), dtype=complex)
     rest[..., near] = bent
     return inside - p["share"] * (

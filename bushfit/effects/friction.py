@@ -175,10 +175,10 @@ def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tu
     held, and its derivative by the first u."""
     path = [(u, 0.0 * u, 1.0 + 0.0 * u)]
     for sense, distance in zip(senses, distances, strict=True):
-        start, slope, kept = path[-1]
+        start, slope, memory = path[-1]
         end, *room_and_reach = _stroke(start, sense, distance)
         by_start, by_distance = _stroke_slopes(sense, distance, *room_and_reach)
-        path.append((end, by_start * slope - by_distance * distance, by_start * kept))
+        path.append((end, by_start * slope - by_distance * distance, by_start * memory))
     return path
 
 
@@ -202,20 +202,20 @@ def _at_turns(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, A
         return senses * 2.0 * x / (s + x + 1.0), -senses * 4.0 * x / (s * (x + 3.0 + s))
     single = scaled.size == scaled.shape[-1]
     pieces = scaled.ravel() if single else np.moveaxis(scaled, -1, 0)
-    signs, paths = (list[Any](each.tolist() if single else each) for each in (np.sign(pieces), np.abs(pieces)))
+    signs, paths = (list[Any](value.tolist() if single else value) for value in (np.sign(pieces), np.abs(pieces)))
     u: Any = 0.0 if single else np.zeros_like(pieces[0])
     path, first = _strokes(signs, paths, u), 0.0
     for _ in range(_ROUNDS if periodic else 0):
-        end, slope, kept = path[-1]
-        room = 1.0 - kept + (kept >= 1.0)  # one at rest keeps all
+        end, slope, memory = path[-1]
+        room = 1.0 - memory + (memory >= 1.0)  # one at rest keeps all
         first, closer = slope / room, np.clip(u + (end - u) / room, -1.0, 1.0)
         if np.all(np.abs(closer - u) < _SETTLED):
             break
         u = closer.item() if single else closer
         path = _strokes(signs, paths, u)
-    turns = [(u, slope + kept * first) for u, slope, kept in path[:-1]]
-    at, slopes = (np.stack(each, axis=-1).reshape(scaled.shape) for each in zip(*turns, strict=True))
-    return at, slopes
+    turns = [(u, slope + memory * first) for u, slope, memory in path[:-1]]
+    u_at_turns, slopes = (np.stack(value, axis=-1).reshape(scaled.shape) for value in zip(*turns, strict=True))
+    return u_at_turns, slopes
 
 
 def _at_samples(eps_half: Array, history: History) -> tuple[Array, Array, Array, Array]:

@@ -42,8 +42,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
     def excess(v: Array, inside: Array) -> Array:
         """v + ln|1 + c K|."""
-        given = compliance * inside
-        return v + 0.5 * np.log1p(2.0 * given.real + given.real**2 + given.imag**2)
+        relative = compliance * inside
+        return v + 0.5 * np.log1p(2.0 * relative.real + relative.real**2 + relative.imag**2)
 
     old = np.zeros(np.broadcast_shapes(np.shape(compliance), np.shape(amplitude)))
     inside_old = below(omega, np.broadcast_to(amplitude, old.shape))
@@ -51,14 +51,14 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     new = -excess_old
     for _ in range(_ROUNDS):
         inside = below(omega, amplitude * np.exp(new))
-        off = excess(new, inside)
-        run, rise = new - old, off - excess_old
+        error = excess(new, inside)
+        run, rise = new - old, error - excess_old
         slope = np.where((rise != 0.0) & (rise * run > 0.0), rise / np.where(run == 0.0, 1.0, run), 1.0)
-        step = -off / slope
-        if np.all(np.abs(off) <= _NEAR):
+        step = -error / slope
+        if np.all(np.abs(error) <= _NEAR):
             inside = inside + (inside - inside_old) * step / np.where(run == 0.0, 1.0, run)
             break
-        old, excess_old, inside_old, new = new, off, inside, new + step
+        old, excess_old, inside_old, new = new, error, inside, new + step
     return inside / (1.0 + compliance * inside)
 
 
@@ -104,25 +104,25 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         motion = np.clip(imposed - compliance * reached, -farthest, farthest)
         felt = below(history.with_value(motion, beneath))
         missing = felt - reached
-        off = np.max(np.abs(compliance * missing), axis=-1, keepdims=True)
+        error = np.max(np.abs(compliance * missing), axis=-1, keepdims=True)
         change = np.fft.irfft(yielding * np.fft.rfft(missing, n=length), n=length)[..., :count]
         past = past or _AndersonMixing(change.shape)
         step = past.step(reached, change)
         # what is no number counts as settled, so that it takes no other with it
-        if not np.any(off > history.accuracy * size) and _differences_resolved(reached, missing):
+        if not np.any(error > history.accuracy * size) and _differences_resolved(reached, missing):
             reached = reached + step
             many = imposed.ndim > 1  # else of many models on one motion the last is kept
-            kept = [each if many else each.reshape(-1, each.shape[-1])[-1].copy() for each in (rigid, reached)]
+            latest = [array if many else array.reshape(-1, array.shape[-1])[-1].copy() for array in (rigid, reached)]
             poor = number >= 16  # rounds, twice the usual: K is measured anew for the next solution
-            solved["compliance"] = (None if poor else kept[0], kept[1])
+            solved["compliance"] = (None if poor else latest[0], latest[1])
             return reached
-        idle = 0 if np.any(off < _NEARER * best) else idle + 1
+        idle = 0 if np.any(error < _NEARER * best) else idle + 1
         if idle == _IDLE:
             break
-        best = np.where(off < _NEARER * best, off, best)
-        pace, last = np.where(off < last, np.minimum(1.0, 2.0 * pace), 0.5 * pace), off
+        best = np.where(error < _NEARER * best, error, best)
+        pace, last = np.where(error < last, np.minimum(1.0, 2.0 * pace), 0.5 * pace), error
         reached = reached + pace * step
-    if not history.periodic and np.any(off > 1e-3 * size):  # less than any test resolves
+    if not history.periodic and np.any(error > 1e-3 * size):  # less than any test resolves
         raise ModelError(
             "a rig or sleeve gives way too much to be followed through time",
             found=f"{float(np.max(compliance)):.3g} m/N",

@@ -83,8 +83,8 @@ def stress(p: Values, history: History) -> Array:
     if history.periodic and turning.strides.shape[-1] == 2:  # to and fro
         low, high = _ends(p)
         sense = turning.at_samples(np.sign(turning.strides))
-        moved = 2.0 * _loaded(np.abs(turning.travel) / 2.0, low, high) - _loaded(history.amplitude, low, high)
-        return p["sigma"] * sense * moved
+        extension = 2.0 * _loaded(np.abs(turning.travel) / 2.0, low, high) - _loaded(history.amplitude, low, high)
+        return p["sigma"] * sense * extension
     slip = np.atleast_1d(p["e_s"])[..., None] * np.exp(np.asarray(p["spread"])[..., None] * _PLACES)
     return p["sigma"] * parallel_elements(history, slip, np.full(slip.shape, 1.0 / _COUNT))
 
@@ -109,8 +109,8 @@ def parallel_elements(history: History, yield_strain: Array, weights: Array) -> 
         start[..., piece, :] = np.clip(start[..., piece - 1, :] + strides[..., piece - 1, :], -1.0, 1.0)
     total = np.zeros(1)
     for element in range(yield_strain.shape[-1]):  # one by one: all at once do not fit into a processor's cache
-        moved = turning.at_samples(start[..., element]) + turning.travel / yield_strain[..., element]
-        total = total + weights[..., element] * np.clip(moved, -1.0, 1.0)
+        extension = turning.at_samples(start[..., element]) + turning.travel / yield_strain[..., element]
+        total = total + weights[..., element] * np.clip(extension, -1.0, 1.0)
     return total
 
 

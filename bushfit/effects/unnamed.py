@@ -85,8 +85,8 @@ class Unnamed:
 
     Args:
         size: standard deviation of the Gaussian process.
-        lengths: correlation lengths in ln frequency and ln strain; a change of temperature counts as the change of
-            frequency that shifts the time scale equally.
+        lengths: correlation lengths in ln frequency and ln strain; a change of temperature is converted to
+            the change of frequency that shifts the time scale equally.
         patches: corrections of the directions; a direction without a patch has the correction 0, with an error of the
             size of the gap.
     """
@@ -125,7 +125,7 @@ class Unnamed:
         return float(np.sqrt(errors.mean() / max(values.mean(), np.finfo(float).tiny)))
 
     @property
-    def beyond(self) -> float:
+    def far_deviation(self) -> float:
         """Standard deviation of each part of the correction far from the nodes."""
         return self.largest / _DEVIATIONS
 
@@ -145,7 +145,7 @@ class Unnamed:
         patch = next((patch for patch in self.patches if str(setting.direction) in patch.directions), None)
         if patch is None:
             zero = np.zeros(np.broadcast_shapes(np.shape(omega), strain.shape))
-            return zero.astype(complex), np.full((2, *zero.shape), self.beyond), zero
+            return zero.astype(complex), np.full((2, *zero.shape), self.far_deviation), zero
         temperature = REFERENCE if setting.under.temperature is None else setting.under.temperature
         kelvin = np.asarray(temperature) if patch.temperature_K else None
         points = coordinates(omega / (2.0 * np.pi), strain, kelvin)
@@ -156,7 +156,7 @@ class Unnamed:
         node_errors = np.array([patch.in_phase_error, patch.in_quadrature_error])
         interpolated = [np.clip(weight @ error, error.min(), error.max()) for error in node_errors]
         inner = np.square(self.size) * variance + np.square(interpolated)
-        variance = np.square(fade) * inner + (1.0 - np.square(fade)) * np.square(self.beyond)
+        variance = np.square(fade) * inner + (1.0 - np.square(fade)) * np.square(self.far_deviation)
         return fade * value, np.sqrt(np.maximum(variance, 0.0)), fade
 
 

@@ -145,9 +145,9 @@ def _property_file(order: Order, elements: Sequence[_Element], kind: Kind, losse
             curves[dof - 1] = element.displacement * displacement, element.force * force
     values = zip(_AXES, damping, strict=True)
     yield from _block("DAMPING", {f"{force.upper()}_DAMPING": format_real(value) for (_, force), value in values})
-    for (moved, resisting), curve in zip(_AXES, curves, strict=True):
+    for (motion_axis, resisting), curve in zip(_AXES, curves, strict=True):
         yield from _block(f"{resisting.upper()}_CURVE", {})
-        yield f"{{{moved:>16} {resisting:>17}}}"
+        yield f"{{{motion_axis:>16} {resisting:>17}}}"
         yield from (f"{format_real(x, 10):>17} {format_real(y):>17}" for x, y in zip(*curve, strict=True))
 
 

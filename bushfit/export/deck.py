@@ -265,5 +265,5 @@ def band_losses(prediction: Prediction) -> Iterator[str]:
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
         yield f"{place}: the 95 % band, up to {number(100.0 * width, 2)} % of |K| either way"
     if prediction.if_rigs:
-        off = percent_off(prediction.if_rigs.stiffness.value / band.value)
-        yield f"{place}: the other reading, by which |K| is {off} if what is unresolved is the rig's"
+        deviation = percent_off(prediction.if_rigs.stiffness.value / band.value)
+        yield f"{place}: the other reading, by which |K| is {deviation} if what is unresolved is the rig's"

@@ -84,7 +84,9 @@ def time_model(order: Order) -> TimeModel:
     model, under = order.result.model.without(Level.INSTRUMENT), order.under
     omitted = [effect.name for effect in model.records if effect.name == UNNAMED or effect.settles]
     model = model.without(*omitted)
-    held = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor]
+    fixed_modifiers = [
+        effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor
+    ]
     for effect in model.records:
         _check_effect(effect)
     arms = model_arms(model, arm_band(order), order.accuracy, under)
@@ -97,7 +99,7 @@ def time_model(order: Order) -> TimeModel:
     values, names = _values(model, order.places, local_values, arms)
     losses = [f"the whole memory of the rubber: {part.sentence}, fading below" for part in arms]
     for prediction in order.predictions:
-        losses += [*_held_losses(model, held, omitted, prediction, under), *band_losses(prediction)]
+        losses += [*_steady_losses(model, fixed_modifiers, omitted, prediction, under), *band_losses(prediction)]
     sizes = values_under(model, under)
     return TimeModel(
         order.places,
@@ -197,15 +199,15 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
     return fields
 
 
-def _held_losses(
-    model: Model, held: list[str], omitted: list[str], prediction: Prediction, under: Circumstances
+def _steady_losses(
+    model: Model, fixed_modifiers: list[str], omitted: list[str], prediction: Prediction, under: Circumstances
 ) -> list[str]:
     """Sentence on the error in steady stiffness at a place from held modifiers and omitted effects."""
-    if not (held or omitted):
+    if not (fixed_modifiers or omitted):
         return []
     place, frequency, amplitude = prediction.direction, prediction.frequency, prediction.amplitude
     middle = _geometric_mean(frequency), _geometric_mean(amplitude)
-    plain, values = model.without(*held), model.values_at(place, *middle)
+    plain, values = model.without(*fixed_modifiers), model.values_at(place, *middle)
     written = plain.with_values({name: values[name] for name in plain.values})
     stiffness = written.stiffness(place, frequency, amplitude, under=under)
     complete = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
@@ -214,5 +216,7 @@ def _held_losses(
         return []
     (length, factor), *_ = place.display
     point = f"{number(middle[0], 3)} Hz and {number(factor * middle[1], 3)} {length}"
-    parts = [f"{', '.join(held)}, held as at {point}"] * bool(held) + [", ".join(omitted)] * bool(omitted)
+    parts = [f"{', '.join(fixed_modifiers)}, held as at {point}"] * bool(fixed_modifiers) + [", ".join(omitted)] * bool(
+        omitted
+    )
     return [f"{place}: {'; '.join(parts)}: stiffness off by up to {number(100.0 * error, 2)} % over the grid"]

@@ -78,8 +78,8 @@ class LeaveOut:
     def step(self, rows: Array, first: int | None = None) -> Array | None:
         """How far the first parameters, or all, move without these rows, in coordinates, (k,).
 
-        It is one Gauss-Newton step, which is exact where the model is linear over that step; None where the step is too
-        long to tell of a refit, and where the rest leaves one of these parameters open.
+        It is one Gauss-Newton step, which is exact where the model is linear over that step; None if the step is too
+        long to predict a refit, or if the remaining rows do not determine one of these parameters.
         """
         if self.open(rows)[:first].any():
             return None

@@ -1,6 +1,6 @@
 """The uncertainty of a fit and how well it meets the data: covariance, quality, range measured, lack of fit.
 
-Tests that no rubber could have given, that were not made at one temperature, or that a fit left out are told of.
+Warnings name tests that no rubber could have given, tests at different temperatures, and tests that a fit left out.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ def _inverse(system: Array) -> Array:
 def linear_errors(slope: Array) -> Array:
     """Standard errors of parameters in coordinates, (k,), from the derivatives of whitened residuals, (k, n).
 
-    The noise counts as known, and the data as met: `covariance` adds what these leave out.
+    The noise is assumed known and the model correct; `covariance` adds the errors that this leaves out.
     """
     return np.linalg.norm(_inverse(np.linalg.qr(slope.T)[1]), axis=1)
 

@@ -110,7 +110,7 @@ class Solution:
 
     @property
     def flat(self) -> bool:
-        """True if the next step would lower chi-square, in units of the misfit's variance, no more than chance does."""
+        """True if the next step would lower chi-square, in units of the misfit's variance, by less than chance does."""
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
 

@@ -91,7 +91,7 @@ def relative_sizes(model: Model, names: Sequence[str]) -> Array:
 
 
 def percent(error: float) -> str:
-    """A relative standard error for people: "2.5 %"."""
+    """Relative standard error as text: "2.5 %"."""
     return f"{float(f'{100.0 * error:.2g}'):g} %" if error < _BEYOND else "beyond 1000 %"
 
 

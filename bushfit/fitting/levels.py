@@ -20,11 +20,11 @@ _LEFT = 1e-6
 
 
 class LevelErrors(NamedTuple):
-    """Error of each level, as far as a fit tells it.
+    """Error of each level, estimated from a fit.
 
     Args:
         error: standard deviation of gain and phase [rad].
-        freedom: degrees of freedom behind it; 0 where it stands at the largest that a rig may have, and is known so.
+        freedom: degrees of freedom behind it; 0 if the error is fixed at the largest that a rig may have.
         gain: what it takes off twice the negative logarithm of the likelihood, beside what is counted already.
         matters: whether that is more than chance.
     """

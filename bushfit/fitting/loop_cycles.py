@@ -105,7 +105,7 @@ def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
 def _crossings(motion: Array) -> tuple[Array, Array, Array]:
     """A motion about its middle, (n,), and the last row before and the first after each crossing of it, (k,) each.
 
-    A tenth of the range on either side, which is more than any noise, counts as the middle.
+    Rows within a tenth of the range on either side, more than any noise, belong to the middle.
     """
     centred = motion - (motion.max() + motion.min()) / 2.0
     marks = np.flatnonzero(np.abs(centred) > 0.1 * np.ptp(centred))

@@ -28,8 +28,8 @@ class Shifted:
     Args:
         sweep: as it was fitted.
         temperature: mean of its points [K].
-        shift: ln a_T by the fitted law, and its standard error; nan where that is not known.
-        own: ln a_T that the sweep asks for by itself, moduli as fitted, and its standard error by what is left of it.
+        shift: ln a_T by the fitted law, and its standard error; nan if it is unknown.
+        own: ln a_T that the sweep asks for by itself, moduli as fitted, and its standard error from the residuals.
         reduced_frequency: f a_T of its points [Hz], (n,).
         reduced_stiffness: of its points, complex [SI], as they would be at 23 degC: times what the model has there,
             at f a_T, over what it has at theirs, (n,).
@@ -85,7 +85,7 @@ def _shifted(result: Result, sweep: MeasuredSweep) -> Shifted:
 def _more(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:
     """Further shift of a sweep's time scale beyond that of the model [neper], and its standard error.
 
-    Notes: Gauss-Newton steps in the one number, all points weighing alike: what is left is mostly no noise;
+    Notes: Gauss-Newton steps in the one number, with equal weights, because the residuals are mostly not noise;
     nan where the stiffness does not change with frequency.
     """
     more, place, under = 0.0, sweep.direction, sweep.circumstances

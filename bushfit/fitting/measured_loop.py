@@ -27,7 +27,7 @@ _ERROR_SIZES /= np.linalg.norm(_ERROR_SIZES)
 
 
 def smooth_waves(phase: Array) -> Array:
-    """1, and the cosine and sine of each harmonic that counts as smooth, at phases in cycles, (n,) -> (11, n)."""
+    """1, and the cosine and sine of each smooth harmonic, at phases in cycles, (n,) -> (11, n)."""
     angle = 2.0 * np.pi * phase
     waves = [wave(order * angle) for order in range(1, _SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
     return np.array([np.ones_like(angle), *waves])
@@ -40,7 +40,7 @@ class MeasuredLoop(MeasuredBase):
     Rows that are left out carry no weight from the start, see `drive_of`, and stay: the others need them to keep time.
 
     Args:
-        fundamental_only: whether all but the first harmonic of its residuals is left out, so that it counts as one
+        fundamental_only: whether all but the first harmonic of its residuals is left out, so that the loop is one
             operating point, with two residuals: of an addition without a law in time nothing else is known.
         gain_error: standard deviation of the gain of the whole record, by the class of its rig.
         gain_weighs: whether it is part of the noise, as where [rig] states the class. A gain that is only assumed
@@ -184,7 +184,7 @@ class MeasuredLoop(MeasuredBase):
         return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
 
     def fundamental(self) -> Self:
-        """Test as far as an addition without a law in time can answer it: a loop by its first harmonic."""
+        """Test reduced to its first harmonic, for an addition without a law in time."""
         return replace(self, fundamental_only=True)
 
     def with_noise(self, relative: float) -> Self:
@@ -283,7 +283,7 @@ class MeasuredLoop(MeasuredBase):
         return smooth_waves(self.drive.phase)
 
     def _whitened(self, rows: Array) -> Array:
-        """Rows in units of noise, (..., n), as independent numbers, 0 where one is told from a row left out."""
+        """Rows in units of noise, (..., n), as independent numbers; 0 for a number that depends on a row left out."""
         return self._less_common(self._counted(self.drive.row_noise.whiten(rows) * self._counting))
 
     def _less_common(self, white: Array) -> Array:
@@ -360,7 +360,7 @@ class MeasuredLoop(MeasuredBase):
         return np.asarray(np.outer(gain, gain) - first @ first.T)
 
     def _counted(self, white: Array) -> Array:
-        """Select what counts as residuals of whitened rows, (..., n)."""
+        """Select the residuals among whitened rows, (..., n)."""
         return white @ self._fundamental if self.fundamental_only else white
 
     @cached_property
@@ -390,7 +390,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _rows(self) -> int:
-        """Rows that carry weight, as far as they tell one from another."""
+        """Number of distinguishable rows that carry weight."""
         return round(self.drive.row_noise.share * np.count_nonzero(self._counting))
 
     @cached_property

@@ -58,7 +58,7 @@ class LineMisfit:
 
     @property
     def words(self) -> str:
-        """Value that the line holds, for people: "0.1 mm" or "10 Hz"; the name of the test where neither."""
+        """Constant value of the line as text, "0.1 mm" or "10 Hz"; for other lines the name of the test."""
         if self.stepped == "frequency":
             return shown_amplitude(self.direction, float(self.amplitude[0]))
         return f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
@@ -84,7 +84,7 @@ class MeasuredSweep(MeasuredBase):
         weight: share of its weight that each point has, (n,) in `order`; all for None.
         part: rows of the sweep that belong to it, (n,) in `order`; all for None.
         under: what its rows were measured under, (rows,) each.
-        model_error: standard deviation of the relative error of the model at an operating point, which counts beside
+        model_error: standard deviation of the relative error of the model at an operating point, added to
             the noise, in phase and in quadrature; repeats share it.
     """
 
@@ -403,7 +403,7 @@ class MeasuredSweep(MeasuredBase):
         return max(float(np.abs(line.smooth).max()) for line in self.lines(model))
 
     def line_words(self, point: int) -> str:
-        """The line that a point belongs to, for people."""
+        """Text that names the line of a point."""
         if self.sweep.stepped == "frequency":
             return f"the {self.direction} level {shown_amplitude(self.direction, self.amplitude[point])}"
         if self.sweep.stepped == "amplitude":

@@ -78,7 +78,7 @@ def with_model_error(
         found: least squares in the noise alone.
         bounds: limits of parameters inside their own.
         rig: the class of the rig, whose errors may explain a misfit.
-        smooth: whether only something smooth counts as a lack of fit.
+        smooth: True to test for smooth discrepancies only.
 
     Returns:
         The fit, and its discrepancy or None.
@@ -171,7 +171,7 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
 def log_likelihood(found: WeightedFit, prior_precision: Mapping[str, float]) -> float:
     """Logarithm of the restricted likelihood of a fit, the parameters that rest on no bound integrated.
 
-    Where the model misses the tests, a process stands beside the noise, its sizes and lengths integrated.
+    If the model misses the tests, a Gaussian process is added to the noise, its sizes and lengths integrated out.
 
     Args:
         found: the fit.
@@ -203,7 +203,7 @@ def log_likelihood(found: WeightedFit, prior_precision: Mapping[str, float]) -> 
 
 
 def model_error_warning(error: Unnamed) -> str:
-    """Sentence for people on the misfit of a model."""
+    """Warning about the misfit of a model."""
     return (
         f"the model misses the tests by {number(100.0 * error.typical, 2)} %; parameters are the closest fit, and "
         "their intervals include this misfit"

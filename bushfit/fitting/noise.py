@@ -51,10 +51,10 @@ class SweepNoise:
         freedom: degrees of freedom behind the shared part; 0 where it is not measured.
         scatter_freedom: the same of the random part of each line; 0 where it is stated.
         level: standard deviation of what all runs of a line share, (ln|K|, phase [rad]).
-        level_freedom: degrees of freedom behind it; 0 where it counts as known.
+        level_freedom: degrees of freedom behind it; 0 if it is known.
         slopes: of sweeps whose random part grows along what is stepped, the exponent, and the step at which it is as
             `random` has it.
-        beyond: what is said of sweeps whose runs differ by more than a rig of the class makes, which no noise excuses.
+        beyond: sentence on each sweep whose runs differ by more than a rig of the class explains, by name.
     """
 
     random: dict[LineKey, tuple[float, float]]

@@ -231,7 +231,7 @@ def _from_repeats(values: Array, place: Array) -> tuple[Array, Array]:
 
 
 def _median_of_others(values: Array, place: Array, counts: Array) -> Array:
-    """The median of the other values at the place of each, (n,); its own where there are none. `counts` by place."""
+    """Median of the other values at the place of each value, (n,); a lone value itself. `counts` is by place."""
     order = np.lexsort((values, place))
     ordered, size, start = values[order], counts[place[order]], (np.cumsum(counts) - counts)[place[order]]
     rank = np.arange(order.size) - start

@@ -63,7 +63,7 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
     Notes:
         All repeats of a loop share it. Independent errors larger by the root of their number leave the mean of the
-        repeats, all that tells of the bushing, just as unsure.
+        repeats, which alone describes the bushing, with the same error.
     """
     errors = of_class(rig)[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
     weighs = rig.stiffness_errors[0] is not None
@@ -182,7 +182,7 @@ def with_level_errors(
 
 
 def split_by_kind(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop], list[MeasuredSweep]]:
-    """The loops and the sweeps among some data sets, for what is said of all of a kind together."""
+    """Loops and sweeps among some data sets, as two lists."""
     tests = list(data_sets)
     loops = [data_set for data_set in tests if isinstance(data_set, MeasuredLoop)]
     return loops, [data_set for data_set in tests if isinstance(data_set, MeasuredSweep)]

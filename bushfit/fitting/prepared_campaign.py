@@ -104,7 +104,7 @@ class PreparedCampaign:
     def require_tests(
         self, tests: Sequence[_Kind], message: str, hint: str, found: str = "no [[loops]] and no [[sweeps]]"
     ) -> Sequence[_Kind]:
-        """Return the tests, or raise a FitError where there is none.
+        """Return the tests, or raise a FitError if the sequence is empty.
 
         Args:
             tests: loops or sweeps.

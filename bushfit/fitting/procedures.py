@@ -255,7 +255,7 @@ def _result(
 
 
 def _moving(step: WeightedFit) -> tuple[str, ...]:
-    """The parameters whose errors a fit tells; beside an error of the model, one at rest on a bound counts as held."""
+    """Parameters with standard errors; in a fit with a model error, a parameter at a bound is fixed."""
     fixed = step.solution.at_bound if step.process else {}
     return tuple(name for name in step.solution.coordinates.names if name not in fixed)
 

@@ -18,7 +18,7 @@ def of_class(rig: RigSettings, unstated: tuple[float, float] = ASSUMED) -> tuple
 
 
 def largest_error(rig: RigSettings) -> tuple[float, float]:
-    """Largest standard deviation of errors that tests share, in gain and phase [rad], that counts as the rig's."""
+    """Largest standard deviation of shared errors, in gain and phase [rad], that the class of the rig explains."""
     gain, phase = of_class(rig)
     return _MOST_CLASSES * gain, _MOST_CLASSES * phase
 

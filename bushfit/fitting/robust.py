@@ -1,7 +1,7 @@
 """Robust fits: the loss soft_l1, and outliers left out and listed.
 
 Notes:
-    A complex point counts as one: an outlier is one in gain and phase together. The loss acts on each point's own
+    A complex point is one observation: an outlier is one in gain and phase together. The loss acts on each point's own
     error, beside what its block shares, so that an outlier does not pull its block along. That is why the fit is
     reweighted, sqrt-weights into the noise of each point, and the loss not put on whitened residuals one by one.
 """

@@ -63,7 +63,7 @@ class RowNoise:
 
     @property
     def order(self) -> int:
-        """Rows before a row that tell of its noise."""
+        """Number of preceding rows that the noise of a row depends on."""
         return self.filter.size - 1
 
     @property

@@ -66,7 +66,7 @@ class Arms:
     error: float
     under: Circumstances = UNKNOWN
 
-    def at(self, omega: Array) -> Array:
+    def complex_modulus(self, omega: Array) -> Array:
         """mu^ [Pa] at angular frequencies [rad/s], (n,)."""
         return _basis(omega, self.time) @ self.modulus
 
@@ -167,15 +167,15 @@ def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float
     """
     values = values_under(model, arms[0].under) if arms else model.values
     at_rest = [("elastic", values["mu"], np.nan)] if "mu" in values else []
-    every = ((part.stands_for, *pair) for part in arms for pair in zip(part.modulus, part.time, strict=True))
-    return at_rest + [(name, float(modulus), float(time)) for name, modulus, time in every]
+    springs = ((part.stands_for, *pair) for part in arms for pair in zip(part.modulus, part.time, strict=True))
+    return at_rest + [(name, float(modulus), float(time)) for name, modulus, time in springs]
 
 
 def qualified_size(branch: Branch) -> str:
     """The parameter that a branch's modulus goes with, as files and reports name it."""
-    own = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
+    qualified_names = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
     assert branch.size is not None
-    return own.get(branch.size, branch.size)
+    return qualified_names.get(branch.size, branch.size)
 
 
 def part_modulus(model: Model, size: str, omega: Array, under: Circumstances = UNKNOWN) -> Array:
@@ -191,16 +191,18 @@ def part_modulus(model: Model, size: str, omega: Array, under: Circumstances = U
         Complex modulus [Pa], (n,).
     """
     still, values, reduced = np.zeros_like(omega), values_under(model, under), omega * model.shift_factor(under)
-    own = (branch for branch in model.viscoelastic if qualified_size(branch) == size)
-    return np.asarray(sum(branch.modulus(seen_by(branch, values), reduced, still) for branch in own))
+    branches = (branch for branch in model.viscoelastic if qualified_size(branch) == size)
+    return np.asarray(sum(branch.modulus(seen_by(branch, values), reduced, still) for branch in branches))
 
 
 def values_under(model: Model, under: Circumstances) -> Values:
     """The values of a model as its temperature leaves them, whatever the motion."""
     if under.temperature is None:
         return model.values
-    others = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor]
-    return model.without(*others).values_at(Specimen("compound", "modulus"), 1.0, 0.0, under)
+    other_modifiers = [
+        effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor
+    ]
+    return model.without(*other_modifiers).values_at(Specimen("compound", "modulus"), 1.0, 0.0, under)
 
 
 def _basis(omega: Array, time: Array) -> Array:
@@ -217,10 +219,10 @@ def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Arr
     """
     for overhang in _OVERHANGS:
         first, last = -np.log(omega[-1]) - overhang, -np.log(omega[0]) + overhang
-        apart = max(1.0, (last - first) / arms)
+        spacing = max(1.0, (last - first) / arms)
         time = np.exp(first + (last - first) * (np.arange(arms) + 0.5) / arms)
         loss = np.interp(-np.log(time), np.log(omega), target.imag)
-        yield np.maximum(2.0 / np.pi * loss * apart, 1e-3 * np.abs(target).mean()), time
+        yield np.maximum(2.0 / np.pi * loss * spacing, 1e-3 * np.abs(target).mean()), time
 
 
 def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 1) -> tuple[float, Array, Array]:
@@ -243,8 +245,8 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
         return arm, arm * (1.0 - basis)
 
     def residual(x: Array) -> Array:
-        off = root * (parts(x)[0].sum(axis=1) - 1.0)
-        return np.concatenate((off.real, off.imag))
+        error = root * (parts(x)[0].sum(axis=1) - 1.0)
+        return np.concatenate((error.real, error.imag))
 
     def slopes(x: Array) -> Array:
         both = root[:, None] * np.concatenate(parts(x), axis=1)
@@ -256,11 +258,11 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     for _ in range(rounds):
         start = np.clip(x, low + 1e-9, high - 1e-9)  # a fit has to start inside
         x = least_squares(residual, start, slopes, bounds=(low, high), max_nfev=200).x  # ten times what it takes
-        off = np.abs(parts(x)[0].sum(axis=1) - 1.0)
-        if off.max() < best[0]:
-            best = off.max(), unit * np.exp(x[:count]), np.exp(x[count:])
-        if off.max() < LEAST_ACCURACY:
+        error = np.abs(parts(x)[0].sum(axis=1) - 1.0)
+        if error.max() < best[0]:
+            best = error.max(), unit * np.exp(x[:count]), np.exp(x[count:])
+        if error.max() < LEAST_ACCURACY:
             break
-        root = root * np.sqrt(off / off.max() + 1e-3)  # a share stays where the error is 0
+        root = root * np.sqrt(error / error.max() + 1e-3)  # a share stays where the error is 0
         root /= np.sqrt(np.mean(np.square(root)))
     return best

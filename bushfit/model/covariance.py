@@ -73,7 +73,7 @@ class Covariance:
         return dict(zip(self.names, self.half_width(np.eye(len(self.names))).tolist(), strict=True))
 
     def left_open(self, values: Mapping[str, float]) -> str:
-        """A sentence on parameters half of whose 95 % interval is their value or more; "" where there is none."""
+        """Sentence on parameters whose 95 % half-width is at least their value; "" for no such parameter."""
         unknown = ", ".join(name for name in self.names if self.half(name) >= abs(values[name]))
         return unknown and f"the tests leave {unknown} open (unknown by 100 % or more)"
 

@@ -53,20 +53,20 @@ class Model:
         if (UNNAMED in self.effects) != (self.unnamed is not None):
             expected = "both, or neither"
             raise ModelError("an effect without its data, or data without an effect", place=UNNAMED, expected=expected)
-        known = self.parameters
-        for name in dict.fromkeys([*known, *self.values]):
+        parameters = self.parameters
+        for name in dict.fromkeys([*parameters, *self.values]):
             if name not in self.values:
-                raise ModelError("a parameter has no value", place=name, expected=f"a number [{known[name].unit}]")
-            if name not in known:
-                raise ModelError("unknown parameter", place=name, expected="one of " + ", ".join(known))
-            _check(name, self.values[name], known[name])
+                raise ModelError("a parameter has no value", place=name, expected=f"a number [{parameters[name].unit}]")
+            if name not in parameters:
+                raise ModelError("unknown parameter", place=name, expected="one of " + ", ".join(parameters))
+            _check(name, self.values[name], parameters[name])
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Model, (self.bushing, self.effects, dict(self.values), self.unnamed)
 
     @cached_property
     def _structure(self) -> Structure:
-        return Structure.of(self.effects)
+        return Structure.from_names(self.effects)
 
     @property
     def records(self) -> tuple[Effect, ...]:
@@ -154,9 +154,9 @@ class Model:
         ('elastic', 'springpot', 'sliders')
         """
         effect = get_effect(name)
-        kept = [other for other in self.effects if other != effect.replaces]
-        known = {**self.values, **self.starts(effect)[0], **(values or {})}
-        return Model.with_defaults(self.bushing, (*kept, name), known, self.unnamed)
+        names = [present for present in self.effects if present != effect.replaces]
+        start = {**self.values, **self.starts(effect)[0], **(values or {})}
+        return Model.with_defaults(self.bushing, (*names, name), start, self.unnamed)
 
     def starts(self, effect: Effect) -> list[dict[str, float]]:
         """Start values for a fit of an effect, derived from the branch that it replaces.
@@ -166,9 +166,9 @@ class Model:
         """
         if effect.replaces not in self.effects or not effect.in_place_of:
             return [{}]
-        own = [(qualified_name(effect, each), each) for each in effect.parameters]
+        parameters = [(qualified_name(effect, parameter), parameter) for parameter in effect.parameters]
         return [
-            {key: float(np.clip(suggested[each.name], *each.bounds)) for key, each in own}
+            {key: float(np.clip(suggested[parameter.name], *parameter.bounds)) for key, parameter in parameters}
             for suggested in effect.in_place_of(self.values)
         ]
 
@@ -180,7 +180,7 @@ class Model:
         """
         twins = [effect for effect in self.records if effect.name in twins_of(name) and effect.name != name]
         effects = [effect.name for effect in self.records if effect not in twins]
-        moved = {
+        twin_values = {
             qualified_name(get_effect(name), new): self.values[qualified_name(twin, old)]
             for twin in twins
             for old, new in zip(twin.parameters, get_effect(name).parameters, strict=True)
@@ -188,7 +188,7 @@ class Model:
         added = [name] if twins and name not in effects else []
         if not twins:
             return self
-        return Model.with_defaults(self.bushing, [*effects, *added], {**self.values, **moved}, self.unnamed)
+        return Model.with_defaults(self.bushing, [*effects, *added], {**self.values, **twin_values}, self.unnamed)
 
     def without(self, *left: Level | str) -> "Model":
         """The model without the effects of these levels and names.
@@ -196,8 +196,8 @@ class Model:
         >>> paper.with_effect("inertia").without(Level.INSTRUMENT).effects
         ('elastic', 'springpot', 'friction')
         """
-        kept = [effect.name for effect in self.records if not {effect.level, effect.name} & {*left}]
-        return Model.with_defaults(self.bushing, kept, self.values, self.unnamed if UNNAMED in kept else None)
+        names = [effect.name for effect in self.records if not {effect.level, effect.name} & {*left}]
+        return Model.with_defaults(self.bushing, names, self.values, self.unnamed if UNNAMED in names else None)
 
     def equation(self) -> str:
         """The model as text: the formula of its first-harmonic stiffness, other effects, and values in common units.
@@ -310,7 +310,7 @@ class Model:
         place, layers = setting.direction, self._structure.layers
         if place.motion is STRAINING:
             layers = tuple(layer for layer in layers if layer.corrects)
-        return tuple(each for each in layers if each.acts_at(place) and (each.turns or not place.is_rotation))
+        return tuple(layer for layer in layers if layer.acts_at(place) and (layer.turns or not place.is_rotation))
 
     def values_at(
         self, place: Place, frequency: float, amplitude: float, under: Circumstances = UNKNOWN
@@ -376,9 +376,9 @@ class Model:
 
             if count == 0:
                 return StiffnessBelow(rubber, cycle)
-            inner, (layer, own) = below(count - 1), as_one_layer(groups[count - 1], values)
+            inner, (layer, layer_values) = below(count - 1), as_one_layer(groups[count - 1], values)
             return StiffnessBelow(
-                lambda omega, amplitude: layer.stiffness(own, inner, omega, amplitude, setting), cycle
+                lambda omega, amplitude: layer.stiffness(layer_values, inner, omega, amplitude, setting), cycle
             )
 
         return below(len(groups))
@@ -388,7 +388,7 @@ class Model:
         per_displacement = self.unit_strain(setting.direction)
         factor = self.stiffness_per_modulus(setting.direction) / (2.0 * per_displacement)
 
-        structure, known = self._structure, dict[int, tuple[Any, Array]]()
+        structure, cached_moduli = self._structure, dict[int, tuple[Any, Array]]()
 
         def rubber(displacement: History) -> Array:
             """Force of the rubber alone over a history of displacement.
@@ -400,7 +400,7 @@ class Model:
             if structure.modifiers:
                 omega = np.atleast_1d(displacement.omega)
                 base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
-            if any(each.shift_factor for each in structure.modifiers):
+            if any(modifier.shift_factor for modifier in structure.modifiers):
                 strain = strain.faster(self.shift_factor(setting.under, values))
             together = displacement.periodic and structure.viscoelastic
             alone = structure.others if together else structure.branches
@@ -421,18 +421,18 @@ class Model:
                 Complex moduli, twice their sum, (..., harmonics).
             """
             count, step = strain.value.shape[-1], strain.step
-            if base is values and count in known and known[count][0] is step:
-                return known[count][1]
+            if base is values and count in cached_moduli and cached_moduli[count][0] is step:
+                return cached_moduli[count][1]
             linear = structure.viscoelastic
             moduli = (branch.modulus(seen_by(branch, base), omega, strain.amplitude) for branch in linear)
             found = np.asarray(2.0 * sum(moduli))
             if base is values:
-                known[count] = step, found
+                cached_moduli[count] = step, found
             return found
 
         def wrap(below: ForceBelow, group: Sequence[Layer]) -> ForceBelow:
-            layer, own = as_one_layer(group, values)
-            return lambda displacement: layer.force(own, below, displacement, setting)
+            layer, layer_values = as_one_layer(group, values)
+            return lambda displacement: layer.force(layer_values, below, displacement, setting)
 
         return reduce(wrap, in_groups(layers), cast(ForceBelow, rubber))
 
@@ -445,8 +445,8 @@ class Model:
     def shift_factor(self, under: Circumstances, values: Values | None = None) -> Value:
         """How many times as fast a motion is on the rubber's own time scale as on the clock's: the shift factor a_T."""
         values = self.values if values is None else values
-        shifts = ((each, each.shift_factor) for each in self._structure.modifiers)
-        return prod(shift(seen_by(each, values), under) for each, shift in shifts if shift)
+        shifts = ((modifier, modifier.shift_factor) for modifier in self._structure.modifiers)
+        return prod(shift(seen_by(modifier, values), under) for modifier, shift in shifts if shift)
 
     def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
         """All values as the modifiers leave them at an operating condition."""

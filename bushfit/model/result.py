@@ -197,9 +197,9 @@ class CampaignTable:
         sha256: of the file.
         command: with all that settles the numbers, as it would be typed beside the file.
         tests: all that the campaign has.
-        report: what stands at the head of a report: customer, part_number, drawing, compound, laboratory and date, as
-            far as they are known.
-        logo: beside it, as a data URI of a PNG or SVG; null where there is none.
+        report: head of the report: customer, part_number, drawing, compound, laboratory and date, if
+            they are known.
+        logo: beside it, as a data URI of a PNG or SVG; null without a logo.
     """
 
     name: str

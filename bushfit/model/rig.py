@@ -81,8 +81,12 @@ def record(
     if swell[0]:
         motion *= 1.0 + (swell[1] - 1.0) * np.sin(np.pi * np.minimum(phase / swell[0], 1.0)) ** 2
     whole = imposed(model, direction, motion, 1.0 / (frequency * steps_per_cycle), frequency, kind=kind, under=under)
-    kept = slice(before * steps_per_cycle, None)
-    return Record(whole.time[kept] - whole.time[kept][0], whole.displacement[kept].copy(), whole.force[kept].copy())
+    recorded = slice(before * steps_per_cycle, None)
+    return Record(
+        whole.time[recorded] - whole.time[recorded][0],
+        whole.displacement[recorded].copy(),
+        whole.force[recorded].copy(),
+    )
 
 
 def imposed(

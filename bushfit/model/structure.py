@@ -34,7 +34,7 @@ class Structure:
 
     @classmethod
     @lru_cache(maxsize=256)
-    def of(cls, names: tuple[str, ...]) -> "Structure":
+    def from_names(cls, names: tuple[str, ...]) -> "Structure":
         """The structure of a model with these effects, in any order; kept, because a fit makes thousands of models.
 
         Returns:
@@ -53,13 +53,20 @@ class Structure:
         branches = tuple(effect for effect in records if isinstance(effect, Branch))
         return cls(
             records,
-            MappingProxyType({qualified_name(effect, each): each for effect in records for each in effect.parameters}),
+            MappingProxyType(
+                {qualified_name(effect, parameter): parameter for effect in records for parameter in effect.parameters}
+            ),
             branches,
             tuple(branch for branch in branches if branch.size),
             tuple(branch for branch in branches if not branch.size),
             tuple(effect for effect in records if isinstance(effect, Modifier)),
             tuple(effect for effect in records if isinstance(effect, Layer)),
-            tuple(qualified_name(b, each) for b in branches for each in b.parameters if each.unit.startswith("Pa")),
+            tuple(
+                qualified_name(b, parameter)
+                for b in branches
+                for parameter in b.parameters
+                if parameter.unit.startswith("Pa")
+            ),
         )
 
 
@@ -70,8 +77,11 @@ def in_groups(layers: Sequence[Layer]) -> list[list[Layer]]:
 
 def as_one_layer(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
     """A group of layers as the first of them, with the values that it reads."""
-    first, own = group[0], [seen_by(layer, values) for layer in group]
-    return first, {**own[0], **({first.adds: sum(each[first.adds] for each in own)} if first.adds else {})}
+    first, layer_values = group[0], [seen_by(layer, values) for layer in group]
+    return first, {
+        **layer_values[0],
+        **({first.adds: sum(values_of_layer[first.adds] for values_of_layer in layer_values)} if first.adds else {}),
+    }
 
 
 def seen_by(effect: Effect, values: Values) -> Values:

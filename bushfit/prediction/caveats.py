@@ -96,7 +96,7 @@ def caveats(result: Result) -> list[str]:
     if unnamed := result.model.unnamed:
         lines.append(
             "the correction without a name follows the measurement and no law: outside the measured range it fades, "
-            f"and the band widens by up to {number(100.0 * Z95 * unnamed.beyond, 2)} % either way"
+            f"and the band widens by up to {number(100.0 * Z95 * unnamed.far_deviation, 2)} % either way"
         )
         lines.append(
             "the correction without a name is counted as part of the bushing, but these tests cannot distinguish it "

@@ -168,7 +168,7 @@ def test_a_band_opens_by_the_model_error_beyond_the_tests(off_by_waves: tuple[Ca
     far = predict(result, Direction.AXIAL, [5000.0], [1e-4])
     alone = predict(replace(result, model_error=None), Direction.AXIAL, [5000.0], [1e-4])
     wider, narrow = (float((each.stiffness.high - each.stiffness.low)[0]) / 2.0 for each in (far, alone))
-    own = 1.96 * result.model_error.beyond * float(far.stiffness.value[0])
+    own = 1.96 * result.model_error.far_deviation * float(far.stiffness.value[0])
     assert np.hypot(narrow, own) == pytest.approx(wider, rel=1e-3)
 
 

@@ -130,7 +130,7 @@ def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
     unit, factor = display_unit("Pa", 1.0, max(float(np.abs(whole).max()) for whole in wholes))
     looks = style.styles(len(arms), "loop")
     for part, whole, look in zip(arms, wholes, looks, strict=True):
-        arm_modulus = part.at(omega)
+        arm_modulus = part.complex_modulus(omega)
         for share, dashes in ((np.real, "-"), (np.imag, (0, (5, 1.5)))):
             moduli.plot(frequency, factor * share(whole), color=style.GREY, lw=2.6, alpha=0.45, ls=dashes)
             moduli.plot(frequency, factor * share(arm_modulus), color=look.color, lw=1.1, ls=dashes)

@@ -139,7 +139,7 @@ def test_arms_are_drawn_over_what_they_stand_for(paper_model: Model) -> None:
         assert 0.95 * part.error < line.get_ydata().max() / 100.0 <= part.error * 1.01
         assert line.get_xdata().min() >= 5.0
     omega = 2.0 * np.pi * lines(moduli)[1].get_xdata()
-    np.testing.assert_allclose(lines(moduli)[1].get_ydata(), 1e-6 * arms[0].at(omega).real)
+    np.testing.assert_allclose(lines(moduli)[1].get_ydata(), 1e-6 * arms[0].complex_modulus(omega).real)
     assert "in place of the springpot" in note(figure)
 
 
