@@ -1,23 +1,24 @@
 """The model of a bushing: its geometry, the effects that its response is made of, and their values."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial, reduce
+from functools import cached_property
 from math import prod
 from types import MappingProxyType
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 
 from bushfit import geometry
 from bushfit.effects import BASE, Branch, Effect, Layer, Level, Parameter, Setting, get_effect, qualified_name, twins_of
-from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Condition, ForceBelow, StiffnessBelow, Value, Values
+from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Value, Values
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
-from bushfit.model.structure import Structure, as_one_layer, in_groups, seen_by
+from bushfit.model.stack import adjusted_values, stack_force, stack_stiffness
+from bushfit.model.structure import Structure, seen_by
 from bushfit.units import display_unit
 
 #: What records a response: a sweep or a loop, which may have force chains of their own.
@@ -65,28 +66,28 @@ class Model:
         return Model, (self.bushing, self.effects, dict(self.values), self.unnamed)
 
     @cached_property
-    def _structure(self) -> Structure:
+    def structure(self) -> Structure:
         return Structure.from_names(self.effects)
 
     @property
     def records(self) -> tuple[Effect, ...]:
         """The effects from the rubber outward: by level, and within a level in the order of the library."""
-        return self._structure.records
+        return self.structure.records
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """Every parameter by its name in files and reports."""
-        return self._structure.parameters
+        return self.structure.parameters
 
     @property
     def viscoelastic(self) -> tuple[Branch, ...]:
         """The linear branches that fade with memory."""
-        return self._structure.viscoelastic
+        return self.structure.viscoelastic
 
     @property
     def only_branches(self) -> bool:
         """True if the response is the plain sum of the branches, without modifiers and layers."""
-        return len(self._structure.branches) == len(self.records)
+        return len(self.structure.branches) == len(self.records)
 
     @property
     def knows_circumstances(self) -> bool:
@@ -208,7 +209,7 @@ class Model:
         >>> print(paper.equation().splitlines()[1])
           mu = 1.09 MPa
         """
-        branches = " + ".join(effect.equation for effect in self._structure.branches)
+        branches = " + ".join(effect.equation for effect in self.structure.branches)
         lines = [f"K = k ({branches}), k the stiffness of this shape per modulus"]
         lines += [f"  {effect.name}: {effect.equation}" for effect in self.records if not isinstance(effect, Branch)]
         for name, parameter in self.parameters.items():
@@ -254,7 +255,7 @@ class Model:
             omega, amplitude = np.broadcast_arrays(omega, amplitude)
         points = np.atleast_1d(omega)
         setting = self.setting(direction, kind, under)
-        respond = self._stack_stiffness(setting, self.values if values is None else values)
+        respond = stack_stiffness(self, setting, self.values if values is None else values)
         stiffness = respond(points, np.atleast_1d(amplitude))
         if stiffness.shape[-points.ndim :] != points.shape:
             stiffness = stiffness + np.zeros(points.shape)
@@ -288,7 +289,7 @@ class Model:
         458.1
         """
         setting = self.setting(direction, kind, under)
-        respond = self._stack_force(setting, self.values if values is None else values, self.layers(setting))
+        respond = stack_force(self, setting, self.values if values is None else values, self.layers(setting))
         return respond(displacement)
 
     def setting(self, place: Place | str, kind: Kind = "sweep", under: Circumstances = UNKNOWN) -> Setting:
@@ -307,7 +308,7 @@ class Model:
 
     def layers(self, setting: Setting) -> tuple[Layer, ...]:
         """The layers that act on a test: a coupon whose modulus is measured has no rig and no sleeves around it."""
-        place, layers = setting.direction, self._structure.layers
+        place, layers = setting.direction, self.structure.layers
         if place.motion is STRAINING:
             layers = tuple(layer for layer in layers if layer.corrects)
         return tuple(layer for layer in layers if layer.acts_at(place) and (layer.turns or not place.is_rotation))
@@ -331,134 +332,16 @@ class Model:
         15648
         """
         omega, reached = 2.0 * np.pi * np.atleast_1d(frequency), np.atleast_1d(amplitude)
-        found = self._adjusted(
-            self.setting(place, under=under), self.values, omega, reached, reached * self.unit_strain(place)
+        found = adjusted_values(
+            self, self.setting(place, under=under), self.values, omega, reached, reached * self.unit_strain(place)
         )
         return {name: float(np.asarray(value).item()) for name, value in found.items()}
-
-    def _stack_stiffness(self, setting: Setting, values: Values) -> Callable[[Array, Array], Array]:
-        """The stiffness outside all layers, as a function of omega [rad/s] and amplitude [m or rad]."""
-
-        def rubber(omega: Array, amplitude: Array) -> Array:
-            strain = amplitude * self.unit_strain(setting.direction)
-            base = self._adjusted(setting, values, omega, amplitude, strain)
-            return self._branch_stiffness(setting, values, omega, strain, base)
-
-        layers = self.layers(setting)
-        if not layers:
-            return rubber
-        groups = in_groups(layers)
-        per_sample = {
-            name: value if np.ndim(value) == 0 else np.asarray(value)[..., None] for name, value in values.items()
-        }
-
-        def below(count: int) -> StiffnessBelow:
-            """Response of the rubber and the innermost `count` groups of layers.
-
-            Returns:
-                Stiffness and steady-cycle force of these layers.
-            """
-
-            def cycle(omega: Array, motion: Array, points: Any) -> Array:
-                """Force over one steady cycle of the rubber and these layers.
-
-                Args:
-                    omega: angular frequencies [rad/s], (..., k).
-                    motion: displacement [m] or rotation [rad] over a cycle, (..., k, n).
-                    points: index of the operating points among those of the test.
-
-                Returns:
-                    Force [N] or moment [N m], (..., k, n).
-                """
-                cycles = replace(setting, under=setting.under.select(points).select((..., None)))
-                force = self._stack_force(cycles, per_sample, [layer for group in groups[:count] for layer in group])
-                return force(History.steady(motion, cast(float, omega[..., None] / (2.0 * np.pi))))
-
-            if count == 0:
-                return StiffnessBelow(rubber, cycle)
-            inner, (layer, layer_values) = below(count - 1), as_one_layer(groups[count - 1], values)
-            return StiffnessBelow(
-                lambda omega, amplitude: layer.stiffness(layer_values, inner, omega, amplitude, setting), cycle
-            )
-
-        return below(len(groups))
-
-    def _stack_force(self, setting: Setting, values: Values, layers: Sequence[Layer]) -> ForceBelow:
-        """The force outside these layers, as a function of the displacement history."""
-        per_displacement = self.unit_strain(setting.direction)
-        factor = self.stiffness_per_modulus(setting.direction) / (2.0 * per_displacement)
-
-        structure, cached_moduli = self._structure, dict[int, tuple[Any, Array]]()
-
-        def rubber(displacement: History) -> Array:
-            """Force of the rubber alone over a history of displacement.
-
-            Returns:
-                Force [N] or moment [N m], (..., n).
-            """
-            strain, base = displacement.scaled(per_displacement), values
-            if structure.modifiers:
-                omega = np.atleast_1d(displacement.omega)
-                base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
-            if any(modifier.shift_factor for modifier in structure.modifiers):
-                strain = strain.faster(self.shift_factor(setting.under, values))
-            together = displacement.periodic and structure.viscoelastic
-            alone = structure.others if together else structure.branches
-            stresses = [branch.stress(seen_by(branch, base), strain) for branch in alone]
-            if together:
-                stresses.append(strain.response(lambda omega: modulus(omega, base, strain)))
-            return factor * sum(stresses, start=np.zeros(1))
-
-        def modulus(omega: Array, base: Values, strain: History) -> Array:
-            """Modulus [Pa] of the linear branches at harmonics, cached for motions with the same time step.
-
-            Args:
-                omega: angular frequencies of the harmonics [rad/s].
-                base: parameter values [SI].
-                strain: history of strain.
-
-            Returns:
-                Complex moduli, twice their sum, (..., harmonics).
-            """
-            count, step = strain.value.shape[-1], strain.step
-            if base is values and count in cached_moduli and cached_moduli[count][0] is step:
-                return cached_moduli[count][1]
-            linear = structure.viscoelastic
-            moduli = (branch.modulus(seen_by(branch, base), omega, strain.amplitude) for branch in linear)
-            found = np.asarray(2.0 * sum(moduli))
-            if base is values:
-                cached_moduli[count] = step, found
-            return found
-
-        def wrap(below: ForceBelow, group: Sequence[Layer]) -> ForceBelow:
-            layer, layer_values = as_one_layer(group, values)
-            return lambda displacement: layer.force(layer_values, below, displacement, setting)
-
-        return reduce(wrap, in_groups(layers), cast(ForceBelow, rubber))
-
-    def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
-        """Complex stiffness of the rubber, with its parameters as in `base`."""
-        omega = omega * self.shift_factor(setting.under, values)
-        moduli = (branch.modulus(seen_by(branch, base), omega, strain) for branch in self._structure.branches)
-        return np.atleast_1d(self.stiffness_per_modulus(setting.direction) * sum(moduli))
 
     def shift_factor(self, under: Circumstances, values: Values | None = None) -> Value:
         """How many times as fast a motion is on the rubber's own time scale as on the clock's: the shift factor a_T."""
         values = self.values if values is None else values
-        shifts = ((modifier, modifier.shift_factor) for modifier in self._structure.modifiers)
+        shifts = ((modifier, modifier.shift_factor) for modifier in self.structure.modifiers)
         return prod(shift(seen_by(modifier, values), under) for modifier, shift in shifts if shift)
-
-    def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
-        """All values as the modifiers leave them at an operating condition."""
-        if not self._structure.modifiers:
-            return values
-        stiffness = partial(self._branch_stiffness, setting, values, omega, strain)
-        condition = Condition(setting, omega, amplitude, strain, stiffness, self._structure.moduli)
-        base = values
-        for modifier in self._structure.modifiers:
-            if modifier.acts_at(setting.direction):
-                base = {**base, **modifier.adjust(seen_by(modifier, base), condition)}
-        return base
 
 
 def _check(name: str, value: float, parameter: Parameter) -> None:
