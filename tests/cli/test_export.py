@@ -259,7 +259,7 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit: Run, tmp_path: Pat
     ):
         assert any(words in line for line in found["formats"]["nastran"]["left_out"]), words
     told = [line.removeprefix("warning: ") for line in done.stderr.splitlines() if line.startswith("warning: ")]
-    assert told == found["warnings"]
+    assert sorted(told) == sorted(found["warnings"])  # the terminal has the most important first
     assert any(line.startswith("radial: not fitted") for line in told)
 
 

@@ -116,7 +116,7 @@ def test_what_is_not_understood_is_named(typed: Run, points: dict[str, Rows], tm
     said = '"Compound" (column 5) varies from row to row (NR45, NR60) and is not understood'
     done = typed("init", "axial.csv", *GEOMETRY, "-o", "x")
     assert done.stderr.count("is not understood") == done.stderr.count(said) == 1
-    assert said in typed("fit", "x/campaign.toml", "-o", "f", "--no-plots").stderr
+    assert said in typed("fit", "x/campaign.toml", "-o", "f", "--no-plots", "-v").stderr
     with (tmp_path / "x/campaign.toml").open("a", encoding="utf-8") as campaign:
         campaign.write('rows = { Compound = "NR60" }\n')
     assert said not in typed("fit", "x/campaign.toml", "-o", "g", "--no-plots").stderr

@@ -179,7 +179,7 @@ def test_odds_that_no_float_holds_are_large_ones(left: tuple[PreparedCampaign, M
         frequency=np.repeat(np.arange(1.0, 17.0), 400),
         amplitude=np.ones(count),
         order=np.arange(count),
-        off=lambda _: np.zeros((2, count)),
+        relative_difference=lambda _: np.zeros((2, count)),
     )
     every = [Outlier("swept", None, row + 1, "stiffness", 8.0) for row in range(400)]
     (found,) = meetings(every, [swept], model)  # type: ignore[list-item]
