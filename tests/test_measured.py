@@ -51,7 +51,11 @@ def off(root: Path) -> Callable[[Campaign], tuple[float, float]]:
 def claimed(root: Path) -> re.Match[str]:
     """What the page says: of the campaign, and median and worst of the draws [%]."""
     page = (root / "bushfit/manual/model.md").read_text(encoding="utf-8")
-    found = re.search(r"within ([\d.]+) % of the independent.* median\s+error is ([\d.]+) % and the largest ([\d.]+) %", page, re.DOTALL)
+    found = re.search(
+        r"within ([\d.]+) % of the independent.* median\s+error is ([\d.]+) % and the largest ([\d.]+) %",
+        page,
+        re.DOTALL,
+    )
     assert found is not None
     return found
 
