@@ -50,7 +50,11 @@ class Search:
         self._odds = _odds([*self.root.effects, *tests.fixed])
 
     def run(self) -> list[Hypothesis]:
-        """Every hypothesis that was weighed, the most probable first."""
+        """Search sets of explanations.
+
+        Returns:
+            All hypotheses that were compared, the most probable first.
+        """
         beam = [self.root]
         for depth in range(ROUNDS + 1):
             for weighed in track(f"round {depth + 1} of at most {ROUNDS + 1}", beam):

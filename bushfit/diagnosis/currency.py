@@ -279,9 +279,15 @@ class LinearModel:
         return float(logsumexp(self._solved.base[beyond])) if beyond.any() else -np.inf
 
     def likely(self, far: float) -> Array:
-        """Numbers of the nodes at which a group may count: those that nothing more, or one of the groups, brings so
-        near the best in ln evidence; without a deviation of the compound also those that one makes likely, since a
-        group may do the same."""
+        """Nodes of the rig's errors at which a further group of columns may contribute.
+
+        Args:
+            far: difference in log evidence from the best node, beyond which a node is left out.
+
+        Returns:
+            Indices of the nodes that are near the best without a further group, or with one of the groups. Without a
+            deviation of the compound, nodes that such a deviation makes likely are included.
+        """
         base, plain, own = self._solved.base, self._plain, self.rig.combination[self._at]
         base = np.where(plain | self._bent, base, -np.inf)
         best = np.full(own.max() + 1, -np.inf)
@@ -318,8 +324,14 @@ class LinearModel:
         return [found[number] for number in range(len(self.groups))]
 
     def amounts(self, number: int) -> tuple[Array, Array]:
-        """Mean, (g,), and covariance, (g, g), of the amounts of a group whose columns move together, over all sizes and
-        the nodes within the class of the rig."""
+        """Posterior of the amounts of a group whose columns move together.
+
+        Args:
+            number: index of the group.
+
+        Returns:
+            Mean, (g,), and covariance, (g, g), over all sizes and the nodes within the class of the rig.
+        """
         kind, place = next((kind, own.index(number)) for kind, (own, _) in enumerate(self._alike) if number in own)
         size, vectors = np.linalg.eigh(self._solved.grams[kind][self._plain, place])
         along = self._solved.along[self._plain][:, self._places[number] - self._first]
@@ -338,7 +350,12 @@ class LinearModel:
         whole = self._solved.base[:, None, None] + gains
         by_node = whole.max(axis=(1, 2))
 
-        def of(chosen: Array, beside: GroupEvidence | None = None) -> GroupEvidence:
+        def evidence_at(chosen: Array, beside: GroupEvidence | None = None) -> GroupEvidence:
+            """Evidence over the chosen nodes.
+
+            Returns:
+                Log evidence, change and likeliest size.
+            """
             own = whole[chosen]
             if not own.size:
                 return GroupEvidence(-np.inf, 0.0, float(SIZES[0]), by_node, beside)
@@ -349,7 +366,7 @@ class LinearModel:
             log_evidence = float(own.max() + np.log(total) - np.log(whole.shape[1] * SIZES.size))
             return GroupEvidence(log_evidence, size, likeliest, by_node, beside)
 
-        return of(self._plain, of(self._bent) if self._bent.any() else None)
+        return evidence_at(self._plain, evidence_at(self._bent) if self._bent.any() else None)
 
 
 def _columns(every: Array, chosen: Array) -> Array:
@@ -382,7 +399,11 @@ def _of_one(group: Group, size: Array, along: Array) -> tuple[Array, Array]:
 
 
 def _of_all(gram: Array, along: Array, units: Sequence[Array]) -> tuple[Array, Array]:
-    """The same of groups whose columns move together, of the change its largest value, (nodes, groups, sizes)."""
+    """Gains in log evidence and largest squared changes of groups whose columns move together.
+
+    Returns:
+        Gains and squared changes, (nodes, groups, sizes) each.
+    """
     size, vectors = np.linalg.eigh(gram)
     along = np.einsum("nmij,nmi->nmj", vectors, along)[:, :, None]
     size, v2 = np.maximum(size, 0.0)[:, :, None], np.square(SIZES)[:, None]

@@ -248,7 +248,16 @@ class Weighed:
         return replace(self.first, at=self._nodes).group_evidence_of([each.group for each in every if each.group])
 
     def with_(self, each: Explanation, worth: GroupEvidence, log_odds: float) -> list[Hypothesis]:
-        """This state with an explanation more, counted linearly; and beside a deviation of the compound."""
+        """Hypotheses that extend this state by one explanation, with its evidence counted linearly.
+
+        Args:
+            each: the explanation.
+            worth: evidence of its columns.
+            log_odds: natural log of its prior odds.
+
+        Returns:
+            The extended hypothesis, and the same beside a deviation of the compound.
+        """
         state, tests = self.state, self.state.tests
         names = (*state.effects, each.name) if each.kind == "effect" else state.effects
         spots = (*state.places, each) if isinstance(each, FaultyPlace) else state.places

@@ -187,7 +187,11 @@ def sensitivity(
     none = model.values[amount]
 
     def residuals_of(shapes: Sequence[Mapping[str, float]]) -> Array:
-        """Residuals with a little of the effect in each shape, and in the last line with none, whatever its shape."""
+        """Residuals with a small amount of the effect in each shape.
+
+        Returns:
+            Residuals, (shapes + 1, n); the last row is without the effect.
+        """
         amounts = np.append(np.full(len(shapes), none + _STEP * effect.amount.typical), none)[:, None]
         grids = {name: np.array([[shape[name]] for shape in (*shapes, shapes[-1])]) for name in axes}
         values = {**model.values, **grids, amount: amounts}

@@ -66,7 +66,15 @@ class Finding:
 
 
 def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
-    """The verdict on hypotheses, the most probable first; what changes less than the tolerance counts as nothing."""
+    """Verdict on hypotheses.
+
+    Args:
+        hypotheses: all hypotheses that were compared, the most probable first.
+        tolerance: change of |K|, relative, below which an explanation counts as nothing.
+
+    Returns:
+        Verdict, probability that nothing is missing, and the explanations behind the verdict.
+    """
     weights = np.exp(
         [each.log_posterior for each in hypotheses] - logsumexp([each.log_posterior for each in hypotheses])
     )
