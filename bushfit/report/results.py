@@ -280,8 +280,9 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
                 )
             if any(_is_same(folder / name, file) for file in inputs):
                 raise OutputError("a result would replace an input of this run", file=folder / name, hint=elsewhere)
-        record = _recorded(folder) if existing else set()
-        foreign = [name for name in existing if not _is_recorded(folder / name, record)]
+        digests = {name: _digest(folder / name) for name in existing}
+        record = _recorded(folder) if existing else set()  # after the files: a command that runs now records, then moves
+        foreign = [name for name, digest in digests.items() if (digest, name) not in record]
     except OSError as error:
         raise unwritable(folder, error) from error
     if foreign:
@@ -315,13 +316,9 @@ def _recorded(folder: Path) -> set[tuple[str, str]]:
     return set()
 
 
-def _is_recorded(file: Path, record: set[tuple[str, str]]) -> bool:
-    """Return True if a file is, byte for byte, one that bushfit wrote."""
-    return (
-        file.is_file()
-        and not file.is_symlink()
-        and (hashlib.sha256(file.read_bytes()).hexdigest(), file.name) in record
-    )
+def _digest(file: Path) -> str:
+    """SHA-256 of a plain file; empty for a link or what is no file."""
+    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() and not file.is_symlink() else ""
 
 
 def unwritable(folder: Path, error: OSError) -> OutputError:
