@@ -13,6 +13,8 @@ from bushfit.reading.source import Channels, Combined, RowSource, Text, cells_of
 _MOST_BYTES = 1 << 22
 #: A letter that is no exponent.
 _LETTER = re.compile(r"[^\W\d_eE]|[eE](?![+-]?\d)")
+#: Bytes of rows of numbers, which begin no block.
+_NUMERIC = b"0123456789.,+-eE \t\r\n"
 #: Amplitude conventions in the header of an added column.
 COUNTED: dict[AmplitudeConvention | None, str] = {
     "peak-to-peak": " p-p", "zero-to-peak": " 0-p", "rms": " rms", None: ""
@@ -39,6 +41,10 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         start = source.offset(layout.header_line - 1)
         header = source.data[start : source.offset(layout.header_line)].strip()
         if source.data.find(header, start + len(header)) < 0:
+            return source, layout
+    if isinstance(source, Text):
+        numbers = source.data[source.offset(layout.lines_before_data) :]
+        if not numbers.translate(None, _NUMERIC + layout.delimiter.encode()):
             return source, layout
     return _stacked(source, layout, vocabulary)
 
@@ -90,7 +96,7 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     between: list[Line] = []
     repeated = False
     groups = [above]
-    contents: list[tuple[int, Sequence[str | float], int]] = []
+    contents: list[tuple[Line, int]] = []
     for line in source.lines(layout.lines_before_data):
         texts = [line.content] if isinstance(line.content, str) else [c for c in line.content if isinstance(c, str)]
         is_note = not layout.numbered and is_comment(line.content, layout.delimiter)
@@ -110,20 +116,21 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
             groups = [*groups, between] if contents else [[*above, *between]]
         unassigned = [] if repeated else [part for part in between if not is_comment(part.content, layout.delimiter)]
         block, repeated = len(groups) - 1, False
-        contents += [(part.number, cells_of(part, layout), block) for part in (*unassigned, line)]
+        contents += [(part, block) for part in (*unassigned, line)]
         between = []
     if len(groups) < 2:
         return source, layout
     titles = [_title(lines) for lines in groups]
     labels = [labels_above(lines) | labels_in_names(_last_text(lines)) for lines in groups]
     added = _label_columns(labels, titles, set(vocabulary.roles(layout.headers)), are_parts=False)
-    contents += [(part.number, cells_of(part, layout), len(groups) - 1) for part in between]
+    contents += [(part, len(groups) - 1) for part in between]
     content: list[Sequence[str | float]] = []
-    for _, row, block in contents:
+    for part, block in contents:
+        row = cells_of(part, layout)
         padded = [*row, *[""] * (width - len(row))]
         content.append([*padded, *(texts[block] for texts in added.values())] if len(row) <= width else row)
     layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
-    return Combined(source.sheet or "", content, numbers=[number for number, *_ in contents]), layout
+    return Combined(source.sheet or "", content, numbers=[part.number for part, _ in contents]), layout
 
 
 def _title(lines: Sequence[Line]) -> str:
