@@ -281,7 +281,7 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
             if any(_is_same(folder / name, file) for file in inputs):
                 raise OutputError("a result would replace an input of this run", file=folder / name, hint=elsewhere)
         digests = {name: _digest(folder / name) for name in existing}
-        record = _recorded(folder) if existing else set()  # after the files: a command that runs now records, then moves
+        record = _recorded(folder) if existing else set()  # read after the files
         foreign = [name for name, digest in digests.items() if (digest, name) not in record]
     except OSError as error:
         raise unwritable(folder, error) from error
