@@ -99,19 +99,45 @@ def parallel_elements(history: History, yield_strain: Array, weights: Array) -> 
 
     Returns:
         Sum over the elements of weight times a stress between -1 and 1, (..., n).
+
+    Notes:
+        Along a piece between two turning points the sum is linear in the travel between the points at which an element
+        yields.
     """
     turning = history.turning
-    strides = turning.strides[..., None] / yield_strain
+    strides, travel = turning.strides[..., None], np.abs(turning.travel)
+    longest = max(float(travel.max()), np.finfo(float).tiny)
     top = np.minimum(history.amplitude[..., None] / yield_strain, 1.0) if history.periodic else np.zeros((1, 1))
-    start = np.empty_like(strides)
+    start = np.empty(np.broadcast_shapes(strides.shape, yield_strain.shape))
     start[..., 0, :] = top[..., 0, :]
     for piece in range(1, strides.shape[-2]):
-        start[..., piece, :] = np.clip(start[..., piece - 1, :] + strides[..., piece - 1, :], -1.0, 1.0)
-    total = np.zeros(1)
-    for element in range(yield_strain.shape[-1]):  # one by one: all at once do not fit into a processor's cache
-        extension = turning.at_samples(start[..., element]) + turning.travel / yield_strain[..., element]
-        total = total + weights[..., element] * np.clip(extension, -1.0, 1.0)
-    return total
+        extension = strides[..., piece - 1, :] / yield_strain[..., 0, :]
+        start[..., piece, :] = np.clip(start[..., piece - 1, :] + extension, -1.0, 1.0)
+    sense = np.sign(strides)
+    yields_at = np.minimum(yield_strain * (1.0 - sense * start), longest)
+    order = np.argsort(yields_at, axis=-1)
+    yields_at = np.take_along_axis(yields_at, order, axis=-1)
+    stiffness = np.take_along_axis(np.broadcast_to(weights / yield_strain, order.shape), order, axis=-1)
+    elastic = stiffness[..., ::-1].cumsum(axis=-1)[..., ::-1]
+    rise = np.cumsum(elastic * np.diff(yields_at, axis=-1, prepend=0.0), axis=-1)
+    first, last = np.zeros((*order.shape[:-1], 1)), np.full((*order.shape[:-1], 1), longest)
+    knots = np.concatenate((first, yields_at, last), axis=-1)
+    stresses = np.sum(weights * start, axis=-1, keepdims=True) + sense * np.concatenate(
+        (first, rise, rise[..., -1:]), axis=-1
+    )
+    # pieces one behind the other, so that one search finds the piece and the knot
+    knots += 2.0 * longest * np.arange(order.shape[-2])[:, None]
+    shape = np.broadcast_shapes(order.shape[:-2], travel.shape[:-1])
+    position = np.broadcast_to(travel + 2.0 * longest * turning.piece, (*shape, travel.shape[-1]))
+    rows = zip(
+        position.reshape(-1, travel.shape[-1]),
+        *(
+            np.broadcast_to(array, (*shape, *array.shape[-2:])).reshape(position[..., 0].size, -1)
+            for array in (knots, stresses)
+        ),
+        strict=True,
+    )
+    return np.array([np.interp(*row) for row in rows]).reshape(position.shape)
 
 
 def in_place_of(p: Values) -> list[dict[str, float]]:
