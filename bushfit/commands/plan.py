@@ -21,6 +21,7 @@ from bushfit.errors import ModelError, did_you_mean
 from bushfit.geometry import Direction, Place, get_place
 from bushfit.model.result import Result
 from bushfit.planning.campaign import Check, campaign_toml
+from bushfit.planning.compound import guess_parameters
 from bushfit.planning.contract import (
     Aim,
     Knowledge,
@@ -32,9 +33,9 @@ from bushfit.planning.contract import (
     motions,
     operating_points,
 )
-from bushfit.planning.knowledge import from_campaign, from_result, guess_parameters, rig_of
-from bushfit.planning.offer import RIVALS_APART
+from bushfit.planning.knowledge import from_campaign, from_result, rig_of
 from bushfit.planning.plan import plan as choose_tests
+from bushfit.planning.problem import RIVALS_APART
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
 from bushfit.report import plots
 from bushfit.report.results import ResultFile, figure_file, json_file, raw_file, table_file

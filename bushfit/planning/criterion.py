@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from bushfit.diagnosis.next_test import entropy_left
 from bushfit.effects.contract import Array
-from bushfit.planning.contract import Knowledge
-from bushfit.planning.sensitivity import Grid, Information, relative_slopes
+from bushfit.planning.information import Information, ModelInformation, rival_chi_squares
 from bushfit.progress import track
 
 #: Smallest useful decrease of the logarithm of the variance by a run or an exchange; chosen: 0.25 % of the error.
@@ -18,68 +17,6 @@ _USEFUL_DECREASE = 5e-3
 #: Weight of the shift of the parameters by a drift beside the visibility of the drift; chosen: orders then keep the
 #: shift below a fifth of a standard error for a drift of 1 % over the session.
 _SHIFT_WEIGHT = 100.0
-
-
-@dataclass(frozen=True, eq=False)
-class ModelInformation:
-    """Information of candidate tests on the k parameters of one model, and on e further columns.
-
-    Args:
-        runs: information of one run of each candidate test.
-        prior: information on relative changes of the parameters before the tests, (k, k).
-        level: standard deviations of the gain and phase errors that all runs of a test share, (tests, 2).
-        bounded: number of parameters at a bound, which are the last ones.
-    """
-
-    runs: Information
-    prior: Array
-    level: Array
-    bounded: int = 0
-
-    @classmethod
-    def from_grid(cls, grid: Grid, knowledge: Knowledge, further: Array | None = None) -> ModelInformation:
-        """Compute the information of the tests of a grid.
-
-        Args:
-            grid: candidate tests.
-            knowledge: the model and its parameters.
-            further: further columns over the residuals of the grid, (e, n).
-
-        Returns:
-            Information on the parameters and the further columns.
-        """
-        slopes = relative_slopes(knowledge, grid.data_sets)
-        columns = np.empty((0, slopes.shape[-1])) if further is None else further
-        return cls(grid.information(slopes, columns), knowledge.precision, grid.level, len(knowledge.bounded))
-
-    def total(self, counts: Array) -> Information:
-        """Information of a number of runs of each test, (tests,), and of the prior, (1, ...)."""
-        total = self.runs.scaled(counts).with_line_error(self.level).summed()
-        return replace(total, parameters=total.parameters + self.prior)
-
-    def with_one_more(self, counts: Array) -> Information:
-        """Information with one more run of each test in turn, (tests, ...)."""
-        now, more = (self.runs.scaled(runs).with_line_error(self.level) for runs in (counts, counts + 1))
-        return self.total(counts) + (more - now)
-
-    def error_covariance(self, information: Information) -> Array:
-        """Compute the expected squares and products of the errors of the parameters.
-
-        Args:
-            information: of the tests and the prior.
-
-        Returns:
-            Covariance of relative changes, (..., k, k).
-
-        Notes:
-            If the true value of a parameter is at its bound, noise would take half of the fits beyond the bound. In
-            these the parameter stays there, and the others are fitted with it fixed, so half of its contribution to
-            their squares is absent.
-        """
-        free = np.linalg.inv(information.parameters)
-        first = free.shape[-1] - self.bounded
-        bounded = free[..., first:]
-        return free - 0.5 * bounded @ np.linalg.inv(bounded[..., first:, :]) @ bounded.mT
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,26 +60,8 @@ class Criterion:
         else:
             aim = np.log(np.einsum("tij,ij->t", self.models[0].error_covariance(informations[0]), self.weight))
         wanted = self.minimum_noncentrality > 0.0
-        share = noncentralities(informations[0])[:, wanted] / self.minimum_noncentrality[wanted]
+        share = informations[0].noncentralities()[:, wanted] / self.minimum_noncentrality[wanted]
         return aim - self.penalty * np.sum(np.log(np.clip(share, 1e-12, 1.0)), axis=1)  # finite
-
-
-def noncentralities(information: Information) -> Array:
-    """Expected chi-square by one unit of each further column after a refit of the parameters, (tests, e)."""
-    fitted = np.linalg.solve(information.parameters, information.cross)
-    return np.maximum(information.squares - np.sum(information.cross * fitted, axis=-2), 0.0)
-
-
-def rival_chi_squares(informations: Sequence[Information]) -> Array:
-    """Expected chi-square between any two rivals after the best refit of either, (tests, rivals, rivals)."""
-    rows = [np.insert(noncentralities(rival), index, 0.0, axis=1) for index, rival in enumerate(informations)]
-    one_way = np.stack(rows, axis=1)
-    return np.minimum(one_way, np.swapaxes(one_way, 1, 2))
-
-
-def covariance_root(information: Array) -> Array:
-    """Root R of the covariance R R^T that belongs to an information matrix, (k, k)."""
-    return np.linalg.inv(np.linalg.cholesky(information)).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,21 +174,22 @@ class DriftEffect:
     level_share: Array
     shift_root: Array
 
-    def turn_sums(self, runs: Sequence[int] | Array) -> tuple[Array, Array]:
-        """Sums of the turns and of their squares over the runs of each test, (tests,) each."""
+    def turn_sums(self, runs: Sequence[int] | Array) -> tuple[Array, Array, Array]:
+        """Turn of each run, (runs,), and the sums of the turns and of their squares over each test, (tests,) each."""
         tests = np.array(runs, dtype=int)
-        first, second = (np.bincount(tests, turns(tests.size) ** power, self.gain_information.size) for power in (1, 2))
-        return first, second
+        turn = np.arange(tests.size) / max(tests.size - 1, 1) - 0.5
+        first, second = (np.bincount(tests, turn**power, self.gain_information.size) for power in (1, 2))
+        return turn, first, second
 
     def noncentrality(self, runs: Sequence[int] | Array) -> float:
         """Noncentrality of a unit drift over runs in their order, given by the numbers of their tests."""
-        first, second = self.turn_sums(runs)
+        _, first, second = self.turn_sums(runs)
         shift = first @ self.shift_root
         return float(self.gain_information @ second - self.level_share @ first**2 - shift @ shift)
 
     def shift(self, runs: Sequence[int] | Array) -> Array:
         """Shift of the parameters by a unit drift over runs in their order, (k,)."""
-        return self.turn_sums(runs)[0] @ self.shift_root
+        return self.turn_sums(runs)[1] @ self.shift_root
 
     def exchange_gains(self, runs: Array) -> Array:
         """Compute the growth of the noncentrality if two runs change places.
@@ -280,8 +200,7 @@ class DriftEffect:
         Returns:
             Growth for each pair of runs, (runs, runs); the shift of the parameters counts with _SHIFT_WEIGHT.
         """
-        turn = turns(runs.size)
-        first = self.turn_sums(runs)[0]
+        turn, first, _ = self.turn_sums(runs)
         step, squared = turn - turn[:, None], turn**2 - turn[:, None] ** 2  # of the run in the row
         gain, shared, root = self.gain_information[runs], self.level_share[runs], self.shift_root[runs]
         sums = first[runs]
@@ -289,11 +208,6 @@ class DriftEffect:
         change = step[..., None] * (root[:, None] - root)
         shifts = np.sum((2.0 * (first @ self.shift_root) + change) * change, axis=-1)
         return np.where(runs[:, None] == runs, 0.0, (gain[:, None] - gain) * squared - levels - _SHIFT_WEIGHT * shifts)
-
-
-def turns(count: int) -> Array:
-    """Turn of each run of a session, from -1/2 to 1/2, (count,)."""
-    return np.arange(count) / max(count - 1, 1) - 0.5
 
 
 def order_runs(counts: Array, places: Array, drift: DriftEffect) -> list[int]:

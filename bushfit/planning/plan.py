@@ -8,9 +8,10 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
+from bushfit.planning.candidates import unlimited_rig_warning
 from bushfit.planning.contract import Knowledge, Plan, PlanRequest, Programme
 from bushfit.planning.criterion import add_runs, order_runs
-from bushfit.planning.offer import RIVALS_APART, PlanningProblem, warn_of_unlimited_rig
+from bushfit.planning.problem import RIVALS_APART, PlanningProblem
 from bushfit.planning.search import PlanSearch
 from bushfit.planning.targets import UNLIMITED_RUNS, Goal, percent
 from bushfit.units import number
@@ -45,16 +46,18 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
             expected="tests of a campaign that two effects or more explain alike",
             hint="plan from the campaign, or for parameters or predictions",
         )
-    problem = PlanningProblem(knowledge, request)
+    problem = PlanningProblem.from_request(knowledge, request)
     search = PlanSearch(problem, request.hours)
     shorter = [PlanSearch(problem, share * request.hours) for share in _SHARES.get(request.aim, ())]
     for any_quality in (False, True) if problem.goals else (True,):  # unsound plans only if no sound one reaches
-        first = bisect_left(shorter, True, key=lambda search: search.reaches_aim and (search.sound or any_quality))
+        first = bisect_left(
+            shorter, True, key=lambda search: search.reaches_aim() and (any_quality or search.is_sound())
+        )
         if first < len(shorter):
             search = shorter[first]
             break
     counts, places = search.counts, search.budget.place
-    if not counts.any() and not search.reaches_aim:
+    if not counts.any() and not search.reaches_aim():
         shortest = float(search.budget.minutes.min() + search.budget.setup_minutes) / 60.0
         raise ModelError(
             "no test fits into the hours",
@@ -63,15 +66,19 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
             expected=f"at least {number(shortest, 2)} h",
         )
     planned = search.programme(order_runs(counts, places, search.drift_effect(counts)) if counts.any() else [])
-    before, standard = search.programme([]), search.programme(search.standard_runs)
     missed = tuple(explain_miss(search, goal) for goal in problem.goals)
-    purposes = {
-        problem.tests[test]: describe_loss(problem, counts, np.where(np.arange(counts.size) == test, 0, counts))
-        or "shows effects that the model lacks"
-        for test in np.flatnonzero(counts).tolist()
-    }
-    enough, notes = explain_free_hours(search, planned, missed), tuple(make_notes(search, planned, missed))
-    return Plan(knowledge, request, before, planned, standard, purposes, missed, enough, notes)
+    purposes = {problem.tests[test]: describe_purpose(search, test) for test in np.flatnonzero(counts).tolist()}
+    return Plan(
+        knowledge,
+        request,
+        before=search.programme([]),
+        planned=planned,
+        standard=search.programme(search.standard_runs),
+        purposes=purposes,
+        missed=missed,
+        enough=explain_free_hours(search, planned, missed),
+        notes=tuple(plan_warnings(search, planned, missed)),
+    )
 
 
 def explain_miss(search: PlanSearch, goal: Goal) -> str | None:
@@ -106,39 +113,41 @@ def explain_miss(search: PlanSearch, goal: Goal) -> str | None:
     return f"{hours} h would reach {reached}, and no further run would take a quarter per cent off that"
 
 
-def describe_loss(problem: PlanningProblem, counts: Array, reduced: Array) -> str | None:
-    """Sentence on the largest loss by leaving out runs.
+def describe_purpose(search: PlanSearch, test: int) -> str:
+    """Sentence on the largest loss without a test and all its repeats.
 
     Args:
-        problem: candidate tests.
-        counts: number of runs of each test in the plan, (tests,).
-        reduced: number of runs of each test without those left out, (tests,).
+        search: with the tests that it chose.
+        test: number of the test.
 
     Returns:
-        The sentence; None if next to nothing is lost.
+        The sentence.
     """
-    request, names = problem.request, problem.knowledge.names
+    problem, counts = search.problem, search.counts
+    request, reduced = problem.request, np.where(np.arange(counts.size) == test, 0, counts)
     covariance, wider = problem.error_covariance(counts), problem.error_covariance(reduced)
     if request.aim == "rivals":
         chi_square, closer = problem.nearest_rivals(counts), problem.nearest_rivals(reduced)
-        sentence = (
-            f"rivals {number(closer, 2)} apart in expected chi-square without it, {number(chi_square, 2)} with it"
-        )
-        return sentence if closer * _NOTABLE_RATIO <= chi_square else None
-    if problem.goals:
+        if closer * _NOTABLE_RATIO <= chi_square:
+            apart = f"{number(closer, 2)} apart in expected chi-square without it, {number(chi_square, 2)} with it"
+            return f"rivals {apart}"
+    elif problem.goals:
         widened = [
             goal for goal in problem.goals if goal.half_width(wider) >= _NOTABLE_RATIO * goal.half_width(covariance)
         ]
-        if not widened:
-            return None
-        goal = max(widened, key=lambda goal: goal.half_width(wider) / goal.target.half)
-        without, planned = (percent(goal.half_width(errors), 3) for errors in (wider, covariance))
-        return f"{goal.target}: {without} without it, {planned} with it"
-    ratios = dict(zip(names, np.sqrt(np.diag(wider) / np.diag(covariance)), strict=False))
-    if request.aim == "predictions":
-        ratios = {"stiffness": np.sqrt(np.sum(wider * problem.weight) / np.sum(covariance * problem.weight))}
-    ratio, name = max((ratios[name], name) for name in ratios if name in ("stiffness", *request.parameters))
-    return f"{name}: error {number(100.0 * (ratio - 1.0), 2)} % larger without it" if ratio >= _NOTABLE_RATIO else None
+        if widened:
+            goal = max(widened, key=lambda goal: goal.half_width(wider) / goal.target.half)
+            without, planned = (percent(goal.half_width(errors), 3) for errors in (wider, covariance))
+            return f"{goal.target}: {without} without it, {planned} with it"
+    else:
+        if request.aim == "predictions":
+            name, ratio = "stiffness", np.sqrt(np.sum(wider * problem.weight) / np.sum(covariance * problem.weight))
+        else:
+            ratios = zip(np.sqrt(np.diag(wider) / np.diag(covariance)), problem.knowledge.names, strict=False)
+            ratio, name = max(pair for pair in ratios if pair[1] in request.parameters)
+        if ratio >= _NOTABLE_RATIO:
+            return f"{name}: error {number(100.0 * (ratio - 1.0), 2)} % larger without it"
+    return "shows effects that the model lacks"
 
 
 def explain_free_hours(search: PlanSearch, planned: Programme, missed: Sequence[str | None]) -> str | None:
@@ -167,7 +176,7 @@ def explain_free_hours(search: PlanSearch, planned: Programme, missed: Sequence[
     return f"{number(planned.hours, 2)} of {number(hours, 3)} h are enough: {reason}, and {number(free, 2)} h stay free"
 
 
-def make_notes(search: PlanSearch, planned: Programme, missed: Sequence[str | None]) -> Iterator[str]:
+def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str | None]) -> Iterator[str]:
     """Warnings and limits of a plan, the important ones first.
 
     Args:
@@ -178,16 +187,17 @@ def make_notes(search: PlanSearch, planned: Programme, missed: Sequence[str | No
     Returns:
         Iterator over sentences.
     """
-    problem, knowledge = search.problem, search.problem.knowledge
-    yield from warn_of_unlimited_rig(knowledge, problem.request, planned.tests)
-    model_error = float(problem.model_error[0].max(initial=0.0))
+    problem, knowledge, request = search.problem, search.problem.knowledge, search.problem.request
+    if sentence := unlimited_rig_warning(knowledge, request.rig, planned.tests):
+        yield sentence
+    model_error = max((float(points.model_error[0].max(initial=0.0)) for points in problem.wanted), default=0.0)
     if model_error > _NOTABLE_RATIO - 1.0:
         yield (
             f"the errors of the stiffness contain the model error, up to {number(100.0 * model_error, 2)} %, which no "
             "test lowers; bushfit diagnose looks for the effect that the model lacks"
         )
     yield from knowledge.warnings
-    for target, half, reason in zip(problem.request.targets, planned.halves, missed, strict=True):
+    for target, half, reason in zip(request.targets, planned.halves, missed, strict=True):
         if reason:
             yield f"{target}: {percent(target.half)} asked for, {percent(half)} planned: {reason}"
     if knowledge.bounded:
@@ -199,11 +209,9 @@ def make_notes(search: PlanSearch, planned: Programme, missed: Sequence[str | No
         yield "too few repeats tell how sweeps scatter: intervals may come out half as wide again as planned"
     if effects := search.less_visible_effects(search.counts):
         yield f"the standard programme shows these effects better: {', '.join(effects)}"
-    separable = {tuple(pair) for pair in problem.separable_pairs.T.tolist()}
-    for pair in problem.pairs.T.tolist():
-        if tuple(pair) not in separable:
-            names = (knowledge.rivals[rival].model.effects[-1] for rival in pair)
-            yield f"no test of this rig would tell {' from '.join(names)}: they are left out"
+    for pair in np.argwhere(np.triu(~problem.separable_rivals, 1)).tolist():
+        names = (knowledge.rivals[rival].model.effects[-1] for rival in pair)
+        yield f"no test of this rig would tell {' from '.join(names)}: they are left out"
     if planned.rival_chi_square is not None and planned.rival_chi_square < RIVALS_APART:
         yield (
             f"the nearest rivals are {number(planned.rival_chi_square, 2)} apart in expected chi-square, less than the "

@@ -12,20 +12,12 @@ from bushfit.effects import qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.repeats import FEWEST_STEPS
 from bushfit.geometry import Place, Specimen
+from bushfit.planning.candidates import standard_tests
 from bushfit.planning.contract import DetectableAmount, Programme, Test
-from bushfit.planning.criterion import (
-    Budget,
-    Criterion,
-    DriftEffect,
-    best_runs,
-    covariance_root,
-    noncentralities,
-    order_runs,
-)
-from bushfit.planning.offer import DETECTABLE, RIVALS_APART, PlanningProblem, smallest_amount, standard_tests
-from bushfit.planning.sensitivity import Information
+from bushfit.planning.criterion import Budget, Criterion, DriftEffect, best_runs, order_runs
+from bushfit.planning.information import eliminate_line_errors
+from bushfit.planning.problem import DETECTABLE, RIVALS_APART, PlanningProblem
 from bushfit.planning.targets import Goal, describe_untested
-from bushfit.reading.measurement import loss_factor
 
 #: Weight of the logarithm of each lack of power beside the logarithm of the variance, and the weight that is used if
 #: the first leaves a lack; chosen.
@@ -57,8 +49,8 @@ class PlanSearch:
 
         If possible, all effects show as well as in the standard programme.
         """
-        required, criterion = self.required_runs, self.criterion(_PENALTY)
-        counts = best_runs(criterion, self.budget, required, required)
+        required = self.required_runs
+        counts = best_runs(replace(self.strict, penalty=_PENALTY), self.budget, required, required)
         if self.less_visible_effects(counts):
             standard = np.minimum(self.count(self.standard_runs), self.budget.maximum_runs)
             starts = [counts, *([] if required.any() else [standard])]
@@ -66,7 +58,58 @@ class PlanSearch:
             counts = min(choices, key=self.strict.value)
         return self.with_scatter(self.with_repeats(counts))
 
-    @property
+    @cached_property
+    def strict(self) -> Criterion:
+        """Criterion with much weight on effects that show less than in the standard programme."""
+        problem = self.problem
+        probabilities = np.array([rival.probability for rival in problem.knowledge.rivals])
+        return Criterion(problem.models, problem.weight, probabilities, self.minimum_noncentrality, _STRICT_PENALTY)
+
+    @cached_property
+    def standard_runs(self) -> list[int]:
+        """Numbers of the tests of the standard programme, repeated within the hours and ordered by direction."""
+        problem = self.problem
+        tests = [problem.tests.index(test) for test in standard_tests(problem.knowledge, problem.request)]
+        runs = list[int]()
+        while tests:
+            runs.append(tests[len(runs) % len(tests)])
+            if self.budget.spent(self.count(runs)) > self.budget.maximum_minutes:
+                runs.pop()
+                break
+        return sorted(runs, key=lambda test: self.budget.place[test])
+
+    @cached_property
+    def minimum_noncentrality(self) -> Array:
+        """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
+        reached = self.problem.models[0].total(self.count(self.standard_runs)).noncentralities()[0]
+        amounts = [effect.amount for effect in self.problem.effects]
+        # the largest amount that a bushing or a rig can have, in typical amounts
+        largest = [max(abs(end - (x.neutral or 0.0)) for end in x.bounds) / x.typical for x in amounts]
+        return np.where(np.array(largest) * np.sqrt(reached) >= DETECTABLE, reached, 0.0)
+
+    @cached_property
+    def required_runs(self) -> Array:
+        """One run in each direction whose stiffness is a target and that was not tested, (tests,).
+
+        Tests in other directions do not determine the error of the stiffness formula. Zero if the runs do not fit into
+        the hours.
+        """
+        problem = self.problem
+        required = np.zeros(len(problem.tests), dtype=int)
+        if problem.goals:
+            values = self.strict.values_with_one_more(required)
+            for goal in problem.goals:
+                chosen = np.array([test.direction == goal.target.place for test in problem.tests])
+                chosen &= self.budget.maximum_runs > 0
+                tested = problem.knowledge.tests or required.any()
+                if chosen.any() and (not tested or self.untested(goal, required)):
+                    required[int(np.argmin(np.where(chosen, values, np.inf)))] = 1
+        return required if self.budget.spent(required) <= self.budget.maximum_minutes else 0 * required
+
+    def count(self, runs: Sequence[int]) -> Array:
+        """Number of runs of each test, (tests,), among runs given by the numbers of their tests."""
+        return np.bincount(np.array(runs, dtype=int), minlength=len(self.problem.tests))
+
     def reaches_aim(self) -> bool:
         """True if the tests separate the rivals with a margin of two, or meet the targets that can be met."""
         problem = self.problem
@@ -77,36 +120,21 @@ class PlanSearch:
         testable = [goal for goal in problem.goals if goal.target.place in problem.request.places]
         return bool(problem.goals) and reached and not any(self.untested(goal, self.counts) for goal in testable)
 
-    @property
-    def sound(self) -> bool:
+    def is_sound(self) -> bool:
         """True if all effects show as in the standard programme, and repeats determine the scatter."""
         return not self.less_visible_effects(self.counts) and self.determines_scatter(self.counts)
 
-    @cached_property
-    def required_runs(self) -> Array:
-        """One run in each direction whose stiffness is a target and that was not tested, (tests,).
-
-        Tests in other directions do not determine the error of the stiffness formula. Zero if the runs do not fit into
-        the hours.
-        """
-        none = np.zeros(len(self.problem.tests), dtype=int)
-        required, values = none.copy(), self.strict.values_with_one_more(none) if self.problem.goals else none
-        for goal in self.problem.goals:
-            chosen = np.array([test.direction == goal.target.place for test in self.problem.tests])
-            chosen &= self.budget.maximum_runs > 0
-            if chosen.any() and (not self.tested_places(required) or self.untested(goal, required)):
-                required[int(np.argmin(np.where(chosen, values, np.inf)))] = 1
-        return required if self.budget.spent(required) <= self.budget.maximum_minutes else none
-
-    def tested_places(self, counts: Array) -> list[str]:
-        """Directions and specimens of the tests so far and of those planned."""
-        planned = (self.problem.tests[test] for test in np.flatnonzero(counts))
-        return [str(test.direction) for test in (*self.problem.knowledge.tests, *planned)]
-
     def untested(self, goal: Goal, counts: Array) -> str | None:
         """Sentence on the error that a goal's interval lacks because its direction is not tested; None without one."""
-        place = goal.target.place
-        return describe_untested(self.problem.knowledge, place, self.tested_places(counts)) if place else None
+        planned = (self.problem.tests[test] for test in np.flatnonzero(counts))
+        tested = [str(test.direction) for test in (*self.problem.knowledge.tests, *planned)]
+        return describe_untested(self.problem.knowledge, goal.target.place, tested) if goal.target.place else None
+
+    def less_visible_effects(self, counts: Array) -> list[str]:
+        """Effects that these runs show less well than the standard programme."""
+        reached = self.problem.models[0].total(counts).noncentralities()[0]
+        short = np.sqrt(reached) < 0.995 * np.sqrt(self.minimum_noncentrality)  # numerical accuracy
+        return list(dict.fromkeys(self.problem.effects[index].name for index in np.flatnonzero(short)))
 
     def with_repeats(self, counts: Array) -> Array:
         """Replace the least useful runs until a drift shows as in the standard programme in each direction.
@@ -121,8 +149,7 @@ class PlanSearch:
         """
         standard = self.drift_effect(self.count(self.standard_runs)).noncentrality(self.standard_runs)
         for place in np.unique(self.budget.place[counts > 0]):
-            chosen = np.flatnonzero((counts > 0) & (self.budget.place == place))
-            drift = self.drift_effect(counts)
+            chosen, drift = np.flatnonzero((counts > 0) & (self.budget.place == place)), self.drift_effect(counts)
             if chosen.size > 2 and (
                 counts[chosen].max() < 2 or drift.noncentrality(order_runs(counts, self.budget.place, drift)) < standard
             ):
@@ -200,46 +227,6 @@ class PlanSearch:
         """True if repeats determine the scatter of sweeps, of the bushing and of each specimen."""
         return self.scatter_freedom(counts) >= [_SCATTER_FREEDOM]
 
-    def criterion(self, penalty: float) -> Criterion:
-        """Criterion with a weight of effects that show less than in the standard programme."""
-        probabilities = np.array([rival.probability for rival in self.problem.knowledge.rivals])
-        return Criterion(self.problem.models, self.problem.weight, probabilities, self.minimum_noncentrality, penalty)
-
-    @cached_property
-    def strict(self) -> Criterion:
-        """Criterion with more weight on effects that show less than in the standard programme."""
-        return self.criterion(_STRICT_PENALTY)
-
-    def count(self, runs: Sequence[int]) -> Array:
-        """Number of runs of each test, (tests,), among runs given by the numbers of their tests."""
-        return np.bincount(np.array(runs, dtype=int), minlength=len(self.problem.tests))
-
-    def less_visible_effects(self, counts: Array) -> list[str]:
-        """Effects that these runs show less well than the standard programme."""
-        reached = noncentralities(self.problem.models[0].total(counts))[0]
-        short = np.sqrt(reached) < 0.995 * np.sqrt(self.minimum_noncentrality)  # numerical accuracy
-        return list(dict.fromkeys(self.problem.grid.columns[i].effect.name for i in np.flatnonzero(short)))
-
-    @cached_property
-    def standard_runs(self) -> list[int]:
-        """Numbers of the tests of the standard programme, repeated within the hours and ordered by direction."""
-        problem = self.problem
-        tests = [problem.tests.index(test) for test in standard_tests(problem.knowledge, problem.request)]
-        counts, runs = np.zeros(len(problem.tests), dtype=int), list[int]()
-        while tests:
-            counts[test := tests[len(runs) % len(tests)]] += 1
-            if self.budget.spent(counts) > self.budget.maximum_minutes:
-                break
-            runs.append(test)
-        return sorted(runs, key=lambda test: self.budget.place[test])
-
-    @cached_property
-    def minimum_noncentrality(self) -> Array:
-        """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
-        reached = noncentralities(self.problem.models[0].total(self.count(self.standard_runs)))[0]
-        amounts = np.array([column.maximum_amount for column in self.problem.grid.columns])
-        return np.where(amounts * np.sqrt(reached) >= DETECTABLE, reached, 0.0)
-
     def drift_effect(self, counts: Array) -> DriftEffect:
         """Compute the effect of a drift of the gain.
 
@@ -249,14 +236,14 @@ class PlanSearch:
         Returns:
             Effect of a unit drift on these runs.
         """
-        model, knowledge = self.problem.models[0], self.problem.knowledge
-        k = len(knowledge.names) + len(knowledge.bounded)
-        products, gain = model.runs.parameters, model.runs.parameters[:, k, k]
-        by_gain = Information(products * counts[:, None, None], products[..., k : k + 1], gain[:, None])  # of one run
-        level = np.square(model.level[:, 0])
+        model = self.problem.models[0]
+        errors_and_parameters = model.products[..., : model.products.shape[-2]]
+        by_gain = errors_and_parameters[..., :1]  # of one run
+        of_all_runs = errors_and_parameters * counts[:, None, None]
+        remaining, _ = eliminate_line_errors(np.concatenate((of_all_runs, by_gain), axis=-1), model.level)
+        gain, level = by_gain[:, 0, 0], np.square(model.level[:, 0])
         root = covariance_root(model.total(counts).parameters[0])
-        shift_root = by_gain.with_line_error(model.level).cross[..., 0] @ root
-        return DriftEffect(gain, level * gain**2 / (1.0 + counts * level * gain), shift_root)
+        return DriftEffect(gain, level * gain**2 / (1.0 + counts * level * gain), remaining[..., -1] @ root)
 
     def programme(self, runs: Sequence[int]) -> Programme:
         """Compute the expected results of runs in their order.
@@ -270,31 +257,24 @@ class PlanSearch:
         problem, counts, places = self.problem, self.count(runs), self.budget.place[list(runs)]
         model, k, drift = problem.models[0], len(problem.knowledge.names), self.drift_effect(counts)
         information = model.total(counts)
-        covariance, free_covariance = (
-            model.error_covariance(information)[0],
-            np.linalg.inv(information.parameters[0]),
-        )
-        gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", problem.slopes, covariance, problem.slopes))
-        stiffness = [
-            problem.knowledge.model.stiffness(points.place, points.frequency, points.amplitude)
-            for points in problem.request.points
-        ]
-        loss = loss_factor(np.concatenate(stiffness))
-        shift = covariance_root(information.parameters[0]) @ drift.shift(runs) / np.sqrt(np.diag(free_covariance))
+        covariance = model.error_covariance(information)[0]
+        free_variance = np.diag(np.linalg.inv(information.parameters[0]))
+        stiffness, loss = np.concatenate([part.standard_errors(covariance) for part in problem.wanted], axis=1)
+        shift = covariance_root(information.parameters[0]) @ drift.shift(runs) / np.sqrt(free_variance)
         # tests alone leave combinations open whose information is rounding; without tests no error is of use
         values, vectors = np.linalg.eigh(information.parameters[0] - model.prior)
         alone = vectors / np.sqrt(np.maximum(values, max(1e-14 * float(values.max()), 1e-12)))
         return Programme(
-            tuple(problem.tests[run] for run in runs),
-            self.budget.minutes[list(runs)] + self.budget.setup_minutes * (np.diff(places, prepend=-1) != 0),
-            np.sqrt(np.diag(covariance))[:k],
-            np.linalg.norm(alone, axis=1)[:k],
-            np.hypot(gain, problem.model_error[0]),
-            np.hypot(phase * (1.0 + np.square(loss)), problem.model_error[1]),
-            problem.nearest_rivals(counts) if problem.knowledge.rivals else None,
-            tuple(goal.half_width(covariance) for goal in problem.goals),
-            tuple(self.detectable_amounts(noncentralities(information)[0], drift.noncentrality(runs))),
-            0.01 * float(np.abs(shift[:k]).max()),
+            tests=tuple(problem.tests[run] for run in runs),
+            minutes=self.budget.minutes[list(runs)] + self.budget.setup_minutes * (np.diff(places, prepend=-1) != 0),
+            errors=np.sqrt(np.diag(covariance))[:k],
+            alone=np.linalg.norm(alone, axis=1)[:k],
+            stiffness=stiffness,
+            loss=loss,
+            rival_chi_square=problem.nearest_rivals(counts) if problem.knowledge.rivals else None,
+            halves=tuple(goal.half_width(covariance) for goal in problem.goals),
+            detectable=tuple(self.detectable_amounts(information.noncentralities()[0], drift.noncentrality(runs))),
+            drift=0.01 * float(np.abs(shift[:k]).max()),
         )
 
     def detectable_amounts(self, reached: Array, drift: float) -> Iterator[DetectableAmount]:
@@ -305,17 +285,23 @@ class PlanSearch:
             drift: noncentrality of a unit drift of the gain.
 
         Returns:
-            Iterator over the amounts, that of the drift last.
+            Iterator over the amounts, that of the drift last; infinite where no amount is detected.
         """
-        columns = self.problem.grid.columns
-        for effect in dict.fromkeys(column.effect for column in columns):
-            shapes = [i for i, column in enumerate(columns) if column.effect is effect]
-            best = shapes[int(np.argmax(self.minimum_noncentrality[shapes]))]
-            if self.minimum_noncentrality[best] > 0.0:
-                parameter = effect.amount
-                name, amount = qualified_name(effect, parameter), parameter.typical * smallest_amount(reached[best])
-                yield DetectableAmount(effect.name, name, parameter.unit, amount)
-        yield DetectableAmount("drift", "drift.gain", "1", smallest_amount(drift))
+        effects, visible = self.problem.effects, self.minimum_noncentrality
+        with np.errstate(divide="ignore"):
+            smallest, smallest_drift = DETECTABLE / np.sqrt(reached), DETECTABLE / np.sqrt(max(drift, 0.0))
+        for effect in dict.fromkeys(effects):
+            best = max((index for index in range(len(effects)) if effects[index] is effect), key=visible.__getitem__)
+            if visible[best] > 0.0:
+                amount = effect.amount
+                size = amount.typical * float(smallest[best])
+                yield DetectableAmount(effect.name, qualified_name(effect, amount), amount.unit, size)
+        yield DetectableAmount("drift", "drift.gain", "1", float(smallest_drift))
+
+
+def covariance_root(information: Array) -> Array:
+    """Root R of the covariance R R^T that belongs to an information matrix, (k, k)."""
+    return np.linalg.inv(np.linalg.cholesky(information)).T
 
 
 def scatter_differences(test: Test) -> int:

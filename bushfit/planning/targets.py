@@ -2,24 +2,69 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.preparation import new_sweep
 from bushfit.geometry import Place
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.result import Range, Result
-from bushfit.planning.contract import Knowledge, PlanRequest, Points, Target
+from bushfit.planning.contract import Knowledge, Points, Target
+from bushfit.planning.information import relative_slopes
 from bushfit.prediction.caveats import unfitted
 from bushfit.prediction.stiffness import predict
+from bushfit.reading.measurement import loss_factor
 from bushfit.units import format_range, number
 
 #: Number of runs of each test that represents unlimited repeats; chosen: years of the rig.
 UNLIMITED_RUNS = 1000
 #: Accepted half width over that of unlimited tests if these miss a target, too; chosen.
 _NEARLY = 1.1
+
+
+@dataclass(frozen=True, eq=False)
+class WantedPoints:
+    """Sensitivity of the stiffness at the n wanted points of a direction, and the errors that no further test lowers.
+
+    Args:
+        points: operating points.
+        loss_factor: loss factor at each point, (n,).
+        slopes: change of ln|K| and of the phase by relative change of each parameter, (2, n, k).
+        model_error: standard error by the model's own error: of |K|, relative, and of the loss factor, (2, n).
+        undecided: half width of the 95 % interval that undecided readings of the tests add, likewise, (2, n).
+    """
+
+    points: Points
+    loss_factor: Array
+    slopes: Array
+    model_error: Array
+    undecided: Array
+
+    @classmethod
+    def from_knowledge(cls, knowledge: Knowledge, points: Points) -> WantedPoints:
+        """Compute sensitivities and errors at wanted points from the knowledge before the tests."""
+        place, frequency, amplitude = points.place, points.frequency, points.amplitude
+        sweep = new_sweep(knowledge.model, place, frequency, amplitude, (1.0, 1.0), (0.0, 0.0))
+        slopes = np.stack(np.split(relative_slopes(knowledge, [sweep]).T, 2))
+        exact = replace(knowledge.result or Result(knowledge.model), covariance=Covariance())
+        prediction = predict(exact, place, frequency, amplitude)  # over the grid of all pairs
+        frequencies, amplitudes = np.unique(frequency), np.unique(amplitude)
+        index = np.searchsorted(amplitudes, amplitude) * frequencies.size + np.searchsorted(frequencies, frequency)
+        model_error, undecided = [], []
+        for band, unit in ((prediction.stiffness, prediction.stiffness.value), (prediction.loss_factor, 1.0)):
+            half, error = np.maximum(band.high - band.value, band.value - band.low), np.linalg.norm(band.root, axis=0)
+            model_error.append((error / unit)[index])
+            undecided.append((np.maximum(half - Z95 * error, 0.0) / unit)[index])
+        loss = loss_factor(knowledge.model.stiffness(place, frequency, amplitude))
+        return cls(points, loss, slopes, np.array(model_error), np.array(undecided))
+
+    def standard_errors(self, error_covariance: Array) -> Array:
+        """Standard errors of |K|, relative, and of the loss factor, (2, n), from the parameters' covariance, (k, k)."""
+        gain, phase = np.sqrt(np.einsum("cnk,kl,cnl->cn", self.slopes, error_covariance, self.slopes))
+        return np.hypot([gain, phase * (1.0 + np.square(self.loss_factor))], self.model_error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +84,21 @@ class Goal:
     model_error: Array
     undecided: Array
     points: Points | None = None
+
+    @classmethod
+    def of_parameter(cls, target: Target, names: Iterable[str]) -> Goal:
+        """Goal of one of the named parameters."""
+        row = np.array([[float(name == target.quantity) for name in names]])
+        return cls(target, row, np.zeros(1), np.zeros(1))
+
+    @classmethod
+    def of_prediction(cls, target: Target, wanted: WantedPoints) -> Goal:
+        """Goal of the stiffness or the loss factor at wanted points."""
+        (gain, phase), loss = wanted.slopes, wanted.loss_factor
+        if target.quantity == "stiffness":
+            return cls(target, gain, wanted.model_error[0], wanted.undecided[0], wanted.points)
+        rows = phase * ((1.0 + loss**2) / loss)[:, None]
+        return cls(target, rows, wanted.model_error[1] / loss, wanted.undecided[1] / loss, wanted.points)
 
     def variances(self, error_covariance: Array) -> Array:
         """Relative variance of the quantity by the parameters' errors, (n,), from their covariance, (k, k)."""
@@ -75,10 +135,11 @@ class Goal:
         Returns:
             Weight, (k, k).
         """
-        wanted = np.square(np.maximum(self.target.half - self.undecided, 0.0) / Z95) - self.model_error**2
-        nearly = np.square(_NEARLY * self.half_widths(limit) / Z95)
-        nearly = nearly - self.model_error**2 - np.square(self.undecided / Z95)
-        allowed = np.where(self.met(limit), wanted, nearly)
+        if self.met(limit):
+            allowed = np.square(np.maximum(self.target.half - self.undecided, 0.0) / Z95) - self.model_error**2
+        else:
+            nearly = np.square(_NEARLY * self.half_widths(limit) / Z95)
+            allowed = nearly - self.model_error**2 - np.square(self.undecided / Z95)
         return np.asarray((self.rows / allowed[:, None]).T @ self.rows / len(self.rows))
 
     def explain_limit(self, knowledge: Knowledge, limit: Array) -> str:
@@ -95,11 +156,12 @@ class Goal:
         contributions = np.abs(self.rows[worst]) * np.sqrt(np.diag(limit))
         name = (*knowledge.names, *knowledge.bounded)[int(np.argmax(contributions))]
         gain, phase = knowledge.noise.level
-        rig_class = f"{number(100.0 * gain, 2)} % of gain and {number(1e3 * phase, 2)} mrad of phase"
+        remaining = (
+            f"the class of the rig, {number(100.0 * gain, 2)} % of gain and {number(1e3 * phase, 2)} mrad of phase "
+            f"that all repeats of a test share, in {name}"
+        )
         if variance[worst] > 0.25 * self.variances(knowledge.covariance)[worst]:
             remaining = f"{name}, which no test on offer determines well enough"
-        else:
-            remaining = f"the class of the rig, {rig_class} that all repeats of a test share, in {name}"
         size, cause = max(
             (Z95 * float(self.model_error[worst]), "the model's own error: no test lowers it, naming its cause may"),
             (float(self.undecided[worst]), "what the tests leave undecided: bushfit diagnose names the next test"),
@@ -111,58 +173,6 @@ class Goal:
             frequency, amplitude = float(self.points.frequency[worst]), float(self.points.amplitude[worst])
             location = f" at {format_range('Hz', frequency)} and {format_range(unit, factor * amplitude)}"
         return f"{percent(size)}{location} is {cause}"
-
-
-def make_goals(knowledge: Knowledge, request: PlanRequest, slopes: Array) -> Iterator[Goal]:
-    """Make a goal for each target.
-
-    Args:
-        knowledge: before the tests.
-        request: targets and wanted points.
-        slopes: gain and phase of the stiffness at all wanted points by relative change of the parameters, (k, 2, n).
-
-    Returns:
-        Iterator over the goals in the order of the targets.
-    """
-    names = (*knowledge.names, *knowledge.bounded)
-    ends = np.cumsum([points.frequency.size for points in request.points])[:-1]
-    parts = zip(request.points, np.split(slopes, ends, axis=-1), strict=True)
-    by_place = {points.place: (points, part) for points, part in parts}
-    for target in request.targets:
-        if target.place is None:
-            row = np.array([[float(name == target.quantity) for name in names]])
-            yield Goal(target, row, np.zeros(1), np.zeros(1))
-            continue
-        points, (gain, phase) = by_place[target.place][0], np.swapaxes(by_place[target.place][1], 0, 1)
-        stiffness, loss_factor = irreducible_errors(knowledge, points)
-        loss = loss_factor[0]
-        value, error, undecided = stiffness if target.quantity == "stiffness" else loss_factor
-        rows = gain if target.quantity == "stiffness" else phase * (1.0 + loss**2) / loss
-        yield Goal(target, rows.T, error / value, undecided / value, points)
-
-
-def irreducible_errors(knowledge: Knowledge, points: Points) -> tuple[tuple[Array, Array, Array], ...]:
-    """Errors of a prediction that no further test lowers: the model's own, and those of undecided readings.
-
-    Args:
-        knowledge: before the tests.
-        points: operating points of one direction.
-
-    Returns:
-        For the stiffness and for the loss factor at each point: value, standard error of the model, and the half width
-        that undecided readings add, (n,) each [SI].
-    """
-    exact = replace(knowledge.result or Result(knowledge.model), covariance=Covariance())
-    frequency, amplitude = points.frequency, points.amplitude
-    prediction = predict(exact, points.place, frequency, amplitude)
-    frequencies, amplitudes = np.unique(frequency), np.unique(amplitude)
-    index = np.searchsorted(amplitudes, amplitude) * frequencies.size + np.searchsorted(frequencies, frequency)
-    errors = []
-    for band in (prediction.stiffness, prediction.loss_factor):
-        value, half = band.value[index], np.maximum(band.high - band.value, band.value - band.low)[index]
-        error = np.linalg.norm(band.root, axis=0)[index]
-        errors.append((value, error, np.maximum(half - Z95 * error, 0.0)))
-    return tuple(errors)
 
 
 def describe_untested(knowledge: Knowledge, place: Place, tested: Iterable[str]) -> str | None:
@@ -178,9 +188,10 @@ def describe_untested(knowledge: Knowledge, place: Place, tested: Iterable[str])
     """
     measured = knowledge.result.measured if knowledge.result else None
     directions = dict.fromkeys([*(measured.directions if measured else ()), *tested])
-    reached = measured or Range((1.0, 1.0), (1.0, 1.0))
-    result = Result(knowledge.model, knowledge.names, measured=replace(reached, directions=tuple(directions)))
-    return next(unfitted(result, place), None) if str(place) not in directions else None
+    if str(place) in directions:
+        return None
+    fitted = replace(measured or Range((1.0, 1.0), (1.0, 1.0)), directions=tuple(directions))
+    return next(iter(unfitted(Result(knowledge.model, knowledge.names, measured=fitted), place)), None)
 
 
 def percent(half: float, digits: int = 2) -> str:

@@ -19,10 +19,10 @@ from bushfit.model.covariance import Z95
 from bushfit.model.model import FIVE, Model
 from bushfit.planning.campaign import Check, campaign_toml, check, settings_of
 from bushfit.planning.contract import Knowledge, Noise, Plan, PlanRequest, Points, Test
-from bushfit.planning.criterion import ModelInformation
-from bushfit.planning.knowledge import from_campaign, gent_modulus, guess_parameters, noise_of, rig_of
+from bushfit.planning.compound import gent_modulus, guess_parameters
+from bushfit.planning.information import Information, ModelInformation, relative_slopes
+from bushfit.planning.knowledge import from_campaign, noise_of, rig_of
 from bushfit.planning.plan import plan
-from bushfit.planning.sensitivity import Information, relative_slopes
 from bushfit.simulation.measured import simulate
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
@@ -163,13 +163,12 @@ def test_what_a_fit_within_bounds_finds_scatters_as_counted() -> None:
     """Against 400,000 draws of a linear model: what noise takes beyond the bound ends on it, the others held to it."""
     rng = np.random.default_rng(4)
     root = rng.normal(size=(3, 9))
-    none = Information(np.empty((0, 5, 5)), np.empty((0, 5, 0)), np.empty((0, 0)))
-    view = ModelInformation(none, np.eye(3), np.empty((0, 2)), bounded=1)
+    view = ModelInformation(np.empty((0, 5, 5)), np.empty((0, 0)), np.empty((0, 2)), np.eye(3), bounded=1)
     covariance = np.linalg.inv(root @ root.T)
     free = rng.multivariate_normal(np.zeros(3), covariance, 400_000)
     held = free - np.outer(free[:, 2], covariance[:, 2] / covariance[2, 2])
     found = np.where(free[:, 2:] > 0.0, free, held)
-    counted = view.error_covariance(Information((root @ root.T)[None], np.empty((1, 3, 0)), np.empty((1, 0))))[0]
+    counted = view.error_covariance(Information((root @ root.T)[None], np.empty((1, 0))))[0]
     scale = np.sqrt(np.outer(np.diag(counted), np.diag(counted)))
     np.testing.assert_allclose(found.T @ found / len(found) / scale, counted / scale, atol=0.01)
     assert counted[0, 0] < 0.97 * covariance[0, 0]

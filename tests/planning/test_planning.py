@@ -12,6 +12,7 @@ from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.quantities import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.commands.plan import plan as plan_tests
+from bushfit.effects import get_effect
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.coordinates import residual
@@ -23,20 +24,13 @@ from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, PlanRequest, Points, Programme, Test, motions
-from bushfit.planning.criterion import (
-    Budget,
-    Criterion,
-    DriftEffect,
-    ModelInformation,
-    best_runs,
-    noncentralities,
-    order_runs,
-    rival_chi_squares,
-)
-from bushfit.planning.knowledge import from_campaign, from_result, guess_parameters, noise_of
-from bushfit.planning.offer import RIVALS_APART, candidates, run_minutes
+from bushfit.planning.candidates import candidates, run_minutes
+from bushfit.planning.compound import guess_parameters
+from bushfit.planning.criterion import Budget, Criterion, DriftEffect, best_runs, order_runs
+from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
+from bushfit.planning.knowledge import from_campaign, from_result, noise_of
 from bushfit.planning.plan import plan
-from bushfit.planning.sensitivity import Grid, relative_slopes
+from bushfit.planning.problem import RIVALS_APART
 from bushfit.simulation.measured import simulate
 from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
 
@@ -70,9 +64,10 @@ def wanted(aim: Aim, hours: float, **rig: float) -> PlanRequest:
 
 def view_of(known: Knowledge, tests: tuple[Test, ...]) -> ModelInformation:
     """What each of some tests tells, and as further columns about each effect of a load cell that lags."""
-    grid = Grid(known, tests)
-    delayed = [column.values for column in grid.columns if column.effect.name == "delay"]
-    return replace(ModelInformation.from_grid(grid, known, np.array(delayed)), prior=np.linalg.inv(known.covariance))
+    grid = CandidateGrid.from_tests(known, tests)
+    effects, columns = grid.effect_columns()
+    delayed = columns[[effect.name == "delay" for effect in effects]]
+    return replace(grid.information(known, delayed), prior=np.linalg.inv(known.covariance))
 
 
 def points_of(test: SimulatedSweep) -> tuple[Place, Array, Array]:
@@ -132,13 +127,12 @@ def test_an_effect_shows_as_a_fit_without_it_misses_it(known: Knowledge) -> None
     """Noncentrality against chi-square of the best fit of the model to noise-free tests with a little of the effect."""
     counts = np.array([2, 1, 1, 1, 2, 0, 0])
     view = view_of(replace(known, noise=replace(NOISE, level=(0.0, 0.0)), covariance=1e8 * np.eye(5)), TESTS)
-    expected = noncentralities(view.total(counts))[0, 0]
+    expected = view.total(counts).noncentralities()[0, 0]
     truth = known.model.with_effect("delay", {"delay.tau": 2e-6})
     each = np.repeat(np.arange(5), counts[:5])
     sweeps = [_noise_free(known.model, truth, SWEEPS[i]) for i in each]
     found = solve(known.model, sweeps, known.names).chi_square
-    amount = next(c.effect.amount for c in Grid(known, TESTS).columns if c.effect.name == "delay")
-    assert found == pytest.approx(expected * (2e-6 / amount.typical) ** 2, rel=0.02)
+    assert found == pytest.approx(expected * (2e-6 / get_effect("delay").amount.typical) ** 2, rel=0.02)
 
 
 def _noise_free(model: Model, truth: Model, test: SimulatedSweep) -> MeasuredSweep:
@@ -159,10 +153,10 @@ def test_rivals_are_as_far_apart_as_the_best_refit_of_either_leaves_them(known: 
     few = [_noise_free(known.model, one, test) for test in SWEEPS[:3]]
     other = solve(known.model.with_effect("delay"), few, (*known.names, "delay.tau")).model
     rivals = [replace(known, model=m, names=tuple(m.parameters), covariance=1e6 * np.eye(6)) for m in (one, other)]
-    grid = Grid(replace(known, noise=replace(NOISE, level=(0.0, 0.0))), SWEEPS)
+    grid = CandidateGrid.from_tests(replace(known, noise=replace(NOISE, level=(0.0, 0.0))), SWEEPS)
     left = [residual(rival.model, grid.data_sets) for rival in rivals]
     views = [
-        replace(ModelInformation.from_grid(grid, rival, further[None]), prior=1e-6 * np.eye(6))
+        replace(grid.information(rival, further[None]), prior=1e-6 * np.eye(6))
         for rival, further in zip(rivals, (left[1] - left[0], left[0] - left[1]), strict=True)
     ]
     linear = rival_chi_squares([view.total(counts) for view in views])[0, 0, 1]
@@ -179,7 +173,7 @@ def test_no_choice_is_much_better_than_the_one_found(known: Knowledge) -> None:
     """Every choice of runs of five tests in as many minutes."""
     view = view_of(known, SWEEPS)
     weight = np.diag([1.0, 0.0, 0.0, 1.0, 1.0])
-    criterion = Criterion([view], weight, np.empty((2, 0), dtype=int), np.zeros(view.runs.squares.shape[1]), 3.0)
+    criterion = Criterion([view], weight, np.empty((2, 0), dtype=int), np.zeros(view.squares.shape[1]), 3.0)
     spent = np.array([run_minutes(test, RigSettings()) for test in SWEEPS])
     budget = Budget(spent, np.array([0, 1, 0, 0, 1]), np.arange(5), np.full(5, 9), 5.0, 32.0)
     found = best_runs(criterion, budget, *np.zeros((2, 5), dtype=int))

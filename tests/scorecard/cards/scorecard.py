@@ -31,7 +31,7 @@ from bushfit.errors import MeasurementError, ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.planning.campaign import settings_of
 from bushfit.planning.contract import Noise, Test
-from bushfit.planning.offer import RIVALS_APART
+from bushfit.planning.problem import RIVALS_APART
 from bushfit.report.page.record import read_results
 from bushfit.report.results import Formats, write_files, write_results
 from bushfit.simulation.files import to_files

@@ -1,0 +1,176 @@
+"""Candidate tests: runs that the rig can make, with their duration, and the standard programme."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.diagnosis.next_test import within_limits
+from bushfit.errors import ModelError
+from bushfit.geometry import TRANSLATION, Direction, Place
+from bushfit.planning.contract import Knowledge, PlanRequest, Test, operating_points
+from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
+from bushfit.units import number
+
+#: Time to bring the rig to another run, for its control to settle [s]; chosen.
+_RUN_SECONDS = 120.0
+#: Cycles of the candidate loops: few, and enough to make the noise of the rows negligible.
+_LOOP_CYCLES = (3, 20)
+#: Indices of the frequencies of candidate sweeps among ten, which are six in equal ratios, three near the top, and the
+#: top: all in equal ratios, few, the ends, the lower or upper part, and the top ones with none, one or two of the
+#: lowest.
+_FREQUENCY_CHOICES = (
+    (0, 1, 2, 3, 4, 5, 9),
+    (0, 2, 4, 9),
+    (0, 3, 9),
+    (0, 9),
+    (0, 1, 2),
+    (4, 5, 9),
+    (6, 7, 8, 9),
+    (0, 7, 8, 9),
+    (0, 1, 6, 7, 8, 9),
+)
+#: Axial strain per displacement of the paper's bushing [1/m]: 1/sqrt(2 (b^2 - a^2) ln(b/a)), a = 10 mm, b = 18 mm.
+_PAPER_STRAIN = float(1.0 / np.sqrt(2.0 * (0.018**2 - 0.010**2) * np.log(1.8)))
+
+
+def run_minutes(test: Test, rig: RigSettings) -> float:
+    """Duration of one run [min] without a change of direction before it."""
+    if isinstance(test, SimulatedLoop):
+        return (_RUN_SECONDS + test.cycles / test.frequency) / 60.0
+    per_point = rig.minutes_per_point or 30.0  # [s], chosen: some cycles to settle, and some to average
+    return (_RUN_SECONDS + per_point * test.points[0].size) / 60.0
+
+
+def standard_tests(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
+    """Runs of the standard programme: the paper's axial and radial tests, or its axial tests of specimens.
+
+    Args:
+        knowledge: model of the bushing or specimens.
+        request: limits of the rig and directions.
+
+    Returns:
+        Each run once: loops of a bushing in the axial direction only, and sweeps in both.
+    """
+    if knowledge.model.bushing is None:
+        return [test for place in request.places for test in paper_tests(knowledge, request.rig, place)]
+    axial, radial = (paper_tests(knowledge, request.rig, place) for place in (Direction.AXIAL, Direction.RADIAL))
+    return [*axial, *(test for test in radial if isinstance(test, SimulatedSweep))]
+
+
+def paper_tests(knowledge: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
+    """The paper's loops and axial sweeps in a direction, with a run for each amplitude.
+
+    Args:
+        knowledge: model of the bushing or specimens.
+        rig: limits of the rig.
+        place: direction or specimen.
+
+    Returns:
+        Loops, then sweeps, within the limits, at the amplitudes that cause the strains of the paper's bushing.
+    """
+    strained = Direction.AXIAL if place is Direction.RADIAL else place  # the paper's radial displacements are axial
+    scale = _PAPER_STRAIN / knowledge.model.unit_strain(strained)
+    sweep = PAPER_SWEEPS[0]
+    tests: list[Test] = [
+        *(replace(loop, direction=place, amplitude=_set_point(loop.amplitude * scale)) for loop in PAPER_LOOPS),
+        *(replace(sweep, direction=place, amplitudes=(_set_point(x * scale),)) for x in sweep.amplitudes),
+    ]
+    return _possible_tests(knowledge, rig, tests)
+
+
+def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
+    """Candidate tests: those of the standard programme, and sweeps and loops of few points over a wider range.
+
+    Frequencies reach twice those of the standard programme if [rig] states that the rig can. Frequencies near the top
+    show masses, delays and resonances in fewer points than a whole sweep.
+
+    Args:
+        knowledge: model that gives forces and strains.
+        request: limits of the rig, directions and wanted points.
+
+    Returns:
+        Distinct runs.
+
+    Raises:
+        ModelError: no test is within the limits of the rig.
+    """
+    rig = request.rig
+    runs = [test for test in standard_tests(knowledge, request) if test.direction in request.places]
+    runs += [replace(test, cycles=_LOOP_CYCLES[-1]) for test in runs if isinstance(test, SimulatedLoop)]
+    for place in request.places:
+        standard = [test for test in paper_tests(knowledge, rig, place) if isinstance(test, SimulatedSweep)]
+        if not standard:
+            continue
+        wanted = [points for points in request.points if points.place == place]
+        sizes = np.concatenate([*(points.amplitude for points in wanted), *(test.amplitudes for test in standard)])
+        rates = np.concatenate([*(points.frequency for points in wanted), *(test.frequencies for test in standard)])
+        amplitudes = [_set_point(x) for x in np.geomspace(sizes.min(), 2.0 * sizes.max(), 6)]
+        top = min(2.0 * float(rates.max()), rig.max_frequency or float(rates.max()))
+        even = np.geomspace(0.2 * rates.min(), top, 7)
+        frequencies = [min(_set_point(f), top) for f in (*even[:-1], 0.7 * top, 0.8 * top, 0.9 * top, top)]
+        steps = [tuple(sorted({frequencies[i] for i in chosen})) for chosen in _FREQUENCY_CHOICES]
+        further: list[Test] = [SimulatedSweep(place, (x,), stepped) for x in amplitudes for stepped in steps]
+        further += [SimulatedSweep(place, tuple(amplitudes), (frequencies[i],), "amplitude") for i in (0, 2, 4, 9)]
+        # quasi-static loops, and as fast as most rigs still record
+        further += [SimulatedLoop(place, x, f, n) for x in amplitudes for f in (0.1, 1.0) for n in _LOOP_CYCLES]
+        runs += _possible_tests(knowledge, rig, further)
+    if not runs:
+        places = " and ".join(map(str, request.places))
+        raise ModelError(
+            "the rig can make no test of this bushing",
+            place="[rig]",
+            found=f"limits below every test that is considered, {places}",
+            expected="limits that let it make two points of a sweep, or a loop",
+        )
+    return list(dict.fromkeys(runs))
+
+
+def _possible_tests(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> list[Test]:
+    """Tests without steps beyond the limits of rig or rubber; sweeps of fewer than two steps are left out."""
+    possible: list[Test] = []
+    for test in tests:
+        (frequency, amplitude), place = operating_points(test), test.direction
+        strain = amplitude * knowledge.model.unit_strain(place)
+        allowed = strain <= max(0.5, knowledge.strain or 0.0)  # strains that it has borne
+        allowed &= within_limits(knowledge.model, rig, place, frequency, amplitude)
+        if isinstance(test, SimulatedLoop):
+            possible += [test] if allowed.all() else []
+        elif np.count_nonzero(allowed) > 1:
+            steps = tuple(np.array(test.steps)[allowed].tolist())
+            by_frequency = test.stepped == "frequency"
+            possible.append(replace(test, frequencies=steps) if by_frequency else replace(test, amplitudes=steps))
+    return possible
+
+
+def _set_point(value: float) -> float:
+    """Value with two digits, as a set point is typed."""
+    return float(f"{value:.2g}")
+
+
+def unlimited_rig_warning(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> str | None:
+    """Sentence on the velocity, acceleration and force of a plan if [rig] states no limits.
+
+    Args:
+        knowledge: model that gives the forces.
+        rig: limits of the rig.
+        tests: runs of the plan.
+
+    Returns:
+        The sentence; None if [rig] states a limit, or the plan has no test with a displacement.
+    """
+    points = [(test.direction, *operating_points(test)) for test in tests if test.direction.motion is TRANSLATION]
+    if not points or any((rig.max_force, rig.max_displacement, rig.max_velocity, rig.max_frequency)):
+        return None
+    frequency, amplitude = np.concatenate([pair for _, *pair in points], axis=1)
+    fastest = int(np.argmax(frequency * amplitude))
+    velocity = 2.0 * np.pi * float(frequency[fastest] * amplitude[fastest])
+    acceleration = float(np.max(np.square(2.0 * np.pi * frequency) * amplitude)) / 9.80665
+    force = max(float(np.max(np.abs(knowledge.model.stiffness(place, f, x)) * x)) for place, f, x in points)
+    point = f"{number(1e3 * amplitude[fastest], 3)} mm at {number(frequency[fastest], 3)} Hz"
+    return (
+        f"[rig] states no limits: the plan reaches {number(velocity, 3)} m/s ({point}), "
+        f"{number(acceleration, 3)} g and {number(force, 3)} N; state max_velocity, max_force, max_displacement and "
+        "max_frequency, and plan again"
+    )
