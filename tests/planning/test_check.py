@@ -18,8 +18,8 @@ from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.model.model import FIVE, Model
 from bushfit.planning.campaign import Check, campaign_toml, check, settings_of
-from bushfit.planning.contract import Knowledge, Noise, Plan, PlanRequest, Points, Test
 from bushfit.planning.compound import gent_modulus, guess_parameters
+from bushfit.planning.contract import Knowledge, Noise, Plan, PlanRequest, Points, Test
 from bushfit.planning.information import Information, ModelInformation, relative_slopes
 from bushfit.planning.knowledge import from_campaign, noise_of, rig_of
 from bushfit.planning.plan import plan

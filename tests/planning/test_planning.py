@@ -23,9 +23,9 @@ from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, PlanRequest, Points, Programme, Test, motions
 from bushfit.planning.candidates import candidates, run_minutes
 from bushfit.planning.compound import guess_parameters
+from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, PlanRequest, Points, Programme, Test, motions
 from bushfit.planning.criterion import Budget, Criterion, DriftEffect, best_runs, order_runs
 from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
 from bushfit.planning.knowledge import from_campaign, from_result, noise_of
