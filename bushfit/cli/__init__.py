@@ -19,28 +19,28 @@ from bushfit.version import __version__
 #: called `command` after a point; and the line that `bushfit --help` shows.
 _GROUPS = {
     "From tests to a result": {
-        "run": ("run", "The main job: every fit, what the model lacks, the prediction."),
-        "diagnose": ("diagnose", "Where do model and tests disagree? What is missing?"),
-        "predict": ("predict", "A model -> tables and plots of stiffness and loss factor."),
-        "compare": ("compare", "Results side by side: what differs, by more than chance?"),
-        "report": ("report", "A folder of results -> one page to show, print and mail."),
-        "batch": ("batch", "Many campaigns at once -> one table, limits, a report for CI."),
+        "run": ("run", "The main job: fits, diagnosis and prediction in one go."),
+        "diagnose": ("diagnose", "Where model and tests disagree, and which effect is missing."),
+        "predict": ("predict", "Stiffness and loss factor of a model, as tables and plots."),
+        "compare": ("compare", "Differences between results that exceed chance."),
+        "report": ("report", "One page from a folder of results, to show, print and mail."),
+        "batch": ("batch", "Many campaigns at once: one table, limits, a report for CI."),
     },
     "Test files": {
-        "inspect": ("inspect", "How they are understood, what is in them, what is odd."),
-        "init": ("init", "Test files and geometry -> a campaign."),
-        "reduce": ("reduce", "Raw stepped-sine histories, or a resonance test -> a sweep."),
+        "inspect": ("inspect", "How bushfit reads test files, and anything unusual in them."),
+        "init": ("init", "A campaign from test files and the geometry."),
+        "reduce": ("reduce", "A sweep from raw stepped-sine histories or a resonance test."),
     },
     "Single fits": {
-        "fit": ("fit.fit", "Loops and sweeps -> all five parameters: the fit to use."),
-        "fit-static": ("fit.static", "Loops -> mu, sigma_fmax, eps_half."),
-        "fit-dynamic": ("fit.dynamic", "Smallest-amplitude sweep -> m, alpha."),
+        "fit": ("fit.fit", "All five parameters from loops and sweeps: the fit to use."),
+        "fit-static": ("fit.static", "mu, sigma_fmax and eps_half from the loops."),
+        "fit-dynamic": ("fit.dynamic", "m and alpha from the sweep of the smallest amplitude."),
     },
     "Before a test, and for other programs": {
-        "plan": ("plan", "Which tests next? Chosen for what they would tell."),
-        "simulate": ("simulate", "A model -> a simulated campaign of raw tests, with noise."),
-        "export": ("export", "A model -> files of solvers, multibody codes, spreadsheets."),
-        "schema": ("schema", "What stands in the files: JSON Schemas, also for editors."),
+        "plan": ("plan", "The most informative next tests within your hours."),
+        "simulate": ("simulate", "A simulated campaign of tests from a model, with noise."),
+        "export": ("export", "Files for solvers, multibody codes and spreadsheets."),
+        "schema": ("schema", "JSON Schemas of all files, for programs and editors."),
     },
 }
 _COMMANDS = {name: entry for commands in _GROUPS.values() for name, entry in commands.items()}
@@ -86,13 +86,14 @@ class _Commands(click.Group):
 def cli() -> None:
     """Fit the stiffness and loss of rubber bushings over frequency and amplitude.
 
-    A CAMPAIGN is a text file (TOML) that names a bushing, its hysteresis loops and its stepped-sine sweeps. Start with
+    A CAMPAIGN is a text file (TOML) that names a bushing, its hysteresis loops and its stepped-sine sweeps. `bushfit
+    init FILES` makes a campaign from test files. Then evaluate it:
 
         bushfit run CAMPAIGN.toml
 
-    which says what the model lacks, if anything, and writes parameters, stiffness tables and plots to
-    results/<campaign name>. `bushfit init FILES` makes a campaign of test files. `bushfit COMMAND -h` tells more of
-    each. Exit status: 0 done, 1 done but a stated limit is missed, 2 wrong usage or unusable input.
+    prints the verdict on the model and writes parameters, stiffness tables, plots and a report to results/<campaign
+    name>. `bushfit COMMAND -h` explains one command. Exit status: 0 done; 1 done, but a stated limit is missed;
+    2 wrong usage or unusable input.
     """
 
 

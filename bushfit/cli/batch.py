@@ -25,7 +25,7 @@ _MOST_SHOWN = 10
 @command_called("batch", '"data/practice/*/bushing.toml" --at "axial 25 Hz 0.1 mm"')
 @click.argument("manifest", metavar="MANIFEST", nargs=-1, required=True)
 @under(
-    "What is done with each",
+    "Work on each bushing",
     option(
         "--command commands",
         "COMMAND",
@@ -33,12 +33,12 @@ _MOST_SHOWN = 10
         type=click.Choice(["run", "fit", "diagnose", "predict"]),
         multiple=True,
     ),
-    place_option("Tests to fit, as in bushfit fit."),
-    effect_option("Add an effect, as in bushfit fit."),
+    place_option("Tests to fit, as in `bushfit fit`."),
+    effect_option("Add an effect, as in `bushfit fit`."),
     option(
         "--at operating_points",
         "POINT",
-        'Stiffness and loss factor at "axial 25 Hz 0.1 mm"; may be given again.',
+        'Tabulate stiffness and loss factor at a point such as "axial 25 Hz 0.1 mm"; may be given again.',
         multiple=True,
     ),
 )
@@ -48,16 +48,16 @@ _MOST_SHOWN = 10
     file_option("--junit", "Write a JUnit report for CI."),
 )
 @under(
-    "How the work is done",
-    flag("--resume", "Do what is missing, failed or changed, keep the rest."),
-    option("--jobs", "N", "Worker processes [the cores there are].", type=click.IntRange(1)),
-    option("--scheduler", "ADDRESS", "Work on this Dask cluster, such as tcp://10.0.0.5:8786."),
+    "Execution",
+    flag("--resume", "Evaluate what is missing, failed or changed; keep the rest."),
+    option("--jobs", "N", "Number of worker processes [one per core].", type=click.IntRange(1)),
+    option("--scheduler", "ADDRESS", "Use this Dask cluster, such as tcp://10.0.0.5:8786."),
 )
 @under(
     "Output",
     flag("--tables"),
-    flag("--plots", "Those of each bushing, too."),
-    flag("--reports", "The page of each bushing that is diagnosed, too."),
+    flag("--plots", "Also write these for each bushing."),
+    flag("--reports", "Also write the page of each diagnosed bushing."),
 )
 @with_output("results/<manifest>", "tables", "pictures", "pages")
 def command(
@@ -76,17 +76,17 @@ def command(
     reports: bool,
     output: Output,
 ) -> None:
-    """Fit (diagnose, predict, run) many campaigns and tabulate them in one table.
+    """Fit, diagnose or predict many campaigns and collect the results in one table.
 
-    MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or campaigns, be it one:
+    MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or one or more campaigns:
 
     \b
         [[bushings]]
-        campaign = "batch_7/*/campaign.toml"   # from the list's folder
+        campaign = "batch_7/*/campaign.toml"   # relative to the folder of the list
 
-    The command names parts that miss a limit, with value and limit, and parts that differ from the others by more than
-    chance. --force also removes results of parts that are no longer listed. The exit status is 1 if a row failed, a
-    limit is missed or a part was not judged. Writes batch.csv, batch.png, batch.json, index.html, and
+    The command names parts that miss a limit, with value and limit, and parts that differ from the others by more
+    than chance. --force also removes results of parts that are no longer listed. The exit status is 1 if a row
+    failed, a limit is missed or a part was not judged. Writes batch.csv, batch.png, batch.json, index.html, and
     bushings/<name>/model.json.
     """
     from bushfit.batch.executor import dask_workers, local_workers

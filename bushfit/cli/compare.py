@@ -25,9 +25,9 @@ _ALL = "all"
 )
 @click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=FILE)
 @under(
-    "What is compared",
+    "Range of the comparison",
     place_option(
-        "axial, radial, torsion or a specimen; of campaigns only these tests are fitted; may be given again [where all "
+        "axial, radial, torsion or a specimen, also for the fit of a campaign; may be given again [where all "
         "were fitted]."
     ),
     grid_options("as measured"),
@@ -35,8 +35,8 @@ _ALL = "all"
         "--families",
         "[NAME,...]",
         (
-            "Model families on the one campaign A: the paper's, and those named, effects joined by + [each law of "
-            "rate with each of amplitude]."
+            "Fit model families to campaign A: the paper's, and the named ones, effects joined by + [each law of "
+            "frequency with each law of amplitude]."
         ),
         is_flag=False,
         flag_value=_ALL,
@@ -47,11 +47,11 @@ _ALL = "all"
 def command(
     sources: tuple[Path, ...], families: str | None, directions: tuple[str, ...], output: Output, **grids: str | None
 ) -> None:
-    """Compare A, the reference, with others: what differs, by how much, and whether by more than chance.
+    """Compare results with A, the reference: differences in parameters, stiffness and loss factor.
 
-    Each is a model (JSON), a folder of results (its model.json), or a campaign, which is fitted on the spot as by
-    `bushfit fit`: parameters, and stiffness and loss factor over frequency. --families fits several models to one
-    campaign: how well each meets the tests, and which predicts best what it was not fitted to.
+    A and B are models (JSON), folders of results, or campaigns, which are fitted first. Each difference has a 95 %
+    interval. --families instead fits several models to one campaign, and compares how well they meet the tests and
+    predict tests that were held out.
 
     Writes compare.json, parameters.csv, differences.csv, compare.png, compare.html; with --families families.csv.
     """

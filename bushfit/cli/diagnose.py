@@ -28,12 +28,12 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 @command_called("diagnose", "configs/mystery_mount.toml")
 @under(
     "What may be missing",
-    option("--max-effects", "N", "Effects to add at most [3].", type=click.IntRange(0, 5), default=3),
+    option("--max-effects", "N", "Largest number of effects to add [3].", type=click.IntRange(0, 5), default=3),
     option(
         "--adopt",
         "EFFECT",
         (
-            "Add this effect, such as inertia, or mend this mistake in the record of a test, such as "
+            "Add this effect, such as inertia, or correct this mistake in the record of a test, such as "
             "peak_to_peak:sweep_axial; may be given again. A wrong EFFECT lists all."
         ),
         multiple=True,
@@ -46,10 +46,10 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
         multiple=True,
         shell_complete=explanations,
     ),
-    option("--tolerance", "SHARE", "Gaps below this share of the stiffness do not count [1 %].", default="1 %"),
+    option("--tolerance", "SHARE", "Ignore gaps below this share of the stiffness [1 %].", default="1 %"),
     file_option("--model", "Start from the effects of this model.json [the paper's three]."),
 )
-@campaign_options(soft_l1="the same with outliers left out")
+@campaign_options(soft_l1="without outliers")
 @with_output("results/<campaign name>", "tables", "pictures", "pages")
 def command(
     campaigns: tuple[Path, ...],
@@ -60,11 +60,12 @@ def command(
     output: Output,
     **settings: Any,
 ) -> None:
-    """Find where the model and the tests of CAMPAIGN disagree, name the missing effect, add it, show the gap shrink.
+    """Find where the model and the tests of CAMPAIGN disagree, name the missing effect, and add it.
 
-    All tests are used, in every direction. The verdict is consistent (nothing is missing), named (what was added, or
-    one test recorded wrongly, closes the gap), ambiguous (look-alikes: all are listed, none is added), described (no
-    name, but a smooth correction), partly (a little remains) or unexplained. --adopt corrects a mistake.
+    Uses all tests in all directions. The verdict is consistent (nothing is missing), named (one explanation, which
+    is added to the model), ambiguous (several explanations are listed, none is added), described (a smooth
+    correction without a name), partly (a remainder stays) or unexplained. A mistake in a test file is named but
+    corrected only with --adopt.
 
     Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv, gap.png, report.html.
     """
@@ -99,7 +100,7 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
     if output.verbose:
         _print_candidates(output, diagnosis)
     if diagnosis.added or output.verbose:
-        title = "model with what was added" if diagnosis.added else "model as it was"
+        title = "model with the added effects" if diagnosis.added else "model"
         print_parameters(output, title, diagnosis.result)
     output.warn(diagnosed.document["warnings"])
 
@@ -137,11 +138,11 @@ def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
     held_out = gap["heldout"]
     cells = [f"{held_out[when]:.2f}" for when in ("before", "after")] if held_out else ["not testable", ""]
     rows = (("held out", *cells), ("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values())))
-    output.print_table("gap, in units of noise (1 is the floor)", ("", "before", "after"), rows)
+    output.print_table("gap, in units of noise (1: noise alone)", ("", "before", "after"), rows)
     if usable:
-        how = "of what was predicted from other runs" if usable["held_out"] else "of what was fitted"
-        error = f"{number(100 * usable['stiffness'], 2)} % of stiffness and {number(usable['loss_factor'], 2)}"
-        console.print(f"  usable within {error} of loss factor (95 % {how})")
+        how = "of the points, each predicted without its own run" if usable["held_out"] else "of the fitted points"
+        error = f"{number(100 * usable['stiffness'], 2)} % in stiffness and {number(usable['loss_factor'], 2)}"
+        console.print(f"  expected error {error} in loss factor (95 % {how})")
     if output.verbose:
         for part in gap["skipped"]:
             console.print(f"  not held out: {part['part']}; {part['reason']}")
@@ -157,23 +158,23 @@ def _print_effect(output: Output, effect: Mapping[str, Any]) -> None:
         value, *ends = format_aligned(
             [factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, minimum_digits=2
         )
-        interval = f"95 % {' to '.join(ends)}" if ends else "without an interval"
+        interval = f"95 % {' to '.join(ends)}" if ends else "no interval"
         console.print(f"    {parameter} = {f'{value} {unit}'.removesuffix(' -')}, {interval}")
     if effect["twins"]:
         names = " or ".join((effect["name"], *effect["twins"]))
         if effect["alternatives"]:
-            console.print(f"    whether it is {names}, the tests do not tell")
+            console.print(f"    the tests cannot distinguish {names}")
         else:
-            console.print(f"    how large it is, the tests tell; whether it is {names}, they do not")
+            console.print(f"    the tests determine its size but cannot distinguish {names}")
     if effect["correction"]:
-        console.print(f"    the line that puts it right: {escape(effect['correction'])}")
+        console.print(f"    correction in the campaign: {escape(effect['correction'])}")
     if effect["alternatives"]:
-        console.print(f"    cannot be told from: {escape(', '.join(effect['alternatives']))}")
+        console.print(f"    alternatives: {escape(', '.join(effect['alternatives']))}")
 
 
 def _print_candidates(output: Output, diagnosis: Diagnosis) -> None:
     """Print every candidate that was refitted, and why it won or lost."""
-    title = "candidates: what each takes off chi-square, and how probably it is part of what is missing"
+    title = "candidates: reduction of chi-square (gain) and probability that the effect is missing in the model"
     fitted = ((candidate, candidate.gain) for candidate in diagnosis.candidates if candidate.gain is not None)
     rows = ((one.name, one.why, f"{gain:.0f}", f"{one.probability:.2f}") for one, gain in fitted)
     output.print_table(title, ("candidate", "why", "gain", "probability"), rows, text_columns=2)

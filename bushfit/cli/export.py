@@ -17,25 +17,25 @@ from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction
 )
 @click.argument("model", metavar="MODEL", type=FILE)
 @under(
-    "For which program",
+    "Target program",
     option(
         "--format formats",
         "FORMAT",
-        "fmu, nastran, abaqus, adams, csv or xlsx; needed, and may be given again.",
+        "fmu, nastran, abaqus, adams, csv or xlsx; required, may be given again.",
         type=click.Choice(["fmu", "nastran", "abaqus", "adams", "csv", "xlsx"]),
         multiple=True,
         required=True,
     ),
-    option("--units", "UNITS", 'Length, mass, time and force, such as "m kg s N" [decks: "mm t s N"].'),
+    option("--units", "UNITS", 'Length, mass, time and force, such as "m kg s N" [solver files: "mm t s N"].'),
     option(
         "--dialect",
         "DIALECT",
-        "optistruct: of --format nastran, with stiffness and loss angle.",
+        "optistruct: --format nastran with stiffness and loss angle.",
         type=click.Choice(["optistruct"]),
     ),
-    option("--accuracy", "ERROR", "Largest error of the modulus that an fmu may have [1 %].", default="1 %"),
+    option("--accuracy", "ERROR", "Largest error of the modulus in an fmu [1 %].", default="1 %"),
 )
-@prediction_options("Take the grid of this campaign.")
+@prediction_options("Use the grid of this campaign.")
 @with_output("results/<name>", "tables", "pictures")
 def command(
     model: Path,
@@ -51,11 +51,11 @@ def command(
 ) -> None:
     """Write a fitted model for other programs: a solver, a multibody code, a spreadsheet.
 
-    MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. The command lists properties
-    that a format cannot represent, with their errors. Effects of the rig are left out. z is the bushing's axis.
+    MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. The command lists properties that a
+    format cannot represent, with their errors. Effects of the rig are left out. z is the axis of the bushing.
 
-    Writes bushing.bdf, .fem, .inp or .xlsx, bushing_car.bus and bushing_ride.bus (adams), a CSV file a table, or an
-    .fmu with arms.csv and arms.png, its Maxwell arms.
+    Writes bushing.bdf, .fem, .inp or .xlsx; bushing_car.bus and bushing_ride.bus (adams); one CSV file for each
+    table; or an .fmu, with its Maxwell arms in arms.csv and arms.png.
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.commands.export import export

@@ -15,18 +15,18 @@ from bushfit.errors import BushfitError, MeasurementError
 #: What a test file does not say itself, as keys of a campaign, with metavar and words: of loops and sweeps, ...
 _OF_TESTS = {
     "amplitude": ("COUNTING", "zero-to-peak, peak-to-peak or rms [header]."),
-    "at_amplitude": ("SIZE", '"0.1 mm", without a column [found in the name].'),
-    "at_frequency": ("FREQUENCY", '"10 Hz", without a column [found in the name].'),
-    "temperature": ("TEMP", '"23 degC": of the test, or of the rows to take.'),
-    "preload": ("LOAD", '"500 N axial", or "none": goes on to the report.'),
+    "at_amplitude": ("SIZE", '"0.1 mm", if no column states it [file name].'),
+    "at_frequency": ("FREQUENCY", '"10 Hz", if no column states it [file name].'),
+    "temperature": ("TEMP", '"23 degC": of the test, or of the rows to select.'),
+    "preload": ("LOAD", '"500 N axial" or "none", for the report.'),
     "rate": ("SPEED", None),
     "frequency": ("FREQUENCY", None),
-    "waveform": ("WAVE", 'Loop without time: "10 mm/min"; "0.1 Hz", sine.'),
-    "specimen": ("NAME", "If this is no bushing, its name [coupon; bar]."),
+    "waveform": ("WAVE", 'If a loop has no time: "10 mm/min"; or "0.1 Hz", sine.'),
+    "specimen": ("NAME", "Name of the specimen, if it is no bushing [coupon; bar]."),
     "area": ("AREA", None),
     "thickness": ("LENGTH", None),
-    "elements": ("N", '"772 mm^2", "6 mm": of N blocks in shear [1].'),
-    "specimen_number": ("NUMBER", "Of the part, or of the rows to take."),
+    "elements": ("N", 'Of N blocks in shear: "772 mm^2", "6 mm" [1].'),
+    "specimen_number": ("NUMBER", "Number of the part, or of the rows to select."),
 }
 #: ... and how any file is written.
 _AS_WRITTEN = {
@@ -81,17 +81,20 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
             wrapped,
             click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
             under(
-                "What the files do not say",
+                "Information that is missing in the files",
                 _metadata_option("direction", "DIRECTION", "axial, radial or torsion [names, columns]."),
-                option("--unit units", "ROLE=UNIT", 'Of a column: "force=kN".', multiple=True),
+                option("--unit units", "ROLE=UNIT", 'Unit of a column: "force=kN".', multiple=True),
                 option(
-                    "--column columns", "ROLE=HEADER", 'Which it is, "force=Fz"; a wrong ROLE lists all.', multiple=True
+                    "--column columns",
+                    "ROLE=HEADER",
+                    'Column of a quantity: "force=Fz"; a wrong ROLE lists all.',
+                    multiple=True,
                 ),
-                _metadata_option("force_sign", "-1", "If the load cell counts the other way."),
+                _metadata_option("force_sign", "-1", "If the force has the opposite sign."),
                 *(_metadata_option(key, metavar, words) for key, (metavar, words) in keys.items()),
             ),
             under(
-                "How they are written, where it is not detected",
+                "File format, if it is not detected",
                 *(_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items()),
             ),
         )

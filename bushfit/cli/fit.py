@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @command_called("fit-static", "configs/cmp_15961.toml")
-@under("How it is fitted", file_option("--dynamic", "Hold m and alpha at those of this dynamic.json."))
+@under("Fit", file_option("--dynamic", "Fix m and alpha at the values in this dynamic.json."))
 @campaign_options()
 @with_output("results/<campaign name>", "tables", "pictures")
 def static(
@@ -24,8 +24,8 @@ def static(
 ) -> None:
     """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, at given m and alpha.
 
-    These come from --dynamic, or from [fit] of the campaign. Where they are not known yet the part of the model that
-    depends on frequency (the springpot) is left out, and a warning says what this does to the result.
+    m and alpha come from --dynamic or from [fit] of the campaign. If neither gives them, the frequency-dependent part
+    of the model (the springpot) is left out, and a warning states the effect on the result.
 
     Writes static.json, loops.csv and loops.png.
     """
@@ -39,9 +39,9 @@ def static(
 
 @command_called("fit-dynamic", "configs/cmp_15961.toml")
 @under(
-    "How it is fitted",
+    "Fit",
     file_option(
-        "--static", "Hold mu, sigma_fmax and eps_half at those of this static.json [the loops are fitted first]."
+        "--static", "Fix mu, sigma_fmax and eps_half at the values in this static.json [the loops are fitted first]."
     ),
 )
 @campaign_options()
@@ -49,12 +49,12 @@ def static(
 def dynamic(
     campaigns: tuple[Path, ...], static: Path | None, loss: Loss | None, max_nrmse: float | None, output: Output
 ) -> None:
-    """Fit m and alpha to the smallest-amplitude sweep of CAMPAIGN, at given mu, sigma_fmax and eps_half.
+    """Fit m and alpha to the sweep of the smallest amplitude, at given mu, sigma_fmax and eps_half.
 
-    These come from --static, and their errors are carried over; without it the loops of CAMPAIGN are fitted first.
-    [fit] dynamic_amplitudes in the campaign chooses other sweep amplitudes.
+    These come from --static, with their errors. Without --static, the loops of CAMPAIGN are fitted first. [fit]
+    dynamic_amplitudes in the campaign selects other amplitudes.
 
-    Writes dynamic.json, a model that bushfit predict takes, sweeps.csv and sweeps.png.
+    Writes dynamic.json (a model for bushfit predict), sweeps.csv and sweeps.png.
     """
     from bushfit.commands.fit import fit_dynamic
     from bushfit.commands.loading import load_model
@@ -66,10 +66,10 @@ def dynamic(
 
 @command_called("fit", "configs/arm_bushing.toml --direction axial --direction radial --profile")
 @under(
-    "What is fitted",
+    "Tests and model",
     place_option(
-        "Tests in this direction (axial, radial, torsion) or of this specimen; may be given again [axial, and all "
-        "specimens]."
+        "Fit the tests in this direction (axial, radial, torsion) or of this specimen; may be given again "
+        "[axial, and all specimens]."
     ),
     effect_option("Add an effect to the model, such as inertia; may be given again. A wrong NAME lists all."),
     flag("--profile", "Add 95 % intervals by profile likelihood (some seconds)."),
@@ -87,12 +87,12 @@ def fit(
 ) -> None:
     """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
 
-    This is the fit to use: bushfit predict takes its model. Without axial loops, or axial sweeps, it takes those of all
-    directions. Tests that were not fitted are shown as predictions. Where [fit] of the campaign holds all five
-    (vary = false) nothing is fitted, and the command reports how well these values agree with the tests. --profile is
-    right also where a parameter is hardly determined and the interval from the standard error is not.
+    Use this fit unless you need the two steps of the paper. It fits the axial tests, or those of all directions if
+    axial loops or sweeps are missing; the other tests are predicted and shown. If [fit] of the campaign fixes all
+    parameters (vary = false), the command reports how well these values agree with the tests. Use --profile if a
+    parameter is hardly determined: its standard error is then misleading.
 
-    Writes model.json, and of loops and sweeps a table and a plot each.
+    Writes model.json, and a table and a plot of loops and sweeps.
     """
     from bushfit.commands.fit import fit as fit_campaign
 

@@ -32,13 +32,13 @@ _FILES_A_PICTURE = 5
 @with_stated()
 @with_output("results/<first file>", "pictures")
 def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Output) -> None:
-    """Look at test files before a campaign names them: loops, sweeps, raw histories.
+    """Show how bushfit reads test files, before a campaign exists: loops, sweeps, raw histories.
 
-    FILE may be a folder, or a workbook with several tests. For each test: how every column was understood, in which
-    unit; cycles, noise, frequencies, amplitudes; and what is odd: gaps, outliers, drift, cut-off tops, copied rows,
-    repeats that disagree. Rows count from 1 below the header. The text for the campaign goes to standard output. If a
-    file cannot be used, the others are shown, nothing is written, exit status 2. Writes inspect.png, and inspect_2.png
-    and so on of more than five files.
+    FILE may be a folder, or a workbook with several tests. For each test, the command lists every column with its
+    meaning and unit; cycles, noise, frequencies, amplitudes; and anything unusual: gaps, outliers, drift, clipped
+    peaks, copied rows, repeats that disagree. Rows count from 1 below the header. The text for the campaign goes to
+    standard output. If a file cannot be used, the others are shown, nothing is written, and the exit status is 2.
+    Writes inspect.png; for more than five files also inspect_2.png and so on.
     """
     from bushfit.inspection.gathering import gather, with_contradictions
     from bushfit.inspection.record import pasted_text, with_specimens_named

@@ -252,6 +252,6 @@ def format_options(*kinds: Written) -> list[Parameter]:
             envvar="BUSHFIT_PLOT_FORMAT",
             show_envvar=True,
         ),
-        "pages": flag("--no-report", "Write no page (HTML)."),
+        "pages": flag("--no-report", "Do not write the HTML page."),
     }
     return [options[kind] for kind in kinds]

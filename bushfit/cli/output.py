@@ -127,7 +127,7 @@ class Output:
             if (use := use_of(warning)) != use_of(""):  # which is said of warnings of no known kind
                 self.print(f"  {use}")
         if remaining := len(warnings) - len(printed):
-            self.print(f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all, the result files hold them")
+            self.print(f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all; the result files contain them")
         self._warnings.clear()
 
     def print_table(
@@ -207,13 +207,13 @@ def with_output(folder: str, *written: Written) -> Parameter:
             wrapped,
             under(
                 "Output",
-                option("-o --output", "DIR", f"For the results [{folder}].", type=Folder(path_type=Path)),
-                flag("--force", "Replace results that stand there."),
+                option("-o --output", "DIR", f"Folder of the results [{folder}].", type=Folder(path_type=Path)),
+                flag("--force", "Replace earlier results in this folder."),
                 *format_options(*written),
-                flag("--no-plots", "Write no plots.", hidden="pictures" not in written),
+                flag("--no-plots", "Do not write plots.", hidden="pictures" not in written),
                 flag("--json as_json", "Print the result as JSON on standard output."),
                 flag("-v --verbose"),
-                flag("-q --quiet", "Say more, or nothing but errors."),
+                flag("-q --quiet", "Print more, or errors only."),
             ),
         )
 

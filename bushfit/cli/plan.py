@@ -32,35 +32,39 @@ _MOST_VALUES = 6
 @command_called("plan", "configs/arm_bushing.toml --hours 4", 'configs/new_bushing.toml --target "stiffness=1 %"')
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
 @under(
-    "What is planned",
+    "Aim of the plan",
     option(
-        "--hours", "HOURS", "Of the rig, at most [8].", type=Size("time in hours such as 8", _MOST_HOURS), default=8.0
+        "--hours",
+        "HOURS",
+        "Hours on the rig, at most [8].",
+        type=Size("time in hours such as 8", _MOST_HOURS),
+        default=8.0,
     ),
     option(
         "--for aim",
         "AIM",
-        "parameters, predictions or rivals: what the tests shall tell best [predictions].",
+        "parameters, predictions or rivals: what the tests shall determine best [predictions].",
         type=click.Choice(["parameters", "predictions", "rivals"]),
     ),
     place_option(
-        "axial, radial, torsion or a specimen: where the rig can test; may be given again [axial and radial, or all "
-        "specimens]."
+        "Directions (axial, radial, torsion) or specimens that the rig can test; may be given again [axial and "
+        "radial, or all specimens]."
     ),
     option(
         "--target targets",
         "NAME=SIZE",
-        'Interval (95 %) to reach: "mu=2 %", "stiffness=1 %"; may be given again.',
+        'Half width of a 95 % interval to reach: "mu=2 %", "stiffness=1 %"; may be given again.',
         multiple=True,
     ),
-    option("--parameters", "NAME,...", "Whose errors count, with --for parameters [all]."),
-    option("--rivals", "NAME,...", "Effects to tell apart [what diagnose leaves open].", shell_complete=effect_lists),
-    file_option("--campaign", "With MODEL.json: take [rig] and [predict] of this."),
+    option("--parameters", "NAME,...", "Parameters to determine, with --for parameters [all]."),
+    option("--rivals", "NAME,...", "Effects to distinguish [those that diagnose cannot].", shell_complete=effect_lists),
+    file_option("--campaign", "With MODEL.json: use [rig] and [predict] of this campaign."),
 )
-@under("Where stiffness will be predicted", grid_options("the campaign's"))
+@under("Range of later predictions", grid_options("the campaign's"))
 @under(
-    "To see that it holds",
-    option("--check count", "N", "Simulate the plan N times, and fit it.", type=click.IntRange(2, 100_000)),
-    option("--seed", "N", "Of its random numbers [0].", type=click.IntRange(0), default=0),
+    "Check by simulation",
+    option("--check count", "N", "Simulate and fit the planned tests N times.", type=click.IntRange(2, 100_000)),
+    option("--seed", "N", "Seed of the random numbers [0].", type=click.IntRange(0), default=0),
 )
 @with_output("results/plan <name>", "tables", "pictures")
 def command(
@@ -77,12 +81,12 @@ def command(
     output: Output,
     **grids: str | None,
 ) -> None:
-    """Choose the tests that would tell most, within what the rig can do.
+    """Select the most informative next tests within the hours and limits of the rig.
 
-    It starts from the tests of CAMPAIGN, from its [compound] (hardness = "61 Shore A", filler = "27 phr") where there
-    are none, or from MODEL.json or a folder of results. A target that is missed is explained, with exit status 1.
+    The plan starts from the tests of CAMPAIGN, from its [compound] if it has no tests (hardness = "61 Shore A",
+    filler = "27 phr"), or from MODEL.json or a folder of results. A missed target is explained, with exit status 1.
 
-    Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml to simulate.
+    Writes plan.csv (the sheet for the rig operator), plan.png, plan.json, and campaign.toml to simulate.
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.commands.loading import load_source

@@ -22,17 +22,21 @@ _MOST_AMPLITUDES = 8
 
 @command_called("predict", 'data/arm_bushing/truth.json --frequencies "10:100:10 Hz" --amplitudes "0.1, 0.5 mm"')
 @click.argument("model", metavar="MODEL", type=FILE)
-@prediction_options("Take its grid, and show its sweeps beside.")
+@prediction_options("Use the grid of this campaign and show its sweeps.")
 @under(
-    "What is predicted besides",
-    file_option("--bushing", "Another one, of the same compound: [bushing] of this TOML file."),
+    "Further predictions",
+    file_option("--bushing", "Another bushing of the same compound, from [bushing] of this TOML file."),
     option("--mass", "MASS"),
     option(
-        "--base-acceleration", "ACCELERATION", 'Resonance of a mass, such as "1.2 kg", on a base shaken with "0.1 g".'
+        "--base-acceleration", "ACCELERATION", 'Resonance of a mass such as "1.2 kg" on a base shaken with "0.1 g".'
     ),
-    flag("--wide", "Tables with amplitudes across, without bands, too."),
+    flag("--wide", "Also write tables with amplitudes across, without bands."),
     option(
-        "--arms", "[ERROR]", "Maxwell arms for the springpot, within this error [1 %].", is_flag=False, flag_value="1 %"
+        "--arms",
+        "[ERROR]",
+        "Also write Maxwell arms that represent the springpot within this error [1 %].",
+        is_flag=False,
+        flag_value="1 %",
     ),
 )
 @with_output("results/<name>", "tables", "pictures")
@@ -49,11 +53,11 @@ def command(
     output: Output,
     **grids: str | None,
 ) -> None:
-    """Dynamic stiffness and loss factor of a fitted model over frequency and amplitude, with 95 % bands.
+    """Predict dynamic stiffness and loss factor over frequency and amplitude, with 95 % bands.
 
-    MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. Effects of the rig are left out; a
-    warning names what leaves the range that was tested. Writes a table and a plot of each place (axial.csv, axial.png),
-    and with --campaign measured.csv.
+    MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. Effects of the rig are left out. A
+    warning reports predictions outside the tested range. Writes a table and a plot for each direction or specimen
+    (axial.csv, axial.png), and with --campaign measured.csv.
     """
     from bushfit.campaign.campaign import load_bushing, load_campaign
     from bushfit.commands.loading import load_model, model_file

@@ -67,8 +67,11 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usab
     tests = [test for test in misfits if output.verbose or test.held is None]
     worst = sorted(tests, key=lambda test: -test.reduced_chi_square)[: len(tests) if output.verbose else _MOST_TESTS]
     if len(tests) > 1:
-        title = "test by test: NRMSE and gain off [%] (+: the model is stiffer), chi2 the reduced chi-square"
-        columns, rows = ("test", "place", "points", "NRMSE", "chi2", "gain", ""), []
+        title = (
+            "test by test: NRMSE and mean error of the model in |K| [%] (+: stiffer than measured), reduced "
+            "chi-square (chi2)"
+        )
+        columns, rows = ("test", "place", "points", "NRMSE", "chi2", "mean", ""), []
         for test in (test for test in tests if test in worst):
             name = test.test if test.held is None else f"  {_run_label(test)}"
             gain = f"{round(100 * test.gain, 2) + 0.0:+.2f}"  # no -0
@@ -76,13 +79,11 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usab
             rows.append((name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted"))
         output.print_table(title, columns, rows, text_columns=2)
     if count := len(tests) - len(worst):
-        output.print(
-            f"and {count} more {'test, which is' if count == 1 else 'tests, which are'} met better; -v shows them"
-        )
+        output.print(f"and {count} more {'test has' if count == 1 else 'tests have'} a smaller misfit; -v lists them")
     for place in usable:
-        how = "each predicted from other runs" if place.held_out else "as fitted"
-        error = f"{number(100 * place.stiffness, 2)} % of stiffness and {number(place.loss_factor, 2)} of loss factor"
-        output.print(f"{place.place}: usable within {error} (95 % of {place.points} points, {how})")
+        how = "each predicted without its own run" if place.held_out else "as fitted"
+        error = f"{number(100 * place.stiffness, 2)} % in stiffness and {number(place.loss_factor, 2)} in loss factor"
+        output.print(f"{place.place}: expected error {error} (95 % of {place.points} points, {how})")
 
 
 def _run_label(test: Misfit) -> str:

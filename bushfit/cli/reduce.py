@@ -38,16 +38,16 @@ _LINES_AN_OCTAVE = 3
 )
 @with_stated(sweeps=False)
 @under(
-    "Of raw histories",
-    option("--levels", "GRID", 'Amplitudes that were asked for, "0.1, 0.2 mm" [found].'),
-    option("--cycles", "N", "Fewest steady cycles [3].", type=click.IntRange(3, 1000), default=3),
+    "Raw histories",
+    option("--levels", "GRID", 'Nominal amplitudes, "0.1, 0.2 mm" [detected].'),
+    option("--cycles", "N", "Smallest number of steady cycles of a step [3].", type=click.IntRange(3, 1000), default=3),
 )
 @under(
-    "Of a resonance test",
-    option("--mass", "MASS", 'On the mount, such as "0.5 kg".'),
-    option("--mass-added", "MASS", 'What moves with it, such as "15 g".'),
-    option("--specimen", "NAME", "What was tested, if it is no bushing."),
-    option("--base-acceleration", "ACCELERATION", 'Such as "0.1 g", if no column says it.'),
+    "Resonance test",
+    option("--mass", "MASS", 'Mass on the mount, such as "0.5 kg".'),
+    option("--mass-added", "MASS", 'Mass that moves with it, such as "15 g".'),
+    option("--specimen", "NAME", "Name of the specimen, if it is no bushing."),
+    option("--base-acceleration", "ACCELERATION", 'Such as "0.1 g", if no column states it.'),
 )
 @with_output("results/<first file>", "tables", "pictures")
 def command(
@@ -60,9 +60,9 @@ def command(
 ) -> None:
     """Reduce raw stepped-sine histories or a resonance test to a sweep.
 
-    Raw histories (time, displacement, force): a FILE may hold many steps of at least five cycles; several files of one
-    direction make one sweep. A resonance test (--mass, one FILE): acceleration and phase of the base and of a mass on
-    the mount, or their transmissibility. Each point has its standard error.
+    Raw histories (time, displacement, force): a FILE may hold many steps of at least five cycles; several files of
+    one direction make one sweep. A resonance test (--mass, one FILE): acceleration and phase of the base and of a
+    mass on the mount, or their transmissibility. Each point has its standard error.
 
     Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """

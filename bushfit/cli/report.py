@@ -12,12 +12,11 @@ from bushfit.cli.output import Output, with_output
 @click.argument("folder", metavar="DIR", type=FILE)
 @with_output("DIR")
 def command(folder: Path, output: Output) -> None:
-    """Make one page of DIR, the results of run, diagnose, a fit, or of a batch: to show, to print, to mail.
+    """Make one page from DIR, the results of run, diagnose, a fit, or a batch: to show, print or mail.
 
-    The page is a single file that needs no network: what was tested, the verdict and within what the model is usable,
-    the parameters with intervals, prediction beside measurement, loops, what was missing, the next test, and where the
-    numbers come from. It is made of the JSON and CSV files of DIR, and shows what they hold; run and diagnose write it
-    by themselves.
+    The page is a single file that needs no network. It shows part and tests, verdict and expected error, prediction
+    and measurement, parameters with intervals, the gap, the next test, and the origin of the numbers. It shows what
+    the JSON and CSV files of DIR contain. run and diagnose write it, too.
 
     Writes report.html, or for a batch index.html.
     """

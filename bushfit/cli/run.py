@@ -33,12 +33,12 @@ _OPEN = 100.0
 @campaign_options()
 @with_output("results/<campaign name>", "tables", "pictures", "pages")
 def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | None, output: Output) -> None:
-    """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
+    """Fit, diagnose and predict in one go.
 
-    Shows the verdict of diagnose, the parameters of the model to use, the range that was tested, and the corners of
-    the prediction; -v shows every step. Steps whose tests are missing are passed over, and said.
+    Prints the verdict of diagnose, the parameters of the model to use, the tested range, and the corners of the
+    prediction; -v prints every step. Steps without tests are skipped and listed.
 
-    Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
+    Writes static.json, dynamic.json, model.json (with what diagnose added; joint.json is then the plain fit),
     diagnosis.json, candidates.csv, report.html; as table and plot: loops, sweeps, gap, axial, radial, each specimen.
     """
     from bushfit.commands.fit import prepare_tests
@@ -62,8 +62,8 @@ def print_run(output: Output, name: str, outcome: RunOutput) -> None:
     if diagnosed:
         print_verdict(output, diagnosed)
     else:
-        output.print(f"{name}: every parameter is held, so diagnose is passed over")
-    print_result(output, f"{name}: {'model with what was added' if outcome.added else 'joint fit'}", result)
+        output.print(f"{name}: every parameter is fixed, so there is nothing to diagnose")
+    print_result(output, f"{name}: {'model with the added effects' if outcome.added else 'joint fit'}", result)
     if diagnosed and diagnosed.diagnosis.verdict != "consistent":
         print_findings(output, diagnosed)
     if result.measured:
@@ -73,7 +73,7 @@ def print_run(output: Output, name: str, outcome: RunOutput) -> None:
     if output.verbose:
         _print_steps(output, name, outcome)
     two_step = outcome.two_step and two_step_line(outcome.two_step, outcome.joint.result)
-    output.print(two_step or f"{outcome.reason_left_out}: the two-step procedure is passed over")
+    output.print(two_step or f"two-step procedure (the paper's): left out, because {outcome.reason_left_out}")
 
 
 def _model_to_use(folder: Path, outcome: RunOutput) -> str:
@@ -81,9 +81,9 @@ def _model_to_use(folder: Path, outcome: RunOutput) -> str:
     description = "the joint fit"
     if outcome.diagnosed and outcome.added:
         effects = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
-        description = f"with {effects}; joint.json is without"
+        description = f"with {effects}; joint.json is the fit without"
     elif outcome.diagnosed and outcome.diagnosed.diagnosis.changed:  # a mistake in the record is named
-        description = "the joint fit to the tests as they are: put the record right first, then run again"
+        description = "the joint fit to the uncorrected tests: correct the record first, then run again"
     return f"the model to use: {folder / 'model.json'}, {description}"
 
 
@@ -91,7 +91,7 @@ def _print_range(output: Output, outcome: RunOutput) -> None:
     """Print the tested range of each direction, whether or not its tests were fitted."""
     measured = outcome.result.measured
     fitted = measured.directions if measured else ()
-    output.console.print("tested range; outside of it the model extrapolates", style="bold")
+    output.console.print("tested range; outside this range the model extrapolates", style="bold")
     for direction in dict.fromkeys(data_set.direction for data_set in outcome.data.data_sets):
         unit, factor = direction.display.displacement
         tests = [data_set for data_set in outcome.data.data_sets if data_set.direction == direction]
@@ -124,22 +124,22 @@ def two_step_line(two_step: TwoStep, joint: Result) -> str:
     passes = len(two_step.passes)
     parts = [f"{passes} pass{'es' * (passes > 1)}"]
     if found.at_bound:
-        parts.append(f"came to rest on a bound: {', '.join(found.at_bound)}")
+        parts.append(f"ended at a bound: {', '.join(found.at_bound)}")
     elif difference:
         far, unsure = (max(sizes, key=sizes.__getitem__) for sizes in (difference, ratio))
         count = max(1, math.ceil(round(difference[far], 1)))
         parts.append(
             f"agrees with the joint fit within {count} standard error{'s' * (count > 1)}"
             if count <= _AGREED
-            else f"{far} is {difference[far]:.1f} standard errors off the joint fit"
+            else f"{far} is {difference[far]:.1f} standard errors from the joint fit"
             if difference[far] <= _COUNTED
-            else f"does not agree with the joint fit: {far} is farthest off"
+            else f"does not agree with the joint fit, least in {far}"
         )
         times = number(ratio[unsure], 2)
         if float(times) > _OPEN:
-            parts.append(f"{unsure} not determined at all")
+            parts.append(f"{unsure} not determined")
         elif float(times) > 1.0:
-            parts.append(f"{unsure} {times} times less certain than there")
+            parts.append(f"{unsure} {times} times less certain than in the joint fit")
     return f"two-step procedure (the paper's): {', '.join(parts)} (static.json, dynamic.json; -v shows it)"
 
 
@@ -167,7 +167,7 @@ def _print_passes(output: Output, two_step: TwoStep) -> None:
         format_aligned([p[name] * factor for p in two_step.passes[::-1]], 5, 2) for name, (_, factor) in units.items()
     ]
     rows = ((str(count), *row) for count, row in enumerate(list(zip(*columns, strict=True))[::-1], start=1))
-    output.print_table("static and dynamic fit in turn, pass by pass", ["pass", *headers], rows)
+    output.print_table("static and dynamic fit in turn, by pass", ["pass", *headers], rows)
 
 
 def _print_cost(output: Output, two_step: Result, joint: Result) -> None:
@@ -193,4 +193,4 @@ def _print_cost(output: Output, two_step: Result, joint: Result) -> None:
                 ratio,
             )
         )
-    output.print_table("what the two-step procedure costs", columns, rows)
+    output.print_table("two-step procedure compared with the joint fit", columns, rows)

@@ -13,12 +13,12 @@ from bushfit.cli.output import Output, with_output
 @click.argument("name", required=False, shell_complete=schemas)
 @with_output("nothing is written")
 def command(name: str | None, output: Output) -> None:
-    """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, tell which there are.
+    """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, list all names.
 
-    They say of every key what it holds and in which unit. Those of JSON files are for programs that read results; those
-    of campaign, manifest and limits for editors of TOML, which then complete and check keys while you type.
+    A schema describes every key of a file and its unit. Schemas of JSON files are for programs that read results.
+    Those of campaign, manifest and limits are for TOML editors, which then complete and check keys while you type.
 
-    With -o, writes <name>.schema.json: that of NAME, or without NAME those of all files.
+    With -o, writes <name>.schema.json for NAME, or for all files without NAME.
     """
     from bushfit.errors import error_location
     from bushfit.report.results import json_file

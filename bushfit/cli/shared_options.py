@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 
 
-def campaign_options(soft_l1: str = "points far off pull less, outliers not at all") -> Parameter:
+def campaign_options(soft_l1: str = "less weight on distant points, none on outliers") -> Parameter:
     """Argument CAMPAIGN, as `campaigns`, and the options of every command that fits it.
 
     Args:
@@ -44,7 +44,7 @@ def campaign_options(soft_l1: str = "points far off pull less, outliers not at a
             function,
             click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
             under(
-                "How it is fitted",
+                "Fit",
                 option(
                     "--loss",
                     "LOSS",
@@ -54,7 +54,7 @@ def campaign_options(soft_l1: str = "points far off pull less, outliers not at a
                 option(
                     "--max-nrmse",
                     "SHARE",
-                    "Exit status 1 above this misfit (NRMSE), such as 2 %.",
+                    "Exit with status 1 if NRMSE exceeds this, such as 2 %.",
                     type=Size("share up to 1, such as 0.02 or 2 %", 1.0),
                 ),
             ),
@@ -104,10 +104,10 @@ def grid_options(default: str) -> Parameter:
 def prediction_options(campaign: str) -> Parameter:
     """Options of where, and at which temperature, a model is predicted; `campaign` is the help of --campaign."""
     return under(
-        "Where it is predicted",
+        "Range and conditions",
         place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
         grid_options("the campaign's"),
-        option("--temperature", "TEMP", 'Such as "40 degC", if the model knows it [23 degC].'),
+        option("--temperature", "TEMP", 'Such as "40 degC", if the model has an effect of temperature [23 degC].'),
         file_option("--campaign", campaign),
     )
 

@@ -21,31 +21,31 @@ if TYPE_CHECKING:
 @command_called("simulate", "configs/simulate_arm_bushing.toml --seed 7")
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
 @under(
-    "What is simulated",
+    "Tests and effects",
     option(
         "--effect effects",
         "EFFECT",
-        'Hide an effect in the tests, such as "inertia.mass=0.1 kg"; may be given again.',
+        'Add an effect to the tests, such as "inertia.mass=0.1 kg"; may be given again.',
         multiple=True,
     ),
-    option("--repeats", "N", "Of each sweep [1].", type=click.IntRange(1, 1000)),
-    option("--seed", "N", "Of the random numbers [0].", type=click.IntRange(0)),
+    option("--repeats", "N", "Number of repeats of each sweep [1].", type=click.IntRange(1, 1000)),
+    option("--seed", "N", "Seed of the random numbers [0].", type=click.IntRange(0)),
 )
 @under(
-    "Noise and errors of the rig [those of the campaign, else none]",
+    "Noise and errors of the rig [from the campaign, else none]",
     option("--noise", "SHARE", 'Scatter of a sweep point relative to |K|, such as "0.5 %".'),
-    option("--force-noise", "SHARE", 'Of a loop, relative to half its range of force: "0.3 %".'),
-    option("--displacement-noise", "SHARE", 'Of a loop, relative to its amplitude: "0.02 %".'),
-    option("--gain-error", "SHARE", 'Shared by a run, one repeat of one amplitude: "0.4 %".'),
-    option("--phase-error", "ANGLE", 'Shared by a run: "0.2 deg".'),
+    option("--force-noise", "SHARE", 'Noise of a loop relative to half its force range: "0.3 %".'),
+    option("--displacement-noise", "SHARE", 'Noise of a loop relative to its amplitude: "0.02 %".'),
+    option("--gain-error", "SHARE", 'Gain error of a run, one repeat of one amplitude: "0.4 %".'),
+    option("--phase-error", "ANGLE", 'Phase error of a run: "0.2 deg".'),
 )
 @with_output("results/simulated <name>", "tables")
 def command(source: Path, effects: tuple[str, ...], output: Output, **settings: Any) -> None:
-    """Put a model on the virtual rig and write a campaign of simulated raw tests.
+    """Simulate the tests of a model on a virtual rig and write them as a campaign.
 
-    The model is MODEL.json, tested as the paper's bushing was, or CAMPAIGN with tests of its [simulate] table. Every
-    step in time is computed, without the closed form that the fits use. Good before a test: would `bushfit diagnose`
-    see what --effect hides here?
+    The model is MODEL.json, tested like the paper's bushing, or CAMPAIGN with the tests in its [simulate] table. The
+    equations are stepped through time, without the closed forms that the fits use. Use it to check whether `bushfit
+    diagnose` would find an effect that --effect adds.
 
     Writes campaign.toml, the tables it names, and truth.json, the model behind them.
     """

@@ -123,7 +123,7 @@ def _two_step(data: PreparedCampaign) -> tuple[TwoStep | None, str]:
     if not (data.loops and data.sweeps):
         return None, f"no {'sweeps' if data.loops else 'loops'}"
     if not data.free(FIVE):
-        return None, "every parameter is held"
+        return None, "every parameter is fixed"
     try:
         return fit_two_step(data), ""
     except FitError as error:

@@ -118,7 +118,7 @@ def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCam
     messages = []
     for name in names:
         claim = _claimed(data, name)
-        messages.append(f"mended by --adopt {name}: read as if {claim.words(data)}; {claim.corrections(data)[0]}")
+        messages.append(f"corrected by --adopt {name}: read as if {claim.words(data)}; {claim.corrections(data)[0]}")
         data = claim.mended(data)
     return data, messages
 

@@ -271,7 +271,7 @@ def _phase_words(phase: Interval) -> str:
     quarters = {0.0: "in phase", 90.0: "in quadrature", 180.0: "in antiphase", -180.0: "in antiphase"}
     quarters[-90.0] = "in negative quadrature"
     if phase[2] - phase[1] > 2.0 * _PHASE_TOLD:
-        return "at a phase that these tests do not tell"
+        return "at a phase that these tests do not determine"
     near = [words for quarter, words in quarters.items() if phase[1] <= quarter <= phase[2]]
     return near[0] if near else f"{number(phase[0], 2)} deg ahead of the displacement"
 

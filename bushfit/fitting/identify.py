@@ -130,11 +130,11 @@ def left_open(
     combinations: dict[str, None] = {}
     for group in groups:
         errors = ", ".join(f"{name} {percent(float(relative_errors[name]))}" for name in group)
-        reasons = "; ".join(_reasons(model, data_sets, group)) or "these tests do not tell"
+        reasons = "; ".join(_reasons(model, data_sets, group)) or "these tests do not determine"
         lines.append(f"{reasons}: {_meaning(information, group)} (standard errors: {errors})")
         combinations |= dict.fromkeys(_combinations(model, data_sets, information, group))
     if combinations:
-        lines.append("what is known all the same: " + "; ".join(combinations))
+        lines.append("what is known nevertheless: " + "; ".join(combinations))
     # what another test would tell beside an error of the model depends on what that error is
     missed = any(data_set.model_error for data_set in data_sets)
     return lines if missed else [*lines, *further_test(model, data_sets, information)]
@@ -166,7 +166,7 @@ def _meaning(information: FisherInformation, group: Sequence[str]) -> str:
     if set(group) == set(_FRICTION) and information.error(dict(zip(_FRICTION, (1.0, -1.0), strict=True))) < _KNOWN:
         return "sigma_fmax and eps_half are known only as a ratio"
     if len(group) > 1:
-        return f"{', '.join(group[:-1])} and {group[-1]} cannot be told from one another"
+        return f"{', '.join(group[:-1])} and {group[-1]} cannot be determined separately"
     return f"{group[0]} is not determined"
 
 

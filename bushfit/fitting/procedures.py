@@ -177,7 +177,7 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
         else:
             springpot = {name: model.values[name] for name in DYNAMIC}
     raise FitError(
-        "the static and the dynamic fit do not settle on each other",
+        "the static and the dynamic fit do not converge in turn",
         file=data.campaign.path,
         found=f"{_MOST_PASSES} passes",
         hint="bushfit fit takes all five parameters together",

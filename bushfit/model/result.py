@@ -284,9 +284,9 @@ class Result:
             return []
         added = (sorted(set(alternative.model.effects) - {*self.model.effects}) for alternative in self.alternatives)
         names = " or ".join(dict.fromkeys(" and ".join(alternative) for alternative in added if alternative))
-        lacking = f"the tests cannot tell what the model lacks, {names}: it is predicted without, and"
-        open_values = "the tests leave other values of the parameters possible:"
-        return [f"{lacking if names else open_values} low and high of predictions hold the model with each of these"]
+        lacking = f"the tests cannot distinguish {names}: the prediction uses the plain model, and"
+        open_values = "the tests permit other values of the parameters:"
+        return [f"{lacking if names else open_values} its bands, low to high, include each alternative"]
 
     def place(self, name: str) -> Place:
         """The specimen of this name, or else the direction; a ModelError where it is neither."""

@@ -202,7 +202,7 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
             yield f"{target}: {percent(target.half)} asked for, {percent(half)} planned: {reason}"
     if knowledge.bounded:
         yield (
-            f"{' and '.join(knowledge.bounded)} came to rest on a bound: the errors of the others count that noise "
+            f"{' and '.join(knowledge.bounded)} ended at a bound: the errors of the others count that noise "
             "takes it off there half of the times"
         )
     if missed and not search.determines_scatter(search.counts):

@@ -89,7 +89,7 @@ def caveats(result: Result) -> list[str]:
     lines = [line for name in fitted if name in places for line in unfitted(result, result.place(name))]
     for name in result.unresolved:
         twins = " or ".join(get_effect(name).twins)
-        lines.append(f"{name} is counted as part of the bushing, but these tests cannot distinguish it from {twins}")
+        lines.append(f"{name} is assigned to the bushing, but these tests cannot distinguish it from {twins}")
     lines += result.undecided
     if "springpot" not in result.model.effects:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
@@ -99,12 +99,12 @@ def caveats(result: Result) -> list[str]:
             f"and the band widens by up to {number(100.0 * Z95 * unnamed.far_deviation, 2)} % either way"
         )
         lines.append(
-            "the correction without a name is counted as part of the bushing, but these tests cannot distinguish it "
-            "from one of the rig: if it belongs to the rig, the bushing in the car lacks it, up to "
+            "the correction without a name is assigned to the bushing, but these tests cannot distinguish it "
+            "from one of the rig: if it belongs to the rig, the bushing in the car does not have it, up to "
             f"{number(100.0 * unnamed.largest, 2)} % of |K|"
         )
     if result.measured is None:
-        lines.append("the model was not fitted here: it has no uncertainty and no fitted range")
+        lines.append("the model was not fitted: it has no uncertainty and no fitted range")
     if rig := rig_effects(result):
         lines.append(
             f"the prediction leaves out effects that belong to the rig and not to the bushing: {', '.join(rig)}"
@@ -159,7 +159,10 @@ def unfitted(result: Result, direction: Place) -> Iterator[str]:
     if formula in corrected:
         return
     band = f"{'The band excludes' if result.fitted else 'No band includes'} the error of the {formula} formula"
-    agreement = "; the measured sweep agrees within its noise" if agrees_within_noise(result, direction) else ""
+    agreement = ""
+    if any(test.place == str(direction) for test in result.tests):
+        agrees = agrees_within_noise(result, direction)
+        agreement = f"; the measured sweep {'agrees within' if agrees else 'differs by more than'} its noise"
     yield f"{direction}: not fitted, predicted from the {tests} tests{agreement}. {band}, {error}"
     if radially and bushing:
         yield from _compressible(result, bushing)
@@ -171,7 +174,7 @@ def _compressible(result: Result, bushing: Bushing) -> Iterator[str]:
     if lowering > _NOTED_LOWERING:
         percent = number(100.0 * lowering, 2)
         yield (
-            f"{Direction.RADIAL}: the model takes the rubber as incompressible; a bulk modulus of 2 GPa would lower "
+            f"{Direction.RADIAL}: the model assumes incompressible rubber; a bulk modulus of 2 GPa would lower "
             f"the radial stiffness of this shape by {percent} %"
         )
 
@@ -218,11 +221,12 @@ def of_points(
     rig = rig_effects(result)
     if rig and measured is not None and not np.isnan(measured).all():
         percent = percent_off(stiffness / np.abs(measured))
-        yield f"{place}: without {' and '.join(rig)} the predicted stiffness is {percent} against what was measured"
-    if rig_stiffness is not None:
-        ratio, condition = rig_stiffness / stiffness, f"if {' and '.join(result.unresolved)} is the rig's"
-        percent = f"{percent_off(ratio)} {condition}; low and high include both"
-        yield f"{place}: stiffness {f'the same {condition}' if np.allclose(ratio, 1.0, atol=_SAME) else percent}"
+        yield (
+            f"{place}: without {' and '.join(rig)} the predicted stiffness is {percent} compared with the measured one"
+        )
+    if rig_stiffness is not None and not np.allclose(rig_stiffness, stiffness, rtol=_SAME):
+        percent, names = percent_off(rig_stiffness / stiffness), " and ".join(result.unresolved)
+        yield f"{place}: stiffness {percent} if {names} belongs to the rig; the band, low to high, includes both"
 
 
 def percent_off(ratio: Array) -> str:

@@ -314,5 +314,7 @@ def predict_resonance(
         warnings += [*result.undecided, f"{subject}: {span}, by the models that the tests leave possible"]
     if if_rigs:
         peak, ratio = (number(value, 4) for value in if_rigs.peak)
-        warnings.append(f"{subject}: at {peak} Hz, |T| {ratio}, if {' and '.join(result.unresolved)} is the rig's")
+        warnings.append(
+            f"{subject}: at {peak} Hz, |T| {ratio}, if {' and '.join(result.unresolved)} belongs to the rig"
+        )
     return replace(predicted, warnings=tuple(warnings), if_rigs=if_rigs)

@@ -178,8 +178,8 @@ def test_it_is_told_with_its_line_and_nothing_is_mended(bushfit: Run, work: Path
 
 def test_a_line_in_the_campaign_or_adopted_aloud_puts_it_right(bushfit: Run, work: Path) -> None:
     done = bushfit("diagnose", DOUBLED, "--adopt", LABEL, "-o", "adopted", "--no-plots")
-    assert f"mended by --adopt {LABEL}" in " ".join(done.stderr.split())
-    assert any("mended by" in line for line in document(work / "adopted/model.json")["warnings"])
+    assert f"corrected by --adopt {LABEL}" in " ".join(done.stderr.split())
+    assert any("corrected by" in line for line in document(work / "adopted/model.json")["warnings"])
     line = 'file = "sweep_axial.csv"'
     text = (work / DOUBLED).read_text().replace(line, f'{line}\namplitude = "peak-to-peak"')
     (work / "doubled/mended.toml").write_text(text)
@@ -195,7 +195,7 @@ def test_run_uses_the_tests_as_they_are_and_warns(bushfit: Run, work: Path) -> N
     assert f"(or bushfit diagnose CAMPAIGN --adopt {LABEL})" in said, "run takes no --adopt"
     last = done.stderr.splitlines()[-1]
     assert last.startswith("the model to use: ")
-    assert last.endswith("fit to the tests as they are: put the record right first, then run again")
+    assert last.endswith("fit to the uncorrected tests: correct the record first, then run again")
     model = document(work / "ran/model.json")
     assert model["effects"] == ["elastic", "springpot", "friction"]
     assert any("fitted to the tests as they are" in warning for warning in model["warnings"])

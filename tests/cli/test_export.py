@@ -130,8 +130,8 @@ ODD = 'sweep_axial: "5 < 7 & 9", |K| of 3 points, ' + "far from the others, " * 
 PAPER = ("radial: not fitted, predicted from the", "+4.9 % in stiffness and +36 % in strain against finite elements")
 MOUNT = (
     "radial: fitted with the paper's formula, for this shape +4.3 % in stiffness and +26 % in strain against finite",
-    "sleeve_compliance is counted as part of the bushing, but these tests cannot distinguish it from rig_compliance",
-    " % if sleeve_compliance is the rig's; low and high include both",
+    "sleeve_compliance is assigned to the bushing, but these tests cannot distinguish it from rig_compliance",
+    " % if sleeve_compliance belongs to the rig; the band, low to high, includes both",
 )
 
 

@@ -170,7 +170,7 @@ def test_held_parameters_that_miss_the_tests_are_said_to(own: Path) -> None:
     held(own, "1.3 MPa")
     done = typing(own)("fit", CAMPAIGN, "-o", "x", "--no-plots", "--max-nrmse", "0.02", status=1)
     assert "the values given miss the tests by" in done.stderr
-    assert "every parameter is held" in typing(own)("diagnose", CAMPAIGN, "-o", "y", "--no-plots", status=2).stderr
+    assert "every parameter is fixed" in typing(own)("diagnose", CAMPAIGN, "-o", "y", "--no-plots", status=2).stderr
 
 
 def test_a_parameter_on_a_bound_shows_no_interval(own: Path) -> None:
@@ -198,8 +198,8 @@ def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp
     done = bushfit("run", CAMPAIGN, "-o", tmp_path / "x", "-v")
     tables = {f"{kind}.{end}" for kind in ("loops", "sweeps", "axial", "radial") for end in ("csv", "png")}
     assert {"static.json", "dynamic.json", "model.json"} | tables <= names(tmp_path / "x")
-    assert "pass by pass" in done.stderr
-    assert "what the two-step procedure costs" in done.stderr
+    assert "in turn, by pass" in done.stderr
+    assert "two-step procedure compared with the joint fit" in done.stderr
     assert f"the model to use: {tmp_path / 'x/model.json'}, the joint fit" in done.stderr
     assert "springpot was left out" in done.stderr
     radial = pd.read_csv(tmp_path / "x" / "radial.csv")
@@ -212,10 +212,15 @@ def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp
 @pytest.mark.parametrize(
     ("error", "off", "bound", "said"),
     [
-        (0.3, 0.0, {}, "agrees with the joint fit within 1 standard error, mu 30 times less certain than there ("),
+        (
+            0.3,
+            0.0,
+            {},
+            "agrees with the joint fit within 1 standard error, mu 30 times less certain than in the joint fit (",
+        ),
         (1e8, 0.0, {}, "agrees with the joint fit within 1 standard error, mu not determined at all ("),
         (0.01, 0.98, {}, "does not agree with the joint fit: mu is farthest off ("),
-        (1e8, 0.5, {"mu": "min"}, "1 pass, came to rest on a bound: mu ("),
+        (1e8, 0.5, {"mu": "min"}, "1 pass, ended at a bound: mu ("),
     ],
 )
 def test_the_line_on_two_steps_counts_no_meaningless_errors(
@@ -235,7 +240,7 @@ def test_run_with_an_effect_shows_what_diagnose_shows(root: Path, tmp_path: Path
     done = typing(root)("run", "configs/mystery_mount.toml", "-o", tmp_path / "x", "--no-plots")
     for words in ("Mystery mount: named", "sleeve_compliance (", "  held out  ", " x noise: measured r", "next test:"):
         assert done.stderr.count(words) == 1
-    assert "model with what was added" in done.stderr
+    assert "model with the added effects" in done.stderr
     assert "was not fitted, and the model misses it" not in done.stderr, "of the joint fit, which is not the one to use"
     assert f"{tmp_path / 'x/model.json'}, with sleeve_compliance; joint.json is without" in done.stderr
 
@@ -262,13 +267,18 @@ def test_run_and_diagnose_write_the_model_that_fit_writes_where_nothing_is_missi
         *("axial: 0.1 to 155 Hz, 0.1 to 1 mm", "radial: 5 to 155 Hz, 0.1 to 0.5 mm, not fitted"),
         *("axial, corners", "radial, corners"),
         "two-step procedure (the paper's): 10 passes, agrees with the joint fit within 1 standard error",
-        "times less certain than there (static.json, dynamic.json; -v shows it)",
+        "times less certain than in the joint fit (static.json, dynamic.json; -v shows it)",
         *("extrapolated beyond", "wrote static.json"),
         "the model to use: ",
     )
     places = [ran.stderr.index(word) for word in words]
     assert places == sorted(places), "the result first"
-    for word in ("pass by pass", "what the two-step procedure costs", "springpot was left out", "held out"):
+    for word in (
+        "in turn, by pass",
+        "two-step procedure compared with the joint fit",
+        "springpot was left out",
+        "held out",
+    ):
         assert word not in ran.stderr
     fitted, diagnosed = document(work / "model/model.json"), document(tmp_path / "diagnose/model.json")
     assert {**fitted, "campaign": None} == {**diagnosed, "campaign": None}
@@ -299,7 +309,7 @@ def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_said_first(own: Pat
         assert done.stderr.startswith(f"CMP 15 961: consistent; {UNKNOWN}\n")
     assert "no sweeps: the two-step procedure is passed over" in ran.stderr
     warnings = document(tmp_path / "run/model.json")["warnings"]
-    assert any("one loop rate, 0.1 Hz: mu, m and alpha cannot be told from one another" in line for line in warnings)
+    assert any("one loop rate, 0.1 Hz: mu, m and alpha cannot be determined separately" in line for line in warnings)
     assert any("the further test that would help most: a loop at" in line for line in warnings)
     assert warnings[0] == UNKNOWN
     fitted = typing(own)("fit", CAMPAIGN, "-o", tmp_path / "fit", "--no-plots", "--json")

@@ -79,8 +79,8 @@ def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth: str, measure
     mended = asked(campaign, adopt=tuple(truth.split()))
     assert mended.verdict == "consistent"
     assert mended.calibration[0] == pytest.approx(after, rel=1e-6)
-    assert [line for line in mended.notes if line.startswith("mended by --adopt ")]
-    assert [line for line in mended.result.warnings if line.startswith("mended by --adopt ")]
+    assert [line for line in mended.notes if line.startswith("corrected by --adopt ")]
+    assert [line for line in mended.result.warnings if line.startswith("corrected by --adopt ")]
 
 
 @pytest.mark.slow

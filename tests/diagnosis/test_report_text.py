@@ -32,7 +32,7 @@ def test_what_the_tests_cannot_show_is_said_and_goes_with_the_model(measured: Me
         (note,) = diagnosis.notes
         assert note.startswith("not identifiable from these tests: ")
         assert unseen <= set(note.partition(": ")[2].split(", "))
-    assert any("cannot be told from one another" in line for line in to_document(diagnosis.result)["warnings"])
+    assert any("cannot be determined separately" in line for line in to_document(diagnosis.result)["warnings"])
     whole = asked(campaign)
     assert whole.notes == whole.result.warnings == ()
 

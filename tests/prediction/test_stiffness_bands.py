@@ -97,10 +97,10 @@ def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(eit
     np.testing.assert_allclose(table[rigs[1]], found.if_rigs.loss_factor.value)
     said = "\n".join((*found.warnings, *caveats(either)))
     assert (
-        "sleeve_compliance is counted as part of the bushing, but these tests cannot distinguish it from rig_compliance"
+        "sleeve_compliance is assigned to the bushing, but these tests cannot distinguish it from rig_compliance"
         in said
     )
-    assert "% if sleeve_compliance is the rig's; low and high include both" in said
+    assert "% if sleeve_compliance belongs to the rig; the band, low to high, includes both" in said
     assert predict(either, Direction.RADIAL, FREQUENCIES, AMPLITUDES, rig=True).warnings == told.warnings
     shaken = predict_resonance(either, Direction.RADIAL, 1.0, 1.0, None)
     assert shaken.if_rigs is not None
@@ -151,7 +151,7 @@ def test_the_measured_stiffness_stands_beside_and_what_the_rig_took_is_said(pape
     assert table["measured loss factor [-]"][1] == pytest.approx(stiffness[2].imag / stiffness[2].real)
     off = 100.0 * (found.stiffness.value[:2] / measured[:2] - 1.0)
     (said,) = [line for line in found.warnings if "without rig_compliance" in line]
-    assert f"is +{off.min():.2g} to +{off.max():.2g} % against what was measured" in said
+    assert f"is +{off.min():.2g} to +{off.max():.2g} % compared with the measured one" in said
     elsewhere = predict(Result(rigged), Direction.AXIAL, FREQUENCIES, AMPLITUDES, sweeps=sweeps)
     assert prediction_table(elsewhere)["measured stiffness [N/mm]"].isna().all()
     assert not [line for line in elsewhere.warnings if "measured" in line and "without" in line]
