@@ -49,7 +49,7 @@ _MOST_SHOWN = 10
 )
 @under(
     "Execution",
-    flag("--resume", "Evaluate what is missing, failed or changed; keep the rest."),
+    flag("--resume", "Evaluate missing, failed or changed rows only."),
     option("--jobs", "N", "Number of worker processes [one per core].", type=click.IntRange(1)),
     option("--scheduler", "ADDRESS", "Use this Dask cluster, such as tcp://10.0.0.5:8786."),
 )
@@ -76,7 +76,7 @@ def command(
     reports: bool,
     output: Output,
 ) -> None:
-    """Fit, diagnose or predict many campaigns and collect the results in one table.
+    """Evaluate many campaigns and collect the results in one table.
 
     MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or one or more campaigns:
 

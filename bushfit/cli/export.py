@@ -26,11 +26,11 @@ from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction
         multiple=True,
         required=True,
     ),
-    option("--units", "UNITS", 'Length, mass, time and force, such as "m kg s N" [solver files: "mm t s N"].'),
+    option("--units", "UNITS", 'Length, mass, time and force, such as "m kg s N" [decks: "mm t s N"].'),
     option(
         "--dialect",
         "DIALECT",
-        "optistruct: --format nastran with stiffness and loss angle.",
+        "optistruct: nastran with stiffness and loss angle.",
         type=click.Choice(["optistruct"]),
     ),
     option("--accuracy", "ERROR", "Largest error of the modulus in an fmu [1 %].", default="1 %"),

@@ -17,16 +17,16 @@ _OF_TESTS = {
     "amplitude": ("COUNTING", "zero-to-peak, peak-to-peak or rms [header]."),
     "at_amplitude": ("SIZE", '"0.1 mm", if no column states it [file name].'),
     "at_frequency": ("FREQUENCY", '"10 Hz", if no column states it [file name].'),
-    "temperature": ("TEMP", '"23 degC": of the test, or of the rows to select.'),
+    "temperature": ("TEMP", '"23 degC": of the test, or of rows to select.'),
     "preload": ("LOAD", '"500 N axial" or "none", for the report.'),
     "rate": ("SPEED", None),
     "frequency": ("FREQUENCY", None),
-    "waveform": ("WAVE", 'If a loop has no time: "10 mm/min"; or "0.1 Hz", sine.'),
-    "specimen": ("NAME", "Name of the specimen, if it is no bushing [coupon; bar]."),
+    "waveform": ("WAVE", 'Loop without time: "10 mm/min"; "0.1 Hz", sine.'),
+    "specimen": ("NAME", "Name, if it is no bushing [coupon; bar]."),
     "area": ("AREA", None),
     "thickness": ("LENGTH", None),
     "elements": ("N", 'Of N blocks in shear: "772 mm^2", "6 mm" [1].'),
-    "specimen_number": ("NUMBER", "Number of the part, or of the rows to select."),
+    "specimen_number": ("NUMBER", "Of the part, or of the rows to select."),
 }
 #: ... and how any file is written.
 _AS_WRITTEN = {
@@ -87,7 +87,7 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
                 option(
                     "--column columns",
                     "ROLE=HEADER",
-                    'Column of a quantity: "force=Fz"; a wrong ROLE lists all.',
+                    'Column: "force=Fz"; a wrong ROLE lists all.',
                     multiple=True,
                 ),
                 _metadata_option("force_sign", "-1", "If the force has the opposite sign."),

@@ -63,11 +63,11 @@ _Read = TypeVar("_Read")
     option("--inner-diameter", "LENGTH", 'Inside; give one of the two, such as "20 mm".'),
     option("--outer-radius", "LENGTH"),
     option("--outer-diameter", "LENGTH", 'Outside; give one of the two, such as "36 mm".'),
-    option("--length", "LENGTH", 'Mean of the lengths inside and outside, such as "34 mm".'),
-    option("--name", "NAME", "Name of the bushing [the folder of the first file]."),
+    option("--length", "LENGTH", 'Mean of inside and outside, such as "34 mm".'),
+    option("--name", "NAME", "Name [that of the folder of the first file]."),
 )
 @with_stated()
-@under("Output", flag("--no-input", "Ask no questions: missing information is an error."))
+@under("Output", flag("--no-input", "Ask nothing: what is missing is an error."))
 @with_output("results/<bushing name>")
 def command(
     files: tuple[Path, ...],
@@ -79,8 +79,8 @@ def command(
 ) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 
-    In a terminal, init asks for information that neither files nor options give. FILE may be a folder, or a workbook
-    with several tests; an option applies to all files of its kind. Writes campaign.toml, or -o my_bushing.toml.
+    In a terminal, init asks for missing information. FILE may be a folder, or a workbook with several tests; an option
+    applies to all files of its kind. Writes campaign.toml, or -o my_bushing.toml.
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named

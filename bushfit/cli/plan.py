@@ -53,12 +53,12 @@ _MOST_VALUES = 6
     option(
         "--target targets",
         "NAME=SIZE",
-        'Half width of a 95 % interval to reach: "mu=2 %", "stiffness=1 %"; may be given again.',
+        'Half a 95 % interval to reach: "mu=2 %", "stiffness=1 %"; may be given again.',
         multiple=True,
     ),
     option("--parameters", "NAME,...", "Parameters to determine, with --for parameters [all]."),
     option("--rivals", "NAME,...", "Effects to distinguish [those that diagnose cannot].", shell_complete=effect_lists),
-    file_option("--campaign", "With MODEL.json: use [rig] and [predict] of this campaign."),
+    file_option("--campaign", "With MODEL.json: use [rig] and [predict] of this."),
 )
 @under("Range of later predictions", grid_options("the campaign's"))
 @under(
@@ -81,7 +81,7 @@ def command(
     output: Output,
     **grids: str | None,
 ) -> None:
-    """Select the most informative next tests within the hours and limits of the rig.
+    """Select the most informative next tests within the limits of the rig.
 
     The plan starts from the tests of CAMPAIGN, from its [compound] if it has no tests (hardness = "61 Shore A",
     filler = "27 phr"), or from MODEL.json or a folder of results. A missed target is explained, with exit status 1.

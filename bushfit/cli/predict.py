@@ -34,7 +34,7 @@ _MOST_AMPLITUDES = 8
     option(
         "--arms",
         "[ERROR]",
-        "Also write Maxwell arms that represent the springpot within this error [1 %].",
+        "Also write Maxwell arms of the springpot, within this error [1 %].",
         is_flag=False,
         flag_value="1 %",
     ),

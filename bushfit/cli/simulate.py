@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     option("--noise", "SHARE", 'Scatter of a sweep point relative to |K|, such as "0.5 %".'),
     option("--force-noise", "SHARE", 'Noise of a loop relative to half its force range: "0.3 %".'),
     option("--displacement-noise", "SHARE", 'Noise of a loop relative to its amplitude: "0.02 %".'),
-    option("--gain-error", "SHARE", 'Gain error of a run, one repeat of one amplitude: "0.4 %".'),
+    option("--gain-error", "SHARE", 'Gain error of a run (a repeat of a level): "0.4 %".'),
     option("--phase-error", "ANGLE", 'Phase error of a run: "0.2 deg".'),
 )
 @with_output("results/simulated <name>", "tables")
