@@ -307,7 +307,7 @@ def _check_used(settings: RowSettings, rows: Collection[tuple[Command, ...]], so
         if getattr(settings, name) is not None and not is_used:
             another = "" if ("run",) in rows else f"--command {users[0]} too, or "
             raise CampaignError(
-                "this setting does nothing here",
+                "this setting has no effect here",
                 file=source,
                 place=name,
                 found=f"commands {', '.join(sorted({command for commands in rows for command in commands}))}",

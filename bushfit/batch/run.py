@@ -55,16 +55,16 @@ def check_output(plan: BatchPlan, *, force: bool) -> None:
     existing = [name for name in (*FILES, store.ROWS_FOLDER) if (output / name).exists()]
     if existing and not replaces:
         raise OutputError(
-            "results stand there already",
+            "there are results already",
             file=output,
             found=", ".join(existing),
-            hint="--resume does what is missing; --force does all again; -o/--output names another folder",
+            hint="--resume evaluates what is missing; --force evaluates all again; -o/--output names another folder",
         )
     if plan.junit:
         with _naming_junit(plan.junit):
             report, folder = plan.junit.resolve(), output.resolve()
             if report in [folder / name for name in FILES] or folder / store.ROWS_FOLDER in (report, *report.parents):
-                problem = "the report cannot stand among the results of the rows, nor in place of the table"
+                problem = "the report cannot be inside the results of the rows or replace the table"
                 raise OutputError(problem, file=plan.junit)
             check_free(plan.junit.parent, [plan.junit.name], overwrite=replaces)
 
@@ -77,7 +77,7 @@ def _naming_junit(junit: Path) -> Iterator[None]:
     except OutputError as error:
         if error.file:
             error.file, error.place = junit, "--junit"
-            error.hint = "name another file with --junit; --force replaces a report that stands"
+            error.hint = "name another file with --junit; --force replaces an existing report"
         raise
 
 

@@ -137,7 +137,7 @@ def batch_folder(output: Path) -> Iterator[None]:
         A context in which the folder is reserved.
 
     Raises:
-        OutputError: another batch is at work there.
+        OutputError: another batch is running in this folder.
     """
     (output / ROWS_FOLDER).mkdir(parents=True, exist_ok=True)
     descriptor = _lock(output / ROWS_FOLDER)
@@ -163,7 +163,7 @@ def _lock(folder: Path) -> int | None:
     except BlockingIOError:
         os.close(descriptor)
         hint = "wait for its end, or name another folder with -o"
-        raise OutputError("another batch is at work there", file=folder.parent, hint=hint) from None
+        raise OutputError("another batch is running in this folder", file=folder.parent, hint=hint) from None
     except OSError:  # a file system without locks
         os.close(descriptor)
         return None

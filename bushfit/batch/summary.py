@@ -319,12 +319,12 @@ class BatchResult:
         poor = [name for name, reason in zip(names, self.poor_fits, strict=True) if reason]
         warnings = []
         if poor:
-            judged = ", and their limits are judged on measured points where there are some" if self.plan.limits else ""
-            warnings.append(f"the model misses the tests of {_listed(poor)}: do not use its parameters{judged}")
+            judged = "; their limits are judged on measured points, if such points exist" if self.plan.limits else ""
+            warnings.append(f"the model misses the tests of {_listed(poor)}: do not use their parameters{judged}")
         warnings += self.notes
         if at_bound:
             clauses = [f"{parameter} of {_listed(parts)}" for parameter, parts in at_bound.items()]
-            warnings.append(f"at a bound of the fit, which the tests do not determine: {'; '.join(clauses)}")
+            warnings.append(f"at a bound of the fit, because the tests do not determine them: {'; '.join(clauses)}")
         if any(outside):
             parts = [name for name, is_outside in zip(names, outside, strict=True) if is_outside]
             warnings.append(f"a point is outside the tested range, where no test confirms the model: {_listed(parts)}")

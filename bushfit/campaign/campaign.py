@@ -135,7 +135,7 @@ def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
     names = [specimen.name for specimen in specimens]
     if not (content.bushing or names):
         expected = "[bushing] with its name, radii and length, or [[specimens]]"
-        raise CampaignError("nothing is said of what was tested", expected=expected)
+        raise CampaignError("the campaign does not state what was tested", expected=expected)
     if doubles := {name for name in names if names.count(name) > 1}:
         raise CampaignError("two specimens have one name", place="[[specimens]]", found=", ".join(sorted(doubles)))
     with error_location(place="predict.directions"):
@@ -164,7 +164,7 @@ def model_of(campaign: Campaign) -> Model:
     """
     if campaign.simulate is None:
         raise CampaignError(
-            "nothing says what to simulate",
+            "the campaign does not state what to simulate",
             file=campaign.path,
             expected="a [simulate] table with parameters",
             hint="or fit the campaign first and simulate its model.json",

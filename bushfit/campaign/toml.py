@@ -20,7 +20,7 @@ _DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*
 #: What to do about an error of TOML, by how it begins.
 _WAYS = {
     ("Unescaped", "Invalid hex"): "write / for each \\ of a path, or the text in single quotes",
-    ("Cannot",): "name each table and key once; several tests stand under [[loops]] or [[sweeps]], in two brackets",
+    ("Cannot",): "name each table and key once; list several tests under [[loops]] or [[sweeps]], in two brackets",
 }
 
 

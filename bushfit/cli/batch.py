@@ -158,7 +158,7 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
     if rows:
         counted = f"{document.title}: {document.done} bushing{'s' * (document.done > 1)}"
         output.print_table(counted, columns[:column_count], [row[:column_count] for row in rows])
-    from_before = f", {result.kept_count} of them from before" if result.kept_count else ""
+    from_before = f", {result.kept_count} of them from an earlier run" if result.kept_count else ""
     rate = len(parts) / max(result.seconds, 1e-9)
     output.print(
         f"{document.done} done{from_before}, {len(document.failed)} failed; {result.seconds:.1f} s, {rate:.1f} a second"

@@ -108,7 +108,7 @@ def _print_comparison(output: Output, compared: ComparisonOutput) -> None:
     if output.verbose or not compared.families:
         _print_parameters(output, compared)
     if compared.families:
-        title = "families; held out: root mean square in units of noise, 1 where noise is all"
+        title = "families; held out: root mean square in units of noise (1: noise alone)"
         output.print_table(title, FAMILY_HEADS, SideBySide.from_document(compared.document).family_cells())
     output.warn(line for line in compared.warnings if line not in compared.notes)
 
@@ -119,9 +119,9 @@ def _print_parameters(output: Output, compared: ComparisonOutput) -> None:
 
     first, *labels = compared.labels
     for label, comparison in zip(labels, compared.comparisons, strict=True):
-        title = f"parameters of {label} against {first}; p: chance of such a difference, by Holm over all of them"
+        title = f"parameters of {label} against {first}; p: probability of such a difference by chance (Holm)"
         columns = ("parameter", first, label, "difference", "95 % interval", "p", "unit")
         output.print_table(title, columns, map(parameter_cells, comparison.parameters))
         if comparison.joint:
             p, count = comparison.joint
-            output.print(f"all {count} together, correlations counted: p {chance(p)}")
+            output.print(f"all {count} together, with correlations: p {chance(p)}")

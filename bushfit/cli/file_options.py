@@ -139,10 +139,10 @@ def direction_error(file: Path, sheet: str | None = None) -> MeasurementError:
     from bushfit.reading.instruments import word_for_part
 
     return MeasurementError(
-        "nothing says in which direction this was tested",
+        "the direction of this test is not stated",
         file=file,
         place=sheet and f'{word_for_part(file)} "{sheet}"',
-        found="neither its name nor its columns say axial, radial or torsion",
+        found="neither the name nor the columns contain axial, radial or torsion",
         expected="a direction",
         hint="state it: --direction axial (or radial, torsion); or where others say another, name the file after it",
     )

@@ -162,7 +162,7 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
             names = [key.replace("radius", "diameter") if key in halved else key for key in keys]
             error.place = ", ".join(map(option_of, names))
             if set(keys) & set(halved):
-                error.hint = "a diameter given counts by its half; check that inner and outer are not swapped"
+                error.hint = "a diameter is halved; check that inner and outer are not swapped"
         raise
 
 
@@ -202,7 +202,7 @@ def _inspect_files(
             inspections.append(inspection)
             continue
         direction = inspection.direction or "..."
-        hint = f"bushfit reduce {quote_path(inspection.file)} --direction {direction} makes a sweep.csv of it"
+        hint = f"bushfit reduce {quote_path(inspection.file)} --direction {direction} converts it to sweep.csv"
         if source.is_named:
             raise MeasurementError(
                 "this is a raw stepped-sine history, not a sweep",
@@ -237,9 +237,11 @@ def _inspect_source(
     if inspection.direction is None:
         raise direction_error(source.file, source.sheet)
     if is_asking and inspection.is_counting_open:
-        raise MeasurementError("no header says how amplitudes are counted", file=source.file, hint="--amplitude")
+        raise MeasurementError(
+            "the headers do not state how amplitudes are counted", file=source.file, hint="--amplitude"
+        )
     if is_asking and "preload" not in {*inspection.entry, *test_options}:
-        raise MeasurementError("nothing says under which preload this was tested", file=source.file, hint="--preload")
+        raise MeasurementError("the preload of this test is not stated", file=source.file, hint="--preload")
     return inspection
 
 

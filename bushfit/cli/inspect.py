@@ -61,7 +61,7 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
     compared = with_contradictions(inspections)
     for alone, inspection in zip(inspections, compared, strict=True):
         for sentence in inspection.odd[len(alone.odd) :]:
-            output.console.print(f"[yellow]odd:[/yellow] {escape(inspection.label)}: {escape(sentence)}")
+            output.console.print(f"[yellow]unusual:[/yellow] {escape(inspection.label)}: {escape(sentence)}")
     inspections = with_specimens_named(compared)
     text = pasted_text(inspections)
     if not output.as_json:
@@ -102,9 +102,9 @@ def print_inspection(output: Output, inspection: Inspection) -> None:
     if inspection.assumed:
         output.print(f"  {inspection.assumed}")
     for sentence in inspection.odd:
-        console.print(f"  [yellow]odd:[/yellow] {escape(sentence)}")
+        console.print(f"  [yellow]unusual:[/yellow] {escape(sentence)}")
     if not inspection.odd:
-        console.print("  nothing odd")
+        console.print("  nothing unusual")
 
 
 def print_left_out(output: Output, left_out: Sequence[str]) -> None:

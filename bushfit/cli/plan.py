@@ -147,26 +147,26 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
         for place, row in document["stiffness"].items()
     )
     output.print(f"{len(document['tests'])} runs in {hours} h: standard error of the stiffness {', '.join(gains)}")
-    output.print(f"known before: {document['source']}")
+    output.print(f"starting point: {document['source']}")
     _print_tests(output, outcome)
     standard = f"standard, {number(document['hours_standard'], 3)} h"
     error_columns = ("of", "before", f"plan, {number(document['hours_planned'], 3)} h", standard)
     rows = {**document["parameters"], **{f"stiffness, {place}": row for place, row in document["stiffness"].items()}}
     rows |= {f"loss factor, {place} [0.01]": row for place, row in document["loss_factor"].items()}
-    title = "standard errors [%]: known before, by the plan, and by the standard programme of tests"
+    title = "standard errors [%]: before, with the plan, and with the standard programme"
     output.print_table(title, error_columns, _percents(rows, ("before", "planned", "standard")))
     if targets := document["targets"]:
         sizes = _percents(targets, ("asked", "before", "planned", "standard"))
         met = ("met" if target["met"] else "not met" for target in targets.values())
         columns = ("of", "asked for", "before", "plan", "standard", "")
-        title = "targets: 95 % interval either way, the widest [%]"
+        title = "targets: half width of the 95 % interval at the widest point [%]"
         output.print_table(title, columns, [(*row, verdict) for row, verdict in zip(sizes, met, strict=True)])
     _print_effects(output, document)
     if rivals := document["rivals"]:
         chi_squares = ", ".join(f"{number(rivals[key], 3)} by the {key} tests" for key in ("planned", "standard"))
         output.print(
-            f"{' and '.join(rivals['effects'])}: {chi_squares} apart in expected chi-square; from "
-            f"{number(rivals['enough'], 3)} on they are told apart in nine of ten cases"
+            f"{' and '.join(rivals['effects'])}: {chi_squares} apart in expected chi-square; "
+            f"{number(rivals['enough'], 3)} distinguishes them in nine of ten cases"
         )
     if document["enough"]:
         output.print(document["enough"])
@@ -208,7 +208,7 @@ def _print_effects(output: Output, document: PlanFile) -> None:
 
     ranked = sorted(document["visible"].items(), key=lambda item: ratio(item[1]))
     printed = ranked if output.verbose else ranked[:_MOST_EFFECTS]
-    title = f"smallest amounts found in nine of ten cases, {len(printed)} of {len(ranked)} effects"
+    title = f"smallest amount that is detected in nine of ten cases, for {len(printed)} of {len(ranked)} effects"
     rows = []
     for name, amounts in printed:
         sizes = [amounts["planned"], amounts["standard"]]

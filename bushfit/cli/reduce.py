@@ -101,7 +101,7 @@ def command(
     document |= {"warnings": list(warnings), "campaign": snippet}
     results = [table_file("sweep", lambda: points), figure_file("reduce", figure)]
     output.write(folder, results, document, files)
-    output.print(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}")
+    output.print(f"for a campaign in {folder} (in another folder, add the path):\n\n{snippet}")
 
 
 def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
@@ -153,7 +153,7 @@ def _reduce_resonance(
         )
     if (mass := positive(shaker["mass"], "--mass", "kg")) is None:
         raise MeasurementError(
-            "this is a resonance test, and nothing says how large the mass is",
+            "this is a resonance test, and its mass is not stated",
             file=table.file,
             place=f"line {table.layout.header_line}",
             found=", ".join(table.headers),
@@ -220,13 +220,13 @@ def _print_steps(output: Output, reduction: Reduction) -> None:
             number(100 * max(step.force_distortion for step in steps), 2),
         )
         rows.append(cells)
-    title = f"{count} point{'s' * (count > 1)} found; of each line the largest noise and distortion"
+    title = f"{count} point{'s' * (count > 1)} found; noise and distortion: largest of each line"
     heads = ("repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]", "THD [%]")
     output.print_table(title, (f"level [{unit}]", *heads), rows)
     output.warn(reduction.warnings)
     if output.verbose:
         for skip in reduction.skipped:
-            output.print(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}")
+            output.print(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}")
 
 
 def _print_resonance(output: Output, resonance: Resonance) -> None:
@@ -255,7 +255,7 @@ def _print_resonance(output: Output, resonance: Resonance) -> None:
         cells.append((ends, f"{len(rows)}", amplitudes, ratios, *figures))
     title = (
         f"{count} point{'s' * (count > 1)} of {resonance.test.frequency.size} rows; resonance at {frequency:.1f} Hz, "
-        f"|T| {largest:.2f}\nof each line the median of |K| and loss factor, and the largest error"
+        f"|T| {largest:.2f}\n|K| and loss factor: median of each line; error: largest"
     )
     heads = ("f [Hz]", "points", f"amplitude [{unit}]", "|T|", f"|K| [{stiffness_unit}]", "loss factor", "error [%]")
     output.print_table(title, heads, cells)

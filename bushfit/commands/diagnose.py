@@ -127,8 +127,8 @@ def _require_free_parameter(data: PreparedCampaign, model: Model | None, setting
             "there is nothing to fit, and so nothing to diagnose",
             file=data.campaign.path,
             place="[fit]",
-            found="every parameter is held with vary = false",
-            hint="bushfit fit says how well the values given meet the tests; free one to diagnose",
+            found="every parameter is fixed by vary = false",
+            hint="bushfit fit shows how well the given values meet the tests; to diagnose, free a parameter",
         )
 
 
@@ -139,4 +139,4 @@ def _with_plan(diagnosis: Diagnosis, campaign: Campaign) -> Diagnosis:
         return diagnosis
     printed_path = Path(path.name) if path.is_absolute() else path  # results hold no path of a machine
     command = f"bushfit plan {quote_path(printed_path)} --rivals {','.join(sets[0])}"
-    return replace(diagnosis, next_test=f"{diagnosis.next_test}; {command} chooses tests that tell them apart")
+    return replace(diagnosis, next_test=f"{diagnosis.next_test}; {command} selects tests that distinguish them")

@@ -116,7 +116,7 @@ def fit_dynamic(
     if fixed is None:
         if not data.loops:
             raise FitError(
-                "nothing says at which mu, sigma_fmax and eps_half to hold the fit",
+                "the values of mu, sigma_fmax and eps_half for this fit are not stated",
                 file=data.campaign.path,
                 found="no --static, no [[loops]], and no values of all three in [fit]",
                 hint="give --static static.json, add a loop, or run bushfit fit for all five parameters together",

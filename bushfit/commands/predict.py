@@ -143,7 +143,7 @@ def predict(
         notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
     if temperature is not None and not result.model.knows_temperature:
         raise ModelError(
-            "the model knows no temperature",
+            "the model has no effect of temperature",
             found=f"{temperature - CELSIUS:.4g} degC asked for",
             expected="a model with the effect of temperature",
             hint="fit tests at several temperatures with --effect temperature",
@@ -236,7 +236,7 @@ def _maxwell_arms(
     arms = model_arms(result.model.without(Level.INSTRUMENT), band, error, Circumstances(temperature))
     if not arms:
         raise ModelError(
-            "there is nothing that Maxwell arms could stand for",
+            "the model has nothing that Maxwell arms could represent",
             place="--arms",
             expected="a model whose stiffness depends on frequency, as by a springpot",
         )

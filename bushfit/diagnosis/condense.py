@@ -55,7 +55,10 @@ def condensed(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]
     rig, loops, messages = data.campaign.rig, _some(data.loops), tuple[str, ...]()
     if len(loops) < len(data.loops):
         data, total = replace(data, loops=tuple(with_gain_errors(loops, rig))), len(data.loops)
-        messages = (f"{len(loops)} of the {total} loops are diagnosed: together they have more than {_MOST_ROWS} rows",)
+        messages = (
+            f"{len(loops)} of the {total} loops are used in the diagnosis: together they have more than "
+            f"{_MOST_ROWS} rows",
+        )
     means_by_sweep = {data_set: means for data_set in data.sweeps if (means := _condensed_sweep(data_set))}
     if not means_by_sweep:
         return data, messages
@@ -126,7 +129,9 @@ def _condensed_sweep(data_set: MeasuredSweep) -> _Means | None:
     if lines.size > _MOST_LINES:
         some = lines[np.linspace(0, lines.size - 1, _MOST_LINES).round().astype(int)]
         rows = rows[np.isin(sweep.held[rows], some)]
-        words = f"{some.size} of its {lines.size} runs at one level, or frequency, are diagnosed, evenly spread"
+        words = (
+            f"{some.size} of its {lines.size} runs at one level, or frequency, are used in the diagnosis, evenly spread"
+        )
     levels, repeat = sweep.held[rows], sweep.repeat[rows]
     step = sweep.step[rows] if sweep.stepped else rows  # where neither is held, in the turn they were measured
     band, long = np.arange(rows.size), list[float]()  # each of its own
@@ -141,7 +146,7 @@ def _condensed_sweep(data_set: MeasuredSweep) -> _Means | None:
     groups = _Groups.from_keys(rows, np.stack((levels, repeat.astype(float), band.astype(float))))
     means = groups.sweep(sweep)
     if means.frequency.size < rows.size:
-        counted = f"{rows.size} points are diagnosed as {means.frequency.size} means over narrow bands"
+        counted = f"{rows.size} points are averaged to {means.frequency.size} narrow bands for the diagnosis"
         words = "; ".join(filter(None, (words, counted)))
     shares = {(sweep.name, line): float(np.mean(1.0 / groups.counts[means.held == line])) for line in long}
     under = data_set.under

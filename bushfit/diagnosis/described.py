@@ -148,7 +148,7 @@ def _inside(data_sets: Sequence[MeasuredTest]) -> Iterator[HoldOutPart]:
         several = np.ptp(sweep.repeat) > 0
         for name, points in (
             (f"every third {sweep.sweep.stepped or 'point'}", (rank % 3 == 1) & (rank < rank.max())),
-            ("the middle of what is held", (level == levels.size // 2) & (levels.size > 2)),
+            ("the middle of the held-out part", (level == levels.size // 2) & (levels.size > 2)),
             ("the last repeat", (sweep.repeat == sweep.repeat.max()) & several),
         ):
             if points.any():
@@ -162,14 +162,14 @@ def _inside(data_sets: Sequence[MeasuredTest]) -> Iterator[HoldOutPart]:
 def _words(correction: Unnamed, like: Fingerprint | None) -> str:
     """Sentence on the size and the form of the gap."""
     largest, band = (number(100.0 * share, 2) for share in (correction.largest, Z95 * correction.uncertainty))
-    sentences = [f"up to {largest} % of |K|, known within {band} % of itself"]
+    sentences = [f"up to {largest} % of |K|, uncertain by {band} % of itself"]
     if like is None or not any(like.determined):
-        sentences.append("nothing is told of its form")
+        sentences.append("its form is unknown")
     elif like.is_power_law:
         sentences.append(like.words)
     else:
         sentences.append(
-            "it is no power law of frequency and amplitude"
+            "it is not a power law of frequency and amplitude"
             + (f"; nearest: {like.words}" if all(like.determined) else "")
         )
     return "; ".join(sentences)
@@ -184,7 +184,7 @@ def _trusted(correction: Unnamed, whole: Evidence) -> str:
     misfit = max((region.excess for region in locate(whole) if region.kind == "loop"), default=0.0)
     stays = f" (their form stays off by {number(misfit, 2)} times the noise)" if misfit else ""
     loops = f", of loops the first harmonic only{stays}" if split_by_kind(whole.data_sets)[0] else ""
-    return f"to be trusted between these tests alone ({'; '.join(patches)}){loops}, and of this bushing"
+    return f"valid only between these tests ({'; '.join(patches)}){loops}, and of this bushing"
 
 
 def _span(values: Sequence[float], factor: float = 1.0) -> str:

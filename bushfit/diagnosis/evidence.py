@@ -23,8 +23,8 @@ from bushfit.model.result import Result
 EVALUATIONS = 40
 #: What is said of a correction.
 _CORRECTED = (
-    "a smooth correction of the model closes a gap without a name: the parameters are those beside it, and have taken "
-    "up what of the gap goes over more than a decade; then their intervals are invalid"
+    "a smooth correction of the model closes a gap without a name: the parameters were fitted with it "
+    "and absorb the part of the gap that is smooth over more than a decade; their intervals are then invalid"
 )
 
 

@@ -71,9 +71,9 @@ class FittedFamily:
         if abs(self.held.after / self.held.before - 1.0) < _ALIKE:
             return f"{figures}: alike within {number(100.0 * _ALIKE, 2)} %"
         better = sum(part.after < part.before for part in self.held.parts)
-        figures += f", nearer in {better} of {len(self.held.parts)} parts"
+        figures += f", better in {better} of {len(self.held.parts)} parts"
         if self.p >= CHANCE or (self.gain[0] > 0.0) is (self.held.after > self.held.before):
-            return f"{figures}: no more than chance (p {number(self.p, 2)})"
+            return f"{figures}: within chance (p {number(self.p, 2)})"
         return f"{figures}: {'better' if self.gain[0] > 0.0 else 'worse'} by more than chance"
 
 

@@ -279,7 +279,7 @@ def _phase_words(phase: Interval) -> str:
 def _power_words(power: Interval, symbol: str, axis: str) -> str:
     value, low, high = power
     if not high - low < 2.0 * _TOLD:
-        return f"how it changes with {axis} is not told"
+        return f"its change with {axis} is not determined"
     if low <= 0.0 <= high:
         return f"independent of {axis}"
     return f"{'grows' if value > 0 else 'falls'} as {symbol}^{number(value, 2)}"

@@ -206,13 +206,13 @@ class _Fitted:
         evidence, names = self.evidence, self.evidence.solution.coordinates.names
         rows, clusters = part.rows(evidence.data_sets), _clusters(evidence.data_sets)
         if left_open := [names[self.free[i]] for i in np.flatnonzero(self.whole.open(rows))]:
-            reason = f"the rest does not tell {', '.join(left_open)}"
+            reason = f"the other tests do not determine {', '.join(left_open)}"
             return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_name_of, left_open))))
         if self.whole.step(rows) is not None:
             return _with_pull(self.whole, rows, clusters, stepped=True)
         refitted = _refitted(evidence, part, bounds)
         if refitted is None or refitted.whole.open(rows).any():
-            return Skipped(part.name, "no fit to the rest comes to an end")
+            return Skipped(part.name, "no fit to the other tests converges")
         return _with_pull(refitted.whole, rows, clusters, stepped=False)
 
 

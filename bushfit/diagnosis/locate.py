@@ -156,6 +156,6 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
             (amplitude,) * 2,
             "force",
             float(np.sqrt(np.mean(np.square(amounts)))),
-            f"the {data_set.direction} loop of {amplitude * factor:.3g} {unit} departs from the model most in "
+            f"the {data_set.direction} loop of {amplitude * factor:.3g} {unit} differs from the model most in "
             f"{_HARMONICS.get(order, f'harmonic {order}')}: {number(100 * share, 2)} % of half its force range",
         )

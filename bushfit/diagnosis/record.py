@@ -325,7 +325,7 @@ def odds_in_words(found: Mapping[str, Any]) -> list[str]:
     lines = [f"{format_probability(entry['probability'])}: {entry['words']}" for entry in found["odds"]]
     rest = 1.0 - sum(entry["probability"] for entry in found["odds"])
     if lines and rest > _LEAST_TOLD:
-        lines.append(f"{format_probability(rest)}: another explanation")
+        lines.append(f"{format_probability(rest)}: other explanations together")
     if lines and found["nothing"] > _LEAST_TOLD:
         lines.append(f"Probability that nothing is missing: {format_probability(found['nothing'])}.")
     return lines

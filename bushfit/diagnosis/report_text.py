@@ -29,7 +29,7 @@ from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned, number
 
 #: What is said of what was weighed and is not told, and where there is no gap.
-_LESS_LIKELY = "another explanation is likelier"
+_LESS_LIKELY = "another explanation is more probable"
 _NOTHING = "nothing is missing beyond noise and tolerance"
 _ONE_DIRECTION = (
     "one direction was tested: a deviation of the compound and a smooth fault of the rig cannot be distinguished; test "
@@ -118,14 +118,14 @@ class DiagnosisWriter:
         """Why names that are all but sure do not explain the whole gap; "" if they do."""
         holdout = hold_out(self._fitted(self.base), self._fitted(after), self.search.asked.bounds)
         if holdout.after is not None and holdout.after > MOST_LEFT:
-            return f"held out, {number(holdout.after, 3)} times the noise is left"
+            return f"a held-out gap of {number(holdout.after, 3)} times the noise"
         result = result_of(self._fitted(after), self.search.asked.bounds, after.model.effects, lacking=False)
         for name in names:
             effect = get_effect(name)
             amount = qualified_name(effect, effect.amount) if effect.replaces is None else ""
             low, high = (result.interval(amount) if amount in result.model.values else None) or (1.0, 1.0)
             if effect.amount.neutral is not None and low <= effect.amount.neutral <= high:
-                return f"{name} may be nothing: the 95 % interval of its amount includes none"
+                return f"{name} may be absent: the 95 % interval of its amount includes zero"
         return ""
 
     def _partly(self, after: Evidence, entries: Sequence[Named], doubt: str) -> Diagnosis:
@@ -140,7 +140,7 @@ class DiagnosisWriter:
         share = 1.0 - excess[1] / excess[0] if excess[0] else 1.0
         words = f"{_all(names)} {'explains' if len(names) == 1 else 'explain'} {number(100 * share, 2)} % of the gap"
         remainder = [place.name for place in self.first.places]
-        remainder += ["errors of levels beyond the rig's class"] if best.levels else []
+        remainder += ["errors of levels beyond the class of the rig"] if best.levels else []
         gap = self._described(after) if not best.levels else None
         if gap:
             entries = [*entries, Named(UNNAMED, gap.evidence)]
@@ -162,7 +162,9 @@ class DiagnosisWriter:
         evidence, best = self._of_claim(self.first), self.first.best
         names = _entries(self.data, claim, evidence)
         command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(self.data))])
-        advice = f"if the records of the tests bear it out, {'; '.join(claim.corrections(self.data))} (or {command})"
+        advice = (
+            f"if the records of the tests confirm it, state {'; '.join(claim.corrections(self.data))} (or {command})"
+        )
         companions = [*best.effects, *(place.name for place in best.places)]
         words = f"these tests agree if {claim.words(self.data)}" + f", with {_all(companions)} beside it" * bool(
             companions
@@ -180,7 +182,7 @@ class DiagnosisWriter:
 
     def _of_claim(self, composition: Composition) -> str:
         gain = self.base.chi_square - composition.best.weighed.state.evidence.chi_square
-        return f"lowers chi-square by {gain:.0f} without a parameter; {self._probability(composition)}"
+        return f"lowers chi-square by {gain:.0f} without a new parameter; {self._probability(composition)}"
 
     def _ambiguous(self) -> Diagnosis:
         compositions = self.finding.told
@@ -202,7 +204,7 @@ class DiagnosisWriter:
             models, [composition.probability for composition in fitted], self.base.data_sets, self.data.campaign.rig
         )
         if led and led.best.claim:
-            advice = f"look into the records of the tests; {'; '.join(led.best.claim.corrections(self.data))}"
+            advice = f"check the records of the tests; {'; '.join(led.best.claim.corrections(self.data))}"
         spot = next((composition.best for composition in compositions if composition.places), None)
         return self._finished("ambiguous", words, self.base, names, places=spot, next_test=advice)
 
@@ -221,11 +223,13 @@ class DiagnosisWriter:
         advice = ""
         spot = spot or (self.first.best if self.first and self.first.best.places else None)
         if spot and spot.places:
-            words = f"{_all([place.name for place in spot.places])}: this stands out from all other tests; "
-            words += "measure it again before looking for physics"
+            words = f"{_all([place.name for place in spot.places])}: this deviates from all other tests; "
+            words += "measure it again first"
         elif spot:
-            words = "the levels disagree by more than the rig's class allows, and by nothing else"
-            advice = "measure the levels again in another session; or state the rig's class, gain_error under [rig]"
+            words = "the levels disagree by more than the class of the rig, and nothing else is missing"
+            advice = (
+                "measure the levels again in another session, or state the class of the rig (gain_error under [rig])"
+            )
         return self._finished("unexplained", words, self.base, places=spot, next_test=advice)
 
     def label(self, composition: Composition) -> str:
@@ -251,7 +255,7 @@ class DiagnosisWriter:
         best = composition.best
         parts = [best.claim.words(self.data)] if best.claim else []
         parts += [f"{get_effect(name).phrase} ({name})" for name in composition.names]
-        parts += [f"the tests are off: {place.name}" for place in composition.places]
+        parts += [f"a faulty test: {place.name}" for place in composition.places]
         *first_parts, last = (*parts, *_nameless(composition))
         return ", and ".join(filter(None, (", ".join(first_parts), last)))
 
@@ -260,7 +264,7 @@ class DiagnosisWriter:
         assert self.first
         after = self._fitted(self._with_names(self.finding.names))
         gain = self._fitted(self.base).chi_square - after.chi_square
-        suffix = " with what was named beside it" if len(self.finding.names) > 1 else ""
+        suffix = " with the other named effects" if len(self.finding.names) > 1 else ""
         return f"lowers chi-square by {gain:.0f}{suffix}; {self._probability(self.first)}"
 
     def _probability(self, composition: Composition) -> str:
@@ -366,7 +370,7 @@ class DiagnosisWriter:
         after = alone.weighed.state.evidence
         values = {key: value for key, value in after.model.values.items() if key not in self.base.model.values}
         is_named = self.first and name in self.first.names
-        why = "part of the likeliest explanation" if is_named else _LESS_LIKELY
+        why = "part of the most probable explanation" if is_named else _LESS_LIKELY
         return CandidateResult(name, score, self.base.chi_square - after.chi_square, share, values, why)
 
     def _notes(self) -> tuple[str, ...]:
@@ -396,7 +400,7 @@ def _format_amount(name: str, result: Result) -> str:
 
 def _nameless(composition: Composition) -> list[str]:
     """Parts of a composition beside effects, places and mistakes."""
-    levels = ["errors of levels beyond the rig's class"] if composition.best.levels else []
+    levels = ["errors of levels beyond the class of the rig"] if composition.best.levels else []
     return [*levels, *(["something without a name"] if composition.unnamed else [])]
 
 
@@ -420,7 +424,7 @@ def _entries(data: PreparedCampaign, claim: Claim, evidence: str) -> list[Named]
 
 def _place_where(base: Evidence, place: FaultyPlace, best: Hypothesis) -> Where:
     kind, component = ("loop", "force") if place.family == "loop" else ("sweep", "storage")
-    reading = f"{place.name} departs by {number(100 * best.size, 2)} % from what all other tests say"
+    reading = f"{place.name} departs by {number(100 * best.size, 2)} % from all other tests"
     return Where(
         place.direction,
         kind,

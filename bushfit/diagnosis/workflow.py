@@ -74,7 +74,8 @@ def diagnose(
     changed = {after.name for before, after in pairs if after.size < before.size}
     counts = Counter(outlier.test for outlier in initial.outliers if outlier.test in changed)
     fewer += tuple(
-        f"{name}: {count} of these points left out, farther off than noise" for name, count in counts.items()
+        f"{name}: {count} of these points are left out, because they deviate by more than noise"
+        for name, count in counts.items()
     )
     of_loops = outliers_at(found.result.model, data.loops)
     outliers = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(excluded_points, robust=True))

@@ -204,7 +204,7 @@ def first_harmonic(values: Values, below: ForceBelow, displacement: History, set
 
 EFFECT = Layer(
     name=NAME,
-    sentence="What no effect of the library explains, as a smooth correction over frequency and amplitude.",
+    sentence="A smooth correction over frequency and amplitude that no effect of the library explains.",
     equation="(1 + c(ln f, ln X)) K",
     level=Level.COMPONENT,
     parameters=(),

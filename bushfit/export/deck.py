@@ -224,7 +224,7 @@ def table_losses(order: Order, form: Form) -> Iterator[str]:
                 lines = (0.5 * (part[1:] + part[:-1]) for part in form.parts(table.frequency, table.stiffness))
                 exact = model.stiffness(place, halfway, table.amplitude, under=order.under)
                 worst = max(worst, float(np.max(np.abs(form.joined(halfway, *lines) / exact - 1.0))))
-            yield f"{place}: between its frequencies |K| is up to {number(100.0 * worst, 2)} % off"
+            yield f"{place}: between the frequencies |K| has errors up to {number(100.0 * worst, 2)} %"
         else:
             yield f"{place}: one frequency, {number(tables[0].frequency[0], 4)} Hz: K and loss are constants"
         yield from band_losses(prediction)
@@ -238,7 +238,7 @@ def common_losses(order: Order) -> Iterator[str]:
         Sentences.
     """
     yield NO_LOOPS
-    yield "each direction answers by itself: what motion in one does to another is not in it"
+    yield "each direction acts by itself: coupling between directions is not included"
     present = {prediction.direction for prediction in exported_directions(order)}
     missing = [str(direction) for direction in DOFS if direction not in present]
     yield f"no stiffness in {', '.join([*missing, 'rotations about x and y'])}"
@@ -254,8 +254,8 @@ def _amplitude_loss(tables: Sequence[StiffnessTable]) -> Iterator[str]:
         unit, factor = reference.direction.display.displacement
         low, value, high = (number(table.amplitude * factor, 4) for table in (tables[0], reference, tables[-1]))
         yield (
-            f"{reference.direction}: amplitude, one a property: taken at {value} {unit}, |K| is {percent_off(ratios)} "
-            f"off at {low} to {high} {unit}"
+            f"{reference.direction}: one amplitude per property: with {value} {unit}, the error of |K| is "
+            f"{percent_off(ratios)} at {low} to {high} {unit}"
         )
 
 
@@ -266,4 +266,4 @@ def band_losses(prediction: Prediction) -> Iterator[str]:
         yield f"{place}: the 95 % band, up to {number(100.0 * width, 2)} % of |K| either way"
     if prediction.if_rigs:
         deviation = percent_off(prediction.if_rigs.stiffness.value / band.value)
-        yield f"{place}: the other reading, by which |K| is {deviation} if what is unresolved is the rig's"
+        yield f"{place}: the other reading: |K| is {deviation} if the unresolved effect belongs to the rig"

@@ -97,7 +97,7 @@ def time_model(order: Order) -> TimeModel:
         for prediction in order.predictions
     ]
     values, names = _values(model, order.places, local_values, arms)
-    losses = [f"the whole memory of the rubber: {part.sentence}, fading below" for part in arms]
+    losses = [f"the long memory of the rubber: {part.sentence}, fading below" for part in arms]
     for prediction in order.predictions:
         losses += [*_steady_losses(model, fixed_modifiers, omitted, prediction, under), *band_losses(prediction)]
     sizes = values_under(model, under)
@@ -138,7 +138,7 @@ def _check_effect(effect: Effect) -> None:
     supported = isinstance(effect, Modifier) or _fields_key(effect) in FIELDS
     if effect.harmonic_only or not (supported or (isinstance(effect, Branch) and effect.size)):
         raise ModelError(
-            "an FMU follows a motion through time, for which there is no law",
+            "an FMU follows a motion through time, for which this effect has no law",
             place=effect.name,
             found="a law of the steady first harmonic alone" if effect.harmonic_only else "a law that no FMU has",
             expected="effects with a law in time",
@@ -216,7 +216,7 @@ def _steady_losses(
         return []
     (length, factor), *_ = place.display
     point = f"{number(middle[0], 3)} Hz and {number(factor * middle[1], 3)} {length}"
-    parts = [f"{', '.join(fixed_modifiers)}, held as at {point}"] * bool(fixed_modifiers) + [", ".join(omitted)] * bool(
-        omitted
-    )
+    parts = [f"{', '.join(fixed_modifiers)}, fixed as at {point}"] * bool(fixed_modifiers) + [
+        ", ".join(omitted)
+    ] * bool(omitted)
     return [f"{place}: {'; '.join(parts)}: stiffness off by up to {number(100.0 * error, 2)} % over the grid"]

@@ -361,8 +361,8 @@ def apart_in_temperature(model: Model, data_sets: Sequence[MeasuredTest]) -> lis
     (low, coldest), (high, warmest) = temperatures[0], temperatures[-1]
     tested = f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC"
     return [
-        f"{tested}, {number(high - low, 3)} degC apart: this model has no effect of temperature, and another that is "
-        "named may be one; fit the tests of each temperature by themselves, or with --effect temperature"
+        f"{tested}, {number(high - low, 3)} degC apart: this model has no effect of temperature, and another "
+        "named effect may be one; fit the tests of each temperature separately, or with --effect temperature"
     ]
 
 
@@ -385,8 +385,8 @@ def mixed_conditions(data_sets: Sequence[MeasuredTest]) -> list[str]:
         if len(by_value) > 1:
             listed = ", ".join(f"{value} ({name})" for value, name in by_value.items())
             sentences.append(
-                f"the tests were made {words} {listed}, and one model is fitted to all: fit those of each by "
-                "themselves, in a campaign of their own"
+                f"the tests were made {words} {listed}, and one model is fitted to all: fit each group in a "
+                "campaign of its own"
             )
     return sentences
 

@@ -144,7 +144,7 @@ class Drive:
         return replace(motion, accuracy=_ACCURACY)
 
     def from_datum(self, response: Array) -> Array:
-        """A response over `history`, less its mean where the loop counts from its own middle."""
+        """A response over `history`, less its mean where the fit uses the loop about its own mean."""
         if self.datum is None:
             return response
         if not self.from_rest:
@@ -235,7 +235,7 @@ def _check_loses_energy(drive: Drive) -> None:
     if stiffness.imag < -max(_CERTAIN * chance, _NO_LOSS * abs(stiffness)):
         late = number(-1e3 * np.angle(stiffness) / (2.0 * np.pi * drive.frequency), 2)
         raise FitError(
-            "the loop gives energy, which no bushing does",
+            "the loop releases energy, which no bushing does",
             file=drive.loop.source.file if drive.loop.source else None,
             found=f"a loss factor of {stiffness.imag / stiffness.real:.3g}: the force lags behind the displacement",
             expected="a force that runs ahead of the displacement",
@@ -360,4 +360,4 @@ def _preload(drive: Drive) -> Iterator[str]:
         unit, factor = display_unit(*units.force, drive.datum)
         means.append(f"a mean {force} of {number(factor * drive.datum, 3)} {unit}")
     if means:
-        yield f"recorded about {' and '.join(means)}; the model knows no preload: the fit takes the loop about its mean"
+        yield f"recorded about {' and '.join(means)}; the model has no preload: the fit uses the loop about its mean"

@@ -164,7 +164,7 @@ def _is_zero(model: Model, name: str, covariance: Covariance) -> bool:
 def _meaning(information: FisherInformation, group: Sequence[str]) -> str:
     """Sentence on the combination of a group of parameters that is not known."""
     if set(group) == set(_FRICTION) and information.error(dict(zip(_FRICTION, (1.0, -1.0), strict=True))) < _KNOWN:
-        return "sigma_fmax and eps_half are known only as a ratio"
+        return "sigma_fmax and eps_half are determined only as a ratio"
     if len(group) > 1:
         return f"{', '.join(group[:-1])} and {group[-1]} cannot be determined separately"
     return f"{group[0]} is not determined"

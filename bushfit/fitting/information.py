@@ -118,7 +118,7 @@ def further_test(model: Model, data_sets: Sequence[MeasuredTest], information: F
     if after[best].max() > min(_LEAST_GAIN_RATIO * before[worst], _HOPELESS):
         return []
     return [
-        f"the further test that would help most: {best}; the standard error of {information.names[worst]} would fall "
+        f"the most helpful further test: {best}; the standard error of {information.names[worst]} would fall "
         f"from {percent(float(before[worst]))} to {percent(float(after[best][worst]))}"
     ]
 
@@ -126,7 +126,7 @@ def further_test(model: Model, data_sets: Sequence[MeasuredTest], information: F
 def _tests(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tuple[str, list[MeasuredTest]]]:
     """Tests that a lab could add: in words, and as the data sets that they would make."""
     loops, sweeps = split_by_kind(data_sets)
-    yield "every test once more", list(data_sets)
+    yield "a repeat of every test", list(data_sets)
     for words, loop in _repeated_loops(model, loops) if loops else _new_loops(model, data_sets):
         yield words, [loop]
     for words, sweep in _new_sweeps(model, data_sets, sweeps):

@@ -95,8 +95,8 @@ def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
         raise FitError(
             "rows are missing inside the loop",
             file=loop.source.file if loop.source else None,
-            found=f"none from {clock[widest]:.4g} to {clock[widest + 1]:.4g} s; how many cycles went by, and so the "
-            "frequency, cannot be told",
+            found=f"none from {clock[widest]:.4g} to {clock[widest + 1]:.4g} s; the number of cycles, and "
+            "therefore the frequency, is unknown",
             expected="no gap longer than a third of a cycle",
             hint="keep the whole cycles before the gap, or those after it",
         )
@@ -220,7 +220,7 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[fl
             return frequency, closed * frequency
     if gap > _OPEN * np.ptp(x):
         raise FitError(
-            "the loop does not hold a whole cycle",
+            "the loop does not contain a whole cycle",
             file=loop.source.file if loop.source else None,
             found=f"displacement from {motion[0]:.4g} to {motion[-1]:.4g} {loop.direction.motion.displacement_unit}",
             expected="at least one closed cycle",
@@ -309,7 +309,8 @@ def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
     if waveform(coefficients) != opposite:
         return None
     return (
-        f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, as those of {like} recorded evenly "
-        f"in time, but the {loop.direction.motion.words[0]} over time is {opposite}: where a file has no time, rate "
+        f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, like those of {like} recorded "
+        f"evenly in time, but the {loop.direction.motion.words[0]} over time is {opposite}: where a file has no "
+        "time, rate "
         'means a triangle, and frequency with waveform = "sine" a sine'
     )

@@ -109,8 +109,8 @@ class MeasuredSweep(MeasuredBase):
         pairs = contradictions(self.measured, place)
         rows = [f"{one} and {second}" for _, *pair in pairs for one, second in [sorted(self.order[pair] + 1)]]
         sentences = [
-            f"{self.source.file if self.source else self.name}: points that repeat each other lie up to "
-            f"{number(100.0 * share, 2)} % apart, rows {', '.join(rows[:_MOST_LISTED])}"
+            f"{self.source.file if self.source else self.name}: repeats of the same points differ by up to "
+            f"{number(100.0 * share, 2)} %, rows {', '.join(rows[:_MOST_LISTED])}"
             + f" and {len(rows) - _MOST_LISTED} more pairs"
             * (len(rows) > _MOST_LISTED)
             for share, *_ in pairs[:1]
@@ -128,7 +128,10 @@ class MeasuredSweep(MeasuredBase):
             return None
         many, spacing = f"{sizes.size} magnitudes at {points} points", f"{number(100.0 * step, 2)} % apart"
         file = self.source.file if self.source else self.name
-        return f"{file}: {many}, {spacing}: they are rounded, and the error of it counts as noise; save more digits"
+        return (
+            f"{file}: {many}, {spacing}: they are rounded, and the rounding error is included in the noise; "
+            "save more digits"
+        )
 
     @property
     def temperature(self) -> Array:

@@ -36,7 +36,8 @@ LineKey = tuple[str, float]
 _ORIGINS = {
     "repeats": "from repeats",
     "stated": "stated in the campaign",
-    "assumed": "no repeats of three points or more: points against a smooth curve, shared part by the class of [rig]",
+    "assumed": "no repeats of three points or more: scatter about a smooth curve; shared errors from the class "
+    "of [rig]",
 }
 
 
@@ -220,7 +221,7 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
 
 
 def _excess_sentence(error: Array, rig: RigSettings) -> str:
-    words = f"more than a rig of this class makes ({class_words(rig)}): measure again, or state the class under [rig]"
+    words = f"more than a rig of this class causes ({class_words(rig)}): measure again, or state the class under [rig]"
     return f"repeats differ as a whole by an error of {words_of(_pair(error))}, {words}"
 
 

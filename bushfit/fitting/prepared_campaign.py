@@ -94,7 +94,10 @@ class PreparedCampaign:
         ):
             return []
         shared = class_words(self.campaign.rig)
-        return [f"nothing was repeated at three points or more: errors shared by a run are the rig's class, {shared}"]
+        return [
+            "no test was repeated at three points or more: the errors shared by a run are assumed from the class "
+            f"of the rig, {shared}"
+        ]
 
     @property
     def robust(self) -> bool:

@@ -49,11 +49,11 @@ _MOST_PASSES = 50
 _TYPICAL_SPRINGPOT = (0.18, 0.24)
 #: What is said of a fit that was stopped.
 _STOPPED = (
-    "the fit was stopped after {} evaluations of the model, where chi-square is flat: parameters that stay open could "
-    "move on, for next to nothing"
+    "the fit was stopped after {} evaluations of the model, where chi-square is flat: undetermined "
+    "parameters could change further without effect"
 )
 #: What is said of levels that disagree by more than their repeats do.
-_LEVELS = "levels disagree by more than their repeats do: an error of {} of each counts as noise"
+_LEVELS = "levels disagree by more than their repeats: an error of {} for each level is included in the noise"
 #: What to do about a model that does not fit, until it is done.
 NEXT = "; bushfit diagnose looks for what is missing"
 
@@ -180,7 +180,7 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
         "the static and the dynamic fit do not converge in turn",
         file=data.campaign.path,
         found=f"{_MOST_PASSES} passes",
-        hint="bushfit fit takes all five parameters together",
+        hint="bushfit fit fits all five parameters together",
     )
 
 
@@ -203,9 +203,9 @@ def _without_springpot(data: PreparedCampaign, solution: Solution, loops: Sequen
         source = f"with the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
     changes = ", ".join(f"{name} by {100 * (better[name] / found[name] - 1):+.1f} %" for name in STATIC)
     return (
-        "m and alpha are not known yet, so the springpot was left out and its stiffness and loss at the loop's rate "
-        f"went into the others; {source} they change: {changes}. bushfit run alternates the two fits, and "
-        "bushfit fit takes all parameters together"
+        "m and alpha are not known yet, so the springpot was left out, and the other parameters include its "
+        f"stiffness and loss at the rate of the loop; {source} they change: {changes}. bushfit run alternates the "
+        "two fits, and bushfit fit fits all parameters together"
     )
 
 
@@ -295,7 +295,7 @@ def _checked(model: Model, data_sets: Sequence[MeasuredTest]) -> str:
     how = "meet" if missed is None else "miss"
     extent = "within their noise" if missed is None else f"by {number(np.sqrt(missed), 2)} times their noise"
     return (
-        f"nothing was fitted here, every parameter is held; the values given {how} the tests {extent} "
+        f"nothing was fitted, because every parameter is fixed; the given values {how} the tests {extent} "
         f"(NRMSE {number(100.0 * found.nrmse, 2)} %, reduced chi-square {number(found.reduced_chi_square, 3)})"
     )
 
@@ -303,11 +303,11 @@ def _checked(model: Model, data_sets: Sequence[MeasuredTest]) -> str:
 def _at_edge(name: str, end: End, solution: Solution, data_sets: Sequence[MeasuredTest], bounds: Bounds) -> str:
     """Sentence on a parameter that rests on a bound: how far from there the tests let it be."""
     if bounds.get(name, (None, None))[end == "max"] is not None:
-        return f"{name} rests on the {end} given in [fit]"
+        return f"{name} is at the {end} given in [fit]"
     limit = limit95(solution, data_sets, name, bounds)
     if limit is None:
-        return f"{name} ended at the edge of what is possible: the data do not determine it"
+        return f"{name} ended at a limit of the model: the data do not determine it"
     parameter = solution.model.parameters[name]
     unit, factor = display_unit(parameter.unit, 1.0, limit)
     how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
-    return f"{name} ended at the edge of what is possible: all that the tests show of it is {how} (95 %)"
+    return f"{name} ended at a limit of the model: the tests only show that it is {how} (95 %)"

@@ -146,7 +146,7 @@ def profile95(
 
 
 def limit95(best: Solution, data_sets: Sequence[MeasuredTest], name: str, bounds: Bounds) -> float | None:
-    """One-sided 95 % limit of a parameter that came to rest on a bound; None if the data set no limit.
+    """One-sided 95 % limit of a parameter that ended at a bound; None if the data set no limit.
 
     A model that misses the data may miss them by as much more.
 

@@ -144,11 +144,11 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
     excluded = [entry for entry in outliers if robust or entry.column == "displacement"]
     followed = [entry for entry in outliers if not robust and entry.column != "displacement"]
     sentences = [
-        (followed, " and the fit follows them: {}; --loss soft_l1 leaves them out"),
+        (followed, " and the fit includes them: {}; --loss soft_l1 leaves them out"),
         (excluded, ", left out of the fit: {}"),
     ]
     return [
-        f"{len(entries)} point{'s lie' if len(entries) > 1 else ' lies'} farther off than noise explains"
+        f"{len(entries)} point{'s lie' if len(entries) > 1 else ' lies'} farther from the model than noise explains"
         f"{words.format(_places(entries))}"
         for entries, words in sentences
         if entries

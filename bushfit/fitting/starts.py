@@ -83,7 +83,7 @@ def start_values(
     inside = {name: float(np.clip(value, *get_parameter(name).bounds)) for name, value in found.items()}
     if inside != found and (reasons := implausible(bushing, data_sets)):
         raise FitError(
-            "the tests are of a size that no rubber shows",
+            "the moduli of these tests are outside those of all rubbers",
             found=reasons[0],
             hint="if these are the units and the dimensions, give start values in [fit] of the campaign",
         )

@@ -86,11 +86,11 @@ def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list
             left_out += sentences
         if not found:
             raise NoTestError(
-                "no file of this folder holds a test",
+                "no file of this folder contains a test",
                 file=path,
                 found="; ".join(left_out) or "nothing",
                 expected="loops or sweeps, as " + ", ".join(TEST_FILES[:4]) + " or .xlsx",
-                hint="bushfit inspect FILE says what it makes of one",
+                hint="bushfit inspect FILE shows how bushfit reads a file",
             )
         sources += found
     by_rows = [_tests_by_rows(source) for source in distribute_options(sources, test_options)]
@@ -162,7 +162,7 @@ def _tests_by_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
         if is_direction and all(same_text(str(test_options.get(key, text)), text) for key, text in keys.items()):
             tests.append(replace(source, test_options={**test_options, **keys, **run}))
         else:
-            why = "as stated" if is_direction else "no direction that is known"
+            why = "as stated" if is_direction else "no known direction"
             left_out.append(f"{source}: its rows of {', '.join(texts)}, {why}")
     return (tests, left_out) if tests else ([source], [])
 
@@ -220,9 +220,9 @@ def _list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
         if path.name.startswith((".", "~$")):
             continue
         if not path.exists():
-            left_out.append(f"{printable(str(path))}: a link that leads nowhere")
+            left_out.append(f"{printable(str(path))}: a broken link")
         elif printable(path.name) != path.name:
-            left_out.append(f"{printable(str(path))}: its name holds characters that are no text; rename it")
+            left_out.append(f"{printable(str(path))}: its name contains characters that are not text; rename it")
         elif path.is_dir() and not path.is_symlink():
             inner_files, inner_left_out = _list_folder(path)
             files += inner_files

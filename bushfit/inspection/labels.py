@@ -119,7 +119,7 @@ def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, L
     if "block" in table.headers:
         state = f'give each block a [[sweeps]] table with rows = {{ block = "1" }} and {key} = "{example}"'
     raise table.header_error(
-        f"nothing says at which {role} this was tested",
+        f"the {role} of this test is not stated",
         found=f"{label}: {' and '.join(quantity.text for quantity in found)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
         hint=f"{state}, or name the column: {table.columns_key(role, expected)}",

@@ -128,7 +128,7 @@ def _stuck(motion: RecordedChannel, force: RecordedChannel) -> Iterator[str]:
         longest = int(np.argmax(np.where(stuck, ends - starts, 0)))
         yield (
             f"{ends[longest] - starts[longest] + 1} rows from data row {starts[longest] + 1} on repeat one "
-            f"{motion.name} and {force.name}, while the motion went on"
+            f"{motion.name} and {force.name}, although the motion continued"
         )
 
 
@@ -185,7 +185,7 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     half_motion = np.ptp(loop.displacement) / 2.0
     amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, float(drive.force.mean())
     facts = {
-        "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'taken as steady'}",
+        "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'treated as steady'}",
         "frequency": f"{drive.frequency:.4g} Hz, {waveform(drive.coefficients)}",
         "sampling": f"{describe_sampling(loop) if loop.timed else 'no time in the file'}, "
         f"{loop.time.size / drive.cycles:.4g} rows a cycle",
@@ -212,11 +212,11 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     if drive.frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
         mistakes = [mistake.in_words(drive.loop) for mistake in MISTAKES.values() if mistake.time < 1.0]
         minutes = number(1.0 / drive.frequency / 60.0, 2)
-        odd.append(f"one cycle takes {minutes} min, as hardly any test does, unless {', or '.join(mistakes)}")
+        odd.append(f"one cycle takes {minutes} min, which is unusual; possible causes: {', or '.join(mistakes)}")
     if _SMALLEST_OFFSET * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and drive.datum is not None:
         odd.append(
-            f"the motion is off zero by {number(to_length * mean_motion, 3)} {length}, "
-            f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the loop counts from its own middle"
+            f"the mean displacement is {number(to_length * mean_motion, 3)} {length}, "
+            f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the fit uses the loop about its own mean"
         )
     return facts, odd
 
@@ -347,8 +347,8 @@ def _ripple(drive: Drive) -> Iterator[str]:
         unit, factor = loop.direction.display.displacement
         yield (
             f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
-            f"({number(100 * lines[line] / drive.amplitude, 2)} % of the amplitude) is on the motion: hum, or a "
-            "controller that hunts? The loop is the slow motion"
+            f"({number(100 * lines[line] / drive.amplitude, 2)} % of the amplitude) is on the motion: mains hum, "
+            "or an oscillating controller? The loop is the slow motion"
         )
 
 

@@ -90,7 +90,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         lacking, "1"
     )
     raise best.header_error(
-        "the columns do not make a test",
+        "the columns are not those of a test",
         kind=NoTestError,
         found=", ".join(best.headers) + f" (understood: {understood})" if understood else None,
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
@@ -109,7 +109,7 @@ def _refuse_resonance(file: Path, test_options: Mapping[str, Any]) -> None:
             "this is a resonance test, not a sweep",
             kind=NoTestError,
             expected="loops and sweeps",
-            hint=f'bushfit reduce {quote_path(file)} --mass "..." makes a sweep of it',
+            hint=f'bushfit reduce {quote_path(file)} --mass "..." converts it to a sweep',
         )
 
 
@@ -161,7 +161,7 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
     found = Direction(*in_column) if len(in_column) == 1 else named
     if "direction" not in test_options:
         if len(in_column) > 1:
-            problem, hint = "this file holds tests in several directions", "state one: --direction axial"
+            problem, hint = "this file contains tests in several directions", "state one: --direction axial"
             raise table.header_error(problem, found=", ".join(in_column), expected="one direction", hint=hint)
         return found
     if found and found != test_options["direction"] and len(in_column) < 2:
@@ -342,7 +342,7 @@ def _read_loop(
             raise error from None
     odd = (
         f'"{table.roles["force"].header}" falls where "{table.roles["displacement"].header}" rises: the load cell '
-        "counts the other way, and the campaign needs force_sign = -1"
+        "counts the other way, and state force_sign = -1 in the campaign"
     )
     return turned, entry, [odd]
 
@@ -362,10 +362,7 @@ def _classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tupl
     facts, odd = describe_loop(loops[0], by_name)
     if fast or len(points) > 1:
         description = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
-        odd.append(
-            f"a motion {description} is taken for a loop; should it be a stepped sine, bushfit reduce makes points of "
-            "it"
-        )
+        odd.append(f"a motion {description} is read as a loop; if it is a stepped sine, run bushfit reduce")
     return "loop", (facts, odd)
 
 
@@ -394,12 +391,12 @@ def _written(table: Table) -> dict[str, str]:
     else:
         written = {
             "encoding": source.encoding or "UTF-8",
-            "columns parted by": next(name for name, mark in DELIMITERS.items() if mark == layout.delimiter),
+            "columns separated by": next(name for name, mark in DELIMITERS.items() if mark == layout.delimiter),
             "decimal mark": "comma" if table.numerals.decimal == "," else "point",
             "header": f"line {layout.header_line}",
         }
     if table.numerals.thousands:
-        written["thousands parted by"] = repr(table.numerals.thousands)
+        written["thousands separated by"] = repr(table.numerals.thousands)
     if layout.units_line:
         written["units"] = f"line {layout.units_line}"
     return written

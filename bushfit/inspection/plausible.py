@@ -44,4 +44,4 @@ def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffnes
                 else format_range(unit, low, high)
                 for low, high in (ends, (lowest, highest))
             )
-            yield f"{name} of {found} is that of no test of rubber ({expected}): is the unit in the header right?"
+            yield f"{name} of {found} is outside all tests of rubber ({expected}): is the unit in the header right?"

@@ -135,9 +135,10 @@ class Inspection:
                 f'its strain is taken as {meaning}, else strain = "{alternative}" or "tensor" in [[specimens]]'
             )
         if self.is_counting_open:
-            missing = "nothing says" if "at_amplitude" in self.entry else "its header does not say"
+            missing = "nothing says" if "at_amplitude" in self.entry else "the header does not state"
             assumptions.append(
-                f"{missing} how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak"
+                f"{missing} how amplitudes are counted: zero-to-peak is assumed; --amplitude peak-to-peak states "
+                "the other"
             )
         return "; ".join(assumptions) or None
 
@@ -172,7 +173,10 @@ def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[
     head = _key_lines({"name": name, **(bushing or {})})
     order = [inspection for kind in _TABLES for inspection in files if inspection.kind == kind]
     tables = [*_specimens(files), *(file_text(inspection, folder) for inspection in order)]
-    report = '# [report] heads the report: customer = "...", part_number = "...", drawing, laboratory, date, logo\n'
+    report = (
+        '# [report] fills the head of the report: customer = "...", part_number = "...", drawing, '
+        "laboratory, date, logo\n"
+    )
     return "\n".join([*(["[bushing]"] if bushing else []), *head, "", *tables, report])
 
 
@@ -197,7 +201,7 @@ def campaigns_of_parts(
     of_parts: list[Any] = [inspection.entry.get("specimen_number") for inspection in files]
     if None in of_parts:
         raise CampaignError(
-            "nothing says of which part this is",
+            "the part of this test is not stated",
             file=files[of_parts.index(None)].file,
             found=f"parts {', '.join(dict.fromkeys(filter(None, of_parts)))} in others",
             expected="a number of the specimen in every file, or the tests of one part",
@@ -253,7 +257,7 @@ def _key_lines(keys: Mapping[str, Any]) -> Iterator[str]:
 
 def pasted_text(files: Sequence[Inspection]) -> str:
     """Tables to paste into a campaign in any folder: files are named by their full path."""
-    head = "# files by their full path, which holds in any folder; bushfit init writes them as seen from the campaign\n"
+    head = "# files with their full path; bushfit init writes paths relative to the campaign\n"
     tables = [*_specimens(files), *(file_text(inspection) for inspection in files)]
     return head * any(inspection.kind in _TABLES for inspection in files) + "\n".join(tables)
 
@@ -278,7 +282,7 @@ def file_text(inspection: Inspection, folder: Path | None = None) -> str:
         name = printable(name)
         word = f'"{name}"' if " " in name else name
         direction_word = inspection.direction or "..."
-        return f"# {name} is a raw history: bushfit reduce {word} --direction {direction_word} makes a sweep of it\n"
+        return f"# {name} is a raw history: bushfit reduce {word} --direction {direction_word} converts it to a sweep\n"
     lines = [f"[[{_TABLES[inspection.kind]}]]", f"file = {toml_value(name)}"]
     lines += [] if isinstance(inspection.direction, Specimen) else [f"direction = {direction}"]
     return "\n".join([*lines, *_key_lines(inspection.entry), ""])

@@ -103,7 +103,7 @@ def _copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
         verb = "s repeat others" if copies > 1 else " repeats another"
         yield (
             f"{copies} row{verb} digit by digit, the first of them at {sweep.frequency[first]:.4g} Hz (data row "
-            f"{first + 1}): copied, not measured again?"
+            f"{first + 1}): copied instead of measured?"
         )
 
 
@@ -118,8 +118,9 @@ def _close_levels(sweep: Sweep) -> Iterator[str]:
     frequency, smallest = min(steps, key=lambda step: step[1], default=(0.0, np.inf))
     if smallest < _SMALLEST_STEP and round(of_frequency) != passes:
         yield (
-            f"two amplitudes at {frequency:.4g} Hz lie {number(100 * np.expm1(smallest), 2)} % apart and count as two "
-            "levels: if they are repeats, a column repeat with their numbers tells so"
+            f"two amplitudes at {frequency:.4g} Hz differ by {number(100 * np.expm1(smallest), 2)} % and are "
+            "treated as two "
+            "levels; if they are repeats, number them in a column repeat"
         )
 
 
@@ -162,7 +163,7 @@ def _outliers(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
             f"{reference}"
         )
     if outliers.size > _MOST_LISTED:
-        yield f"{outliers.size - _MOST_LISTED} more points are as far off"
+        yield f"{outliers.size - _MOST_LISTED} more points deviate as much"
 
 
 def _from_curve(sweep: Sweep) -> Array:
@@ -219,7 +220,7 @@ def _odd_blocks(sweep: Sweep) -> Iterator[str]:
         if abs(block_gain) > max(_FAR * usual, _SMALLEST_BLOCK_OFFSET):
             yield (
                 f"{shown_amplitude(sweep.direction, sweep.amplitude[rows[0]])}, repeat {sweep.repeat[rows[0]]} lies "
-                f"{number(100 * np.expm1(block_gain), 2, '+')} % off the other repeats as a whole: "
+                f"{number(100 * np.expm1(block_gain), 2, '+')} % from the other repeats as a whole: "
                 "other amplitude, temperature or mounting?"
             )
     repeat = np.array([sweep.repeat[rows[0]] for rows in blocks], dtype=float)
@@ -257,7 +258,7 @@ def _odd_loss(sweep: Sweep) -> Iterator[str]:
     if mistakes:
         unless = ", or ".join(mistake.in_words(sweep) for mistake in mistakes)
         loss = float(np.median(loss_factor(sweep.stiffness)))
-        yield f"the loss factor is {number(loss, 2)} in the median, that of hardly any rubber, unless {unless}"
+        yield f"the loss factor is {number(loss, 2)} in the median, unusual for rubber; possible causes: {unless}"
 
 
 def _complex_median(values: Array) -> complex:

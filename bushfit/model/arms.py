@@ -74,8 +74,8 @@ class Arms:
     def sentence(self) -> str:
         """How many they are, what they stand for, and their error."""
         count, (low, high) = self.time.size, (number(end, 3) for end in self.band)
-        arms = f"{count} Maxwell arm{'s' * (count > 1)} in place of the {self.stands_for}"
-        return f"{arms}: off by at most {number(100.0 * self.error, 2)} % of its modulus from {low} to {high} Hz"
+        arms = f"{count} Maxwell arm{'s' * (count > 1)} represent the {self.stands_for}"
+        return f"{arms}: error at most {number(100.0 * self.error, 2)} % of its modulus from {low} to {high} Hz"
 
 
 def fitted_arms(
@@ -123,7 +123,7 @@ def fitted_arms(
         stalled = 0 if error < _BETTER * best else stalled + 1
         best = min(best, error)
     raise ModelError(
-        "no springs and dashpots come near enough to what depends on the rate",
+        "no set of springs and dashpots represents the frequency dependence closely enough",
         found=f"an error of {100.0 * best:.3g} % with up to {arms} arms",
         expected=f"{100.0 * accuracy:.3g} % from {low:g} to {high:g} Hz",
         hint="allow a larger error",

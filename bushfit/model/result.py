@@ -115,7 +115,7 @@ class Usable:
 
 @dataclass(frozen=True)
 class Outlier:
-    """A point that lies farther off than noise explains, beside neighbours that do not.
+    """A point that lies farther from the model than noise explains, beside neighbours that do not.
 
     Args:
         test: by its name.

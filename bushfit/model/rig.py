@@ -119,7 +119,7 @@ def imposed(
     untimed = [effect.name for effect in model.records if effect.harmonic_only]
     if untimed:
         raise ModelError(
-            "the rig follows a motion through time, for which there is no law",
+            "the rig follows a motion through time, for which this effect has no law",
             place=untimed[0],
             found="a law of the steady first harmonic alone",
             expected="effects with a law in time",

@@ -38,7 +38,7 @@ def from_result(result: Result, noise: Noise | None = None, source: str = "") ->
     """
     model, fitted = result.model, result.covariance
     names = tuple(name for name in fitted.names if fitted.stderr(name)) or tuple(model.parameters)
-    covariance, origin = np.eye(len(names)) / 4.0, "values given by hand, taken as right within a factor of 2.7"
+    covariance, origin = np.eye(len(names)) / 4.0, "given values, assumed to be known within a factor of 2.7"
     if fitted.names:
         size = Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names)
         covariance, origin = fitted.restricted(names).matrix / np.outer(size, size), "a fitted model"
@@ -97,7 +97,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
     names = list(dict.fromkeys(twins_of(name)[0] for name in rivals or next(iter(sets), ())))
     if not names:
         raise ModelError(
-            "there are no rivals to be told apart",
+            "there are no rivals to distinguish",
             file=data.campaign.path,
             found=f"the diagnosis of these tests is {diagnosis.verdict}",
             expected="ambiguous",

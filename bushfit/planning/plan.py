@@ -41,7 +41,7 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
     """
     if request.aim == "rivals" and len(knowledge.rivals) < 2:
         raise ModelError(
-            "there are no rivals to be told apart",
+            "there are no rivals to distinguish",
             found=knowledge.source,
             expected="tests of a campaign that two effects or more explain alike",
             hint="plan from the campaign, or for parameters or predictions",
@@ -110,7 +110,7 @@ def explain_miss(search: PlanSearch, goal: Goal) -> str | None:
     if goal.met(covariance(more)):
         return f"{number(search.hours, 3)} h are too few, about {hours} h would do"
     reached = percent(goal.half_width(covariance(more)))
-    return f"{hours} h would reach {reached}, and no further run would take a quarter per cent off that"
+    return f"{hours} h would reach {reached}, and no further run would reduce that by a quarter per cent"
 
 
 def describe_purpose(search: PlanSearch, test: int) -> str:
@@ -165,15 +165,17 @@ def explain_free_hours(search: PlanSearch, planned: Programme, missed: Sequence[
     hours, free = request.hours, request.hours - planned.hours
     if free <= float(budget.minutes.max() + budget.setup_minutes) / 60.0:
         return None
-    reason = "no further run would take a quarter per cent off the error"
+    reason = "no further run would reduce the error by a quarter per cent"
     if request.aim == "rivals" and search.hours < hours:
-        reason = "these tests tell the rivals apart"
+        reason = "these tests distinguish the rivals"
     elif missed and search.hours < hours:
         reason = "no target that can be met is missed" if any(missed) else "all targets are met"
     if not planned.tests:
         needed = "would help" if any(missed) else "is needed"
-        return f"no test {needed}: {reason} by what is known, and all of the {number(hours, 3)} h stay free"
-    return f"{number(planned.hours, 2)} of {number(hours, 3)} h are enough: {reason}, and {number(free, 2)} h stay free"
+        return f"no test {needed}: {reason} from the tests so far, and all {number(hours, 3)} h remain free"
+    return (
+        f"{number(planned.hours, 2)} of {number(hours, 3)} h are enough: {reason}, and {number(free, 2)} h remain free"
+    )
 
 
 def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str | None]) -> Iterator[str]:
@@ -193,8 +195,8 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
     model_error = max((float(points.model_error[0].max(initial=0.0)) for points in problem.wanted), default=0.0)
     if model_error > _NOTABLE_RATIO - 1.0:
         yield (
-            f"the errors of the stiffness contain the model error, up to {number(100.0 * model_error, 2)} %, which no "
-            "test lowers; bushfit diagnose looks for the effect that the model lacks"
+            f"the errors of the stiffness include the model error, up to {number(100.0 * model_error, 2)} %, "
+            "which no test reduces; bushfit diagnose looks for the missing effect"
         )
     yield from knowledge.warnings
     for target, half, reason in zip(request.targets, planned.halves, missed, strict=True):
@@ -202,18 +204,18 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
             yield f"{target}: {percent(target.half)} asked for, {percent(half)} planned: {reason}"
     if knowledge.bounded:
         yield (
-            f"{' and '.join(knowledge.bounded)} ended at a bound: the errors of the others count that noise "
-            "takes it off there half of the times"
+            f"{' and '.join(knowledge.bounded)} ended at a bound: the errors of the others include half of the "
+            "error that it would add"
         )
     if missed and not search.determines_scatter(search.counts):
-        yield "too few repeats tell how sweeps scatter: intervals may come out half as wide again as planned"
+        yield "too few repeats determine the scatter of sweeps: intervals may become half as wide again as planned"
     if effects := search.less_visible_effects(search.counts):
         yield f"the standard programme shows these effects better: {', '.join(effects)}"
     for pair in np.argwhere(np.triu(~problem.separable_rivals, 1)).tolist():
         names = (knowledge.rivals[rival].model.effects[-1] for rival in pair)
-        yield f"no test of this rig would tell {' from '.join(names)}: they are left out"
+        yield f"no test of this rig would distinguish {' from '.join(names)}: they are left out"
     if planned.rival_chi_square is not None and planned.rival_chi_square < RIVALS_APART:
         yield (
             f"the nearest rivals are {number(planned.rival_chi_square, 2)} apart in expected chi-square, less than the "
-            f"{number(RIVALS_APART, 3)} that tell them in nine of ten cases"
+            f"{number(RIVALS_APART, 3)} that distinguishes them in nine of ten cases"
         )

@@ -163,8 +163,11 @@ class Goal:
         if variance[worst] > 0.25 * self.variances(knowledge.covariance)[worst]:
             remaining = f"{name}, which no test on offer determines well enough"
         size, cause = max(
-            (Z95 * float(self.model_error[worst]), "the model's own error: no test lowers it, naming its cause may"),
-            (float(self.undecided[worst]), "what the tests leave undecided: bushfit diagnose names the next test"),
+            (Z95 * float(self.model_error[worst]), "the model error: no test reduces it, but naming its cause may"),
+            (
+                float(self.undecided[worst]),
+                "explanations that the tests cannot distinguish: bushfit diagnose names the next test",
+            ),
             (Z95 * float(np.sqrt(variance[worst])), remaining),
         )
         location = ""

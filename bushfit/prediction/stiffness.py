@@ -311,7 +311,7 @@ def predict_resonance(
         peaks = np.array([shaken(model).peak for model in _alternatives(result, rig=False)])
         (low, smallest), (high, largest) = peaks.min(axis=0), peaks.max(axis=0)
         span = f"{number(low, 4)} to {number(high, 4)} Hz, |T| {number(smallest, 4)} to {number(largest, 4)}"
-        warnings += [*result.undecided, f"{subject}: {span}, by the models that the tests leave possible"]
+        warnings += [*result.undecided, f"{subject}: {span}, for all models that agree with the tests"]
     if if_rigs:
         peak, ratio = (number(value, 4) for value in if_rigs.peak)
         warnings.append(

@@ -257,7 +257,7 @@ class Cells:
         """
         if found is None and self.is_table:
             found = ", ".join(self.headers)
-        found = found or f"{len(self.headers)} cell{'s' * (len(self.headers) != 1)}, which name no columns of a test"
+        found = found or f"{len(self.headers)} cell{'s' * (len(self.headers) != 1)}, without the name of a column"
         return self.error(problem, line=self.layout.header_line, found=found, **details)
 
     @property

@@ -265,7 +265,7 @@ def _by_unit(cells: Cells, roles: dict[str, Column]) -> list[str]:
         ]
         if role not in roles and len(fitting) == 1:
             roles[role] = replace(fitting[0], role=role)
-            notes.append(f'"{fitting[0].header}" is taken as the {role} by its unit')
+            notes.append(f'"{fitting[0].header}" is read as the {role} by its unit')
     if "time" not in roles:
         stamps = [
             column for column in _unnamed(cells) if clock(str((*first, *cells.headers)[column.index])) is not None
@@ -283,7 +283,7 @@ def _angle_as_phase(cells: Cells, roles: dict[str, Column]) -> list[str]:
     if len(angles) != 1:
         return []
     roles["phase"] = replace(angles[0], role="phase")
-    return [f'"{angles[0].header}" is taken as the phase by its unit']
+    return [f'"{angles[0].header}" is read as the phase by its unit']
 
 
 def _motion_as_amplitude(
@@ -322,4 +322,4 @@ def _motion_as_amplitude(
         if x.size == 0 or not np.all(np.abs(np.abs(k * x) - np.abs(f)) <= 0.1 * np.abs(f)):
             return []
     roles["amplitude"] = replace(fitting[0], role="amplitude")
-    return [f'"{fitting[0].header}" is taken as the amplitude: it stands beside the amplitude of the force']
+    return [f'"{fitting[0].header}" is read as the amplitude, because the file has the amplitude of the force, too']

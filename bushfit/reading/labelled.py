@@ -93,7 +93,7 @@ class LabelledCells(Cells):
         if several or (chosen and not selected):
             conflicts = [(column, parts, "one part")] if several else chosen
             raise self.header_error(
-                "this file holds tests of several parts" if several else "no row is of this test",
+                "this file contains tests of several parts" if several else "no row is of this test",
                 found="; ".join(
                     f'{", ".join(dict.fromkeys(texts))} in column "{self.headers[index]}"'
                     for index, texts, _ in conflicts
@@ -136,7 +136,8 @@ class LabelledCells(Cells):
                 listed = ", ".join(values[:4]) + ", ..." * (values.size > 4)
                 yield (
                     f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all '
-                    f'rows count as one test; rows = {{ "{header}" = "{values[0]}" }} in the campaign takes those alone'
+                    f'rows count as one test; rows = {{ "{header}" = "{values[0]}" }} in the campaign selects '
+                    "those alone"
                 )
 
     def _texts_of_tests(self, index: int) -> list[str]:

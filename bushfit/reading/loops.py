@@ -49,7 +49,7 @@ def read_loop(file: Path, direction: Place, test: LoopFile, *, name: str | None 
             "the force falls where the displacement rises",
             column=wanted["force"],
             expected="force and displacement counted in the same direction",
-            hint="if the load cell counts the other way round, write force_sign = -1 in the campaign"
+            hint="if the force has the opposite sign, write force_sign = -1 in the campaign"
             if test.force_sign == 1
             else "take force_sign = -1 out of the campaign",
         )

@@ -104,7 +104,7 @@ def _resonance_columns(table: Table, *, has_stated_base: bool) -> dict[str, Colu
         )
     if not (has_base or has_stated_base):
         raise table.header_error(
-            "nothing says how strongly the base was shaken",
+            "the acceleration of the base is not stated",
             expected="a column such as base acceleration [g]",
             hint='state it: --base-acceleration "0.1 g"',
         )

@@ -86,7 +86,7 @@ def force_amplitude_convention(table: Table, column: Column, of_motion: Amplitud
         forms = {"peak-to-peak": "p-p", "rms": "rms"}
         keys = (f'units = {{ force_amplitude = "{column.unit} {form}" }}' for form in (forms[of_motion], "0-p"))
         raise table.header_error(
-            "nothing says how the amplitudes of the force are counted",
+            "the header does not state how the amplitudes of the force are counted",
             found=f'"{column.header}" beside a displacement that is {of_motion}',
             expected="p-p, rms or 0-p in the header",
             hint=f"{' or '.join(keys)} in the campaign",
@@ -116,7 +116,7 @@ def with_positive_loss(
         header = columns["phase"].header
         wrapped = np.angle(np.exp(1j * phase))
         if np.abs(phase).max() > np.pi * (1.0 + 1e-9):
-            notes.append(f'"{header}" goes beyond 180 deg and is wrapped')
+            notes.append(f'"{header}" exceeds 180 deg and is wrapped')
         else:
             wrapped = phase
         automatic = test.force_sign is None and np.median(np.abs(wrapped)) > np.pi / 2.0
@@ -124,7 +124,7 @@ def with_positive_loss(
             wrapped = np.angle(-np.exp(1j * wrapped))
         if automatic:
             notes.append(
-                f'"{header}" lies beyond 90 deg: the force counts the other way, and the phase is turned by 180 deg; '
+                f'"{header}" exceeds 90 deg: the force has the opposite sign, and the phase is turned by 180 deg; '
                 "force_sign = 1 in the campaign keeps it"
             )
         corrected["phase"] = wrapped
@@ -141,7 +141,7 @@ def with_positive_loss(
             corrected[role] = -corrected[role]
         if automatic:
             notes.append(
-                f'"{columns[role].header}" is negative throughout and is taken with the other sign; '
+                f'"{columns[role].header}" is negative throughout and is read with the opposite sign; '
                 "phase_sign = 1 in the campaign keeps it"
             )
     return corrected, tuple(notes)
@@ -190,7 +190,7 @@ def check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
     """
     if np.mean(loss_factor < -LEAST_LOSS_FACTOR) > _THROUGHOUT:
         raise table.error(
-            "the loss counts the other way",
+            "the loss has the opposite sign",
             column=column,
             found=f"{np.count_nonzero(loss_factor < 0.0)} of {loss_factor.size} rows below zero",
             expected="a force that leads the displacement: phase, loss factor and loss stiffness above zero",

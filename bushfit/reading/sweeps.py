@@ -189,7 +189,7 @@ def amplitude_convention(
         return stated_convention or "zero-to-peak"
     if column.convention and stated_convention and column.convention != stated_convention:
         raise table.header_error(
-            "header and campaign count amplitudes differently",
+            "header and campaign state different counts of the amplitude",
             column=column,
             found=f'{column.convention} in the header, amplitude = "{stated_convention}" in the campaign',
             expected="one convention",
@@ -253,7 +253,7 @@ def rows_at_temperature(
     if stated_temperature is None:
         if np.ptp(celsius) <= ONE_TEST:
             return rows, round(float(celsius.mean()), 2) + si.CELSIUS, kelvin
-        problem, expected = "this file holds tests at several temperatures", "one temperature"
+        problem, expected = "this file contains tests at several temperatures", "one temperature"
     else:
         rows = np.flatnonzero(np.abs(kelvin - stated_temperature) <= SAME_TEMPERATURE)
         if rows.size >= _FEWEST_SWEEP_ROWS:

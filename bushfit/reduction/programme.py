@@ -150,7 +150,7 @@ def _check_not_changing(loop: Loop, size: Floats) -> None:
             "no part of the record is a loop",
             file=loop.source.file if loop.source else loop.name,
             found=f"{size.size / 2.0:.2g} cycles from {factor * size.min() / 2.0:.3g} to "
-            f"{factor * size.max() / 2.0:.3g} {unit}, no two in a row alike",
+            f"{factor * size.max() / 2.0:.3g} {unit}, no two successive ones equal",
             expected="at least two cycles of one amplitude and rate",
             hint="record more cycles of each amplitude, best five",
         )

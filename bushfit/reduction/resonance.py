@@ -78,12 +78,12 @@ class Resonance:
         if omitted.size:
             sentences.append(
                 f"{omitted.size} of {total} points left out, {omitted.min():.4g} to {omitted.max():.4g} Hz: the "
-                f"standard error of K is beyond {100 * LARGEST_ERROR:g} % there, because the mass moves almost as "
+                f"standard error of K exceeds {100 * LARGEST_ERROR:g} % there, because the mass moves almost as "
                 "the base does"
             )
         if self.turned:
             sentences.append(
-                "the phases of this file count the other way: taken with the sign that makes the loss positive"
+                "the phases of this file have the opposite sign: read with the sign that makes the loss positive"
             )
         frequency, largest = self.peak
         if frequency in (self.test.frequency[0], self.test.frequency[-1]):
@@ -187,7 +187,7 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
     is_kept = (error <= LARGEST_ERROR) & (stiffness.real > 0.0)
     if not is_kept.any():
         raise MeasurementError(
-            "no point of this test tells the stiffness",
+            "no point of this test determines the stiffness",
             file=test.source.file,
             found=f"{100 * error.min():.3g} % at best",
             expected=f"a standard error of K of at most {100 * LARGEST_ERROR:g} % somewhere",
@@ -220,9 +220,10 @@ def _is_turned(test: ResonanceTest) -> bool:
     loss = -float(np.sum(weight * np.sin(np.angle(flexibility))))
     if max(share, 1.0 - share) < _CLEAR_SHARE or abs(loss) < LEAST_LOSS_FACTOR:
         raise MeasurementError(
-            "the phases show no loss, whichever way they count",
+            "the phases show no loss with either sign",
             file=test.source.file,
-            found=f"a mean loss factor of {loss:.2g}, above zero in {100 * share:.0f} % of what the test tells",
+            found=f"a mean loss factor of {loss:.2g}, above zero in {100 * share:.0f} % of the points that the "
+            "test determines",
             expected="a mass that lags behind the base through the whole resonance",
             hint="check the unit of the phases, deg or rad, and that they are those of base and mass",
         )
@@ -231,7 +232,7 @@ def _is_turned(test: ResonanceTest) -> bool:
         raise MeasurementError(
             "the stiffness comes out below zero",
             file=test.source.file,
-            found=f"a stiffness above zero in {100 * positive:.0f} % of what the test tells",
+            found=f"a stiffness above zero in {100 * positive:.0f} % of the points that the test determines",
             expected="a mass that moves with the base at low frequency, and more around the resonance",
             hint="check that base and mass are not swapped, and that no phase is off by 180 deg",
         )

@@ -120,7 +120,7 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
     unit, factor = reduction.direction.display.displacement
     steps = reduction.steps
     if reduction.outliers:
-        yield f"{reduction.outliers} row{'s' * (reduction.outliers > 1)} far off the rows around left out"
+        yield f"{reduction.outliers} row{'s' * (reduction.outliers > 1)} far from their neighbours left out"
     yield from _preload(reduction)
     slope = _amplitude_slope(steps)
     for level in sorted({step.level for step in steps}):
@@ -130,15 +130,15 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
             yield (
                 f"the rig reached {low:.4g} to {high:.4g} {unit} at the level of {factor * level:.4g} {unit}: |K| "
                 f"there is up to {number(100 * abs(slope) * np.abs(miss).max(), 2)} % off that at the level (fits "
-                "count with what was reached)"
+                "use the amplitude that was reached)"
             )
     coarse = [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]
     if coarse:
         worst = min(coarse, key=lambda step: step.rows_per_cycle)
         yield (
             f"{len(coarse)} of {len(steps)} points have fewer than {_FEW_ROWS_PER_CYCLE} rows a cycle "
-            f"({worst.rows_per_cycle:.3g} at {worst.frequency:.4g} Hz): overtones above half the sampling rate may "
-            "fold onto the fundamental"
+            f"({worst.rows_per_cycle:.3g} at {worst.frequency:.4g} Hz): harmonics above half the sampling rate "
+            "may fold onto the fundamental"
         )
     bent = [step for step in steps if step.displacement_distortion > 0.02]  # rigs in order have less
     if bent:
@@ -150,7 +150,7 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
         )
     rejected = [skip for skip in reduction.skipped if skip.steady]
     for skip in rejected[:_MOST_LISTED]:
-        yield f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}"
+        yield f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}"
     if len(rejected) > _MOST_LISTED:
         yield f"{len(rejected) - _MOST_LISTED} more stretches make no point"
 
@@ -168,7 +168,7 @@ def _preload(reduction: Reduction) -> Iterator[str]:
             ends = dict.fromkeys(number(factor * end, 3) for end in sorted((min(found), max(found)), key=abs))
             means.append(f"a mean {word} of {' to '.join(ends)} {written}")
     if means:
-        yield f"recorded about {' and '.join(means)}; the model knows no preload: the points are those about it"
+        yield f"recorded about {' and '.join(means)}; the model has no preload: the points refer to this mean"
 
 
 def _amplitude_slope(steps: Sequence[Step]) -> float:

@@ -276,7 +276,7 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
         for name in existing:
             if (folder / name).is_dir():
                 raise OutputError(
-                    "a folder stands where a file goes", file=folder / name, hint=f"move it away, or {elsewhere}"
+                    "a folder has the name of a result file", file=folder / name, hint=f"move it away, or {elsewhere}"
                 )
             if any(_is_same(folder / name, file) for file in inputs):
                 raise OutputError("a result would replace an input of this run", file=folder / name, hint=elsewhere)
@@ -287,14 +287,14 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
         raise unwritable(folder, error) from error
     if foreign:
         raise OutputError(
-            "a result would replace a file that is not as bushfit wrote it",
+            "a result would replace a file that bushfit did not write, or that was changed",
             file=folder,
             found=", ".join(foreign),
             hint=f"move it away, or {elsewhere}",
         )
     if existing and not overwrite:
         raise OutputError(
-            "results stand there already",
+            "there are results already",
             file=folder,
             found=", ".join(existing),
             hint="--force replaces them; -o/--output names another folder",

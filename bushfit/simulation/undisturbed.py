@@ -80,7 +80,7 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
     if not (loops or sweeps or resonances):
         if truth.bushing is None:
             raise CampaignError(
-                "nothing says what to test",
+                "the tests to simulate are not stated",
                 found="specimens alone",
                 expected="a campaign with [[simulate.sweeps]] of a specimen; the paper's tests are those of a bushing",
             )

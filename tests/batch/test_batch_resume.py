@@ -147,7 +147,7 @@ def test_one_batch_holds_a_folder_and_clears_what_a_killed_one_left(
         assert not left.exists()
         second = typed(*ALL, option)
         assert (second.returncode, second.stdout) == (2, "")
-        assert "another batch is at work there" in second.stderr
+        assert "another batch is running in this folder" in second.stderr
     assert not (shop / "all" / store.STAGE).exists()
 
 

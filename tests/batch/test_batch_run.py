@@ -158,7 +158,7 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
     assert good["on a bound"] == ""
     assert "mu (max)" in held["on a bound"]
     assert "at the max of its fit" in held["on the edge"]
-    assert "warning: at a bound of the fit, which the tests do not determine: " in done.stderr
+    assert "warning: at a bound of the fit, because the tests do not determine them: " in done.stderr
     assert "mu of b1" in done.stderr
     assert "b1 passes conditionally: mu 0.2 MPa" in done.stderr
     none = typed("batch", "bushings/b[013]/bushing.toml", "-o", "none", "--no-plots", "--effect", "inertia", "--json")
@@ -224,9 +224,9 @@ def test_a_campaign_that_kills_its_worker_is_told_once_and_the_others_go_on(
 @pytest.mark.parametrize(
     ("report", "words"),
     [
-        ("old.xml", "not as bushfit wrote it"), ("old.xml/r.xml", "not a folder"),
-        ("bushings", "a folder stands where a file goes"), ("all/bushings/b0/r.xml", "among the results"),
-        ("all/bushings/../batch.csv", "in place of the table"), ("all/batch.png", "in place of the table"),
+        ("old.xml", "that bushfit did not write"), ("old.xml/r.xml", "not a folder"),
+        ("bushings", "a folder has the name of a result file"), ("all/bushings/b0/r.xml", "inside the results"),
+        ("all/bushings/../batch.csv", "replace the table"), ("all/batch.png", "replace the table"),
     ],
 )  # fmt: skip
 def test_a_report_that_cannot_be_written_is_refused_before_the_work(

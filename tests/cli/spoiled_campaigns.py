@@ -23,7 +23,7 @@ IN_CAMPAIGN = [
     *(('length = "34 mm"', f'length = "34 mm"\n[compound]\nhardness = "61 Shore A"\nfiller = {text}', "campaign.toml, compound.filler", said) for text, said in (('"27"', "27 phr"), ('"27 %"', "27 phr"), ('"27 phr silica"', "27 phr"), ("true", "27 phr"), ('"500 phr"', "500 phr"))),
     ('length = "34 mm"', 'length = "1 mm"\nshape = "calibrated"', "campaign.toml, shape: no finite elements were computed for this shape", "inner/outer 0.15 to 0.92 and length/outer 0.1 to 60"),
     ('"loop.csv"', r'"C:\Tests.csv"', "campaign.toml, line 8, column", "write / for each \\ of a path"),
-    ("[[sweeps]]", "[[loops]]\nfile = 'x'\n[loops]", "campaign.toml, line 13, column", "several tests stand under [[loops]]"),
+    ("[[sweeps]]", "[[loops]]\nfile = 'x'\n[loops]", "campaign.toml, line 13, column", "list several tests under [[loops]]"),
     ("[[loops]]", "[loops]", "campaign.toml, loops: this value is not understood", "write [[loops]], in two brackets"),
     ('"loop.csv"', '"lop.csv"', "lop.csv: there is no such file", 'did you mean "loop.csv"?'),
     ('"loop.csv"', '"."', ".: this is not a file", "a file"),

@@ -89,7 +89,9 @@ def test_an_input_of_the_run_is_not_replaced(own: Path, typed: Run) -> None:
     before = {file.name: file.read_bytes() for file in own.glob("*.*")}
     for command in (("fit", "campaign.toml"), ("simulate", "campaign.toml")):
         refused = typed(*command, "-o", ".", "--force", "--no-plots", status=2)
-        assert "an input of this run" in refused.stderr or "nothing says what to simulate" in refused.stderr
+        assert (
+            "an input of this run" in refused.stderr or "the campaign does not state what to simulate" in refused.stderr
+        )
     typed("fit", "campaign.toml", "-o", "x", "--no-plots")
     refused = typed("diagnose", "campaign.toml", "--model", "x/model.json", "-o", "x", "--force", status=2)
     assert "x/model.json: a result would replace an input of this run" in refused.stderr

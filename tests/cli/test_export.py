@@ -252,7 +252,7 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit: Run, tmp_path: Pat
         for line in each["left_out"]:
             assert f"{name} leaves out: {line}" in done.stderr
     for words in (
-        "axial: amplitude, one a property: taken at 0.2 mm, |K| is ",
+        "axial: one amplitude per property: with 0.2 mm, the error of |K| is ",
         "axial: the 95 % band, up to ",
         "no law in time",
         "no stiffness in torsion, rotations about x and y",
@@ -268,7 +268,7 @@ def test_the_tables_are_those_of_predict_and_arms_stand_beside_an_fmu(bushfit: R
     (fmu,) = json.loads(done.stdout)["formats"]["fmu"]["files"]
     assert names(tmp_path) == {fmu, "arms.csv", "arms.png"}
     arms = pd.read_csv(tmp_path / "arms.csv")["relaxation time [s]"]
-    assert f"{arms.notna().sum()} Maxwell arms in place of the springpot" in done.stderr
+    assert f"{arms.notna().sum()} Maxwell arms represent the springpot" in done.stderr
     grid = ("--direction", "axial", "--amplitudes", "0.1, 0.3 mm", "--frequencies", "10:30:10 Hz")
     of_campaign = ("model/model.json", "--campaign", CAMPAIGN, *grid)
     bushfit("export", *of_campaign, "--format", "csv", "-o", tmp_path / "x")
@@ -348,4 +348,4 @@ def test_a_deck_is_of_the_temperature_asked_for(bushfit: Run, root: Path, tmp_pa
     assert "$ temperature: 60 degC" in deck
     assert f"{exact[1].real / 1e3:.4E}" in deck
     cold = ("export", root / "data/arm_bushing/truth.json", "--format", "nastran", "--temperature", "60 degC")
-    refused(bushfit(*cold, "-o", tmp_path / "y", status=2), tmp_path / "y", "the model knows no temperature")
+    refused(bushfit(*cold, "-o", tmp_path / "y", status=2), tmp_path / "y", "the model has no effect of temperature")

@@ -27,7 +27,7 @@ FILES = {
 }
 SWEEP = "data/cmp_15961/sweep_axial.csv"
 REPEATS_OFF = "repeats differ as a whole by an error of"
-ROWS_APART = "points that repeat each other lie up to"
+ROWS_APART = "repeats of the same points differ by up to"
 
 
 @pytest.mark.parametrize("command", FILES)
@@ -310,7 +310,7 @@ def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_said_first(own: Pat
     assert "no sweeps: the two-step procedure is passed over" in ran.stderr
     warnings = document(tmp_path / "run/model.json")["warnings"]
     assert any("one loop rate, 0.1 Hz: mu, m and alpha cannot be determined separately" in line for line in warnings)
-    assert any("the further test that would help most: a loop at" in line for line in warnings)
+    assert any("the most helpful further test: a loop at" in line for line in warnings)
     assert warnings[0] == UNKNOWN
     fitted = typing(own)("fit", CAMPAIGN, "-o", tmp_path / "fit", "--no-plots", "--json")
     assert fitted.stderr.startswith(f"CMP 15 961: {UNKNOWN}\n")

@@ -35,7 +35,7 @@ def test_the_campaign_loads_and_fits_and_its_geometry_is_echoed(
     sizes = ("--inner-diameter", "20 mm", "--outer-diameter", "3.6 cm", "--length", "34 mm")
     done = typed("init", *tests, *sizes, "--name", 'Bushing "7"', "-o", "lab/campaign")
     assert "rubber from 20 to 36 mm in diameter, 8 mm thick, 34 mm long" in done.stderr
-    assert "loop_axial_1.csv: loop, axial; cycles: 3, taken as steady; frequency: 0.1 Hz, a sine; " in done.stderr
+    assert "loop_axial_1.csv: loop, axial; cycles: 3, treated as steady; frequency: 0.1 Hz, a sine; " in done.stderr
     assert "sweep_axial.csv: sweep, axial; frequencies: 16, from 5 to 155 Hz; amplitudes: " in done.stderr
     written = tomllib.loads((tmp_path / "lab/campaign/campaign.toml").read_text(encoding="utf-8"))
     assert [test["file"] for test in written["loops"] + written["sweeps"]] == [f"../my tests/{name}" for name in FILES]
@@ -143,7 +143,7 @@ def test_a_force_that_counts_the_other_way_is_turned_and_said(typed: Run, tests:
     table["force [N]"] *= -1.0
     table.to_csv(tests[0], index=False)
     done = typed("init", tests[0], *GEOMETRY, "-o", "x")
-    assert "the load cell counts the other way" in done.stderr
+    assert "the force has the opposite sign" in done.stderr
     assert "force_sign = -1" in (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
     (loop,) = load_campaign(tmp_path / "x/campaign.toml").loops
     assert loop.force[loop.displacement.argmax()] > 0.0
@@ -169,10 +169,10 @@ def test_a_time_that_does_not_go_with_the_rows_is_told_by_every_fit(
     for stated, said in (("--rate=0.4 mm/s", 1), ("--frequency=0.1 Hz", 0)):
         waveform = () if said else ("--waveform", "sine")
         started = typed("init", *tests, *GEOMETRY, stated, *waveform, "-o", "campaign", "--force")
-        assert started.stderr.count("as those of a sine recorded evenly") == said
+        assert started.stderr.count("like those of a sine recorded evenly") == said
         for command in ("fit-static", "fit"):
             done = typed(command, "campaign/campaign.toml", "-o", "out", "--no-plots", "--force")
-            words = "warning: loop_axial_1: 29 % of the rows lie beyond 0.9 of the amplitude, as those of a sine"
+            words = "warning: loop_axial_1: 29 % of the rows lie beyond 0.9 of the amplitude, like those of a sine"
             assert done.stderr.count(words) == said
             (written,) = (tmp_path / "out").glob("[sm]*.json")
             assert sum("rate means a triangle" in line for line in document(written)["warnings"]) == said

@@ -25,10 +25,16 @@ def test_files_are_told_and_the_campaign_s_text_can_be_pasted(typed: Run, root: 
         ("loops", "axial"), ("sweeps", "radial"),
     ]  # fmt: skip
     assert "bushfit reduce" in done.stdout
-    assert done.stderr.count("nothing odd") == 3
+    assert done.stderr.count("nothing unusual") == 3
     assert "mean displacement: 0 mm" in done.stderr
     assert not re.search(r": -?[\d.]+e[-+]?\d", done.stderr)
-    for words in ("a hysteresis loop, axial", "taken for", "columns parted by comma", "0.1 Hz, a sine", "frequencies"):
+    for words in (
+        "a hysteresis loop, axial",
+        "taken for",
+        "columns separated by comma",
+        "0.1 Hz, a sine",
+        "frequencies",
+    ):
         assert words in done.stderr
 
 
@@ -50,7 +56,7 @@ def test_bad_files_are_told_in_the_order_given_the_last_as_the_error(typed: Run,
     said = ("a hysteresis loop", "used: one.csv", "used: two.csv", "bushfit: error: three.csv")
     places = [done.stderr.index(words) for words in said]
     assert places == sorted(places)
-    refused(done, tmp_path / "x", "the columns do not make a test")
+    refused(done, tmp_path / "x", "the columns are not those of a test")
     assert "[[loops]]" in done.stdout
 
 
@@ -114,12 +120,12 @@ def test_the_unit_tells_frequency_from_force(typed: Run, tmp_path: Path, header:
 @pytest.mark.parametrize(
     ("header", "options", "said", "unsaid"),
     [
-        ("amplitude [mm]", (), "taken zero-to-peak, else --amplitude peak-to-peak", "half of"),
-        ("Pegel [mm]", ("--column", "amplitude=Pegel"), "taken zero-to-peak, else --amplitude", "half of"),
-        ("Amplitude SS [mm]", (), '0.05 mm zero-to-peak, half of "Amplitude SS [mm]", which counts peak', "taken zero"),
-        ("Pegel", ("--column", "amplitude=Pegel", "--unit", "amplitude=mmpp"), 'half of "Pegel"', "taken zero"),
-        ("amplitude [mm]", ("--amplitude", "peak-to-peak"), 'half of "amplitude [mm]"', "taken zero"),
-        ("amplitude 0-p [mm]", (), "0.1 mm zero-to-peak", "taken zero"),
+        ("amplitude [mm]", (), "zero-to-peak is assumed; --amplitude peak-to-peak", "half of"),
+        ("Pegel [mm]", ("--column", "amplitude=Pegel"), "zero-to-peak is assumed; --amplitude", "half of"),
+        ("Amplitude SS [mm]", (), '0.05 mm zero-to-peak, half of "Amplitude SS [mm]", which counts peak', "is assumed"),
+        ("Pegel", ("--column", "amplitude=Pegel", "--unit", "amplitude=mmpp"), 'half of "Pegel"', "is assumed"),
+        ("amplitude [mm]", ("--amplitude", "peak-to-peak"), 'half of "amplitude [mm]"', "is assumed"),
+        ("amplitude 0-p [mm]", (), "0.1 mm zero-to-peak", "is assumed"),
     ],
 )
 def test_how_amplitudes_are_counted_is_said(
@@ -148,7 +154,7 @@ def test_a_column_is_named_where_it_stands_and_the_text_holds_in_any_folder(
     (tmp_path / "lab").mkdir()
     (tmp_path / "lab/axial.csv").write_bytes((root / CLEAN[0]).read_bytes())
     done = typed("inspect", "lab/axial.csv", "--no-plots")
-    assert done.stdout.startswith("# files by their full path")
+    assert done.stdout.startswith("# files with their full path")
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere/campaign.toml").write_text(BUSHING + done.stdout, encoding="utf-8")
     (loop,) = load_campaign(tmp_path / "elsewhere/campaign.toml").loops

@@ -138,7 +138,7 @@ def test_predict_writes_maxwell_arms_where_asked(bushfit: Run, root: Path, tmp_p
     (part,) = json.loads(done.stdout)["arms"]
     assert part["in_place_of"] == "springpot"
     assert part["largest_relative_error"] <= 0.005
-    assert f"{len(part['relaxation_time_s'])} Maxwell arms in place of the springpot: off by at most" in done.stderr
+    assert f"{len(part['relaxation_time_s'])} Maxwell arms represent the springpot: error at most" in done.stderr
     table = pd.read_csv(folder / "arms.csv")
     assert table["in place of"].tolist() == ["elastic"] + ["springpot"] * len(part["relaxation_time_s"])
     assert table["relaxation time [s]"].tolist()[1:] == pytest.approx(part["relaxation_time_s"], rel=1e-6)

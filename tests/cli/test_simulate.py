@@ -108,7 +108,7 @@ def test_a_raw_record_becomes_a_sweep_that_fits(
     assert len(set(sweep.amplitude)) == 3
 
     shutil.copy(root / "data/cmp_15961/loop_axial_1.csv", tmp_path / "x")
-    snippet = done.stderr.partition("the way there):")[2]
+    snippet = done.stderr.partition("add the path):")[2]
     loop = '[[loops]]\nfile = "loop_axial_1.csv"\ndirection = "axial"\n'
     (tmp_path / "x/campaign.toml").write_text(BUSHING + loop + snippet, encoding="utf-8")
     fitted = typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json")
@@ -174,7 +174,7 @@ def test_a_measured_test_becomes_a_sweep(typed: Run, root: Path, tmp_path: Path)
 
 
 def test_other_words_for_the_same_test(typed: Run, root: Path, tmp_path: Path) -> None:
-    """As a transmissibility in a German file, with its base stated, and phases that count the other way."""
+    """As a transmissibility in a German file, with its base stated, and phases that have the opposite sign."""
     raw = pd.read_csv(root / RESONANCE)
     ratio = raw["mass_accel_ms2"] / raw["base_accel_ms2"]
     phase = np.degrees(raw["base_phase_rad"] - raw["mass_phase_rad"])
@@ -184,7 +184,7 @@ def test_other_words_for_the_same_test(typed: Run, root: Path, tmp_path: Path) -
     table.to_csv(tmp_path / "axial.csv", sep=";", decimal=",", index=False)
     typed("reduce", root / RESONANCE, *MASS, "--direction", "axial", "-o", "x", "--no-plots")
     done = typed("reduce", "axial.csv", "--mass", "0.5878 kg", "--base-acceleration", "1 g", "-o", "y", "--no-plots")
-    assert "count the other way" in done.stderr
+    assert "have the opposite sign" in done.stderr
     one, other = (pd.read_csv(tmp_path / name / "sweep.csv") for name in ("x", "y"))
     assert np.allclose(one["stiffness [N/mm]"], other["stiffness [N/mm]"], rtol=1e-3)
     assert np.allclose(one["amplitude [mm]"], other["amplitude [mm]"], rtol=0.15)  # the shaker missed 1 g by as much

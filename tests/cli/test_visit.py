@@ -170,7 +170,7 @@ def test_folders_and_workbooks_without_a_test_are_refused_and_a_test_with_a_faul
 ) -> None:
     (tmp_path / "lab").mkdir()
     (tmp_path / "lab/photo.png").write_bytes(b"\x89PNG")
-    said = "no file of this folder holds a test"
+    said = "no file of this folder contains a test"
     refused(typed("init", "lab", *GEOMETRY, "-o", "x", status=2), tmp_path / "x", said, "photo.png: no table")
     sheets = pd.read_excel(visited / "Buchse 7.xlsx", sheet_name=None, engine="openpyxl")
     with pd.ExcelWriter(tmp_path / "notes.xlsx") as book:

@@ -1,4 +1,4 @@
-"""Long sweeps count in means over narrow bands: as sharp as their points, and as honest."""
+"""Long sweeps count in narrow bands: as sharp as their points, and as honest."""
 
 from dataclasses import astuple, replace
 from pathlib import Path
@@ -71,7 +71,7 @@ def test_a_campaign_without_long_runs_is_as_it_was() -> None:
 def test_means_are_as_sharp_as_their_points() -> None:
     """Scatter of 900 points in 100 bands falls with the root of 9, and so does the noise that is estimated."""
     (sweep,), said = condensed(data_of(swept(PAPER)))[0].sweeps, condensed(data_of(swept(PAPER)))[1]
-    assert said == ("swept: 5400 points are diagnosed as 600 means over narrow bands",)
+    assert said == ("swept: 5400 points are diagnosed as 600 narrow bands",)
     expected = SCATTER / np.sqrt(POINTS / 100)
     assert np.std(off(sweep.sweep).real) == pytest.approx(expected, rel=0.1)
     assert sweep.relative_noise == pytest.approx(expected, rel=0.1)
@@ -98,7 +98,7 @@ def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten() -> None:
     data = data_of(grid(levels))
     banded, said = condensed(data)
     sweep = banded.sweeps[0].sweep
-    assert said == ("silent: 40 of its 300 runs at one level, or frequency, are diagnosed, evenly spread",)
+    assert said == ("silent: 40 of its 300 runs at one level, or frequency, are used in the diagnosis, evenly spread",)
     assert sweep.frequency.size == 160
     assert {sweep.amplitude.min(), sweep.amplitude.max()} == {levels.min(), levels.max()}
     assert np.abs(off(sweep)).max() < 1e-12
@@ -154,7 +154,7 @@ def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told() -> None:
     lagging = PAPER.with_effect("delay", {"delay.tau": 2e-4})
     found = diagnose(data_of(swept(lagging)))
     assert [effect.name for effect in found.effects] == ["delay"]
-    assert any("means over narrow bands" in note for note in found.notes)
+    assert any("narrow bands" in note for note in found.notes)
     low, high = found.result.interval("delay.tau") or (0.0, 0.0)
     assert low < 2e-4 < high
 
@@ -175,7 +175,7 @@ def test_means_that_a_robust_fit_leaves_out_are_told() -> None:
     data = data_of(off_there)
     robust = PreparedCampaign.from_campaign(replace(data.campaign, fit=replace(data.campaign.fit, loss="soft_l1")))
     (told,) = [note for note in diagnose(robust).notes if "left out" in note]
-    assert told == "swept: 1 of these points left out, farther off than noise"
+    assert told == "swept: 1 of these points are left out, because they deviate by more than noise"
     as_it_was = replace(robust.campaign, sweeps=(sweep,))
     assert not any("left out" in note for note in diagnose(PreparedCampaign.from_campaign(as_it_was)).notes)
 

@@ -180,7 +180,7 @@ def test_the_error_between_frequencies_that_is_told_is_the_one_there_is(
     """Read back, drawn as straight lines between the rows, and compared with the model, without its rig, everywhere."""
     rigged = Result(order.result.model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7}))
     exported, found = read(name, replace(order, result=rigged, predictions=order.predictions[:1]), tmp_path)
-    told = next(line for line in exported.losses if "between its frequencies" in line)
+    told = next(line for line in exported.losses if "between the frequencies" in line)
     claimed = float(told.split("up to ")[1].split(" %")[0]) / 100.0
     fine, worst = np.linspace(5.0, 155.0, 601), 0.0
     for (_, rank), (f, k) in found.items():

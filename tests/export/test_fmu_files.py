@@ -161,7 +161,7 @@ def test_wrong_calls_are_refused_and_output_before_the_first_step_is_that_of_the
 
 @pytest.mark.parametrize("name", ["kraus", "hysteretic_loss"])
 def test_effects_without_a_law_in_time_are_refused(paper_model: Model, name: str) -> None:
-    with pytest.raises(ModelError, match="for which there is no law") as refused:
+    with pytest.raises(ModelError, match="for which this effect has no law") as refused:
         time_model(order_of(paper_model.with_effect(name)))
     assert refused.value.place == name
 

@@ -133,7 +133,7 @@ def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep: N
     np.testing.assert_allclose(scatter_of(found), 5e-3, rtol=0.1)
     assert {noise.shared for noise in found} == {ASSUMED}
     assert {noise.origin for noise in found} == {"assumed"}
-    assert "by the class of [rig]" in found[0].describe()
+    assert "from the class of [rig]" in found[0].describe()
 
 
 def test_levels_without_repeats_are_pooled(noisy_sweep: Noisy) -> None:

@@ -107,12 +107,12 @@ LOOP_FAULTS: dict[str, Callable[[Loop], Loop]] = {
     "before its steady cycles are left out": lambda x: replace(
         x, displacement=x.displacement * np.where(x.time < 9.9, 0.6, 1.0)
     ),
-    "the motion is off zero by 0.03 mm, 3 % of its amplitude": lambda x: replace(x, displacement=x.displacement + 3e-5),
+    "the mean displacement is 0.03 mm, 3 % of its amplitude": lambda x: replace(x, displacement=x.displacement + 3e-5),
     "recorded about a mean displacement of 0.1 mm; the model knows no preload": lambda x: replace(
         x, displacement=x.displacement + 1e-4
     ),
     "recorded about a mean force of 820 N; the model knows no preload": lambda x: replace(x, force=x.force + 820.0),
-    "the campaign needs force_sign = -1": lambda x: replace(x, force=-x.force),
+    "state force_sign = -1 in the campaign": lambda x: replace(x, force=-x.force),
 }
 
 
@@ -136,7 +136,7 @@ def test_gaps_and_an_uneven_clock_are_described(loop: Loop, tmp_path: Path) -> N
 
 
 def test_a_loop_the_wrong_way_round_is_refused(loop: Loop, tmp_path: Path) -> None:
-    with pytest.raises(FitError, match="gives energy"):
+    with pytest.raises(FitError, match="releases energy"):
         look(tmp_path, replace(loop, force=np.roll(loop.force, 60)))
 
 
@@ -148,8 +148,8 @@ def test_rows_of_a_sine_do_not_pass_for_a_triangle(root: Path, tmp_path: Path) -
     triangle, sine = LoopFile(file="", rate=1.2e-4), LoopFile(file="", frequency=0.1, waveform="sine")
     _, wrong = describe_loop(read_loop(file, Direction.AXIAL, triangle), Labels())
     _, right = describe_loop(read_loop(file, Direction.AXIAL, sine), Labels())
-    assert any("as those of a sine" in line for line in wrong)
-    assert not any("as those of" in line for line in right)
+    assert any("like those of a sine" in line for line in wrong)
+    assert not any("like those of" in line for line in right)
 
 
 def spoiled(sweep: Sweep, rows: np.ndarray, factor: complex) -> Sweep:
@@ -199,7 +199,7 @@ def test_repeats_that_nothing_tells_are_asked_for(sweep: Sweep, tmp_path: Path, 
     table = by_amplitude if order == "by amplitude" else table.sample(frac=1.0, random_state=1)
     table.to_csv(tmp_path / "axial.csv", index=False)
     odd = inspect_file(tmp_path / "axial.csv", {}).odd
-    assert any("if they are repeats, a column repeat with their numbers tells so" in sentence for sentence in odd)
+    assert any("if they are repeats, number them in a column repeat" in sentence for sentence in odd)
 
 
 @pytest.mark.parametrize(
@@ -347,7 +347,7 @@ def test_the_data_of_the_repository_raise_only_what_is_there(root: Path) -> None
     ("frequency", "amplitudes", "said"),
     [
         (1.0, (1.0,), None),
-        (5.0, (1.0,), "a motion at 5 Hz is taken for a loop"),
+        (5.0, (1.0,), "a motion at 5 Hz is is read as a loop"),
         (0.1, (0.2, 0.6, 1.0), None),
     ],
 )
@@ -362,7 +362,7 @@ def test_one_sine_is_a_loop_however_fast(
     force = 500.0 * (size * np.sin(phase + 0.1) + 1e-3 * noise[1])
     seen = look(tmp_path, Loop("x", Direction.AXIAL, time, motion, force))
     assert seen.kind == "loop"
-    told = [sentence for sentence in seen.odd if "taken for a loop" in sentence]
+    told = [sentence for sentence in seen.odd if "is read as a loop" in sentence]
     assert [sentence.startswith(said or "") for sentence in told] == [True] * bool(said)
     assert all("bushfit reduce" in sentence for sentence in told)
 

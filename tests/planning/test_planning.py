@@ -317,7 +317,7 @@ def test_a_rig_without_limits_and_an_error_of_the_model_are_told(root: Path) -> 
     limits, model, *_ = found.document["warnings"]
     assert limits.startswith("[rig] states no limits: the plan reaches ")
     assert "m/s" in limits
-    assert model.startswith("the errors of the stiffness contain the model error, up to ")
+    assert model.startswith("the errors of the stiffness include the model error, up to ")
     assert all(row["planned"] > 0.01 for row in found.document["stiffness"].values())
     points = found.plan.request.points
     errors = found.plan.planned.stiffness

@@ -298,7 +298,7 @@ EXPORTS: dict[str, Export] = {
         sweep("Frequenz [Hz]|Wegamplitude SS [mm]|Kraftamplitude SS [N]|Phasenwinkel [°]", F, 2 * A, 2 * K * A, PHASE, mark=";").replace(".", ",")
     ),
     "tan(delta)/%": Export(sweep("f/Hz|A/mm|K*/(N/mm)|tan(delta)/%", F, A, K, 100 * ETA)),
-    "a quality factor": Export(sweep(USUAL + "Q [-]", F, A, K, 1 / ETA), None, ["the columns do not make a test"]),
+    "a quality factor": Export(sweep(USUAL + "Q [-]", F, A, K, 1 / ETA), None, ["the columns are not those of a test"]),
     "logarithms of a DMA": Export(
         sweep("log10(f/Hz)|Strain [%]|log10 G' [Pa]|log10 G'' [Pa]", np.log10(F), 10 * A, np.log10(1e6 * G.real), np.log10(1e6 * G.imag)), reference=MODULUS
     ),

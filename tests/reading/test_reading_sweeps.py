@@ -202,7 +202,7 @@ BAD_SWEEPS: list[tuple[str, dict[str, Any], list[str]]] = [
     (
         PHASE.replace("0.1\n", "-6.5\n"),
         {"phase_sign": 1},
-        ["the loss counts the other way", '"phase [deg]"', "8 of 8", "phase_sign = -1"],
+        ["the loss has the opposite sign", '"phase [deg]"', "8 of 8", "phase_sign = -1"],
     ),
     (SWEEP.replace("[-]", "[%]"), {}, ['"loss factor [%]"', "0.1 % at most", "0.5 %", '"[-]"']),
     (

@@ -216,7 +216,7 @@ def test_a_file_that_bushfit_did_not_write_is_never_replaced(tmp_path: Path, for
 
 def test_results_are_replaced_with_force_alone_and_nothing_else_is_touched(tmp_path: Path) -> None:
     write(tmp_path, OLD)
-    with pytest.raises(OutputError, match="results stand there already") as refused:
+    with pytest.raises(OutputError, match="there are results already") as refused:
         write(tmp_path, {"a.csv": b"2"})
     assert "--force" in str(refused.value)
     write(tmp_path, {"a.csv": b"2"}, force=True)
@@ -229,7 +229,7 @@ def test_results_are_replaced_with_force_alone_and_nothing_else_is_touched(tmp_p
 def test_without_a_record_a_file_is_taken_for_the_user_s(record: bytes, tmp_path: Path) -> None:
     write(tmp_path, OLD)
     (tmp_path / ".bushfit.sha256").write_bytes(record)
-    with pytest.raises(OutputError, match="not as bushfit wrote it"):
+    with pytest.raises(OutputError, match="that bushfit did not write"):
         write(tmp_path, NEW, force=True)
     assert contents(tmp_path) == OLD
 

@@ -102,7 +102,7 @@ def test_a_target_is_met_where_the_whole_interval_is_within_it() -> None:
         ("delay", said("named", truths=("delay", "viscous")), True),
         ("fault: 50 Hz in axial", said("unexplained", truths=("delay",)), None),
         ("inertia + something without a name", said("partly", kind="law"), False),
-        ("errors of levels beyond the rig's class", said("unexplained", kind="awkward"), False),
+        ("errors of levels beyond the class of the rig", said("unexplained", kind="awkward"), False),
     ],
 )
 def test_the_likeliest_is_right_if_all_of_it_is(leader: str, outcome: Outcome, right: bool | None) -> None:

@@ -103,8 +103,12 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
         elif lowest:
             axes.set_xlabel("bushing, in the manifest's order", **style.WORDS)
         axes.set_xlim(0.5, len(names) + 0.5)
-    limits = "Dashed: limits; red: out of them, the worst by name." if any(panel.allowed for panel in drawn) else ""
-    beyond_note = "Triangles: further out than the panel reaches, the furthest by name and value."
+    limits = (
+        "Dashed: limits; red: outside the limits, the worst with its name."
+        if any(panel.allowed for panel in drawn)
+        else ""
+    )
+    beyond_note = "Triangles: outside the panel; the farthest has its name and value."
     few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in drawn)
     more = f"The first {len(drawn)} of {len(panels)} quantities." * (len(panels) > len(drawn))
     return style.explained(
@@ -281,5 +285,5 @@ def comparison_figure(comparison: SideBySide) -> Figure:
     return style.explained(
         figure,
         "Shaded: 95 % bands. Lower panels: the band of each point by itself; "
-        "compare.json and the terminal say what holds at all points at once.",
+        "compare.json and the terminal state what is valid for all points together.",
     )

@@ -157,7 +157,7 @@ def points_note(table: pd.DataFrame) -> str:
 def thinned_note(groups: Sequence[SweepGroup]) -> str:
     """Sentence that states that not all levels are drawn; empty otherwise."""
     full = any(len(group.curves) == MOST_CURVES for group in groups)
-    return f"Of more than {MOST_CURVES} levels {MOST_CURVES} are drawn." * full
+    return f"Only {MOST_CURVES} of the levels are drawn." * full
 
 
 def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) -> tuple[Array, Array]:
@@ -235,8 +235,7 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
         f"in units of the noise of a row, and means over {SECTOR:g}° of the cycle (lines). 95 % of the points should "
         "be in the grey band.",
         _OUTLIERS * bool((table["outlier"] == "yes").any()),
-        f"Of more than {MOST_LOOPS} loops of a direction {MOST_LOOPS} are drawn."
-        * any(len(loops) == MOST_LOOPS for _, loops in places),
+        f"Only {MOST_LOOPS} loops of a direction are drawn." * any(len(loops) == MOST_LOOPS for _, loops in places),
     )
 
 

@@ -110,7 +110,7 @@ OF_RESULTS = [
     ),
     (written("axial.csv", ""), ("axial.csv: the file is empty",)),
     (lambda folder: (folder / "axial.csv").write_bytes(b"\xff\xfe\x00"), ("axial.csv", "not UTF-8")),
-    (written("report.html", "mine"), ("not as bushfit wrote it", "report.html")),
+    (written("report.html", "mine"), ("that bushfit did not write", "report.html")),
 ]
 OF_COMPARISON = [
     (written("compare.json", "{"), ("compare.json, line 1", "not valid JSON")),
@@ -118,7 +118,7 @@ OF_COMPARISON = [
     (changed("compare.json", schema="bushfit/compare/9"), ("compare.json, schema", "bushfit/compare/1")),
     (changed("compare.json", pairs=7), ("compare.json, pairs",)),
     (changed("compare.json", pairs=[]), ("compare.json, pairs",)),
-    (written("compare.html", "mine"), ("not as bushfit wrote it", "compare.html")),
+    (written("compare.html", "mine"), ("that bushfit did not write", "compare.html")),
 ]
 OF_BATCH = [
     (written("batch.json", "{"), ("not valid JSON",)),

@@ -140,7 +140,7 @@ def test_arms_are_drawn_over_what_they_stand_for(paper_model: Model) -> None:
         assert line.get_xdata().min() >= 5.0
     omega = 2.0 * np.pi * lines(moduli)[1].get_xdata()
     np.testing.assert_allclose(lines(moduli)[1].get_ydata(), 1e-6 * arms[0].complex_modulus(omega).real)
-    assert "in place of the springpot" in note(figure)
+    assert "represent the springpot" in note(figure)
 
 
 def test_prediction_over_frequency_and_amplitude_and_means_of_repeats(paper_model: Model, swept: Swept) -> None:
