@@ -341,8 +341,8 @@ def _read_loop(
         except BushfitError:
             raise error from None
     odd = (
-        f'"{table.roles["force"].header}" falls where "{table.roles["displacement"].header}" rises: the load cell '
-        "counts the other way, and state force_sign = -1 in the campaign"
+        f'"{table.roles["force"].header}" falls where "{table.roles["displacement"].header}" rises: the force '
+        "has the opposite sign; state force_sign = -1 in the campaign"
     )
     return turned, entry, [odd]
 

@@ -161,7 +161,7 @@ MANIFESTS = [
     ("manifest.toml", "max_effects = 1\n" + ROW, "max_effects", "has no effect", "commands fit"),
     ("manifest.csv", "campaign,directions,commands\na.toml,axial,fit\nb.toml,axial,diagnose", "b.toml", "directions", "commands diag"),
     ("manifest.toml", ROW + 'commands = ["run", "fit"]', "commands", "run is the whole chain", "found: run, fit"),
-    ("manifest.toml", ROW + 'commands = ["run"]\neffects = ["inertia"]', "effects", "nothing", "try: leave effects out"),
+    ("manifest.toml", ROW + 'commands = ["run"]\neffects = ["inertia"]', "effects", "no effect", "try: leave effects out"),
     ("manifest.toml", ROW + 'effects = ["inertai"]', "bushings #1.effects #1", 'did you mean "inertia"?'),
     ("manifest.toml", 'at = ["axial 25 Hz"]\n' + ROW, "at", "no operating point", "axial 25 Hz"),
     ("manifest.toml", '[[bushings]]\ncampaign = "no/*.toml"', "the pattern matches no file", "no/*.toml"),

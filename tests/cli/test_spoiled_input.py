@@ -145,4 +145,4 @@ def test_a_fit_to_runs_of_12_000_points(long_runs: Path) -> None:
 def test_a_diagnosis_of_runs_of_12_000_points(long_runs: Path) -> None:
     done = bounded(long_runs, "diagnose", "campaign.toml", "-o", "x", "--no-plots", "-v", times=2)
     assert done.returncode == 0, done.stderr
-    assert "24000 points are diagnosed as 200 means over narrow bands" in done.stderr
+    assert "24000 points are averaged to 200 narrow bands for the diagnosis" in done.stderr

@@ -71,7 +71,7 @@ def test_a_campaign_without_long_runs_is_as_it_was() -> None:
 def test_means_are_as_sharp_as_their_points() -> None:
     """Scatter of 900 points in 100 bands falls with the root of 9, and so does the noise that is estimated."""
     (sweep,), said = condensed(data_of(swept(PAPER)))[0].sweeps, condensed(data_of(swept(PAPER)))[1]
-    assert said == ("swept: 5400 points are diagnosed as 600 narrow bands",)
+    assert said == ("swept: 5400 points are averaged to 600 narrow bands for the diagnosis",)
     expected = SCATTER / np.sqrt(POINTS / 100)
     assert np.std(off(sweep.sweep).real) == pytest.approx(expected, rel=0.1)
     assert sweep.relative_noise == pytest.approx(expected, rel=0.1)
@@ -202,7 +202,7 @@ def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_re
     fewer, said = condensed(data)
     assert "".join(each.name for each in fewer.loops) == kept
     assert len(said) == (len(kept) < 6)
-    assert all(f"{len(kept)} of the 6 loops are diagnosed" in words for words in said)
+    assert all(f"{len(kept)} of the 6 loops are used in the diagnosis" in words for words in said)
     assert fewer.sweeps == data.sweeps
     whole = sum(made[int(name)][1] == 1.0 and made[int(name)][2] == 0 for name in kept)
     assert fewer.loops[0].gain_error == pytest.approx(0.01 * np.sqrt(whole if kept[0] != "1" else 1))

@@ -92,7 +92,7 @@ LOOP_FAULTS: dict[str, Callable[[Loop], Loop]] = {
     "the displacement is cut off at its bottom": lambda x: replace(
         x, displacement=np.maximum(x.displacement, 0.9 * x.displacement.min())
     ),
-    "one cycle takes 170 min, as hardly any test does, unless axial.csv ran 60 times faster than stated": (
+    "one cycle takes 170 min, which is unusual; possible causes: axial.csv ran 60 times faster than stated": (
         lambda x: replace(x, time=1000.0 * x.time)
     ),
     "the force drifts: its mean goes from": lambda x: replace(x, force=x.force + 3.0 * x.time / x.time[-1]),
@@ -108,10 +108,10 @@ LOOP_FAULTS: dict[str, Callable[[Loop], Loop]] = {
         x, displacement=x.displacement * np.where(x.time < 9.9, 0.6, 1.0)
     ),
     "the mean displacement is 0.03 mm, 3 % of its amplitude": lambda x: replace(x, displacement=x.displacement + 3e-5),
-    "recorded about a mean displacement of 0.1 mm; the model knows no preload": lambda x: replace(
+    "recorded about a mean displacement of 0.1 mm; the model has no preload": lambda x: replace(
         x, displacement=x.displacement + 1e-4
     ),
-    "recorded about a mean force of 820 N; the model knows no preload": lambda x: replace(x, force=x.force + 820.0),
+    "recorded about a mean force of 820 N; the model has no preload": lambda x: replace(x, force=x.force + 820.0),
     "state force_sign = -1 in the campaign": lambda x: replace(x, force=-x.force),
 }
 
@@ -175,10 +175,10 @@ SWEEP_FAULTS: dict[str, Callable[[Sweep], Sweep]] = {
     "9 points with a loss factor below zero, the first at 155 Hz, 0.1 mm: is the force channel late?": (
         lambda x: spoiled(x, x.frequency == 155.0, np.exp(-0.4j))
     ),
-    "unless the phases of axial.csv are radians, not degrees (then, in the campaign: [[sweeps]] of axial": (
+    "possible causes: the phases of axial.csv are radians, not degrees (then, in the campaign: [[sweeps]] of axial": (
         lambda x: replace(x, stiffness=np.abs(x.stiffness) * np.exp(1j * np.radians(np.angle(x.stiffness))))
     ),
-    "unless the phases of axial.csv are 90 deg less the loss angle (then, in the campaign: [[sweeps]] of axial": (
+    "possible causes: the phases of axial.csv are 90 deg less the loss angle (then, in the campaign: [[sweeps]] of axial": (
         lambda x: replace(x, stiffness=1j * np.conj(x.stiffness * np.exp(0.2j)))
     ),
 }
@@ -347,7 +347,7 @@ def test_the_data_of_the_repository_raise_only_what_is_there(root: Path) -> None
     ("frequency", "amplitudes", "said"),
     [
         (1.0, (1.0,), None),
-        (5.0, (1.0,), "a motion at 5 Hz is is read as a loop"),
+        (5.0, (1.0,), "a motion at 5 Hz is read as a loop"),
         (0.1, (0.2, 0.6, 1.0), None),
     ],
 )
