@@ -177,7 +177,7 @@ LACKING = {
     ),
     "one loop": ((loop(1e-3, 0.1),), (), "one loop rate, 0.1 Hz", "sin(pi alpha/2) at 0.1 Hz", "the rate"),
     "loops of one rate": (
-        (loop(1e-3, 0.1), loop(3e-4, 0.1)), (), "mu, m and alpha cannot be determined", "mu + m/2 omega^alpha", "the rate",
+        (loop(1e-3, 0.1), loop(3e-4, 0.1)), (), "mu, m and alpha cannot be", "mu + m/2 omega^alpha", "the rate",
     ),
     "one frequency": (
         (loop(1e-3, 10.0),), (sweep(1e-4, 5e-4, band=(10.0,)),), "one frequency, 10 Hz", "at 10 Hz", "rate",
