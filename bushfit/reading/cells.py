@@ -2,31 +2,34 @@
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.headers import WORDS, Column, plain
 from bushfit.reading.instruments import word_for_part
-from bushfit.reading.layout import FileFormat, Layout, Line, is_comment, is_row, is_units_row
+from bushfit.reading.layout import FileFormat, Layout, is_comment, is_row, is_units_row
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, is_like_number, weigh
-from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of, holds_number, rows
+from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 from bushfit.reading.times import clock
 
-#: Bytes of a text whose columns are read with pandas; chosen: shorter ones take a moment.
-_LARGE = 1 << 20
 #: Rows that are left out and look like data, per row of data, at most; chosen: more make the meaning doubtful.
-_MOST_LEFT_OUT = 0.1
+MOST_LEFT_OUT = 0.1
+#: Rows that are examined first; chosen: a long record need not be read whole.
+_FIRST = 1000
 #: Lines that a note lists.
 _MOST_LISTED = 4
+#: Rows with an unknown word instead of a number that are left out in any case; chosen: a mean, a deviation, a range.
+_MOST_WORDS = 3
+#: Placeholders for a missing value.
+_MISSING = frozenset(WORDS["rows_of"]["missing"])
 _SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
-#: Texts for a missing value.
-_MISSING = frozenset(
-    ("", "nan", "#n/a", "#na", "n/a", "na", "-", "--", "---", "null", "none", "#value!", "#div/0!", "#num!")
-)
+
+#: Line number and cells of a row of a table.
+Row = tuple[int, Sequence[str | float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,7 @@ class Cells:
     source: RowSource
     layout: Layout
     stated: FileFormat
-    roles: Mapping[str, Column]
+    roles: Mapping[str, Column] = field(default_factory=dict, kw_only=True)
     selected: frozenset[int] | None = field(default=None, kw_only=True)
     needed: frozenset[int] = field(default=frozenset(), kw_only=True)
     clocks: frozenset[int] = field(default=frozenset(), kw_only=True)
@@ -58,53 +61,69 @@ class Cells:
         """Cells of the header."""
         return self.layout.headers
 
-    def rows(self) -> Iterator[tuple[int, Sequence[str | float]]]:
+    def rows(self) -> Iterator[Row]:
         """Line number and cells of each row of data; rows without data are left out.
 
         Raises:
             MeasurementError: a line or a quoted cell is far too long.
         """
-        for position, (line, cells, fault) in enumerate(self._all_rows()):
+        for position, (line, cells, fault) in enumerate(self.all_rows()):
             if fault is None and (self.selected is None or position in self.selected):
                 yield line, cells
 
-    def _all_rows(self) -> Iterator[tuple[int, Sequence[str | float], str | None]]:
-        """Line number, cells, and fault of each row; a row of data has no fault."""
-        width = len(self.headers)
+    @cached_property
+    def first_rows(self) -> list[Sequence[str | float]]:
+        """Cells of the first thousand rows of data; those of an empty row if there are none."""
+        return [cells for _, cells in islice(self.rows(), _FIRST)] or [[""] * len(self.headers)]
+
+    def all_rows(self) -> Iterator[tuple[int, Sequence[str | float], str | None]]:
+        """Line number, cells, and fault of each row that is filled; see `fault`."""
         try:
-            for line, cells in rows(self.source, self.layout):
-                if any(cell != "" for cell in cells):
-                    padded = cells if len(cells) >= width else [*cells, *[""] * (width - len(cells))]
-                    yield line, padded, self._fault(cells, padded)
+            for line in self.source.lines(self.layout.lines_before_data):
+                if self.layout.numbered or not is_comment(line.content, self.layout.delimiter):
+                    cells = cells_of(line, self.layout)
+                    if any(cell != "" for cell in cells):
+                        cells = [*cells, *[""] * (len(self.headers) - len(cells))]
+                        yield line.number, cells, self.fault(cells)
         except csv.Error as error:
             raise self.error("the table cannot be read", found=str(error)) from error
 
-    def _fault(self, cells: Sequence[str | float], padded: Sequence[str | float]) -> str | None:
-        """Reason why a row is no data; None if it is data."""
-        first = next((cell for cell in cells if cell != ""), "")
-        if isinstance(first, str) and plain(first) in _SUMMARIES and plain(first):
-            return "summary"
-        if len(cells) > len(self.headers) and any(cell != "" for cell in cells[len(self.headers) :]):
-            return "width" if is_row([str(cell) for cell in cells]) else "text"
-        if len(cells) < len(self.headers) and self.layout.delimiter == " " and is_row([str(cell) for cell in cells]):
-            return "width"
+    def fault(self, cells: Sequence[str | float]) -> str | None:
+        """Reason why a row is no data.
+
+        Args:
+            cells: of the row, as many as the header has or more.
+
+        Returns:
+            None for data; "other" for a row that is clearly none, such as a remark or a mean; "missing" for a known
+            placeholder instead of a number; "word" for another one; and "doubtful" for a row that looks like data.
+        """
+        texts = [str(cell) for cell in cells]
+        first = next((text for text in texts if text), "")
+        if plain(first) in _SUMMARIES and not is_like_number(first):
+            return "other"
+        if any(texts[len(self.headers) :]):
+            return "doubtful" if is_row(texts) else "other"
+        if self.layout.delimiter == " " and not texts[-1] and is_row(texts):
+            return "doubtful"  # a cell is missing, and all behind it are displaced
         for index in self.needed:
-            cell = padded[index]
-            if index in self.clocks:
-                if clock(str(cell)) is None:
-                    return "text"
-            elif isinstance(cell, str) and not is_like_number(cell):
-                texts = [str(padded[number]).lower() for number in self.needed]
-                if all(text in _MISSING for text in texts) or not any(is_like_number(str(text)) for text in cells):
-                    return "text"
-                return "missing" if cell.lower() in _MISSING and cell else "cell"
+            if isinstance(cells[index], str) and not is_like_number(texts[index]):
+                if index in self.clocks and clock(texts[index]) is not None:
+                    continue
+                if index in self.clocks or not any(map(is_like_number, texts)):
+                    return "other"
+                if not any(is_like_number(texts[number]) for number in self.needed):
+                    return "other"
+                word = texts[index].lower().strip("#*!?-./ ")
+                is_word = texts[index] and not any(sign.isdigit() for sign in word)
+                return "doubtful" if not is_word else "missing" if word in _MISSING else "word"
         return None
 
-    def left_out(self, rows: Sequence[tuple[int, Sequence[str | float], str]] | None = None) -> Iterator[str]:
+    def note_left_out(self, rows: Sequence[Row] | None = None) -> Iterator[str]:
         """Sentence on the rows that are left out because they hold no data of the test.
 
         Args:
-            rows: line number, cells and fault of each such row; default all in the table.
+            rows: line number and cells of each row that may be left out; default all in the table.
 
         Yields:
             One sentence if there are such rows.
@@ -112,46 +131,26 @@ class Cells:
         Raises:
             MeasurementError: so many of these rows look like data that their meaning is in doubt.
         """
-        found = [(line, cells, fault) for line, cells, fault in self._all_rows() if fault] if rows is None else rows
-        faults: dict[int, tuple[str, Sequence[str | float]]] = {}
-        header = [plain(cell) for cell in self.headers]
-        for line, cells, fault in found:
+        header, left_out, in_doubt = [plain(cell) for cell in self.headers], list[Row](), list[Row]()
+        digits = 0
+        for line, cells in ((row[0], row[1]) for row in self.all_rows()) if rows is None else rows:
             texts = [str(cell) for cell in cells]
-            if [plain(text) for text in texts[: len(header)]] != header and not is_units_row(texts):
-                faults[line] = fault, cells
-        doubtful = [line for line, (fault, _) in faults.items() if fault in ("cell", "width")]
-        if len(doubtful) > 1 and len(doubtful) > _MOST_LEFT_OUT * sum(1 for _ in self.rows()):
-            raise self.bad_row(doubtful[0], faults[doubtful[0]][1], len(doubtful))
-        if faults:
+            repeats_header = [plain(text) for text in texts[: len(header)]] == header or is_units_row(texts)
+            if not repeats_header and (fault := self.fault(cells)):
+                left_out.append((line, cells))
+                in_doubt += [(line, cells)] * (fault in ("doubtful", "word"))
+                digits += fault == "doubtful"
+        is_much = digits > 1 or len(in_doubt) > _MOST_WORDS
+        if is_much and len(in_doubt) > MOST_LEFT_OUT * sum(1 for _ in self.rows()):
+            raise self.bad_row(*in_doubt[0], len(in_doubt))
+        if left_out:
             listed = [
                 f"{'row' if isinstance(self.source, Sheet) else 'line'} {line} "
                 f"({', '.join(str(cell) for cell in cells if cell != '')[:40]})"
-                for line, (_, cells) in islice(faults.items(), _MOST_LISTED)
+                for line, cells in left_out[:_MOST_LISTED]
             ]
-            more = ", ..." if len(faults) > _MOST_LISTED else ""
-            yield f"{len(faults)} row{'s' * (len(faults) > 1)} left out, without data: {', '.join(listed)}{more}"
-
-    def without_faults(self) -> tuple[Self, list[tuple[int, Sequence[str | float], str]]]:
-        """Remove lines without data from a text; only lines with letters, dashes or empty cells are examined.
-
-        Returns:
-            The table, and line number, cells and fault of each removed line.
-        """
-        source, layout = self.source, self.layout
-        lines = source.suspicious(layout, _MOST_LEFT_OUT) if isinstance(source, Text) and not layout.numbered else None
-        if not lines or not isinstance(source, Text):
-            return self, []
-        faults: list[tuple[int, Sequence[str | float], str]] = []
-        chunks, chunk_start = list[bytes](), 0
-        for number, start, end in lines:
-            line = Line(number, source.data[start:end].decode("utf-8", "replace").rstrip())
-            cells = [] if is_comment(line.content, layout.delimiter) else list(cells_of(line, layout))
-            if any(cells) and (fault := self._fault(cells, [*cells, *[""] * (len(self.headers) - len(cells))])):
-                faults.append((number, [*cells, *[""] * (len(self.headers) - len(cells))], fault))
-                chunks.append(source.data[chunk_start:start])
-                chunk_start = end
-        data = b"".join([*chunks, source.data[chunk_start:]]) if chunks else source.data
-        return replace(self, source=Text(data, source.encoding)), faults
+            more = ", ..." if len(left_out) > _MOST_LISTED else ""
+            yield f"{len(left_out)} row{'s' * (len(left_out) > 1)} left out, without data: {', '.join(listed)}{more}"
 
     def bad_row(
         self, line: int, cells: Sequence[str | float], count: int = 1, column: Column | None = None
@@ -167,16 +166,18 @@ class Cells:
         Returns:
             The error.
         """
-        width, also = len(self.headers), f", and {count - 1} more such rows" if count > 1 else ""
-        needed = (column for column in self.roles.values() if column.index in self.needed)
-        column = column or next((column for column in needed if not holds_number(cells, column.index)), None)
-        if column is None or len(cells) > width:
+        also = f", and {count - 1} more such rows" if count > 1 else ""
+        needed = [column for column in self.roles.values() if column.index in self.needed]
+        bad = (one for one in needed if isinstance(cells[one.index], str) and not is_like_number(str(cells[one.index])))
+        column = column or next(bad, None)
+        if column is None or len(cells) > len(self.headers) or (self.layout.delimiter == " " and cells[-1] == ""):
             commas = self.layout.delimiter == "," and not any("." in str(cell) for cell in cells)
+            filled = next((n for n in range(len(cells), 0, -1) if cells[n - 1] != ""), 0)
             return self.error(
                 "the row does not match the header",
                 line=line,
-                found=f"{len(cells)} cell{'s' * (len(cells) != 1)}{also}",
-                expected=f"{width} cells",
+                found=f"{filled} cell{'s' * (filled != 1)}{also}",
+                expected=f"{len(self.headers)} cells",
                 hint="separate the columns by semicolons if numbers have a decimal comma" if commas else None,
             )
         cell = cells[column.index]
@@ -193,39 +194,8 @@ class Cells:
 
     def holds_numbers(self, index: int) -> bool:
         """Return True if a column begins with a number."""
-        return holds_number(next(self.rows(), (0, ()))[1], index)
-
-    def texts(self, index: int, count: int | None = None) -> list[str]:
-        """Read the texts of a column.
-
-        Args:
-            index: of the column.
-            count: number of rows; default all.
-
-        Returns:
-            Texts, (n,); an empty cell, such as a merged one, has the text of the cell above.
-        """
-        column: Iterator[str | float] = (cells[index] if index < len(cells) else "" for _, cells in self.rows())
-        if count is None and index in self.large_texts:
-            column = iter(self.large_texts[index])
-        texts, last = [], ""
-        for cell in islice(column, count):
-            last = (cell.strip(" #") if isinstance(cell, str) else f"{cell:.12g}") or last
-            texts.append(last)
-        return texts
-
-    @cached_property
-    def large_texts(self) -> Mapping[int, Sequence[str]]:
-        """Texts of all columns without a role in a large text whose rows all are data, by index; else empty."""
-        if not isinstance(self.source, Text) or len(self.source.data) < _LARGE or self.selected is not None:
-            return {}
-        first = [str(cell) for cell in next(self.rows(), (0, ()))[1]]
-        if len(first) != len(self.headers) or not self.needed or self.needed & self.clocks:
-            return {}
-        if self.source.columns(self.layout, first, dict.fromkeys(self.needed, 1.0), self.numerals) is None:
-            return {}
-        free = sorted(set(range(len(first))) - {column.index for column in self.roles.values()})
-        return (self.source.texts(self.layout, free) if free else None) or {}
+        cell = self.first_rows[0][index]
+        return not isinstance(cell, str) or is_like_number(cell)
 
     def error(
         self,
@@ -263,8 +233,7 @@ class Cells:
     @property
     def is_table(self) -> bool:
         """True if the file is understood as a table of numbers; the text of any other file is not shown in errors."""
-        rows = ([str(cell) for cell in cells] for _, cells in islice(self.rows(), _MOST_LISTED))
-        return len(self.roles) > 1 or bool(self.layout.written) or any(map(is_row, rows))
+        return len(self.roles) > 1 or any(is_row(list(map(str, cells))) for cells in self.first_rows[:_MOST_LISTED])
 
     def place(self, line: int | None, column: Column | None) -> str | None:
         """Location in the file in words, as "line 3, column "Time [s]"".
@@ -296,10 +265,10 @@ class Cells:
         if layout.delimiter == "," and isinstance(source, Text) and not source.may_have_comma(layout):
             notations = tuple(way for way in notations if "," not in (way.decimal, way.thousands)) or notations
         evidence = weigh(self.number_texts(), notations)
-        columns = {column.index: column for column in self.roles.values()}
         may_group = isinstance(source, Sheet) or source.may_group(layout, evidence.ways[0].decimal)
         if evidence.contrary is None and may_group:
             evidence = weigh(self.number_texts(), notations, all_cells=True)
+        columns = {column.index: column for column in self.roles.values()}
         if evidence.contrary:
             (line, index), text = evidence.contrary
             raise self.error(
@@ -338,5 +307,5 @@ class Cells:
         indices = {column.index for column in self.roles.values()} - self.source.numeric - self.clocks
         for line, cells in self.rows() if indices else ():
             for index in indices:
-                if index < len(cells) and isinstance(cell := cells[index], str):
+                if isinstance(cell := cells[index], str):
                     yield (line, index), cell

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
-from itertools import islice
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bushfit import units
 from bushfit.errors import NoColumnError, UnitError
@@ -16,14 +16,16 @@ from bushfit.reading.headers import (
     SWEEP_COLUMNS,
     WORDS,
     ZERO_TO_PEAK,
-    AmplitudeConvention,
     Column,
     Heading,
     Vocabulary,
     fits,
     is_angular,
+    of_motion,
+    parse_unit,
     plain,
     split_convention,
+    split_unit,
 )
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.times import clock
@@ -34,13 +36,27 @@ _ALIKE = 0.4
 _FIRST = 50
 #: Share within which two columns for one amplitude agree; chosen: some are rounded to few digits.
 _AGREEMENT = 0.02
+#: Share within which force over displacement agrees with a stiffness; chosen: far from any other channel.
+_STIFFNESS_AGREEMENT = 0.1
 #: Roles of which two different columns are ignored and not refused, since other columns can replace them.
 _REPLACEABLE = ("force_amplitude", "damping_coefficient", "damping_ratio", "relative_error", "temperature")
-#: SI units by which a column without a known name has a role.
-_UNITS_OF_LOOP = {"time": ("s",), "displacement": ("m", "rad"), "force": ("N", "N*m")}
 #: Roles that state the loss of a sweep.
-_LOSSES = ("phase", "loss_factor", "loss_stiffness", "damping_coefficient", "damping_ratio")
-_NOT_MEASURED = frozenset(map(plain, WORDS["channels"]["not_measured"]))
+_LOSSES = {"phase", "loss_factor", "loss_stiffness", "damping_coefficient", "damping_ratio"}
+#: Words by which a column is no measurement of the test, or marks a part of a complex number, or an amplitude.
+_QUALIFIERS = {kind: frozenset(map(plain, words)) for kind, words in WORDS["qualifiers"].items()}
+#: Role of a column without a known name, by its unit and the words in its name; in this order.
+_BY_UNIT: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
+    ("time", ("s",), None),
+    ("displacement", ("m", "rad"), None),
+    ("force", ("N", "N*m"), None),
+    ("storage_stiffness", ("N/m", "N*m/rad", "Pa"), "real"),
+    ("loss_stiffness", ("N/m", "N*m/rad", "Pa"), "imaginary"),
+    ("stiffness", ("N/m", "N*m/rad"), None),
+    ("frequency", ("Hz",), None),
+    ("amplitude", ("m", "rad", "1"), "amplitude"),
+    ("force_amplitude", ("N", "N*m"), "amplitude"),
+    ("phase", ("rad",), None),
+)
 
 
 def classify(
@@ -72,61 +88,50 @@ def classify(
     roles: dict[str, Column] = {}
     rejected: set[str] = set()
     role_by_index = _stated_indices(cells, vocabulary, columns)
-    for index, header in sorted(enumerate(cells.headers), key=lambda column: is_symbol_k(column[1])):
+    for index, header in sorted(enumerate(cells.headers), key=lambda column: _is_symbol_k(column[1])):
         heading = vocabulary.heading(header) if header else None
         if index in role_by_index:
-            heading = Heading(role_by_index[index], *_meaning(header))
+            meaning = Vocabulary({"": [units.split_header(header)[0]]}, {"": header}).heading(header)
+            heading = replace(meaning or Heading(""), role=role_by_index[index])
         elif heading and heading.role in role_by_index.values():
             heading = None
         if heading is None or heading.role in rejected:
             continue
-        role = heading.role
-        column = _column_of(cells, heading, index, stated_units.get(role))
-        bare = plain(units.split_header(split_convention(header)[0])[0])
-        if role not in columns and role not in stated_units and not fits(bare, role, column.unit):
+        role, column = heading.role, _column_of(cells, heading, index, stated_units.get(heading.role))
+        if role not in columns and not _is_fitting(column, stated=role in stated_units):
             continue
-        if role in ("damping_coefficient", "force_amplitude") and column.unit is None:
-            continue  # another damping, or no force of a sweep
-        if plain(header) == "t" and role == "temperature" and not units.kelvin_scale(column.unit or ""):
-            continue  # a time, or another quantity
-        if is_symbol_k(header) and role not in columns:
-            is_taken_up = role in roles and not is_symbol_k(roles[role].header)  # K* is more specific than K
-            if is_taken_up or not any(units.is_compatible(column.unit or "", si) for si in ("N/m", "N*m/rad")):
-                continue
         if role not in roles:
             roles[role] = column
         elif role in _REPLACEABLE:
             rejected.add(role)
             del roles[role]
-        else:
+        elif _is_symbol_k(header) <= _is_symbol_k(roles[role].header):  # K* is more specific than K
             roles[role] = _preferred(cells, roles[role], column)
     if "amplitude_reached" in roles and "amplitude" not in roles:
         roles["amplitude"] = replace(roles.pop("amplitude_reached"), role="amplitude")
-    notes: list[str] = []
-    if "displacement" in names and motion is not STRAINING:
-        notes += _by_unit(cells, roles)
+    notes = _add_by_unit(cells, roles, names, motion)
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
-        notes += _motion_as_amplitude(cells, roles, motion, stated_units)
-    if "amplitude" in roles:
-        notes += _angle_as_phase(cells, roles)
-    first = next(cells.rows(), (0, ()))[1]
-    clocks = {
-        column.index
-        for role, column in roles.items()
-        if role == "time" and column.index < len(first) and clock(str(first[column.index])) is not None
-    }
+        notes += _add_motion_as_amplitude(cells, roles, stated_units)
+    times = {role: column for role, column in roles.items() if role == "time"}
+    clocks = {column.index for column in times.values() if clock(str(cells.first_rows[0][column.index])) is not None}
     return roles, tuple(notes), frozenset(clocks)
 
 
-def is_symbol_k(header: str) -> bool:
+def _is_symbol_k(header: str) -> bool:
     """Return True if a header is the symbol K alone, with or without a unit."""
     return plain(units.split_header(header)[0]) == "k"
 
 
-def _meaning(header: str) -> tuple[str | None, AmplitudeConvention | None, float]:
-    """Unit, convention and logarithm of the header of a column whose role is stated by its number."""
-    heading = Vocabulary({"": [units.split_header(header)[0]]}, {"": header}).heading(header)
-    return (heading.unit, heading.convention, heading.logarithm) if heading else (None, None, 0.0)
+def _is_fitting(column: Column, *, stated: bool) -> bool:
+    """Return True unless the unit of a column, or the lack of one, shows that its name stands for another role."""
+    role, unit, name = column.role, column.unit, units.split_header(split_convention(column.header)[0])[0]
+    if not stated and not fits(plain(name), role, unit):
+        return False
+    if plain(column.header) == "t" and role == "temperature":
+        return bool(units.kelvin_scale(unit or ""))  # else a time, or another quantity
+    if _is_symbol_k(column.header):
+        return any(units.is_compatible(unit or "", si) for si in ("N/m", "N*m/rad"))
+    return unit is not None or role not in ("damping_coefficient", "force_amplitude")
 
 
 def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, str]) -> dict[int, str]:
@@ -136,23 +141,19 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
         NoColumnError: a stated header or number that the file does not have.
         MeasurementError: one header for two roles.
     """
+    indices, role_by_text = dict[int, str](), dict[str, str]()
+    named_roles = vocabulary.roles([header for header in cells.headers if header])
     for role, text in columns.items():
-        same_columns = [
-            second_role
-            for second_role, header in columns.items()
-            if second_role != role and plain(header) == plain(text)
-        ]
-        if same_columns:
+        if first_role := role_by_text.get(plain(text)):
             raise cells.header_error(
                 "one column is named for two roles",
-                found=f'"{text}" for the {role.replace("_", " ")} and the {same_columns[0].replace("_", " ")}',
+                found=f'"{text}" for the {first_role.replace("_", " ")} and the {role.replace("_", " ")}',
                 expected="a column for each",
                 hint=f'name another column for one of them: columns = {{ {role} = "..." }} in the campaign',
             )
-    named_roles = {heading.role for header in cells.headers if header and (heading := vocabulary.heading(header))}
-    indices = {}
+        role_by_text[plain(text)] = role
     for role, text in columns.items():
-        number = int(text) if text.isdecimal() and len(text) < 5 else 0
+        label, number = role.replace("_", " "), int(text) if text.isdecimal() and len(text) < 5 else 0
         if 1 <= number <= len(cells.headers):
             indices[number - 1] = role
         elif role not in named_roles:
@@ -161,35 +162,37 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
             raise cells.header_error(
                 f'there is no column "{text}"',
                 kind=NoColumnError,
-                expected=f"the header that was named for the {role.replace('_', ' ')}, or its number",
+                expected=f"the header that was named for the {label}, or its number",
                 hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
                 + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
             )
     return indices
 
 
-def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | None) -> Column:
+def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | None = None) -> Column:
     """Column under a heading, with the unit on which header, units row and user agree."""
-    texts = [text for text in (heading.unit, cells.layout.units[index], stated_unit) if text]
-    logarithm = heading.logarithm
-    for number, text in enumerate(texts):
-        for word, base in (("log10", 10.0), ("ln", float(np.e))):
-            if text.startswith(f"{word}(") and text.endswith(")"):
-                texts[number], logarithm = text[len(word) + 1 : -1], base
-    parts = [split_convention(text) for text in texts]
-    conventions = {convention for convention in (heading.convention, *(part[1] for part in parts)) if convention}
-    stated_texts = {unit for unit, _ in parts if unit}
-    unit, counting = next(iter(stated_texts), None), next(iter(conventions), None)
-    column = Column(heading.role, cells.headers[index], index, unit, 1.0, counting, logarithm)
-    if len(stated_texts) > 1 or len(conventions) > 1:
+    parsed = [parse_unit(text) for text in (heading.unit, cells.layout.units[index], stated_unit) if text]
+    texts = sorted({text for text, *_ in parsed if text})
+    conventions = {convention for convention in (heading.convention, *(part[1] for part in parsed)) if convention}
+    logarithm = next((base for *_, base in reversed(parsed) if base), heading.logarithm)
+    unit, convention = next(iter(texts), None), next(iter(conventions), None)
+    column = Column(heading.role, cells.headers[index], index, unit, 1.0, convention, logarithm)
+    if len(texts) > 1 or len(conventions) > 1:
         raise UnitError(
             f"two units for the {heading.role.replace('_', ' ')}",
             file=cells.file,
             place=cells.place(cells.layout.header_line, column),
-            found=" and ".join(sorted(stated_texts) if len(stated_texts) > 1 else sorted(conventions)),
+            found=" and ".join(texts if len(texts) > 1 else sorted(conventions)),
             expected="one unit, from the header, the units row or the campaign",
         )
     return column
+
+
+def _first_numbers(cells: Cells, columns: Sequence[Column]) -> NDArray[np.float64]:
+    """Numbers of the first rows of columns, (rows, columns), as the file has them; none if a cell is no number."""
+    texts = [[str(row[column.index]).replace(",", ".") for column in columns] for row in cells.first_rows[:_FIRST]]
+    are_numbers = all(units.is_number(text) for row in texts for text in row)
+    return np.array(texts, dtype=float) if are_numbers else np.empty((0, len(columns)))
 
 
 def _preferred(cells: Cells, first: Column, second: Column) -> Column:
@@ -198,26 +201,21 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
     Raises:
         MeasurementError: columns that differ.
     """
-    role = first.role
+    role, both = first.role, (first, second)
     if role == "frequency":
-        angular = [is_angular(column.header, column.unit or "") for column in (first, second)]
+        angular = [is_angular(column.header, column.unit or "") for column in both]
         if angular[0] != angular[1]:
             return first if angular[1] else second
     if role == "time" and (first.unit is None) != (second.unit is None):
         return first if first.unit else second
-    rows = [row for _, row in islice(cells.rows(), _FIRST)]
-    texts = [[str(row[column.index]) for row in rows] for column in (first, second)]
-    numbers = [
-        np.array([float(t) for t in column_texts]) if all(map(units.is_number, column_texts)) else None
-        for column_texts in texts
-    ]
-    factors = [ZERO_TO_PEAK[column.convention or "zero-to-peak"] for column in (first, second)]
-    same_unit = first.unit == second.unit and numbers[0] is not None and numbers[1] is not None and len(rows) > 0
-    if factors[0] != factors[1] and same_unit:
-        sizes = [factor * values for factor, values in zip(factors, numbers, strict=True) if values is not None]
-        if np.all(np.abs(sizes[0] - sizes[1]) <= _AGREEMENT * np.abs(sizes[0])):
+    numbers = _first_numbers(cells, both)
+    factors = np.array([ZERO_TO_PEAK[column.convention or "zero-to-peak"] for column in both])
+    is_equal = all(row[first.index] == row[second.index] for row in cells.first_rows)
+    if factors[0] != factors[1] and first.unit == second.unit and len(numbers):
+        sizes = factors * numbers
+        if np.all(np.abs(sizes[:, 0] - sizes[:, 1]) <= _AGREEMENT * np.abs(sizes[:, 0])):
             return first
-        if texts[0] == texts[1]:
+        if is_equal:
             raise cells.header_error(
                 "two columns contradict each other",
                 found=f'equal numbers for "{first.header}" and "{second.header}"',
@@ -225,10 +223,10 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
                 hint=f'choose the right one in the campaign: columns = {{ {role} = "{first.header}" }} or '
                 f'columns = {{ {role} = "{second.header}" }}',
             )
-    if texts[0] == texts[1] and cells.texts(first.index) == cells.texts(second.index):
+    if is_equal and all(row[first.index] == row[second.index] for _, row in cells.rows()):
         return first
     numbered = first.header == second.header
-    choices = [str(column.index + 1) if numbered else column.header for column in (first, second)]
+    choices = [str(column.index + 1) if numbered else column.header for column in both]
     raise cells.header_error(
         f"more than one column could be the {role.replace('_', ' ')}",
         found=f"{first.header}, {second.header}",
@@ -239,56 +237,59 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
     )
 
 
-def _unnamed(cells: Cells) -> list[Column]:
-    """Columns whose name has no known meaning, with the unit of header or units row, without set points and means."""
-    usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
-    columns = []
-    for index, header in enumerate(cells.headers):
-        text, convention = split_convention(header)
-        name, unit = units.split_header(text)
-        words = {plain(word) for word in name.replace("_", " ").split()}
-        if header and usual.heading(header) is None and not words & _NOT_MEASURED:
-            columns.append(Column("", header, index, unit or cells.layout.units[index] or None, 1.0, convention))
-    return columns
+def _add_by_unit(
+    cells: Cells, roles: dict[str, Column], names: Mapping[str, Sequence[str]], motion: Motion
+) -> list[str]:
+    """Add the columns that are recognised by their unit and the words in their name; return a sentence for each.
 
-
-def _by_unit(cells: Cells, roles: dict[str, Column]) -> list[str]:
-    """Add the columns of a loop that are recognised by their unit alone; return a sentence for each."""
-    if len(roles) + len(cells.headers) < 3 or cells.layout.written:
+    A column is taken if it is the only one with such a unit, without set points and means. In a sweep these are the
+    columns that belong to a stiffness.
+    """
+    if len(roles) + len(cells.headers) < 3:
         return []
-    notes, first = [], next(cells.rows(), (0, ()))[1]
-    free = [column for column in _unnamed(cells) if column.unit]
-    for role, expected in _UNITS_OF_LOOP.items():
-        fitting = [column for column in free if any(units.is_compatible(column.unit or "", unit) for unit in expected)]
+    usual, strains = (
+        Vocabulary(of_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {}),
+        WORDS["straining"]["displacement"],
+    )
+    free: dict[int, tuple[Column, set[str]]] = {}
+    for index, header in enumerate(cells.headers):
+        name, unit, convention = split_unit(header)
+        words = {plain(word) for word in name.replace("_", " ").replace("/", " ").split()}
+        if header and usual.heading(header) is None and not words & _QUALIFIERS["not_measured"]:
+            in_row, of_row, _ = parse_unit(cells.layout.units[index])
+            column = Column("", header, index, in_row or unit, 1.0, convention or of_row)
+            words |= {"amplitude"} if column.convention else set()
+            if motion is STRAINING and any(len(strain) > 4 and plain(strain) in plain(name) for strain in strains):
+                words |= {"amplitude"}  # a compound, such as Scherdeformation
+            free[index] = column, words
+    notes = []
+    for role, expected, qualifier in _BY_UNIT:
+        if role in roles or role not in names or (role == "phase" and _LOSSES & set(roles)):
+            continue
+        belongs_to_stiffness = role in ("frequency", "amplitude", "phase")
+        if belongs_to_stiffness and not {"stiffness", "storage_stiffness", "force_amplitude"} & set(roles):
+            continue
+        if not belongs_to_stiffness or role == "amplitude":
+            expected = tuple(si for si in expected if (si in ("1", "Pa")) == (motion is STRAINING))
         fitting = [
-            column for column in fitting if column.index < len(first) and is_like_number(str(first[column.index]))
+            column
+            for column, words in free.values()
+            if column.unit
+            and any(units.is_compatible(column.unit, si) for si in expected)
+            and (qualifier is None or words & (_QUALIFIERS[qualifier] | {qualifier}))
+            and is_like_number(str(cells.first_rows[0][column.index]))
         ]
-        if role not in roles and len(fitting) == 1:
+        if len(fitting) == 1:
             roles[role] = replace(fitting[0], role=role)
-            notes.append(f'"{fitting[0].header}" is read as the {role} by its unit')
-    if "time" not in roles:
-        stamps = [
-            column for column in _unnamed(cells) if clock(str((*first, *cells.headers)[column.index])) is not None
-        ]
-        if len(stamps) == 1 and len(first) == len(cells.headers):
-            roles["time"] = replace(stamps[0], role="time")
+            del free[fitting[0].index]
+            notes.append(f'"{fitting[0].header}" is read as the {role.replace("_", " ")} by its unit')
+    if "time" in names and "time" not in roles:
+        stamps = [column for column, _ in free.values() if clock(str(cells.first_rows[0][column.index])) is not None]
+        roles |= {"time": replace(stamps[0], role="time")} if len(stamps) == 1 else {}
     return notes
 
 
-def _angle_as_phase(cells: Cells, roles: dict[str, Column]) -> list[str]:
-    """Add the phase of a sweep if one column is an angle and no other column states the loss."""
-    if not {"stiffness", "storage_stiffness", "force_amplitude"} & set(roles) or set(roles) & set(_LOSSES):
-        return []
-    angles = [column for column in _unnamed(cells) if column.unit and units.is_compatible(column.unit, "rad")]
-    if len(angles) != 1:
-        return []
-    roles["phase"] = replace(angles[0], role="phase")
-    return [f'"{angles[0].header}" is read as the phase by its unit']
-
-
-def _motion_as_amplitude(
-    cells: Cells, roles: dict[str, Column], motion: Motion, stated_units: Mapping[str, str]
-) -> list[str]:
+def _add_motion_as_amplitude(cells: Cells, roles: dict[str, Column], stated_units: Mapping[str, str]) -> list[str]:
     """Add the amplitude of a sweep that is named like a displacement: with a force and a phase it can be nothing else.
 
     If the file has a stiffness too, it must agree with force over displacement.
@@ -299,27 +300,18 @@ def _motion_as_amplitude(
         for index, header in enumerate(cells.headers)
         if header and (heading := motions.heading(header)) and not heading.logarithm
     ]
-    fitting = [
-        column for column in candidates if any(units.is_compatible(column.unit or "", si) for si in ("m", "rad"))
-    ]
+    fitting = [c for c in candidates if any(units.is_compatible(c.unit or "", si) for si in ("m", "rad"))]
     if len(fitting) != 1 or "force_amplitude" not in roles:
         return []
     if "stiffness" in roles:
-        force, stiffness = roles["force_amplitude"], roles["stiffness"]
-        numbers = [
-            [float(str(row[column.index])) for column in (fitting[0], force, stiffness)]
-            for _, row in islice(cells.rows(), _FIRST)
-            if all(units.is_number(str(row[column.index])) for column in (fitting[0], force, stiffness))
-        ]
-        try:
-            si = [motion.displacement_unit, motion.force_unit, motion.stiffness_unit]
-            scales = [
-                units.si_factor(c.unit or "", unit) for c, unit in zip((fitting[0], force, stiffness), si, strict=True)
-            ]
-        except UnitError:
+        columns = (fitting[0], roles["force_amplitude"], roles["stiffness"])
+        turns = units.is_compatible(fitting[0].unit or "", "rad")
+        expected = ("rad", "N*m", "N*m/rad") if turns else ("m", "N", "N/m")
+        if not all(units.is_compatible(c.unit or "", si) for c, si in zip(columns, expected, strict=True)):
             return []
-        x, f, k = (np.array(numbers).reshape(-1, 3) * scales).T
-        if x.size == 0 or not np.all(np.abs(np.abs(k * x) - np.abs(f)) <= 0.1 * np.abs(f)):
+        scales = [units.si_factor(column.unit or "", si) for column, si in zip(columns, expected, strict=True)]
+        x, force, stiffness = np.abs(scales * _first_numbers(cells, columns)).T
+        if x.size == 0 or not np.all(np.abs(stiffness * x - force) <= _STIFFNESS_AGREEMENT * force):
             return []
     roles["amplitude"] = replace(fitting[0], role="amplitude")
     return [f'"{fitting[0].header}" is read as the amplitude, because the file has the amplitude of the force, too']

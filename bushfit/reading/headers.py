@@ -64,6 +64,10 @@ _CHANNEL = re.compile(r"\([^()]*[:|][^()]*\)")
 _TAN = re.compile(r"(?i)\btan\s*\(\s*(delta|d|δ)\s*\)")
 #: Logarithm of a quantity: "log10 f [Hz]", "lg(G') [Pa]", "log f". The base of a plain log is not known.
 _LOGARITHM = re.compile(r"\s*(?P<kind>log[\s_]?10|lg|ln|log)(?=[\s_(])[\s_]*(?:\((?P<inner>[^()]*)\))?", re.IGNORECASE)
+#: Logarithm in a unit: "log10(Pa)", "ln(Pa)", "dB re 1 N/mm", "dB (N/mm)".
+_LOGARITHM_OF_UNIT = re.compile(
+    r"(?:(?:log_?10|lg|(?P<ln>ln))\s*\(|(?P<dB>dB)\s*\(?(?:\s*rel?f?\.?(?![^\W_]))?(?:\s*1(?=\s))?)\s*(?P<unit>[^()]*)\)?"
+)
 #: Quotation mark that stands for two primes: G".
 _TWO_PRIMES = re.compile(r"(?<![^\W_])([A-Za-z])\"")
 #: Words that do not change the meaning of a channel.
@@ -83,7 +87,7 @@ _UNITS_OF = {
 }
 #: Names of an amplitude that imply peak-to-peak.
 _PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
-_PEAK = r"(?:peak|pk|spitze|sp\.?|crete|cresta|pico|pic)"
+_PEAK = r"(?:peak|pk|spitze|sp\.?|crete|cresta|picco|pico|pic)"
 _START, _END = r"(?<![^\W_])", r"(?![^\W_])"
 #: End of a unit to which a convention may be joined without a blank: "mmpp".
 _AFTER_UNIT = r"(?:(?<=mm)|(?<=[u\u03bc]m)|(?<=deg)|(?<=rad))"
@@ -291,11 +295,34 @@ def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
     return text.strip(), None
 
 
+def parse_unit(text: str) -> tuple[str, AmplitudeConvention | None, float]:
+    """Unit without its convention, the amplitude convention, and the base of the logarithm in it, else 0.
+
+    20 log10 of a ratio to a reference is a logarithm too: "dB re 1 N/mm", "log10(Pa)", "ln(Pa)".
+    """
+    base = 0.0
+    if match := _LOGARITHM_OF_UNIT.fullmatch(text):
+        base = 10.0**0.05 if match["dB"] else 2.718281828459045 if match["ln"] else 10.0
+        text = match["unit"]
+    return *split_convention(text), base
+
+
 @lru_cache(maxsize=4096)
 def plain(name: str) -> str:
     """Spelling of a name for comparison: letters, digits and ' | * alone, without case, accents or umlauts."""
     letters = re.sub(r"[^\w'|*]|_", "", _folded(name.translate(_SPELLINGS)).replace("ß", "ss"))
     return letters.replace("ae", "a").replace("oe", "o").replace("ue", "u")
+
+
+def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None]:
+    """Name, unit and amplitude convention of a header whose name has no known meaning."""
+    text, convention = split_convention(header)
+    for name, unit, certain in _splits(text):
+        if certain and unit is None and units.is_unit(name) and name != "-":
+            return name, name, convention  # a unit alone
+        if unit and (certain or units.is_unit(unit)):
+            return name, unit, convention
+    return text, None, convention
 
 
 def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:

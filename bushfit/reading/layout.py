@@ -19,7 +19,7 @@ from bushfit.reading.headers import Vocabulary, split_convention
 from bushfit.reading.numerals import is_like_number
 
 #: Delimiters by their names in a campaign, in the order in which they are tried.
-DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "blanks": " "}
+DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "caret": "^", "blanks": " "}
 #: Filled lines at the start of a file that can contain the header; chosen: far more than preambles have.
 MOST_HEAD_LINES = 500
 #: Columns of a table; chosen: far more than a test has.
@@ -67,7 +67,7 @@ class FileFormat:
     """
 
     encoding: str | None = None
-    delimiter: Literal["comma", "semicolon", "tab", "pipe", "blanks"] | None = None
+    delimiter: Literal["comma", "semicolon", "tab", "pipe", "caret", "blanks"] | None = None
     decimal: Literal[".", ","] | None = None
     thousands: Literal[".", ",", " ", "'", "none"] | None = None
     header_line: int | None = None

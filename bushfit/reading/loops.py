@@ -7,6 +7,7 @@ import numpy as np
 
 from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.headers import LOOP_COLUMNS, Column
+from bushfit.reading.labelled import note_not_understood
 from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.stated import LoopFile
@@ -65,7 +66,7 @@ def read_loop(file: Path, direction: Place, test: LoopFile, *, name: str | None 
         displacement,
         force,
         test.noise,
-        test.source(table.sha256, test.temperature, (*notes, *table.not_understood())),
+        test.source(table.sha256, test.temperature, (*notes, *note_not_understood(table, table.row_labels, None))),
         "time" in values,
         test.weight,
         temperature=test.temperature,
@@ -107,7 +108,7 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
         wanted["time"] = replace(time, scale=DAY) if in_days else table.column("time", "s")
     elif test.rate is None and test.frequency is None:
         hint = 'or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign'
-        raise table.missing("time", "s", hint)
+        table.column("time", "s", hint)
     return wanted
 
 

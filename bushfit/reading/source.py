@@ -6,8 +6,8 @@ import csv
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bushfit.reading.files import HEAD_BYTES
 from bushfit.reading.layout import MOST_HEAD_LINES, Layout, Line, is_comment, split
 from bushfit.reading.measurement import Floats
-from bushfit.reading.numerals import Numerals, is_like_number
+from bushfit.reading.numerals import Numerals
 from bushfit.units import SIZES
 
 #: Smallest positive value, and largest value of a cell [SI].
@@ -40,6 +40,7 @@ class Text:
     sheet: None = None
     layout: None = None
     numeric: frozenset[int] = frozenset()
+    _parsed: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
 
     def head(self) -> list[Line]:
         """Filled lines at the start of the text."""
@@ -73,88 +74,85 @@ class Text:
         return has_blanks and bool(_GROUP_BY_BLANK.search(self.data, self.offset(layout.lines_before_data)))
 
     def columns(
-        self, layout: Layout, first: Sequence[str], scales: Mapping[int, float], numerals: Numerals
+        self, layout: Layout, first: Sequence[str], indices: frozenset[int], numerals: Numerals
     ) -> dict[int, Floats] | None:
         """Read columns with pandas.
 
         Args:
             layout: header and delimiter.
             first: cells of the first row of data.
-            scales: factor to SI by column index.
+            indices: of the columns.
             numerals: notation of the numbers.
 
         Returns:
-            Values in SI by column index, (n,) each; None if a row has another length, or a cell is no number or is
-            beyond LARGEST_VALUE.
+            Values by column index, (n,) each; None if a row has another length, or a cell is no number.
 
         Notes:
             All columns that begin with a number are parsed as numbers: a summary row such as "Mean" then fails, as it
             must. pandas does not check the length of rows if some columns are skipped; the delimiters are counted
             instead. pandas rounds correctly from 3.1 on.
         """
-        import pandas as pd
-
         width, start = len(first), self.offset(layout.lines_before_data)
-        numbers = [index for index in range(width) if index in scales or numerals.allows(first[index])]
-        has_quotes = self.has('"', layout)
-        skips = len(numbers) < width and layout.delimiter != " " and not has_quotes
-        stream = io.BytesIO(self.data)
-        stream.seek(start)
-        types: Any = float if len(numbers) == width else {i: float if i in numbers else str for i in range(width)}
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error", pd.errors.ParserWarning)
-                frame = pd.read_csv(
-                    stream,
-                    sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
-                    header=None,
-                    names=list(range(width)),
-                    usecols=numbers if skips else None,
-                    index_col=False,
-                    decimal=numerals.decimal,
-                    dtype=types,  # one type for all columns spares pandas a copy
-                    na_filter=False,
-                    compression=None,
-                )
-        except (ValueError, pd.errors.ParserWarning):
-            return None
-        if has_quotes and len(frame) != sum(1 for _ in self.lines(layout.lines_before_data)):
-            return None  # an unclosed quote swallowed line ends
-        if skips and self.data.count(layout.delimiter.encode(), start) != len(frame) * (width - 1):
-            return None
-        columns = {index: frame[index].to_numpy() for index in scales}
-        for index, column in columns.items():
-            largest = LARGEST_VALUE / abs(scales[index])
-            if not (column.min(initial=0.0) >= -largest and column.max(initial=0.0) <= largest):
-                return None
-            column.flags.writeable = True  # nobody else uses the frame
-            column *= scales[index]
-        return columns
+        numbers = [index for index in range(width) if index in indices or numerals.allows(first[index])]
+        key = (start, layout.delimiter, numerals.decimal, *numbers)
+        if key not in self._parsed:
+            has_quotes = self.has('"', layout)
+            skips = len(numbers) < width and layout.delimiter != " " and not has_quotes
+            types: Any = float if len(numbers) == width else {i: float if i in numbers else str for i in range(width)}
+            frame = self._frame(layout, width, numbers if skips else None, types, numerals.decimal)
+            if frame is not None and has_quotes:  # an unclosed quote swallows line ends
+                frame = frame if len(frame) == sum(1 for _ in self.lines(layout.lines_before_data)) else None
+            self._parsed[key] = frame
+        frame = self._parsed[key]
+        return None if frame is None else {index: frame[index].to_numpy() for index in indices}
 
-    def texts(self, layout: Layout, indices: Sequence[int]) -> dict[int, list[str]] | None:
-        """Read columns of a large text with pandas.
+    def texts(self, layout: Layout, indices: Sequence[int]) -> dict[int, tuple[list[str], NDArray[np.intp]]] | None:
+        """Read columns of texts with pandas.
 
         Args:
             layout: header and delimiter.
             indices: of the columns.
 
         Returns:
-            Texts of all rows by index, (n,) each; None if rows differ in length, or cells may contain delimiters.
+            Different texts of each column, and the position of that of each row among them, (n,), by index; None if
+            rows differ in length, or cells may contain delimiters.
         """
+        if layout.delimiter == " " or self.has('"', layout):
+            return None
+        key = (self.offset(layout.lines_before_data), layout.delimiter, "texts", *indices)
+        if key not in self._parsed:
+            self._parsed[key] = self._frame(layout, len(layout.headers), list(indices), "category", ".")
+        frame = self._parsed[key]
+        if frame is None:
+            return None
+        return {n: (list(frame[n].cat.categories), frame[n].cat.codes.to_numpy().astype(np.intp)) for n in indices}
+
+    def _frame(self, layout: Layout, width: int, used: list[int] | None, types: Any, decimal: str) -> Any:
+        """Data frame of the columns with these indices, default all; None if pandas refuses the text."""
         import pandas as pd
 
-        start, mark, width = self.offset(layout.lines_before_data), layout.delimiter, len(layout.headers)
-        if mark == " " or self.has('"', layout):
-            return None
+        start, mark = self.offset(layout.lines_before_data), layout.delimiter
         stream = io.BytesIO(self.data)
         stream.seek(start)
-        names = list(range(width))
-        frame = pd.read_csv(
-            stream, sep=mark, header=None, names=names, usecols=list(indices), dtype="category", na_filter=False
-        )
-        if self.data.count(mark.encode(), start) != len(frame) * (width - 1):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", pd.errors.ParserWarning)
+                frame = pd.read_csv(
+                    stream,
+                    sep=r"\s+" if mark == " " else mark,
+                    header=None,
+                    names=list(range(width)),
+                    usecols=used,
+                    index_col=False,
+                    decimal=decimal,
+                    dtype=types,  # one type for all columns spares pandas a copy
+                    na_filter=False,
+                    compression=None,
+                )
+        except (ValueError, pd.errors.ParserWarning):
             return None
-        return {index: frame[index].astype(object).tolist() for index in indices}
+        is_skipping = used is not None and self.data.count(mark.encode(), start) != len(frame) * (width - 1)
+        return None if is_skipping else frame
 
     def suspicious(self, layout: Layout, largest_share: float) -> list[tuple[int, int, int]] | None:
         """Find lines below the header that have letters, dashes or an empty cell.
@@ -170,10 +168,9 @@ class Text:
         pattern = re.compile(
             rb"[A-DF-Za-df-z#]|--" + (rb"|%s\s*%s|%s[ \t]*\r?\n" % (mark, mark, mark) if mark.strip() else b"")
         )
-        place = self.offset(layout.lines_before_data)
+        place = counted = self.offset(layout.lines_before_data)
         number, lines = layout.lines_before_data + 1, list[tuple[int, int, int]]()
         limit = largest_share * self.data.count(b"\n", place) + 20
-        counted = place
         while (match := pattern.search(self.data, place)) and len(lines) <= limit:
             start = self.data.rfind(b"\n", 0, match.start()) + 1
             end = self.data.find(b"\n", match.start())
@@ -188,7 +185,7 @@ def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:
     """Filled lines of a stream that begins after line number `after`; closes the stream."""
     with io.TextIOWrapper(data, encoding="utf-8", errors="replace") as text:
         for number, line in enumerate(text, start=after + 1):
-            if line.strip(" \t\r\n,;|"):
+            if line.strip(" \t\r\n,;|^"):
                 yield Line(number, line.rstrip("\n"))
 
 
@@ -225,9 +222,19 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class Combined(Sheet):
-    """Table that was put together from parts of a sheet or text; `numbers` are the original lines of its rows."""
+    """Table that was put together from parts of a sheet or text.
+
+    Args:
+        numbers: original lines of its rows.
+        above: lines above the first part.
+    """
 
     numbers: Sequence[int] = ()
+    above: Sequence[Line] = ()
+
+    def head(self) -> list[Line]:
+        """Lines above the first part, and the first rows."""
+        return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
 
     def lines(self, after: int) -> Iterator[Line]:  # noqa: ARG002
         """All rows below the header."""
@@ -257,20 +264,6 @@ class Channels(Sheet):
         for start in range(after, len(self.arrays[0]), _CHUNK_ROWS):
             chunk = zip(*(values[start : start + _CHUNK_ROWS].tolist() for values in self.arrays), strict=True)
             yield from (Line(number, cells) for number, cells in enumerate(chunk, start=start + 1))
-
-    def values(self, scales: Mapping[int, float]) -> dict[int, Floats] | None:
-        """Read channels.
-
-        Args:
-            scales: factor to SI by channel index.
-
-        Returns:
-            Values in SI by channel index, (n,) each; None if one is not a finite number below LARGEST_VALUE.
-        """
-        if not self.numeric >= set(scales):
-            return None
-        scaled = {index: self.arrays[index] * scale for index, scale in scales.items()}
-        return scaled if all(np.all(np.abs(values) <= LARGEST_VALUE) for values in scaled.values()) else None
 
 
 class Channel(NamedTuple):
@@ -311,8 +304,3 @@ def cells_of(line: Line, layout: Layout) -> Sequence[str | float]:
         return split(line.content, layout.delimiter) if isinstance(line.content, str) else line.content
     except csv.Error as error:
         raise csv.Error(f"{error}, line {line.number}") from error
-
-
-def holds_number(cells: Sequence[str | float], index: int) -> bool:
-    """Return True if a row has a number in the column with this index."""
-    return index < len(cells) and (not isinstance(cells[index], str) or is_like_number(str(cells[index])))

@@ -18,6 +18,7 @@ from bushfit.reading.headers import (
     AmplitudeConvention,
     Column,
 )
+from bushfit.reading.labelled import column_texts, note_not_understood
 from bushfit.reading.measurement import SAME_TEMPERATURE, Floats, Sweep
 from bushfit.reading.runs import runs_of
 from bushfit.reading.stated import SweepFile
@@ -112,7 +113,7 @@ def read_sweep(
     runs = runs_of(frequency, level, None if repeat is None else repeat[selected], test.stepped)
     if reached is None and not np.array_equal(runs.amplitude, level):
         reached = level
-    notes = (*notes, *more, *table.not_understood(selected, frequency, runs.amplitude))
+    notes = (*notes, *more, *note_not_understood(table, table.row_labels, selected, frequency, runs.amplitude))
     return Sweep(
         name or file.stem,
         direction,
@@ -290,8 +291,7 @@ def repeat_numbers(
         MeasurementError: a number that is no whole number.
     """
     if "repeat" in table.roles and "repeat" not in values:
-        texts = table.texts(table.roles["repeat"].index)
-        return np.array([*map([*dict.fromkeys(texts)].index, texts)], dtype=np.int64) + 1
+        return column_texts(table, table.roles["repeat"].index).codes.astype(np.int64) + 1
     if (repeat := values.get("repeat")) is None:
         return None
     is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)

@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -16,36 +17,27 @@ from bushfit import units
 from bushfit.errors import MeasurementError, UnitError, error_location
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.blocks import combined
+from bushfit.reading.cells import MOST_LEFT_OUT, Cells, Row
 from bushfit.reading.classification import classify
-from bushfit.reading.headers import (
-    LOOP_COLUMNS,
-    OF_MOTION,
-    PAIRS,
-    SWEEP_COLUMNS,
-    Column,
-    Vocabulary,
-    is_angular,
-    of_motion,
-    split_convention,
-)
-from bushfit.reading.labelled import LabelledCells, Rows
-from bushfit.reading.layout import DELIMITERS, FileFormat, find_layout
+from bushfit.reading.headers import OF_MOTION, PAIRS, Column, Vocabulary, is_angular, of_motion, split_convention
+from bushfit.reading.labelled import Rows, find_labels, select_rows
+from bushfit.reading.layout import DELIMITERS, FileFormat, Line, find_layout, is_comment
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import Numerals, weigh
 from bushfit.reading.parts import OpenedFile, open_file
-from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, Channels, RowSource, Sheet, Text
+from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, Channels, RowSource, Sheet, Text, cells_of
 from bushfit.reading.times import clock
 from bushfit.reading.wide import unpivot
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 #: Rows that are converted at a time if pandas cannot read them; chosen: their texts fill some MiB.
 _CHUNK_ROWS = 1 << 16
-#: Rows that are compared, and cells that settle the decimal mark; chosen: a long record need not be read whole.
+#: Cells that settle the decimal mark; chosen: a long record need not be read whole.
 _FIRST = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Table(LabelledCells):
+class Table(Cells):
     """Table of a test, with its columns by role.
 
     Args:
@@ -118,7 +110,7 @@ class Table(LabelledCells):
             found = f"header_line = {file_format.header_line}"
             problem, hint = "there is no header on this line", "lines count from 1"
             raise MeasurementError(problem, file=opened.file, found=found, hint=hint)
-        table = cls(opened.file, source, layout, file_format, {}, opened.checksum, names, motion)
+        table = cls(opened.file, source, layout, file_format, opened.checksum, names, motion)
         if len(table.headers) < 2:
             expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
             raise table.header_error("there is only one column", expected=expected)
@@ -135,12 +127,17 @@ class Table(LabelledCells):
         present = next((pair for pair in essential if pair <= set(roles)), set(roles) & {"displacement", "force"})
         needed = frozenset(roles[role].index for role in present)
         table = replace(table, roles=roles, notes=notes, clocks=clocks, needed=needed)
-        return table if rows is None else table.taking(rows)
+        return replace(table, selected=select_rows(table, table.row_labels, rows)) if rows else table
 
     @property
     def sha256(self) -> str:
         """SHA-256 of the file."""
         return self.checksum.result()
+
+    @cached_property
+    def row_labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
+        """Columns that state direction, specimen_number and run; see `find_labels`."""
+        return find_labels(self)
 
     def column(self, role: str, expected: str, hint: str | None = None) -> Column:
         """Find the column of a role, with its factor to SI; a ratio needs no unit.
@@ -157,12 +154,19 @@ class Table(LabelledCells):
             MeasurementError: no such column.
             UnitError: no unit, an unknown one, or one of another dimension.
         """
+        label = role.replace("_", " ")
         if role not in self.roles:
-            raise self.missing(role, expected, hint)
+            self.refuse_other_motion(role)
+            ways = ", ".join(filter(None, (self.columns_key(role, expected), hint)))
+            raise self.header_error(
+                f"there is no column for the {label}",
+                expected=f'a header such as "{label} [{units.example_unit(expected)}]"',
+                hint=f"name the column in the campaign: {ways}",
+            )
         column = self.roles[role]
         if column.index in self.clocks:
             return column
-        label, place = role.replace("_", " "), self.place(self.layout.header_line, column)
+        place = self.place(self.layout.header_line, column)
         if math.isnan(column.logarithm):
             unit = column.unit or units.example_unit(expected)
             raise UnitError(
@@ -173,8 +177,17 @@ class Table(LabelledCells):
                 expected="log10 or ln in the header",
                 hint=f'units = {{ {role} = "log10({unit})" }} in the campaign, or units = {{ {role} = "ln({unit})" }}',
             )
-        if column.unit is None and (expected != "1" or role in OF_MOTION):
+        if column.unit is None and (expected != "1" or role in OF_MOTION or column.logarithm):
             example = units.example_unit(expected)
+            if column.logarithm:
+                raise UnitError(
+                    f"the logarithms of the {label} have no unit",
+                    file=self.file,
+                    place=place,
+                    found=f'"{column.header}"',
+                    expected="the reference, such as dB re 1 N/mm, or the unit, such as log10(N/mm)",
+                    hint=f'units = {{ {role} = "{example}" }} in the campaign if the logarithm of 1 {example} is 0',
+                )
             angular = expected == "Hz" and is_angular(column.header, "1/s")
             second = "rad/s" if angular else "rad" if expected == "rad" and role == "phase" else ""
             alternative = f', or units = {{ {role} = "{second}" }}' if second else ""
@@ -203,25 +216,6 @@ class Table(LabelledCells):
         column = self.roles.get(role)
         return column is not None and column.unit is not None and units.is_compatible(column.unit, expected)
 
-    def missing(self, role: str, expected: str, hint: str | None = None) -> MeasurementError:
-        """Create the error for a role without a column.
-
-        Args:
-            role: of the column.
-            expected: its SI unit.
-            hint: what else the user can do.
-
-        Returns:
-            The error.
-        """
-        self.refuse_other_motion(role)
-        label = role.replace("_", " ")
-        return self.header_error(
-            f"there is no column for the {label}",
-            expected=f'a header such as "{label} [{units.example_unit(expected)}]"',
-            hint=f"name the column in the campaign: {self.columns_key(role, expected)}" + (f", {hint}" if hint else ""),
-        )
-
     def columns_key(self, role: str, unit: str) -> str:
         """Suggest keys of a campaign that name the column of a role.
 
@@ -232,15 +226,13 @@ class Table(LabelledCells):
         Returns:
             A key for each of the first three headers without a role that have a fitting unit, or one with "...".
         """
-        usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
-        free = [header for header in self.headers if header and usual.heading(header) is None]
-        in_row = dict(zip(self.headers, self.layout.units, strict=True))
-        of_unit = (
-            header
-            for header in free
-            if units.is_compatible(split_convention(units.split_header(header)[1] or in_row[header])[0], unit)
-        )
-        fitting = [] if unit == "1" else list(of_unit)  # a ratio can be anything
+        taken = {column.index for column in self.roles.values()}
+        free = [
+            (header, split_convention(units.split_header(split_convention(header)[0])[1] or in_row)[0])
+            for index, (header, in_row) in enumerate(zip(self.headers, self.layout.units, strict=True))
+            if header and index not in taken
+        ]
+        fitting = [header for header, text in free if unit != "1" and units.is_compatible(text, unit)]
         return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
 
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
@@ -253,11 +245,11 @@ class Table(LabelledCells):
         Raises:
             MeasurementError: there is such a header.
         """
-        kinds = ("displacement and force or stiffness", "strain and modulus")
-        other_motion, (expected, found) = STRAINING, kinds
+        other_motion = TRANSLATION if self.motion is STRAINING else STRAINING
+        kinds = ["displacement and force or stiffness", "strain and modulus"]
+        expected, found = kinds[:: -1 if self.motion is STRAINING else 1]
         hint = 'write [[specimens]] with a name and kind = "modulus" in the campaign, and specimen = "its name" here'
         if self.motion is STRAINING:
-            other_motion, (found, expected) = TRANSLATION, kinds
             hint = 'take specimen out of the campaign, or give it kind = "shear" with its area and thickness'
         names = of_motion(self.names, other_motion)
         differs = role in names and names[role] is not of_motion(self.names, self.motion)[role]
@@ -287,39 +279,35 @@ class Table(LabelledCells):
             MeasurementError: numbers that can be read in two ways, too few rows, or so many rows without data that the
                 meaning of the table is in doubt.
         """
-        notes, values = self.notes, self._by_library(wanted)
+        table, left_out = self.needing(wanted), None
+        values = table._by_library(wanted)
         if values is None:
-            table, faults = self.needing(wanted).without_faults()
-            values = table._by_library(wanted) if faults else None
-            if values is not None:
-                notes = (*notes, *table.left_out(faults))
-        if values is None:
-            table = self.needing(wanted)
-            notes = (*notes, *table.left_out())
-            values = table._row_by_row(wanted)
-            if len(next(iter(values.values()))) < fewest_rows and (bad := table.first_fault()):
-                raise bad
-        for role, column in wanted.items():
-            if column.logarithm:
-                with np.errstate(over="ignore"):
-                    values[role] = column.scale * column.logarithm ** (values[role] / column.scale)
+            cleaned, left_out = table._without_faults()
+            values = cleaned._by_library(wanted) if left_out else None
+            if values is None:
+                cleaned, left_out, values = table, None, table._row_by_row(wanted)
+            notes = (*self.notes, *cleaned.note_left_out(left_out))
+        else:
+            notes = self.notes
         count = len(next(iter(values.values())))
         if count < fewest_rows:
+            faulty = ((line, cells) for line, cells, fault in table.all_rows() if fault in ("doubtful", "missing"))
+            if row := next(faulty, None):
+                raise table.bad_row(*row)
             problem, hint = "too few rows", None
             if isinstance(self.source, Sheet) and self.source.lacks_values():
                 problem = "the workbook has formulas whose values were not saved"
                 hint = "open it in a spreadsheet program and save it again"
             raise self.error(problem, found=f"{count}", expected=f"at least {fewest_rows}", hint=hint)
+        for role, column in wanted.items():
+            if column.logarithm:
+                with np.errstate(over="ignore"):
+                    values[role] = column.scale * column.logarithm ** (values[role] / column.scale)
         return values, notes
 
     def needing(self, wanted: Mapping[str, Column]) -> "Table":
         """The table with only those rows that have a number in each of these columns."""
         return replace(self, needed=self.needed | {column.index for column in wanted.values()})
-
-    def first_fault(self) -> MeasurementError | None:
-        """Error for the first row without data; None if there is no such row."""
-        faults = ((line, cells) for line, cells, fault in self._all_rows() if fault in ("cell", "width", "missing"))
-        return next((self.bad_row(line, cells) for line, cells in faults), None)
 
     def check_positive(self, roles: Sequence[str], wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
         """Refuse values that are not positive.
@@ -360,31 +348,50 @@ class Table(LabelledCells):
             raise self.error(problem, line=line, column=column, found=found, expected=expected, hint=hint)
 
     def _by_library(self, wanted: Mapping[str, Column]) -> dict[str, Floats] | None:
-        """Columns as a library reads them, in SI by role; None if they have to be read row by row.
+        """Columns as pandas reads them, in SI by role; None if they have to be read row by row.
 
-        The library takes no thousands separators. If it reads all cells as numbers, the first cells settle the decimal
-        mark.
+        pandas takes no thousands separators. If it reads all cells as numbers, the first cells settle the decimal mark.
         """
-        scales = {column.index: column.scale for column in wanted.values()}
-        if self.selected is not None or self.clocks & set(scales):
+        indices, source = frozenset(column.index for column in wanted.values()), self.source
+        if self.selected is not None or self.clocks & indices:
             return None
-        if isinstance(self.source, Channels):
-            arrays = self.source.values(scales)
-            return None if arrays is None else {role: arrays[column.index] for role, column in wanted.items()}
-        if not isinstance(self.source, Text):
+        arrays: Mapping[int, Floats] | None = None
+        if isinstance(source, Channels) and source.numeric >= indices:
+            arrays = {index: source.arrays[index] for index in indices}
+        elif isinstance(source, Text):
+            ways = weigh(islice(self.number_texts(), _FIRST), self.possible_numerals()).ways
+            first = [str(cell) for cell in self.first_rows[0]]
+            numerals = Numerals(ways[0].decimal)
+            are_settled = len({way.decimal for way in ways}) == 1 and len(first) == len(self.headers)
+            if are_settled and all(numerals.allows(first[index]) for index in indices):  # pandas takes TRUE for 1
+                arrays = source.columns(self.layout, first, indices, numerals)
+        if arrays is None:
             return None
-        decimals = {way.decimal for way in weigh(islice(self.number_texts(), _FIRST), self.possible_numerals()).ways}
-        first = [str(cell) for cell in next(self.rows(), (0, ()))[1]]
-        if len(decimals) > 1 or len(first) != len(self.headers):
-            return None
-        numerals = Numerals(decimals.pop())
-        if not all(numerals.allows(first[column.index]) for column in wanted.values()):
-            return None  # a library may take a column of TRUE for numbers
-        values = self.source.columns(self.layout, first, scales, numerals)
-        return None if values is None else {role: values[column.index] for role, column in wanted.items()}
+        values = {role: column.scale * arrays[column.index] for role, column in wanted.items()}
+        fits = all(
+            x.min(initial=0.0) >= -LARGEST_VALUE and x.max(initial=0.0) <= LARGEST_VALUE for x in values.values()
+        )
+        return values if fits else None  # so are numbers that are not finite
+
+    def _without_faults(self) -> tuple["Table", list[Row]]:
+        """The table without lines that are no data, and these; only lines with letters or empty cells are examined."""
+        source, layout, faulty = self.source, self.layout, list[Row]()
+        if not isinstance(source, Text) or layout.numbered:
+            return self, faulty
+        chunks, chunk_start = list[bytes](), 0
+        for number, start, end in source.suspicious(layout, MOST_LEFT_OUT) or ():
+            line = Line(number, source.data[start:end].decode("utf-8", "replace").rstrip())
+            cells = [] if is_comment(line.content, layout.delimiter) else cells_of(line, layout)
+            cells = [*cells, *[""] * (len(self.headers) - len(cells))]
+            if any(cells) and self.fault(cells):
+                faulty.append((number, cells))
+                chunks.append(source.data[chunk_start:start])
+                chunk_start = end
+        data = b"".join([*chunks, source.data[chunk_start:]])
+        return (replace(self, source=Text(data, source.encoding)) if faulty else self), faulty
 
     def _row_by_row(self, wanted: Mapping[str, Column]) -> dict[str, Floats]:
-        """Columns of rows that a library does not read, in SI by role, (n,) each.
+        """Columns of rows that pandas does not read, in SI by role, (n,) each.
 
         Raises:
             MeasurementError: a cell with no finite number, or one beyond LARGEST_VALUE.
@@ -393,11 +400,11 @@ class Table(LabelledCells):
         remaining = self.rows()
         while chunk := list(islice(remaining, _CHUNK_ROWS)):
             for role, column in wanted.items():
-                numbers, is_clock = [], column.index in self.clocks
+                number_in = clock if column.index in self.clocks else self.numerals.value
+                numbers = []
                 for line, cells in chunk:
                     cell = cells[column.index]
-                    text = clock if is_clock else self.numerals.value
-                    number = text(str(cell)) if isinstance(cell, str) or is_clock else cell
+                    number = cell if not isinstance(cell, str) else number_in(cell)
                     if number is None or not abs(number * column.scale) <= LARGEST_VALUE:
                         raise self.bad_row(line, cells, column=column)
                     numbers.append(number * column.scale)

@@ -95,8 +95,8 @@ def test_an_error_names_the_option_that_settles_it(
 @pytest.mark.parametrize(
     ("header", "said", "unsaid"),
     [
-        ("frequency [Hz],amplitude [mm],K7 [N/mm],loss factor [-]", '--column "stiffness=K7 [N/mm]"', "force="),
-        ("x [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]", "--at-frequency", "force="),
+        ("frequency [Hz],amplitude [mm],K7 [N/mm],K8 [N/mm]", '--column "stiffness=K7 [N/mm]"', "force="),
+        ("x,amplitude [mm],stiffness [N/mm],loss factor [-]", "--at-frequency", "force="),
         ("frequency [Hz],amplitude,stiffness [N/mm],loss factor [-]", '--unit "amplitude=', "--amplitude"),
         ("frequency [Hz],amplitude [mm],stiffness [N/mm],K* [N/mm]", "could be the stiffness", "force"),
     ],

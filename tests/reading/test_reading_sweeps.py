@@ -194,7 +194,7 @@ BAD_SWEEPS: list[tuple[str, dict[str, Any], list[str]]] = [
     (SWEEP, {"direction": DMA}, ["line 1", "test of displacement and force or stiffness", 'kind = "shear"']),
     (COUPON.replace("_dyn_pct", ""), {"direction": DMA}, ["line 1", "the amplitude has no unit", 'write "strain [%]"']),
     (SWEEP.replace("loss factor [-]", "phase"), {}, ["line 1", "the phase has no unit", "phase [deg]"]),
-    (SWEEP.replace("[-]", "[dB]"), {}, ["line 1", "unknown unit", "dB"]),
+    (SWEEP.replace("[-]", "[dB]"), {}, ["line 1", "logarithms of the loss factor", "dB"]),
     (with_line(SWEEP, 3, "15,0.1,600,-0.9"), {}, ["line 3", "loss factor", "-0.5 to 5", '"-0.9"']),
     (with_line(PHASE, 3, "15,0.1,600,95"), {}, ["line 3", "95"]),
     (STORAGE.replace("0.1\n", "91\n"), {}, ["line 2", "a loss factor", "phase in deg"]),
