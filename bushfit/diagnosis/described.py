@@ -22,7 +22,7 @@ from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import with_model_error
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
-from bushfit.fitting.robust import WeightedFit
+from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number
@@ -47,7 +47,7 @@ class GapDescription:
     """
 
     after: Evidence
-    fitted: WeightedFit
+    fitted: FitResult
     held: HoldOut
     fingerprint: Fingerprint | None
     words: str
@@ -90,9 +90,9 @@ def describe(
         base = _refitted(base.model, harmonic, (*fixed, *base.solution.at_bound), bounds)
     except FitError:  # too few points are left for the parameters
         return None
-    model = replace(fitted.solution.model, effects=(*evidence.model.effects, NAME), unnamed=correction)
-    after = Evidence(fitted.solution.moved_to(model, harmonic), harmonic)
-    whole = Evidence(fitted.solution.moved_to(model, evidence.data_sets), evidence.data_sets)
+    model = replace(fitted.model, effects=(*evidence.model.effects, NAME), unnamed=correction)
+    after = Evidence(fitted.moved_to(model, harmonic), harmonic)
+    whole = Evidence(fitted.moved_to(model, evidence.data_sets), evidence.data_sets)
     like = fingerprint(base, *weighed(base, rig), start, bounds)
     texts = _words(correction, like), _trusted(correction, whole)
     return GapDescription(after, fitted, _held_out(evidence, fitted), like, *texts)
@@ -119,12 +119,12 @@ def _refitted(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[s
     return Evidence(fit_from(model, data_sets, fixed, bounds).finished(_EVALUATIONS).solution, tuple(data_sets))
 
 
-def _held_out(before: Evidence, fitted: WeightedFit) -> HoldOut:
+def _held_out(before: Evidence, fitted: FitResult) -> HoldOut:
     """Whole runs inside the range, in turn predicted from the others, without the correction and with it."""
     solution = before.solution
     both = (
         LeaveOut.from_fit(solution.jacobian[solution.moving], solution.residual),
-        LeaveOut.from_fit(fitted.solution.jacobian[fitted.solution.moving], fitted.solution.residual),
+        LeaveOut.from_fit(fitted.jacobian[fitted.moving], fitted.residual),
     )
     residuals = dict[str, Array]()
     for part in _inside(before.data_sets):

@@ -1,7 +1,7 @@
 """A model fitted to all tests of a campaign, with the figures by which models are compared."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,12 +10,12 @@ from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
 from bushfit.fitting.agreement import met_within, misfits, usable
 from bushfit.fitting.assess import FitStage, apart_in_temperature, covariance, measured_range, quality
-from bushfit.fitting.coordinates import Bounds, Solution
+from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.preparation import MeasuredTest, sources
+from bushfit.fitting.problem import FitResult
 from bushfit.fitting.procedures import cautions
-from bushfit.fitting.robust import WeightedFit
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 
@@ -38,9 +38,9 @@ class Evidence:
         joint: the same fit with residuals whitened by an error that the tests have in common, if it was made so.
     """
 
-    solution: Solution
+    solution: FitResult
     data_sets: tuple[MeasuredTest, ...]
-    joint: Solution | None = None
+    joint: FitResult | None = None
 
     @property
     def model(self) -> Model:
@@ -52,9 +52,9 @@ class Evidence:
         return self.solution.residual
 
     @property
-    def estimate(self) -> WeightedFit:
-        """Estimate of a fit that leaves nothing out."""
-        return WeightedFit(self.solution, self.data_sets, self.data_sets, self.data_sets, ())
+    def estimate(self) -> FitResult:
+        """The fit, to all tests with the weights of their noise."""
+        return replace(self.solution, problem=replace(self.solution.problem, tests=self.data_sets))
 
     @property
     def chi_square(self) -> float:
@@ -124,7 +124,7 @@ def result_of(
     resolved: Collection[str],
     *,
     lacking: bool = True,
-    corrected: WeightedFit | None = None,
+    corrected: FitResult | None = None,
     rig: RigSettings = UNSTATED,
 ) -> Result:
     """Build the result of a fit with its uncertainty; a parameter at a bound is treated as fixed.
@@ -144,10 +144,10 @@ def result_of(
     found = corrected or evidence.estimate
     if lacking and not corrected:
         found, error = with_model_error(found, bounds, rig)
-        model = found.solution.model
-    solution = found.solution
+        model = found.model
+    solution = found
     moving = tuple(name for name in solution.coordinates.names if name not in solution.at_bound)
-    cov = covariance(solution.model, [FitStage(moving, found.weighed, found.process)])
+    cov = covariance(solution.model, [FitStage(moving, found.weighed or found.minimised, found.process)])
     return Result(
         model,
         moving,
@@ -164,7 +164,7 @@ def result_of(
         at_bound=solution.at_bound,
         tests=misfits(model, tests),
         # a correction has seen every run
-        usable=met_within(model, tests, ()) if corrected else usable(solution, found.minimised),
+        usable=met_within(model, tests, ()) if corrected else usable(solution),
         model_error=error,
         unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in resolved),
     )

@@ -167,9 +167,7 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
     """Log evidence of the last model of a chain, in which each model has one effect more; without common terms."""
     *before, last = chain
     found = with_model_error(last.estimate, bounds)[0]
-    priors = [
-        laplace(name, replace(last, solution=found.solution), one) for name, one in zip(names, before, strict=True)
-    ]
+    priors = [laplace(name, replace(last, solution=found), one) for name, one in zip(names, before, strict=True)]
     precisions = {name: value for _, precision, _ in priors for name, value in precision.items()}
     return sum(density for density, *_ in priors) + log_likelihood(found, precisions)
 

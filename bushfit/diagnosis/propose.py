@@ -150,7 +150,7 @@ def _replacing(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> Prop
         return None
     best = min(fits, key=_promised)
     coordinate_names = [qualified_name(effect, parameter) for parameter in effect.parameters]
-    columns = best.jacobian[[best.coordinates.names.index(name) for name in coordinate_names]]
+    columns = best.jacobian[[best.problem.coordinates.names.index(name) for name in coordinate_names]]
     score = max(evidence.chi_square - _promised(best), 0.0)
     return Proposal(effect.name, best.model, score, columns, 0, visible=True, together=True)
 

@@ -16,6 +16,7 @@ from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import fit_from, probes
 from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 from bushfit.progress import track
@@ -52,7 +53,7 @@ def refitted(
     fits: dict[str, Descent] = {}
     tests: Sequence[MeasuredTest] = evidence.data_sets
     if columns is not None:
-        tests = Joined(evidence.data_sets, CommonError.of_all(columns))
+        tests = Joined(evidence.data_sets, CommonError(columns))
     for proposal in proposed:
         limits = {**within_reach(proposal.model, evidence.data_sets), **bounds}
         start_values = {name: value for name, value in start.items() if name in proposal.model.values}
@@ -128,9 +129,9 @@ def refit_with_free_columns(
         The better of the fits from the values of `evidence` and from `start`.
     """
     names = evidence.solution.coordinates.names
-    tests = Joined(bare.data_sets, CommonError.of_all(columns))
+    tests = Joined(bare.data_sets, CommonError(columns))
     start_values = {name: value for name, value in start.items() if name in names}
     starts = [evidence.model, *([evidence.model.with_values(start_values)] if start_values else [])]
-    fits = [solve(model, tests, names, bounds, strict=False) for model in starts]
+    fits = [solve(FitProblem(model, tests, names, bounds), strict=False) for model in starts]
     model = min(fits, key=lambda each: each.chi_square).model
     return replace(evidence, solution=evidence.solution.moved_to(model, evidence.data_sets))

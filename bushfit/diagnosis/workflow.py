@@ -20,6 +20,7 @@ from bushfit.effects.mistakes import get_candidate, get_mistake
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.preparation import split_by_kind, with_gains
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.robust import estimate, outlier_warnings, outliers_at
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -138,8 +139,7 @@ def _begin(data: PreparedCampaign, model: Model | None, settings: DiagnosisSetti
             model = model.with_effect(name, initial_values)
     outliers: tuple[Outlier, ...] = ()
     if data.robust:
-        names = [name for name in model.parameters if name not in fixed]
-        robust = estimate(model, data_sets, names, data.bounds, robust=True)
+        robust = estimate(FitProblem.with_fixed(model, data_sets, fixed, data.bounds), robust=True)
         outliers, data_sets = robust.outliers, robust.data_sets
     data_sets = [data_set.with_weight() for data_set in with_gains(data_sets, weigh=True)]
     descent = fit_from(model, data_sets, fixed, data.bounds).finished(EVALUATIONS)

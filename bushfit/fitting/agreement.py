@@ -5,13 +5,13 @@ Where each test, and each level of it, has its own figures, thousands of rows of
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.coordinates import Solution
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, log_slopes, rows_of
+from bushfit.fitting.problem import FitResult
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Usable
 from bushfit.reading.measurement import loss_factor
@@ -29,17 +29,14 @@ _SHARE = 0.95
 #: Share of the points of a place that have to be held out for these to speak for it.
 _ENOUGH = 0.5
 
-#: A place, how far points there are off in |K| and loss factor, (2, n), and whether these were predicted from others.
-_Part = tuple[str, Array, bool]
-
 
 class _Run(NamedTuple):
-    """Run of a test: the quantity held, its value and unit, and a mask of the points of the run, (n,)."""
+    """Run of a test: the quantity held, its value and unit, and its points, as a mask (n,) or a slice."""
 
     held: Literal["amplitude", "frequency"] | None
     value: float | None
     unit: str | None
-    points: Array
+    points: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,15 +72,15 @@ class LeaveOut:
         without = np.square(self.back @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
         return without > _MOST_GROWTH * np.sum(np.square(self.back), axis=1)
 
-    def step(self, rows: Array, first: int | None = None) -> Array | None:
-        """How far the first parameters, or all, move without these rows, in coordinates, (k,).
+    def step(self, rows: Array) -> Array | None:
+        """Change of the parameters without these rows, in coordinates, (k,).
 
         It is one Gauss-Newton step, which is exact where the model is linear over that step; None if the step is too
         long to predict a refit, or if the remaining rows do not determine one of these parameters.
         """
-        if self.open(rows)[:first].any():
+        if self.open(rows).any():
             return None
-        change = (self.back @ self._basis_step(rows))[:first]
+        change = self.back @ self._basis_step(rows)
         return None if np.abs(change).max(initial=0.0) > _LONGEST_STEP else change
 
     def predicted(self, rows: Array, clusters: Array, *, stepped: bool = True) -> tuple[Array, Array]:
@@ -134,7 +131,7 @@ class LeaveOut:
 
 
 def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = ()) -> tuple[Misfit, ...]:
-    """How well a model meets each test, and each run of those that have several.
+    """Agreement of a model with each test, and with each run of those that have several.
 
     Args:
         model: fitted model.
@@ -144,73 +141,63 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
     Returns:
         One `Misfit` for each test, and one for each run of a test with several runs.
     """
-    pairs = [(data_set, True) for data_set in fitted] + [(data_set, False) for data_set in unfitted]
-    return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.with_weight(), was_fitted=was))
+    found = []
+    for number, whole in enumerate([*fitted, *unfitted]):
+        test = whole.with_weight()
+        relative, gain = test.relative(model), np.abs(test.noise_free(model).measured / test.measured) - 1.0
+        squares = np.square(test.residual(model)).reshape(test.parts, -1).sum(axis=0)
+        runs = list(_runs(test))
+        for run in (_Run(None, None, None, slice(None)), *(runs if len(runs) > 1 else ())):
+            of_run = relative[run.points]
+            counted = test.counted * of_run.size / relative.size * test.test.weight
+            misfit = Misfit(
+                test=test.name,
+                place=str(test.direction),
+                fitted=number < len(fitted),
+                held=run.held,
+                value=run.value,
+                unit=run.unit,
+                points=of_run.size,
+                nrmse=float(np.sqrt(np.mean(of_run**2))),
+                reduced_chi_square=float(squares[run.points].sum()) / counted,
+                gain=float(gain[run.points].mean()),
+            )
+            found.append(misfit)
+    return tuple(found)
 
 
-def _misfits(model: Model, data_set: MeasuredTest, *, was_fitted: bool) -> Iterator[Misfit]:
-    """The figures of a test without points of no weight, and of its runs where there are several."""
-    relative, gain = data_set.relative(model), np.abs(data_set.noise_free(model).measured / data_set.measured) - 1.0
-    squares = np.square(data_set.residual(model)).reshape(data_set.parts, -1).sum(axis=0)
-    place, all_points, rows = str(data_set.direction), np.ones(data_set.frequency.size, dtype=bool), relative.size
+def usable(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) -> tuple[Usable, ...]:
+    """Expected error of a fitted model in stiffness and loss factor: 95 % of the points of a direction are closer.
 
-    def figures(run: _Run, relative: Array, squares: Array, gain: Array) -> Misfit:
-        """Figures of one run.
-
-        Args:
-            run: run of the test, or all its points.
-            relative: size of the relative misfit, (n,).
-            squares: sum of squared residuals of each point, (n,).
-            gain: relative error of |K| at each operating point.
-        """
-        named = data_set.name, place, was_fitted, run.held, run.value, run.unit
-        counted = data_set.counted * relative.size / rows
-        reduced = float(squares.sum()) / (counted * data_set.test.weight)
-        return Misfit(*named, relative.size, float(np.sqrt(np.mean(relative**2))), reduced, float(gain.mean()))
-
-    yield figures(_Run(None, None, None, all_points), relative, squares, gain)
-    runs = list(_runs(data_set))
-    for run in runs if len(runs) > 1 else ():
-        yield figures(run, *(values[run.points] for values in (relative, squares, gain)))
-
-
-def usable(
-    solution: Solution, data_sets: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = ()
-) -> tuple[Usable, ...]:
-    """Within what a fitted model meets the measured stiffness and loss factor, 95 % of the points, place by place.
-
-    Each run is predicted from the fit without it where the rest tells all parameters and moves none far; a test that
-    was not fitted is predicted anyway. Where fewer than half the points of a place are predicted so, all count as the
-    fit has them.
-
-    The tests have the weights at which the solution is the least sum of squares.
+    Each run is predicted from the fit without it if the rest determines all parameters and moves none far; a test that
+    was not fitted is predicted in any case. If fewer than half the points of a direction are predicted so, all count as
+    the fit has them.
 
     Args:
-        solution: end of the fit.
-        data_sets: fitted tests, with the weights of the fit.
+        solution: the fit.
         unfitted: tests that were not fitted.
 
     Returns:
         95 % quantile of the error of stiffness and loss factor, for each direction or specimen.
     """
-    free = solution.moving
-    whole, parts = LeaveOut.from_fit(solution.jacobian[free], solution.residual), list[_Part]()
-    per_coordinate = solution.coordinates.slopes(solution.model.values)[:, None]
-    for data_set, rows in zip(data_sets, rows_of(data_sets), strict=True):
-        modelled = data_set.noise_free(solution.model).measured
-        slopes = (log_slopes(solution.model, data_set, solution.coordinates.names) * per_coordinate)[free]
-        for run in _runs(data_set):
-            points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
-            step = whole.step(rows.start + np.flatnonzero(points), len(free))
+    model, free, parts = solution.model, solution.moving, list[tuple[str, Array, bool]]()
+    whole = LeaveOut.from_fit(solution.jacobian[free], solution.residual)
+    per_coordinate = solution.coordinates.slopes(model.values)[:, None]
+    for test, rows in zip(solution.minimised, rows_of(solution.minimised), strict=True):
+        modelled = test.noise_free(model).measured
+        slopes = (log_slopes(model, test, solution.names) * per_coordinate)[free]
+        for run in _runs(test):
+            points = np.broadcast_to(run.points, (test.parts, test.size // test.parts))
+            step = whole.step(rows.start + np.flatnonzero(points))
             predicted = modelled if step is None else modelled * np.exp(step @ slopes)
-            counted = run.points & (data_set.weights > 0.0 if isinstance(data_set, MeasuredSweep) else True)
-            difference = _absolute_difference(predicted[counted], data_set.measured[counted])
-            parts.append((str(data_set.direction), difference, step is not None))
-    return _by_place([*parts, *_as_modelled(solution.model, unfitted, predicted=True)])
+            counted = run.points & (test.weights > 0.0 if isinstance(test, MeasuredSweep) else True)
+            difference = _absolute_difference(predicted[counted], test.measured[counted])
+            parts.append((str(test.direction), difference, step is not None))
+    return _by_place([*parts, *_as_modelled(model, unfitted, predicted=True)])
 
 
 def met_within(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest]) -> tuple[Usable, ...]:
-    """Usable range of a model whose fit is not at hand: residuals of the fitted tests stand for held-out ones.
+    """Expected error of a model without its fit: residuals of the fitted tests stand for held-out ones.
 
     Args:
         model: fitted model.
@@ -223,24 +210,24 @@ def met_within(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[
     return _by_place([*_as_modelled(model, fitted, predicted=False), *_as_modelled(model, unfitted, predicted=True)])
 
 
-def _as_modelled(model: Model, data_sets: Sequence[MeasuredTest], *, predicted: bool) -> Iterator[_Part]:
-    for data_set in data_sets:
-        yield (
-            str(data_set.direction),
-            _absolute_difference(data_set.noise_free(model).measured, data_set.measured),
-            predicted,
-        )
+def _as_modelled(model: Model, data_sets: Sequence[MeasuredTest], *, predicted: bool) -> list[tuple[str, Array, bool]]:
+    """Direction of each test, its differences from the model, (2, n), and the flag, for `_by_place`."""
+    pairs = [(test, _absolute_difference(test.noise_free(model).measured, test.measured)) for test in data_sets]
+    return [(str(test.direction), difference, predicted) for test, difference in pairs]
 
 
-def _by_place(parts: Sequence[_Part]) -> tuple[Usable, ...]:
-    """The figures of each place: of its predicted points where these are enough, else of all."""
+def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[Usable, ...]:
+    """Expected error of each direction, from its predicted points if these are enough, else from all.
+
+    Each part has the name of the direction, the differences, (2, n), and True if they were predicted from other runs.
+    """
     found = []
     for place in dict.fromkeys(place for place, _, _ in parts):
-        mine = [(compared, predicted) for name, compared, predicted in parts if name == place]
-        all_points = np.concatenate([compared for compared, _ in mine], axis=1)
-        held_out = np.concatenate([np.empty((2, 0)), *(compared for compared, predicted in mine if predicted)], axis=1)
-        enough = held_out.shape[1] >= _ENOUGH * all_points.shape[1]
-        compared = held_out if enough else all_points
+        differences = np.concatenate([difference for name, difference, _ in parts if name == place], axis=1)
+        held_out = [difference for name, difference, predicted in parts if name == place and predicted]
+        predicted = np.concatenate([np.empty((2, 0)), *held_out], axis=1)
+        enough = predicted.shape[1] >= _ENOUGH * differences.shape[1]
+        compared = predicted if enough else differences
         stiffness, loss = np.quantile(compared, _SHARE, axis=1, method="higher").tolist()
         found.append(Usable(place, stiffness, loss, compared.shape[1], enough))
     return tuple(found)

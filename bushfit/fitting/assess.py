@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from itertools import compress
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from bushfit.fitting.preparation import (
     rows_of,
     split_by_kind,
 )
+from bushfit.fitting.problem import Process
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -46,41 +46,14 @@ _CHECK = "check the units of displacement and force, and the dimensions of what 
 
 
 @dataclass(frozen=True, eq=False)
-class Process:
-    """A Gaussian process of the relative error of a model, as a part of the covariance of its residuals.
+class FitStage:
+    """One fit of a procedure.
 
     Args:
-        shapes: one standard deviation of each amount at the operating points of all tests, complex (q, p).
-        freedom: degrees of freedom that determine its size.
+        names: parameters that it moved.
+        data_sets: its tests.
+        process: error of the model, where the model misses the tests.
     """
-
-    shapes: Array
-    freedom: float
-
-    def moves(self, model: Model, data_sets: Sequence[MeasuredTest], influence: Array) -> Array:
-        """Covariance of parameters that it makes, (k, k), by the influence of whitened residuals on them, (k, n).
-
-        Args:
-            model: fitted model.
-            data_sets: tests.
-            influence: of whitened residuals on the parameters, (k, n).
-
-        Returns:
-            Covariance in the coordinates of `influence`, (k, k).
-        """
-        first, changes = 0, np.zeros((len(influence), len(self.shapes)))
-        for data_set, rows in zip(data_sets, rows_of(data_sets), strict=True):
-            shapes = self.shapes[:, first : first + data_set.frequency.size]
-            first += data_set.frequency.size
-            changes += (
-                influence[:, rows] @ data_set.residual_change(shapes * data_set.noise_free(model).measured, model).T
-            )
-        return np.asarray(changes @ changes.T)
-
-
-@dataclass(frozen=True, eq=False)
-class FitStage:
-    """One fit of a procedure: the parameters it moved, the data it saw, and how the model misses them, if it does."""
 
     names: tuple[str, ...]
     data_sets: Sequence[MeasuredTest]
@@ -88,17 +61,17 @@ class FitStage:
 
 
 def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | None = None) -> Covariance:
-    """Covariance of all parameters that a procedure estimated, each stage holding what the others found.
+    """Covariance of all parameters that a procedure estimated, each stage with the results of the others fixed.
 
     Args:
         model: fitted model.
         stages: fits of the procedure, in order.
-        fixed: covariance of parameters that all stages held.
+        fixed: covariance of parameters that all stages kept fixed.
 
     Returns:
-        By parameter value. Where the residuals of a stage, or of one test of it, exceed its noise, the share of each
-        test is inflated by the larger of the two reduced chi-squares. What the error of an estimated noise adds is
-        counted as Kenward and Roger (1997) do, and how far the covariance may be off for it goes along as `spread`.
+        Covariance by parameter value. Where the residuals of a stage, or of one test of it, exceed its noise, the share
+        of each test is inflated by the larger of the two reduced chi-squares. What the error of an estimated noise adds
+        is counted as Kenward and Roger (1997) do, and how far the covariance may be off for it is in `spread`.
 
     Notes:
         Each stage solves J_own (J_own^T d_own + J_rest^T d_rest + noise) = 0 for its own parameters while the rest
@@ -118,58 +91,58 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
         slope = jacobian(model, stage.data_sets, names)
         basis = np.linalg.qr(slope[equations].T)[0]
         system[equations] = basis.T @ slope.T
-        excess = [1.0] * len(stage.data_sets) if stage.process else _excess(model, stage)
-        inflation = np.repeat(excess, [data_set.size for data_set in stage.data_sets])
-        share = basis.T * np.sqrt(inflation)
+        excess = [1.0] * len(stage.data_sets)
+        if not stage.process:
+            of_all = lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0
+            excess = [max(of_all, lack_of_fit(model, [test], 0) or 1.0) for test in stage.data_sets]
+        share = basis.T * np.sqrt(np.repeat(excess, [test.size for test in stage.data_sets]))
         root[equations, equations] = np.linalg.qr(share.T)[1].T
         bases.append((equations, share))
         begin = equations.stop
     reaction = _inverse(system)
-    answer = reaction @ root
-    by_value, reaction = answer * slopes[:, None], reaction * slopes[:, None]
+    by_value, reaction = (reaction @ root) * slopes[:, None], reaction * slopes[:, None]
     carried = reaction[:, : len(fixed.names)] / slopes[: len(fixed.names)]
-    spread = [carried @ part @ carried.T for part in fixed.spread]
-    influences = [reaction[:, equations] @ basis for equations, basis in bases]
-    matrix = by_value @ by_value.T
-    for stage, influence in zip(stages, influences, strict=True):
-        if stage.process:
-            added = stage.process.moves(model, stage.data_sets, influence)
-            blocks = zip(stage.data_sets, rows_of(stage.data_sets), strict=True)
-            matrix = matrix + added + sum(data_set.uncounted(influence[:, rows]) for data_set, rows in blocks)
+    matrix, spread = by_value @ by_value.T, [carried @ part @ carried.T for part in fixed.spread]
+    by_noise = dict[Hashable, tuple[Array, Array]]()
+    for stage, (equations, basis) in zip(stages, bases, strict=True):
+        influence = reaction[:, equations] @ basis
+        blocks = list(zip(stage.data_sets, rows_of(stage.data_sets), strict=True))
+        if stage.process:  # beside it the error of the noise is the least part
+            added = stage.process.covariance(model, stage.data_sets, influence)
             spread.append(added * np.sqrt(2.0 / stage.process.freedom))
-        else:
-            matrix = matrix + _of_gains(stage, influence)
-    without_process = [not stage.process for stage in stages]  # of the others the noise is the least part
-    counted = [
-        list(compress(values, without_process)) for values in (stages, influences, [basis for _, basis in bases])
-    ]
-    for part, lost in _unsure(*counted):
-        spread.append(part)
-        matrix = matrix + 2.0 * _positive(lost, np.sqrt(np.diag(matrix)))
+            matrix = matrix + added + sum(test.uncounted(influence[:, rows]) for test, rows in blocks)
+            continue
+        for test, rows in blocks:
+            if isinstance(test, MeasuredLoop) and not test.gain_weighs:  # which the weights do not count
+                change = test.gain_error * (influence[:, rows] @ test.unit_gain)
+                matrix = matrix + np.outer(change, change)
+        for variance, (change, lost) in _changes_by_noise(stage.data_sets, influence, basis).items():
+            changes, losses = by_noise.get(variance, (0.0, 0.0))
+            by_noise[variance] = changes + change, losses + lost
+    for change, lost in by_noise.values():
+        size = np.sqrt(np.diag(matrix))
+        scale = np.outer(size, size) + np.finfo(float).tiny
+        values, vectors = np.linalg.eigh(lost / scale)  # what is below zero is rounding
+        matrix = matrix + 2.0 * (vectors * np.maximum(values, 0.0)) @ vectors.T * scale
+        spread.append(change)
     return Covariance(names, matrix, tuple(spread))
 
 
-def _of_gains(stage: FitStage, influence: Array) -> Array:
-    """Covariance, (k, k), by gain errors that have no part in the weights, from the influence of residuals, (k, n)."""
-    added = np.zeros((len(influence), len(influence)))
-    for data_set, rows in zip(stage.data_sets, rows_of(stage.data_sets), strict=True):
-        if isinstance(data_set, MeasuredLoop) and not data_set.gain_weighs:
-            change = data_set.gain_error * (influence[:, rows] @ data_set.gain_and_offset()[0])
-            added += np.outer(change, change)
-    return added
+def _changes_by_noise(
+    data_sets: Sequence[MeasuredTest], influence: Array, basis: Array
+) -> dict[Hashable, tuple[Array, Array]]:
+    """Change of a covariance by the standard error of each estimated variance, and what wrong weights add, (k, k) each.
 
-
-def _excess(model: Model, stage: FitStage) -> list[float]:
-    """Factor of each test's variance: reduced chi-square where a test, or all together, exceed the noise; else 1."""
-    together = lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0
-    return [max(together, single or 1.0) for single in missed(model, stage.data_sets)]
-
-
-def _positive(matrix: Array, sizes: Array) -> Array:
-    """A symmetric matrix without the directions in which it is below zero, those of parameters of these sizes."""
-    scale = np.outer(sizes, sizes) + np.finfo(float).tiny
-    values, vectors = np.linalg.eigh(matrix / scale)
-    return (vectors * np.maximum(values, 0.0)) @ vectors.T * scale
+    The influence of each residual on the parameters is (k, n), the basis of the stage's own equations (own, n).
+    """
+    unit, sums = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
+    for test, rows in zip(data_sets, rows_of(data_sets), strict=True):
+        here = influence[:, rows]
+        for variance, move in test.unsure(here).items():
+            products = [move @ here.T, move @ move.T, move @ unit[:, rows].T]
+            so_far = sums.get(variance, [0.0] * 3)
+            sums[variance] = [one + previous for one, previous in zip(products, so_far, strict=True)]
+    return {variance: (first, second - lost @ lost.T) for variance, (first, second, lost) in sums.items()}
 
 
 def _inverse(system: Array) -> Array:
@@ -186,49 +159,62 @@ def linear_errors(slope: Array) -> Array:
     return np.linalg.norm(_inverse(np.linalg.qr(slope.T)[1]), axis=1)
 
 
-def _unsure(
-    stages: Sequence[FitStage], influences: Sequence[Array], bases: Sequence[Array]
-) -> list[tuple[Array, Array]]:
-    """How far the error of each estimated variance moves the covariance, and what it adds by wrong weights, (k, k).
-
-    Args:
-        influences: of each residual of a stage on the parameters, (k, n).
-        bases: of the stage's own equations, (own, n).
-    """
-    parts: dict[Hashable, tuple[Array, Array]] = {}
-    for stage, influence, basis in zip(stages, influences, bases, strict=True):
-        unit, reactions = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
-        for data_set, rows in zip(stage.data_sets, rows_of(stage.data_sets), strict=True):
-            influence_rows = influence[:, rows]
-            for variance, move in data_set.unsure(influence_rows).items():
-                products = [move @ influence_rows.T, move @ move.T, move @ unit[:, rows].T]
-                so_far = reactions.get(variance, [0.0] * 3)
-                reactions[variance] = [one + previous for one, previous in zip(products, so_far, strict=True)]
-        for variance, (first_order, squared, absorbed) in reactions.items():
-            spread, lost = parts.get(variance, (0.0, 0.0))
-            parts[variance] = spread + first_order, lost + squared - absorbed @ absorbed.T
-    return list(parts.values())
-
-
 def reduced(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> tuple[float, int]:
-    """Reduced chi-square and its degrees of freedom.
+    """Reduced chi-square of a model and its degrees of freedom.
 
     Args:
         model: model to compare.
         data_sets: tests.
         parameters: number of fitted parameters.
     """
-    return _over_freedom(residual(model, data_sets), data_sets, parameters)
-
-
-def _over_freedom(residuals: Array, data_sets: Sequence[MeasuredTest], parameters: int) -> tuple[float, int]:
-    """Sum of squares of residuals, (n,), over their degrees of freedom, and these."""
+    residuals = residual(model, data_sets)
     freedom = max(sum(data_set.counted for data_set in data_sets) - parameters, 1)
     return float(residuals @ residuals) / freedom, freedom
 
 
+def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> float | None:
+    """Reduced chi-square if the model misses the tests by more than their noise; else None.
+
+    Args:
+        model: fitted model.
+        data_sets: tests.
+        parameters: number of fitted parameters.
+    """
+    return beyond_noise(*reduced(model, data_sets, parameters))
+
+
+def beyond_noise(chi_square: float, freedom: int) -> float | None:
+    """A reduced chi-square if it is larger than noise explains; else None."""
+    return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
+
+
+def misfit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, advice: str = "") -> list[str]:
+    """Warning that the model misses all tests together, or one test, by more than the noise; none if it does not.
+
+    Args:
+        model: fitted model.
+        data_sets: tests.
+        parameters: number of fitted parameters.
+        advice: end of the sentence.
+
+    Returns:
+        The sentence, or an empty list.
+    """
+    chi_square, freedom = reduced(model, data_sets, parameters)
+    by_test = {test.name: lack for test in data_sets if (lack := lack_of_fit(model, [test], 0)) is not None}
+    if beyond_noise(chi_square, freedom) is None and not by_test:
+        return []
+    worst = max(by_test, key=lambda name: by_test[name], default="")
+    worst_words = f", {number(by_test[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
+    return [
+        "the model misses the data by more than their noise (reduced chi-square "
+        f"{number(chi_square, 2)}{worst_words}): "
+        f"intervals are invalid, though standard errors are scaled up{advice}"
+    ]
+
+
 def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> Quality:
-    """How well a model meets data sets: NRMSE, reduced chi-square, number of residuals, relative noise.
+    """Agreement of a model with its tests: NRMSE, reduced chi-square, number of residuals, relative noise.
 
     Args:
         model: fitted model.
@@ -238,15 +224,17 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
     Returns:
         Figures of the fit over all tests.
     """
-    relative = np.concatenate([data_set.relative(model) for data_set in data_sets])
-    noise = np.repeat([data_set.relative_noise for data_set in data_sets], [data_set.counted for data_set in data_sets])
+    relative, counts = (
+        np.concatenate([test.relative(model) for test in data_sets]),
+        [test.counted for test in data_sets],
+    )
     loops, _ = split_by_kind(data_sets)
     repeats = np.count_nonzero(repeats_of(loops), axis=1)
     return Quality(
         nrmse=float(np.sqrt(np.mean(relative**2))),
         reduced_chi_square=reduced(model, data_sets, parameters)[0],
-        points=sum(data_set.counted for data_set in data_sets),
-        noise=float(np.sqrt(np.mean(noise**2))),
+        points=sum(counts),
+        noise=float(np.sqrt(np.average(np.square([test.relative_noise for test in data_sets]), weights=counts))),
         loop_gain_error=float(np.max([loop.gain_error for loop in loops] / np.sqrt(repeats))) if loops else None,
     )
 
@@ -259,56 +247,6 @@ def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
     axes = [*operating_conditions(model.bushing, data_sets), *([np.concatenate(kelvin)] if kelvin else [])]
     ends = [(float(axis.min()), float(axis.max())) for axis in axes]
     return Range(ends[0], ends[1], directions, *ends[2:])
-
-
-def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> float | None:
-    """Reduced chi-square where the model misses the data by more than their noise, else None.
-
-    Args:
-        model: fitted model.
-        data_sets: tests.
-        parameters: number of fitted parameters.
-    """
-    return beyond_noise(*reduced(model, data_sets, parameters))
-
-
-def missed(model: Model, data_sets: Sequence[MeasuredTest]) -> list[float | None]:
-    """Reduced chi-square of each test that the model misses by more than its noise; else None."""
-    residuals, parts = residual(model, data_sets), zip(rows_of(data_sets), data_sets, strict=True)
-    return [beyond_noise(*_over_freedom(residuals[rows], [data_set], 0)) for rows, data_set in parts]
-
-
-def beyond_noise(chi_square: float, freedom: int) -> float | None:
-    """A reduced chi-square that noise is no explanation of, else None."""
-    return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
-
-
-def misfit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, advice: str = "") -> list[str]:
-    """A sentence, with advice, where the model misses all data, or one test, by more than the noise; else none.
-
-    Args:
-        model: fitted model.
-        data_sets: tests.
-        parameters: number of fitted parameters.
-        advice: end of the sentence.
-
-    Returns:
-        The sentence, or an empty list.
-    """
-    together = lack_of_fit(model, data_sets, parameters)
-    named = zip(data_sets, missed(model, data_sets), strict=True)
-    by_test = {data_set.name: chi_square for data_set, chi_square in named if chi_square is not None}
-    if together is None and not by_test:
-        return []
-    worst, all_tests = (
-        max(by_test, key=lambda name: by_test[name], default=""),
-        reduced(model, data_sets, parameters)[0],
-    )
-    worst_words = f", {number(by_test[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
-    return [
-        f"the model misses the data by more than their noise (reduced chi-square {number(all_tests, 2)}{worst_words}): "
-        f"intervals are invalid, though standard errors are scaled up{advice}"
-    ]
 
 
 def implausible(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[str]:
@@ -392,29 +330,24 @@ def mixed_conditions(data_sets: Sequence[MeasuredTest]) -> list[str]:
 
 
 def unfitted(model: Model, data_sets: Sequence[MeasuredTest], advice: str) -> list[str]:
-    """A sentence on the tests of each place that a model was not fitted to and misses by more than their noise.
+    """Warnings about tests that a model was not fitted to and misses by more than their noise, one for each direction.
 
     Args:
         model: fitted model.
         data_sets: tests that were not fitted.
         advice: end of each sentence.
     """
-    misses: dict[str, list[tuple[float, float, str]]] = {}
-    for data_set in data_sets:
-        if (misfit := lack_of_fit(model, [data_set], 0)) is not None:
-            share = 100.0 * quality(model, [data_set], 0).nrmse
-            misses.setdefault(str(data_set.direction), []).append((float(np.sqrt(misfit)), share, data_set.name))
-    return [_missed_at(place, found) + advice for place, found in misses.items()]
-
-
-def _missed_at(place: str, found: Sequence[tuple[float, float, str]]) -> str:
-    """Sentence on the tests of a place that are missed, from times the noise, per cent and name of each."""
-    noises, share, worst = max(found)
-    times = f"{number(noises, 2)} times its noise"
-    if len(found) == 1:
-        return f"{worst}, {place}, was not fitted, and the model misses it by {number(share, 2)} % (NRMSE), {times}"
-    smallest, largest = (number(end(share for _, share, _ in found), 2) for end in (min, max))
-    return (
-        f"{len(found)} tests, {place}, were not fitted, and the model misses them by {smallest} to {largest} % "
-        f"(NRMSE), {worst} by {times}"
-    )
+    misses, sentences = dict[str, list[tuple[float, float, str]]](), []
+    for test in data_sets:
+        if (chi_square := lack_of_fit(model, [test], 0)) is not None:
+            share = 100.0 * float(np.sqrt(np.mean(np.square(test.relative(model)))))
+            misses.setdefault(str(test.direction), []).append((float(np.sqrt(chi_square)), share, test.name))
+    for place, found in misses.items():
+        noises, share, worst = max(found)
+        missed = f"was not fitted, and the model misses it by {number(share, 2)} % (NRMSE),"
+        if len(found) > 1:
+            smallest, largest = (number(end(share for _, share, _ in found), 2) for end in (min, max))
+            missed = f"were not fitted, and the model misses them by {smallest} to {largest} % (NRMSE), {worst} by"
+        subject = f"{worst}, {place}," if len(found) == 1 else f"{len(found)} tests, {place},"
+        sentences.append(f"{subject} {missed} {number(noises, 2)} times its noise{advice}")
+    return sentences

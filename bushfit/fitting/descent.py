@@ -12,7 +12,6 @@ Notes:
     effect closes, it took 4 to 29 % off all evaluations of the diagnosis.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,17 +19,8 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.coordinates import (
-    ROUNDING,
-    Bounds,
-    Coordinates,
-    Solution,
-    at_bound,
-    jacobian,
-    residual,
-    starting_point,
-)
-from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.coordinates import ROUNDING, jacobian, residual
+from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.model.model import Model
 
 #: Damping of the first step, relative to the curvature: next to none, the starts are good (usual for such methods).
@@ -54,9 +44,6 @@ _LEAST_FALL = 0.01
 #: Least squared norm of a parameter's derivatives, in units of noise, with which it moves: the shape of an effect of
 #: no amount stays.
 _LEAST_SENSITIVITY = 1e-6
-#: Distance of the point from a bound at the least, relative to the room between the bounds: the way between values and
-#: coordinates rounds.
-_INSIDE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,22 +51,22 @@ class Descent:
     """A fit under way, which never climbs; its model is the best so far.
 
     Args:
-        low, high: bounds, (k,) each.
-        point: where the model lies, (k,).
-        residual: whitened, of that model, (n,).
-        jacobian: its derivatives by coordinate, (k, n).
-        tolerance: relative fall of chi-square, a step that is expected to bring less is the last; None for one that
-            models are compared by.
+        problem: parameters to fit, tests and bounds.
+        model: best model so far.
+        point: its coordinates, (k,).
+        residual: whitened residuals of that model, (n,).
+        jacobian: their derivatives by coordinate, (k, n).
+        tolerance: the last step is one that is expected to lower chi-square by this share; None for the small absolute
+            fall by which models are compared.
+        evaluations: of the model.
+        converged: True after the last step.
         damping: of the next step, relative to the curvature.
         growth: factor on the damping should that step fail.
         last: the step that led here, (k,), and the second derivative of the residuals along it, (n,); None at first.
     """
 
+    problem: FitProblem
     model: Model
-    data_sets: Sequence[MeasuredTest]
-    coordinates: Coordinates
-    low: Array
-    high: Array
     point: Array
     residual: Array
     jacobian: Array
@@ -91,47 +78,32 @@ class Descent:
     last: tuple[Array, Array] | None = None
 
     @classmethod
-    def start(
-        cls,
-        model: Model,
-        data_sets: Sequence[MeasuredTest],
-        names: Sequence[str],
-        bounds: Bounds,
-        tolerance: float | None = None,
-    ) -> "Descent":
-        """A fit of the named parameters, the others held, that has not yet left the model's own values.
+    def start(cls, problem: FitProblem, tolerance: float | None = None) -> "Descent":
+        """The fit before its first step.
 
         Args:
-            model: model with the start values.
-            data_sets: tests.
-            names: parameters to fit.
-            bounds: limits inside the parameters' own [SI].
+            problem: parameters to fit, tests and bounds.
             tolerance: relative fall of chi-square at which the fit ends; None for models that are compared.
-
-        Returns:
-            The fit before its first step.
 
         Raises:
             FitError: fewer data than parameters, or no finite response.
             ModelError: no response.
         """
-        coordinates, point, low, high = starting_point(model, data_sets, names, bounds)
-        inside = _INSIDE * (high - low)
-        low, high = low + inside, high - inside
-        point = np.clip(point, low, high)
-        model = model.with_values(coordinates.values(point))
-        slopes = jacobian(model, data_sets, names)
-        misfit = residual(model, data_sets)  # which mostly came with the derivatives
+        point = problem.start
+        model = problem.model.with_values(problem.coordinates.values(point))
+        slopes = jacobian(model, problem.tests, problem.names)
+        misfit = residual(model, problem.tests)  # which mostly came with the derivatives
         if not np.all(np.isfinite(misfit)) or not np.all(np.isfinite(slopes)):
             raise FitError(
                 "the model has no finite response to these tests",
                 found=", ".join(f"{name} = {value:.4g}" for name, value in model.values.items()),
                 hint="give start values or bounds in [fit] of the campaign",
             )
-        return cls(model, data_sets, coordinates, low, high, point, misfit, slopes, tolerance)
+        return cls(problem, model, point, misfit, slopes, tolerance)
 
     @property
     def chi_square(self) -> float:
+        """Sum of the squared residuals."""
         return float(self.residual @ self.residual)
 
     @property
@@ -140,70 +112,71 @@ class Descent:
         return max(self._step(0.0)[1], 0.0)
 
     @property
-    def solution(self) -> Solution:
-        """State of the fit as a solution."""
-        ends = at_bound(self.coordinates.names, self.point, self.low, self.high)
-        return Solution(
-            self.model, self.coordinates, self.residual, self.jacobian, self.evaluations, ends, not self.converged
-        )
+    def solution(self) -> FitResult:
+        """State of the fit as a result."""
+        at_bound = self.problem.at_bound(self.point)
+        state = self.model, self.residual, self.jacobian, self.evaluations, at_bound, not self.converged
+        return FitResult(self.problem, *state)
 
     def stepped(self) -> "Descent":
-        """The fit one evaluation on: at a lower chi-square with less damping, or where it was with more.
-
-        Returns:
-            The fit after one more evaluation of the model.
-        """
-        damping = self.damping
-        step, expected = self._step(damping)
-        smallest_fall = _LEAST_FALL if self.tolerance is None else self.tolerance * self.chi_square
-        evaluations, converged = self.evaluations + 1, 0.0 <= expected < smallest_fall
-        bend = self._bend(step, damping)
-        # so far out between the bounds, or on a way that bends so much, that only caution leads down
-        while expected < 0.0 or self._length(bend) > _MOST_BENT * self._length(step):
-            damping *= 2.0
-            step, expected = self._step(damping)
-            bend = self._bend(step, damping)
-        point = np.clip(self.point + step + bend, *self._reach)
-        change = point - self.point
-        cautious = replace(
-            self, evaluations=evaluations, converged=converged, damping=damping * self.growth, growth=2.0 * self.growth
-        )
-        names = self.coordinates.names
-        try:
-            model = self.model.with_values(self.coordinates.values(point))
-            with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                # derivatives bring the response along; after a step that failed the response is asked for alone first,
-                # and what is left of a last step is too short for them to change
-                slopes = None if converged or self.growth > _FIRST_GROWTH else jacobian(model, self.data_sets, names)
-                reached = residual(model, self.data_sets)
-                fall = self.chi_square - float(reached @ reached)
-                if expected <= 0.0 or not fall > _LEAST_GAIN_RATIO * expected:
-                    return cautious
-                if slopes is None:
-                    slopes = self.jacobian if converged else jacobian(model, self.data_sets, names)
-        except ModelError:  # no response there
-            return cautious
-        if not np.all(np.isfinite(slopes)):
-            return cautious
-        return replace(
-            self,
-            model=model,
-            point=point,
-            residual=reached,
-            jacobian=slopes,
-            evaluations=evaluations,
-            converged=converged,
-            damping=damping * max(_LEAST_DAMPING_RATIO, 1.0 - (2.0 * fall / expected - 1.0) ** 3),
-            growth=_FIRST_GROWTH,
-            last=(change, change @ (slopes - self.jacobian)),
-        )
+        """The fit after one more evaluation of the model."""
+        return self.finished(self.evaluations + 1)
 
     def finished(self, evaluations: int) -> "Descent":
-        """The fit at its end, or after so many evaluations of the model."""
-        current = self
-        while not current.converged and current.evaluations < evaluations:
-            current = current.stepped()
-        return current
+        """Take steps until the fit has converged or has evaluated the model so often.
+
+        Each step leads to a lower chi-square with less damping, or leaves the fit where it was with more.
+        """
+        fit, tests, names = self, self.problem.tests, self.problem.names
+        while not fit.converged and fit.evaluations < evaluations:
+            damping = fit.damping
+            step, expected = fit._step(damping)
+            smallest_fall = _LEAST_FALL if fit.tolerance is None else fit.tolerance * fit.chi_square
+            converged = 0.0 <= expected < smallest_fall
+            bend = fit._bend(step, damping)
+            # so far out between the bounds, or on a way that bends so much, that only caution leads down
+            while expected < 0.0 or fit._length(bend) > _MOST_BENT * fit._length(step):
+                damping *= 2.0
+                step, expected = fit._step(damping)
+                bend = fit._bend(step, damping)
+            point = np.clip(fit.point + step + bend, *fit._reach)
+            before, fit = (
+                fit,
+                replace(
+                    fit,
+                    evaluations=fit.evaluations + 1,
+                    converged=converged,
+                    damping=damping * fit.growth,
+                    growth=2.0 * fit.growth,
+                ),
+            )
+            try:
+                model = fit.model.with_values(fit.problem.coordinates.values(point))
+                with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+                    # derivatives bring the response along; after a step that failed the response is asked for alone
+                    # first, and what is left of a last step is too short for them to change
+                    slopes = None if converged or before.growth > _FIRST_GROWTH else jacobian(model, tests, names)
+                    reached = residual(model, tests)
+                    fall = fit.chi_square - float(reached @ reached)
+                    if expected <= 0.0 or not fall > _LEAST_GAIN_RATIO * expected:
+                        continue
+                    if slopes is None:
+                        slopes = fit.jacobian if converged else jacobian(model, tests, names)
+            except ModelError:  # no response there
+                continue
+            if np.all(np.isfinite(slopes)):
+                change = point - fit.point
+                fit = replace(
+                    fit,
+                    model=model,
+                    point=point,
+                    residual=reached,
+                    jacobian=slopes,
+                    damping=damping * max(_LEAST_DAMPING_RATIO, 1.0 - (2.0 * fall / expected - 1.0) ** 3),
+                    growth=_FIRST_GROWTH,
+                    last=(change, change @ (slopes - fit.jacobian)),
+                )
+        return fit
 
     @cached_property
     def _normal(self) -> tuple[Array, Array]:
@@ -213,8 +186,9 @@ class Descent:
     @cached_property
     def _reach(self) -> tuple[Array, Array]:
         """Least and largest coordinates that one step may reach, (k,) each."""
-        longest = np.array([_LONGEST_STEP if parameter.log else np.inf for parameter in self.coordinates.parameters])
-        return np.maximum(self.low, self.point - longest), np.minimum(self.high, self.point + longest)
+        parameters, (low, high) = self.problem.coordinates.parameters, self.problem.limits
+        longest = np.array([_LONGEST_STEP if parameter.log else np.inf for parameter in parameters])
+        return np.maximum(low, self.point - longest), np.minimum(high, self.point + longest)
 
     def _step(self, damping: float) -> tuple[Array, float]:
         """The damped step within the bounds, (k,), and the fall of chi-square that it is expected to bring.
@@ -226,7 +200,8 @@ class Descent:
         size = np.diag(curvature)
         low, high = self._reach
         damped = curvature + np.diag(damping * size)
-        outward = ((self.point <= self.low) & (slope >= 0.0)) | ((self.point >= self.high) & (slope <= 0.0))
+        lowest, highest = self.problem.limits
+        outward = ((self.point <= lowest) & (slope >= 0.0)) | ((self.point >= highest) & (slope <= 0.0))
         free, step = (size > _LEAST_SENSITIVITY) & ~outward, np.zeros_like(slope)
         while free.any():
             step[free] = -_solved(damped, slope + damped[:, ~free] @ step[~free], free)

@@ -1,6 +1,6 @@
 """Fits of effects that are added: from a small design of their shapes, as one start may lie in another valley."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -8,9 +8,10 @@ import numpy as np
 from bushfit.effects import Effect, Parameter, get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.coordinates import Bounds, Solution
+from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import MeasuredTest, operating_conditions, split_by_kind
+from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 
@@ -36,48 +37,59 @@ _MOST = 200
 def designed(
     model: Model, plain: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds
 ) -> Model:
-    """A model to start a fit from, effects added in turn to the best fit of those before.
+    """A model to start a fit from, with effects added in turn to the best fit of those before.
 
     Args:
+        model: model with all effects, at the start values.
         plain: the same without the effects that are to be added, and with the branches that they replace.
+        data_sets: tests.
         fixed: parameters that do not move.
+        bounds: limits inside the parameters' own [SI].
 
     Returns:
         The better of the model itself and the one built up effect by effect.
     """
     added = [get_effect(name) for name in model.effects if name not in plain.effects]
-    ends = []
     with suppress(FitError, ModelError):  # no response, or too few points; the fit then says what is wrong
-        ends.append(fit_from(model, data_sets, fixed, bounds).finished(_MOST).solution)
-        solution = solve(plain, data_sets, _free(plain, fixed), bounds, evaluations=_MOST, strict=False)
+        direct = fit_from(model, data_sets, fixed, bounds).finished(_MOST)
+        problem = FitProblem.with_fixed(plain, data_sets, fixed, bounds)
+        solution = solve(problem, evaluations=_MOST, strict=False)
         for effect in added:
             solution = with_effect(solution, data_sets, effect, fixed, bounds)
-        ends.append(solution)
-    if len(ends) < 2 or ends[1].chi_square > ends[0].chi_square - _LOWER:  # alike: two of one law may change names
-        return model
-    return model.with_values({name: ends[1].model.values[name] for name in model.values})
+        if solution.chi_square <= direct.chi_square - _LOWER:  # alike: two of one law may change names
+            return model.with_values({name: solution.model.values[name] for name in model.values})
+    return model
 
 
 def with_effect(
-    solution: Solution, data_sets: Sequence[MeasuredTest], effect: Effect, fixed: Sequence[str], bounds: Bounds
-) -> Solution:
-    """A fitted model with one effect more, or one in place of a branch: the best fit of several starts.
+    solution: FitResult, data_sets: Sequence[MeasuredTest], effect: Effect, fixed: Sequence[str], bounds: Bounds
+) -> FitResult:
+    """Add an effect to a fitted model, or replace a branch by it, as the best fit of several starts.
 
     Args:
-        solution: end of the fit without the effect.
+        solution: fit without the effect.
         data_sets: tests.
         effect: effect to add.
         fixed: names of parameters that do not move.
         bounds: limits inside the parameters' own [SI].
 
     Returns:
-        End of the best fit.
+        The best fit.
 
     Raises:
         FitError: no start has a finite response.
     """
+    # what has a neutral amount starts at a tenth of its typical one: at its neutral value a fit may not see its shape
+    small_amount = {} if effect.replaces else {qualified_name(effect, effect.amount): effect.amount.sized(0.1)}
+    starts = [solution.model.with_effect(effect.name, small_amount | start) for start in solution.model.starts(effect)]
+    first = starts[0]
+    for parameter in effect.parameters:
+        if parameter.neutral is None:
+            name = qualified_name(effect, parameter)
+            values = probes(data_sets, first, parameter) if parameter.scale else first.values[name] * np.array(_FACTORS)
+            starts += [first.with_values({name: value}) for value in np.clip(values, *parameter.bounds).tolist()]
     fits = []
-    for start in _starts(solution.model, data_sets, effect):
+    for start in starts:
         with suppress(FitError, ModelError):  # no response from this start
             fits.append(fit_from(start, data_sets, fixed, bounds).finished(_FIRST))
     if not fits:
@@ -87,7 +99,7 @@ def with_effect(
 
 
 def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Descent:
-    """A fit of every parameter of a model but the held ones, from its own values, before its first step.
+    """A fit of every parameter of a model but the fixed ones, from its own values, before its first step.
 
     Args:
         model: model with the start values.
@@ -95,29 +107,7 @@ def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[st
         fixed: names of parameters that do not move.
         bounds: limits inside the parameters' own [SI].
     """
-    return Descent.start(model, data_sets, _free(model, fixed), bounds)
-
-
-def _free(model: Model, fixed: Sequence[str]) -> list[str]:
-    return [name for name in model.parameters if name not in fixed]
-
-
-def _starts(fitted: Model, data_sets: Sequence[MeasuredTest], effect: Effect) -> Iterator[Model]:
-    """Models to start from: each that the fitted one suggests, and the first with each shape parameter elsewhere.
-
-    What has a neutral amount starts at a tenth of its typical one: at its neutral value a fit may not see its shape.
-    """
-    amount = effect.amount
-    small_amount = {} if effect.replaces else {qualified_name(effect, amount): amount.sized(0.1)}
-    model, *alternatives = [fitted.with_effect(effect.name, small_amount | start) for start in fitted.starts(effect)]
-    yield from (model, *alternatives)
-    for parameter in effect.parameters:
-        if parameter.neutral is None:
-            name = qualified_name(effect, parameter)
-            factors = model.values[name] * np.array(_FACTORS)
-            values = probes(data_sets, model, parameter) if parameter.scale else factors
-            for value in np.clip(values, *parameter.bounds).tolist():
-                yield model.with_values({name: value})
+    return Descent.start(FitProblem.with_fixed(model, data_sets, fixed, bounds))
 
 
 def probes(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter) -> Array:
@@ -139,7 +129,11 @@ def probes(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter
         case "frequency":
             low, high = 0.7 * frequencies.max(), 4.0 * frequencies.max()
         case "displacement":
-            low, high = stroke(data_sets)
+            amplitudes = np.concatenate([data_set.amplitude for data_set in data_sets])
+            low, high = (
+                0.8 * amplitudes.min(),
+                0.95 * amplitudes.max(),
+            )  # some test reaches one, and just misses the other
         case "strain":
             low = 0.03 * strains.min()
             high = max(0.5 * model.values.get("eps_half", strains.max()), low)
@@ -155,9 +149,3 @@ def probes(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter
         case None:
             return np.array([parameter.typical])
     return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)
-
-
-def stroke(data_sets: Sequence[MeasuredTest]) -> tuple[float, float]:
-    """Displacements that some test reaches and some test just misses [m]."""
-    amplitudes = np.concatenate([data_set.amplitude for data_set in data_sets])
-    return 0.8 * float(amplitudes.min()), 0.95 * float(amplitudes.max())

@@ -17,9 +17,9 @@ from scipy.special import stdtrit
 from bushfit.effects.contract import Array
 from bushfit.effects.temperature import REFERENCE
 from bushfit.effects.unnamed import Patch, Unnamed
-from bushfit.fitting.common_error import ErrorSubspace
-from bushfit.fitting.coordinates import ROUNDING, Solution
+from bushfit.fitting.coordinates import ROUNDING
 from bushfit.fitting.preparation import MeasuredTest, log_slopes, operating_conditions, rows_of
+from bushfit.fitting.problem import FitResult
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood, coordinates, in_lengths, patterns
 from bushfit.model.covariance import Z95
 
@@ -38,16 +38,23 @@ Groups = tuple[tuple[str, ...], ...]
 
 @dataclass(frozen=True, eq=False)
 class FittedTests:
-    """A fitted model and its tests, for what a relative change of the stiffness does to the residuals.
+    """A fitted model and its tests: changes of the residuals by relative changes of the stiffness.
+
+    Changes of the stiffness move all residuals of a sweep, but only two combinations of those of a loop. Residuals are
+    therefore given by d components: all of a sweep, two of a loop.
 
     Args:
-        solution: residuals and derivatives, each test whitened by itself.
+        solution: the fit, each test whitened by itself.
         rig_errors: of each test, whitened residuals by one standard deviation of each of the rig's errors, (w, n).
     """
 
-    solution: Solution
-    data_sets: Sequence[MeasuredTest]
+    solution: FitResult
     rig_errors: Sequence[Array]
+
+    @property
+    def data_sets(self) -> Sequence[MeasuredTest]:
+        """The tests."""
+        return self.solution.minimised
 
     @cached_property
     def directions(self) -> Array:
@@ -57,50 +64,61 @@ class FittedTests:
 
     @cached_property
     def conditions(self) -> list[Array]:
-        """Frequency [Hz], equivalent strain and, if the model knows of it, temperature [K] of each point, (p,) each."""
+        """Frequency [Hz], equivalent strain and, if the model depends on it, temperature [K] of the points."""
         model = self.solution.model
         axes = [*operating_conditions(model.bushing, self.data_sets)]
         if model.knows_temperature:
-            kelvin = list[Array]()
-            for data_set in self.data_sets:
-                temperature = data_set.circumstances.temperature
-                kelvin.append(
-                    np.broadcast_to(REFERENCE if temperature is None else temperature, data_set.frequency.shape)
+            kelvin = [
+                np.broadcast_to(
+                    REFERENCE if test.circumstances.temperature is None else test.circumstances.temperature,
+                    test.frequency.shape,
                 )
+                for test in self.data_sets
+            ]
             axes.append(np.concatenate(kelvin))
         return axes
 
     @property
     def moving(self) -> Array:
-        """Derivatives of the residuals by coordinate of the parameters that rest on no bound, (k, n)."""
+        """Derivatives of the residuals by coordinate of the parameters that are at no bound, (k, n)."""
         return self.solution.jacobian[self.solution.moving]
 
     @cached_property
     def slopes(self) -> Array:
         """Derivatives of ln K at the points by coordinate of these parameters, complex (k, p)."""
-        model, fitted = self.solution.model, self.solution.coordinates
-        names = [fitted.names[i] for i in self.solution.moving]
+        model, moving = self.solution.model, self.solution.moving
+        names = [self.solution.names[i] for i in moving]
         slopes = np.concatenate([log_slopes(model, data_set, names) for data_set in self.data_sets], axis=-1)
-        return slopes * fitted.slopes(model.values)[self.solution.moving, None]
+        return slopes * self.solution.coordinates.slopes(model.values)[moving, None]
 
     @cached_property
-    def subspace(self) -> ErrorSubspace:
-        """Residuals that changes of the stiffness can move: all of a sweep, two combinations of a loop."""
-        pairs = zip(rows_of(self.data_sets), self._loops, strict=True)
-        return ErrorSubspace([(rows, None if loop is None else loop[0]) for rows, loop in pairs])
+    def _blocks(self) -> list[tuple[MeasuredTest, slice, Array | None, Array]]:
+        """Each test, its rows, and for a loop the orthonormal directions of its residuals, (n, 2), and the components
+        along them by 1 and i of a change of stiffness, (2, 2)."""
+        units, blocks = np.array([[1.0], [1.0j]]), list[tuple[MeasuredTest, slice, Array | None, Array]]()
+        for test, rows in zip(self.data_sets, rows_of(self.data_sets), strict=True):
+            if test.kind == "loop":
+                directions, components = np.linalg.qr(test.residual_change(units, self.solution.model).T)
+                blocks.append((test, rows, directions, components.T))
+            else:
+                blocks.append((test, rows, None, units))
+        return blocks
+
+    def project(self, rows: Array) -> Array:
+        """Components of residuals, (..., n) -> (..., d)."""
+        parts = [rows[..., block] if along is None else rows[..., block] @ along for _, block, along, _ in self._blocks]
+        return np.concatenate(parts, axis=-1)
 
     def columns(self, shapes: Array) -> Array:
-        """Whitened residuals, as `seen`, by relative changes of the stiffness, complex (c, p) -> (c, d).
-
-        Returns:
-            Changes of the residuals within `subspace`, (c, d).
-        """
+        """Components of the residuals by relative changes of the stiffness, complex (c, p) -> (c, d)."""
         columns, first, changes = [], 0, shapes * self._stiffness
-        for data_set, loop in zip(self.data_sets, self._loops, strict=True):
-            change = changes[:, first : first + data_set.frequency.size]
-            parts = np.concatenate((change.real, change.imag), axis=-1)
-            columns.append(data_set.residual_change(change, self.solution.model) if loop is None else parts @ loop[1])
-            first += data_set.frequency.size
+        for test, _, along, components in self._blocks:
+            change = changes[:, first : first + test.frequency.size]
+            first += test.frequency.size
+            if along is None:
+                columns.append(test.residual_change(change, self.solution.model))
+            else:
+                columns.append(np.concatenate((change.real, change.imag), axis=-1) @ components)
         return np.concatenate(columns, axis=-1)
 
     @cached_property
@@ -108,38 +126,23 @@ class FittedTests:
         return np.concatenate([data_set.noise_free(self.solution.model).measured for data_set in self.data_sets])
 
     @cached_property
-    def _loops(self) -> list[tuple[Array, Array] | None]:
-        """Orthonormal directions of the residuals of each loop, (n, 2), and the components along them by 1 and i of a
-        change, (2, 2); None of a sweep.
-        """
-        units, loops = np.array([[1.0], [1.0j]]), list[tuple[Array, Array] | None]()
-        for data_set in self.data_sets:
-            if data_set.kind == "loop":
-                directions, components = np.linalg.qr(data_set.residual_change(units, self.solution.model).T)
-                loops.append((directions, components.T))
-            else:
-                loops.append(None)
-        return loops
-
-    @cached_property
     def remainder(self) -> tuple[Array, Array]:
         """Directions that parameters and rig errors absorb, (k, d), orthonormal but for the prior of the latter, and
-        the residual that both leave, (d,), as `seen`."""
-        rows, residual, blocks = self.solution.jacobian, self.solution.residual, rows_of(self.data_sets)
-        pairs = list(zip(blocks, self.rig_errors, strict=True))
-        across = np.concatenate([rows[:, block] @ errors.T for block, errors in pairs], axis=1)
+        the components of the residual that both leave, (d,)."""
+        rows, residual = self.solution.jacobian, self.solution.residual
+        pairs = list(zip(self._blocks, self.rig_errors, strict=True))
+        across = np.concatenate([rows[:, block] @ errors.T for (_, block, *_), errors in pairs], axis=1)
         among = block_diag(*(errors @ errors.T for errors in self.rig_errors))
         information = np.block([[rows @ rows.T, across], [across.T, among + np.eye(len(among))]])
         scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         size, vectors = np.linalg.eigh(information / np.outer(scale, scale))
         determined = size > ROUNDING * size.max(initial=0.0)
         mixed = (vectors[:, determined] / np.sqrt(size[determined])).T / scale
-        rig_components = block_diag(
-            *(self.subspace.project_part(i, errors) for i, errors in enumerate(self.rig_errors))
-        )
-        span = mixed @ np.concatenate((self.subspace.project(rows), rig_components))
-        slopes = [rows @ residual, *(errors @ residual[block] for block, errors in pairs)]
-        return span, self.subspace.project(residual) - (mixed @ np.concatenate(slopes)) @ span
+        moved = block_diag(*(errors if along is None else errors @ along for (_, _, along, _), errors in pairs))
+        span = mixed @ np.concatenate((self.project(rows), moved))
+        slopes = [rows @ residual, *(errors @ residual[block] for (_, block, *_), errors in pairs)]
+        absorbed = mixed @ np.concatenate(slopes)
+        return span, self.project(residual) - absorbed @ span
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,8 +214,8 @@ class Discrepancy:
         """
         size, columns, rows = self.best[1], self.tests.columns(self.complex_shapes), self.tests.moving
         inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
-        mean = (-inverse @ columns @ self.tests.subspace.project(self.tests.solution.residual)) @ self.complex_shapes
-        both = np.concatenate((columns, self.tests.subspace.project(rows)))
+        mean = (-inverse @ columns @ self.tests.project(self.tests.solution.residual)) @ self.complex_shapes
+        both = np.concatenate((columns, self.tests.project(rows)))
         information = both @ both.T
         information[len(columns) :, len(columns) :] = rows @ rows.T  # loops tell more than by a change of stiffness
         information[np.diag_indices(len(columns))] += 1.0 / size**2

@@ -305,12 +305,12 @@ class MeasuredLoop(MeasuredBase):
     def _gain(self) -> CommonError | None:
         """The error of the gain, where it weighs; None without. Beside a model error it does not weigh."""
         weighs = self.gain_weighs and self.gain_error
-        return CommonError.of_all(self.gain_error * self.unit_gain[None]) if weighs else None
+        return CommonError(self.gain_error * self.unit_gain[None]) if weighs else None
 
     @cached_property
     def _error_directions(self) -> tuple[Array, Array]:
         """Orthonormal directions that a model error of 100 % takes in units of noise, (n, c), and its sizes, (c,)."""
-        return CommonError.of_all(self._counted(self._error_waves)[2 * (self.first_error - 1) :]).principal_errors
+        return CommonError(self._counted(self._error_waves)[2 * (self.first_error - 1) :]).principal_errors
 
     @cached_property
     def _error_waves(self) -> Array:

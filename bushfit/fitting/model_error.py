@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -30,9 +29,9 @@ from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.assess import Process, beyond_noise
+from bushfit.fitting.assess import beyond_noise
 from bushfit.fitting.common_error import CommonError
-from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, Solution
+from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates
 from bushfit.fitting.discrepancy import (
     OVER_FREQUENCY,
     OVER_STRAIN,
@@ -44,8 +43,8 @@ from bushfit.fitting.discrepancy import (
 )
 from bushfit.fitting.levels import level_errors_of
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, rows_of
+from bushfit.fitting.problem import FitProblem, FitResult, Process
 from bushfit.fitting.rig_class import of_class
-from bushfit.fitting.robust import WeightedFit
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood
@@ -70,8 +69,8 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 
 
 def with_model_error(
-    found: WeightedFit, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False
-) -> tuple[WeightedFit, Unnamed | None]:
+    found: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False
+) -> tuple[FitResult, Unnamed | None]:
     """The closest fit and its discrepancy where the tests show a lack of fit; else the fit as it is, and None.
 
     Args:
@@ -83,45 +82,53 @@ def with_model_error(
     Returns:
         The fit, and its discrepancy or None.
     """
-    if not found.solution.coordinates.names or not (
-        (not smooth and _exceeds_noise(found, rig)) or _is_smooth(found, rig)
-    ):
+    if not found.names or not ((not smooth and _exceeds_noise(found, rig)) or _is_smooth(found, rig)):
         return found, None
-    solution, size = closest_fit(found, bounds)
+    closest, size = closest_fit(found, bounds)
     if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
         return found, None
-    tests = _in_noise(solution, [_with_shape_error(data_set, size) for data_set in _thinned(found.minimised)])
+    # of a loop only the shape has an independent error: its first harmonic changes with the stiffness
+    thinned = [
+        replace(test, model_error=size, first_error=2) if isinstance(test, MeasuredLoop) else test
+        for test in _thinned(found.minimised)
+    ]
+    tests = _in_noise(closest, thinned)
     sizes = np.geomspace(_SMOOTH_RATIO[0] * size, _SMOOTH_RATIO[1] * size, 9)
     processes = [replace(process, sizes=sizes) for process in discrepancies(tests)]
-    discrepancy = max(processes, key=lambda process: process.best[0])
-    minimised, weighed = (
-        tuple(data_set.with_model_error(size) for data_set in part) for part in (found.minimised, found.weighed)
-    )
-    whole = Discrepancy.over_tests(_in_noise(solution, weighed), discrepancy.groups, discrepancy.lengths, MAXIMUM_NODES)
-    process = Process(discrepancy.best[1] * whole.complex_shapes, discrepancy.likelihood.freedom(discrepancy.best[1]))
+    likeliest = max(processes, key=lambda process: process.best[0])
     error = averaged(processes)
     if error.typical >= SIZES[-1]:
         return found, None
-    return WeightedFit(solution, found.data_sets, minimised, weighed, found.outliers, process), error
+    weighed = [test.with_model_error(size) for test in found.weighed or found.minimised]
+    whole = Discrepancy.over_tests(_in_noise(closest, weighed), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
+    process = Process(likeliest.best[1] * whole.complex_shapes, likeliest.likelihood.freedom(likeliest.best[1]))
+    closest = replace(closest, unsoftened=found.data_sets, outliers=found.outliers)
+    return replace(closest, weighed=weighed, process=process), error
 
 
-def closest_fit(found: WeightedFit, bounds: Bounds) -> tuple[Solution, float]:
+def closest_fit(found: FitResult, bounds: Bounds) -> tuple[FitResult, float]:
     """Least squares with the noise and an independent model error, and the relative size of this.
 
     Size and parameters follow each other: the size of the largest restricted likelihood, then the parameters.
 
     Returns:
-        End of the fit, and the relative size of the model error.
+        The fit, and the relative size of the model error.
     """
-    tests, names = found.minimised, found.solution.coordinates.names
-    starts = [found.solution.model, *_restarted(found.solution, tests)]
+    tests, names, starts = found.minimised, found.names, [found.model]
+    fixed = {name: value for name, value in found.model.values.items() if name not in names}
+    with suppress(FitError):  # tests that no rubber gives
+        # a second start, with the branches read off the tests: a fit bent by noise may have lost one for good
+        paper = Model.with_defaults(found.model.bushing, BASE, start_values(found.model.bushing, tests, fixed))
+        of_effects = [paper.starts(effect)[0] for effect in found.model.records]
+        values = {**paper.values, **{name: value for start in of_effects for name, value in start.items()}}
+        starts.append(found.model.with_values({name: values[name] for name in names if name in values}))
     sizes = [likeliest_size(start, tests, names) for start in starts]
     size = min(size for size in sizes if np.isfinite(size))
     for _ in range(_MAXIMUM_ROUNDS):
-        weighted, ends = [data_set.with_model_error(size) for data_set in tests], list[Solution]()
+        weighted, ends = [test.with_model_error(size) for test in tests], list[FitResult]()
         for start in starts:
             with suppress(FitError, ModelError):  # no response from values that were read off the tests
-                ends.append(solve(start, weighted, names, bounds, strict=False))
+                ends.append(solve(FitProblem(start, weighted, names, bounds), strict=False))
         solution = min(ends, key=lambda end: end.chi_square)
         starts, before = [solution.model], size
         size = likeliest_size(solution.model, tests, [names[i] for i in solution.moving])
@@ -145,31 +152,31 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
         The logarithm is -(ln|S| + r^T P r + ln|J S^-1 J^T|)/2 with S the covariance of noise and model error, J the
         derivatives, (k, n), and P = S^-1 - S^-1 J^T (J S^-1 J^T)^-1 J S^-1.
     """
-    products_by_test = [data_set.error_products(model, names) for data_set in data_sets]
+    parts = [data_set.error_products(model, names) for data_set in data_sets]
     scale = np.append(1.0, Coordinates.of_parameters(model, names).slopes(model.values))
+    products = np.sum([part.products for part in parts], axis=0) * np.outer(scale, scale)
+    components = np.concatenate([part.components for part in parts], axis=1) * scale[:, None]
+    variance = np.concatenate([part.variance for part in parts])
 
     def cost(log_size: float) -> float:
-        """Cost of a model error, by the logarithm of its size.
-
-        Returns:
-            Minus twice the log likelihood.
-        """
-        products, log_sizes = zip(*(test.with_size(float(np.exp(log_size))) for test in products_by_test), strict=True)
-        both = np.sum(products, axis=0) * np.outer(scale, scale)
+        """Minus twice the logarithm of the likelihood of a model error, by the logarithm of its size."""
+        square = float(np.exp(2.0 * log_size))
+        grown = 1.0 + square * variance
+        both = products - components * (square / grown) @ components.T
         units = np.sqrt(np.maximum(np.diag(both)[1:], np.finfo(float).tiny))
         size, vectors = np.linalg.eigh(both[1:, 1:] / np.outer(units, units))
         significant = size > ROUNDING * size.max(initial=0.0)
         absorbed = np.square(both[0, 1:] / units @ vectors[:, significant]) / size[significant]
         information = np.sum(np.log(size[significant])) + 2.0 * np.sum(np.log(units))
-        return float(sum(log_sizes) + both[0, 0] - absorbed.sum() + information)
+        return float(np.sum(np.log(grown)) + both[0, 0] - absorbed.sum() + information)
 
     low, high = np.log(SIZES[[0, -1]]).tolist()
     found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": _SETTLED / 2.0})
     return float(np.exp(found.x))
 
 
-def log_likelihood(found: WeightedFit, prior_precision: Mapping[str, float]) -> float:
-    """Logarithm of the restricted likelihood of a fit, the parameters that rest on no bound integrated.
+def log_likelihood(found: FitResult, prior_precision: Mapping[str, float]) -> float:
+    """Logarithm of the restricted likelihood of a fit, the parameters that are at no bound integrated.
 
     If the model misses the tests, a Gaussian process is added to the noise, its sizes and lengths integrated out.
 
@@ -180,13 +187,15 @@ def log_likelihood(found: WeightedFit, prior_precision: Mapping[str, float]) -> 
     Returns:
         Natural logarithm of the likelihood.
     """
-    size, names = max(data_set.model_error for data_set in found.minimised), found.solution.coordinates.names
-    bare = [replace(data_set, model_error=0.0) for data_set in _thinned(found.minimised)]
-    tests = _in_noise(found.solution, [_with_shape_error(data_set, size) for data_set in bare] if size else bare)
+    size = max(test.model_error for test in found.minimised)
+    bare = [replace(test, model_error=0.0) for test in _thinned(found.minimised)]
+    if size:
+        bare = [replace(t, model_error=size, first_error=2) if isinstance(t, MeasuredLoop) else t for t in bare]
+    tests = _in_noise(found, bare)
     rows, residual = tests.moving, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
     if size:
-        components, processes = tests.subspace.project(residual), discrepancies(tests)
+        components, processes = tests.project(residual), discrepancies(tests)
         columns = [process.tests.columns(process.complex_shapes) for process in processes]
         likelihoods = [
             RestrictedLikelihood.from_columns(rows, components, np.empty((0, components.size))) for rows in columns
@@ -195,9 +204,9 @@ def log_likelihood(found: WeightedFit, prior_precision: Mapping[str, float]) -> 
         gain = float(np.logaddexp.reduce(evidence)) - np.log(evidence.size)
         best = int(evidence.argmax())
         shares = columns[best] * SIZES[likelihoods[best].gains(SIZES).argmax()]
-        across = shares @ tests.subspace.project(tests.moving).T
+        across = shares @ tests.project(tests.moving).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
-    prior = np.diag([prior_precision.get(names[i], 0.0) for i in found.solution.moving])
+    prior = np.diag([prior_precision.get(found.names[i], 0.0) for i in found.moving])
     log_size = sum(test.log_size for test in tests.data_sets) + float(np.linalg.slogdet(information + prior)[1])
     return gain - 0.5 * (float(residual @ residual) + log_size)
 
@@ -210,70 +219,48 @@ def model_error_warning(error: Unnamed) -> str:
     )
 
 
-def _exceeds_noise(found: WeightedFit, rig: RigSettings) -> bool:
+def _exceeds_noise(found: FitResult, rig: RigSettings) -> bool:
     """True if chi-square of all tests, or of one, exceeds what noise and a rig of the class make."""
-    data_sets, residual = found.minimised, found.solution.residual
-    errors = [_errors_of_class(data_set, rig) for data_set in data_sets]
-    squares = [
-        float(np.sum(np.square(CommonError.of_all(columns).whiten(residual[rows]))))
-        for columns, rows in zip(errors, rows_of(data_sets), strict=True)
-    ]
-    counts = [data_set.counted for data_set in data_sets]
-    freedom = max(sum(counts) - len(found.solution.coordinates.names), 1)
+    squares, counts = [], [test.counted for test in found.minimised]
+    for test, rows in zip(found.minimised, rows_of(found.minimised), strict=True):
+        whitened = CommonError(_errors_of_class(test, rig)).whiten(found.residual[rows])
+        squares.append(float(np.sum(np.square(whitened))))
+    freedom = max(sum(counts) - len(found.names), 1)
     pairs = [(sum(squares), freedom), *zip(squares, counts, strict=True)]
     return any(beyond_noise(square / count, count) is not None for square, count in pairs if count)
 
 
-def _is_smooth(found: WeightedFit, rig: RigSettings) -> bool:
+def _is_smooth(found: FitResult, rig: RigSettings) -> bool:
     """True if the tests are likelier with something smooth beside noise and a rig of the class, prior odds counted."""
     thinned = _thinned(found.minimised)
-    solution = found.solution.moved_to(found.solution.model, thinned)
-    tests = FittedTests(solution, thinned, [_errors_of_class(data_set, rig) for data_set in thinned])
+    solution = found.moved_to(found.model, thinned)
+    tests = FittedTests(solution, [_errors_of_class(test, rig) for test in thinned])
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     quick = [Discrepancy.over_tests(tests, (names,), _MIDDLING, _FEW)]
     if tests.directions.size > _DENSE:
         quick.append(Discrepancy.over_tests(tests, (names,), (OVER_FREQUENCY[0], OVER_STRAIN[-1]), MAXIMUM_NODES))
     if max(process.best[0] for process in quick) <= _SHOWS:
         return False
-    processes = discrepancies(tests)
-    evidence = [process.likelihood.log_evidence(SIZES) for process in processes]
+    evidence = [process.likelihood.log_evidence(SIZES) for process in discrepancies(tests)]
     return float(np.logaddexp.reduce(evidence)) - np.log(len(evidence)) + np.log(_ODDS) >= 0.0
 
 
-def _restarted(solution: Solution, data_sets: Sequence[MeasuredTest]) -> list[Model]:
-    """A model with its branches as read off the tests: a fit bent by noise may have lost one for good."""
-    model, names = solution.model, solution.coordinates.names
-    fixed = {name: value for name, value in model.values.items() if name not in names}
-    with suppress(FitError):  # tests that no rubber gives
-        paper = Model.with_defaults(model.bushing, BASE, start_values(model.bushing, data_sets, fixed))
-        starts = [paper.starts(effect)[0].items() for effect in model.records]
-        values = {**paper.values, **dict(chain.from_iterable(starts))}
-        return [model.with_values({name: values[name] for name in names if name in values})]
-    return []
-
-
-def _errors_of_class(data_set: MeasuredTest, rig: RigSettings) -> Array:
+def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
     """Whitened residuals of a test by the errors of a rig of the class beside what counts already: the gain of a loop,
     and gain and phase of each level, (w, n)."""
-    if isinstance(data_set, MeasuredLoop):
-        gain = data_set.gain_error * data_set.unit_gain[None]
-        return gain[:0] if data_set.gain_weighs else gain
-    uncounted = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(data_set.noise.level), 0.0))
-    columns = level_errors_of(data_set)
+    if isinstance(test, MeasuredLoop):
+        gain = test.gain_error * test.unit_gain[None]
+        return gain[:0] if test.gain_weighs else gain
+    uncounted = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(test.noise.level), 0.0))
+    columns = level_errors_of(test)
     return columns * np.tile(uncounted, len(columns) // 2)[:, None]
 
 
-def _in_noise(solution: Solution, data_sets: Sequence[MeasuredTest]) -> FittedTests:
-    """The model of a fit with other weights, beside no errors of the rig."""
-    none = [np.empty((0, data_set.size)) for data_set in data_sets]
-    return FittedTests(solution.moved_to(solution.model, data_sets), data_sets, none)
+def _in_noise(solution: FitResult, tests: Sequence[MeasuredTest]) -> FittedTests:
+    """A fitted model with other weights of the tests, beside no errors of the rig."""
+    return FittedTests(solution.moved_to(solution.model, tests), [np.empty((0, test.size)) for test in tests])
 
 
-def _thinned(data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:
+def _thinned(tests: Sequence[MeasuredTest]) -> list[MeasuredTest]:
     """The tests with evenly chosen points of dense sweeps: enough for what is smooth."""
-    return [data_set if isinstance(data_set, MeasuredLoop) else data_set.thinned(_ENOUGH) for data_set in data_sets]
-
-
-def _with_shape_error(data_set: MeasuredTest, size: float) -> MeasuredTest:
-    """The test in noise; a loop with the model error of its shape, which no change of the stiffness makes."""
-    return replace(data_set, model_error=size, first_error=2) if isinstance(data_set, MeasuredLoop) else data_set
+    return [test if isinstance(test, MeasuredLoop) else test.thinned(_ENOUGH) for test in tests]

@@ -143,7 +143,7 @@ class PreparedCampaign:
         return {name: setting.value for name, setting in settings.items() if setting.value is not None}
 
     def start_values(self, data_sets: Sequence[MeasuredTest], fixed: Mapping[str, float]) -> dict[str, float]:
-        """Values of the paper's parameters, and what the campaign gives, to start a fit of some tests from."""
+        """Start values of the paper's parameters for a fit of some tests, with what the campaign gives."""
         with error_location(self.campaign.path):
             return start_values(self.campaign.bushing, data_sets, {**self.given_values, **fixed})
 

@@ -4,17 +4,16 @@ A standard error takes the misfit for a parabola. The profile asks the data: it 
 anew, and looks where chi-square has risen too far. The two differ where a parameter is barely determined.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.assess import linear_errors, reduced
-from bushfit.fitting.coordinates import Bounds, Coordinates, Solution, coordinate_bounds
-from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.coordinates import Coordinates
+from bushfit.fitting.problem import FitResult
 from bushfit.fitting.solve import solve
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.progress import track
@@ -48,35 +47,25 @@ class _Profile:
     """The rise of chi-square by the coordinate of one parameter, the others fitted from the nearest `known` fit."""
 
     name: str
-    best: Solution
-    data_sets: Sequence[MeasuredTest]
-    bounds: Bounds
-    known: dict[float, Solution]
+    best: FitResult
+    known: dict[float, FitResult]
 
     def value(self, coordinate: float) -> float:
         """Value of the parameter at a coordinate."""
-        minimum, maximum = self.best.model.parameters[self.name].bounds  # exp(log(bound)) may lie beyond it
-        return float(
-            np.clip(
-                Coordinates.of_parameters(self.best.model, [self.name]).values([coordinate])[self.name],
-                minimum,
-                maximum,
-            )
-        )
+        (value,) = Coordinates.of_parameters(self.best.model, [self.name]).values([coordinate]).values()
+        return float(np.clip(value, *self.best.model.parameters[self.name].bounds))  # exp(log(bound)) may lie beyond it
 
-    def fitted(self, coordinate: float) -> Solution:
-        """The fit of the others, with the parameter held at a coordinate."""
+    def fitted(self, coordinate: float) -> FitResult:
+        """The fit of the others, with the parameter fixed at a coordinate."""
         if coordinate not in self.known:
             near = self.known[min(self.known, key=lambda known: abs(known - coordinate))].model
-            self.known[coordinate] = solve(
-                near.with_values({self.name: self.value(coordinate)}),
-                self.data_sets,
-                [name for name in self.best.coordinates.names if name != self.name],
-                self.bounds,
-                evaluations=100,  # chosen: five to ten are the rule
-                tolerance=1e-7,  # far less than what the rise of chi-square is compared with
-                strict=False,
+            others = replace(
+                self.best.problem,
+                model=near.with_values({self.name: self.value(coordinate)}),
+                names=[name for name in self.best.names if name != self.name],
             )
+            # five to ten evaluations are the rule, and the tolerance is far below what the rise is compared with
+            self.known[coordinate] = solve(others, evaluations=100, tolerance=1e-7, strict=False)
         return self.known[coordinate]
 
     def root_rise(self, coordinate: float) -> float:
@@ -89,23 +78,18 @@ class _Profile:
 
         steps = start + np.copysign(step, bound - start) * np.arange(_MOST_STEPS + 1)
         for current, ahead in pairwise(np.clip(steps, min(start, bound), max(start, bound)).tolist()):
-            if self.root_rise(ahead) >= allowed:
-                crossing = brentq(
-                    lambda coordinate: self.root_rise(coordinate) - allowed, current, ahead, xtol=_PRECISION * step
-                )
-                held_by_others = abs(crossing - start) > _FAR and self._bounded(crossing) > _HELD_BY_OTHERS * allowed**2
-                return None if held_by_others else self.value(crossing)
+            if self.root_rise(ahead) < allowed:
+                continue
+            crossing = brentq(lambda u: self.root_rise(u) - allowed, current, ahead, xtol=_PRECISION * step)
+            found = self.fitted(crossing)
+            new_bounds = not set(found.at_bound) <= set(self.best.at_bound)
+            # by which chi-square would fall there if others could leave the bounds that they met on the way
+            fall = found.gain(self.best.at_bound) if new_bounds and abs(crossing - start) > _FAR else 0.0
+            return None if fall > _HELD_BY_OTHERS * allowed**2 else self.value(crossing)
         return None
 
-    def _bounded(self, coordinate: float) -> float:
-        """How far chi-square would fall there if others could leave the bounds that they met on the way."""
-        found = self.fitted(coordinate)
-        return 0.0 if set(found.at_bound) <= set(self.best.at_bound) else found.gain(self.best.at_bound)
 
-
-def profile95(
-    best: Solution, data_sets: Sequence[MeasuredTest], covariance: Covariance, bounds: Bounds
-) -> Mapping[str, Interval]:
+def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]:
     """95 % intervals of the fitted parameters by profile likelihood.
 
     The residuals are in units of a known noise, so the rise of chi-square itself is the measure, 3.84 for 95 %, and not
@@ -114,10 +98,8 @@ def profile95(
     chi-square may rise to the square of that interval's half width over the linear standard error.
 
     Args:
-        best: end of the fit.
-        data_sets: tests, with the weights of the fit.
+        best: the fit.
         covariance: of the fitted parameters.
-        bounds: limits inside the parameters' own [SI].
 
     Returns:
         Lower and upper end by name; None where the data leave that side open up to the bound, or
@@ -126,52 +108,41 @@ def profile95(
     Raises:
         FitError: fewer than two parameters were fitted.
     """
-    names = best.coordinates.names
+    names = best.names
     if len(names) < 2:
         raise FitError(
             "a profile needs two parameters or more",
             found=f"{len(names)} fitted",
             hint="leave out --profile, or hold fewer parameters in [fit]",
         )
-    start, limits = best.coordinates.point(best.model.values), np.transpose(coordinate_bounds(best.coordinates, bounds))
+    start, limits = best.coordinates.point(best.model.values), np.transpose(best.problem.limits)
     linear = linear_errors(best.jacobian)
-    allowed = _allowed(best, data_sets, covariance, linear)
+    half = np.array(
+        [covariance.half(name) if name in covariance.names else 0.0 for name in names]
+    )  # 0 of one at a bound
+    missed = any(test.model_error for test in best.minimised)  # how far it bends parameters, no weight tells
+    widest = np.inf if missed else _WIDEST * Z95 * np.sqrt(_excess(best))
+    allowed = np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, widest)
     found: dict[str, Interval] = {}
     for i, name in enumerate(track("profiles", names)):
-        profile = _Profile(name, best, data_sets, bounds, {start[i]: best})
+        profile = _Profile(name, best, {start[i]: best})
         step = min(_FIRST_REACH * allowed[i] * linear[i], _LONGEST_STEP)
         low, high = (profile.end(start[i], bound, step, allowed[i]) for bound in limits[i])
         found[name] = low, high
     return found
 
 
-def limit95(best: Solution, data_sets: Sequence[MeasuredTest], name: str, bounds: Bounds) -> float | None:
+def limit95(best: FitResult, name: str) -> float | None:
     """One-sided 95 % limit of a parameter that ended at a bound; None if the data set no limit.
 
     A model that misses the data may miss them by as much more.
-
-    Args:
-        best: end of the fit.
-        data_sets: tests, with the weights of the fit.
-        name: parameter at a bound.
-        bounds: limits inside the parameters' own [SI].
     """
-    i = best.coordinates.names.index(name)
+    i = list(best.names).index(name)
     start, inward = best.coordinates.point(best.model.values)[i], int(best.at_bound[name] == "min")
-    profile = _Profile(name, best, data_sets, bounds, {start: best})
-    other_end = coordinate_bounds(best.coordinates, bounds)[inward][i]
-    return profile.end(start, other_end, _BLIND_STEP, _ONE_SIDED * np.sqrt(_excess(best, data_sets)))
+    profile = _Profile(name, best, {start: best})
+    return profile.end(start, best.problem.limits[inward][i], _BLIND_STEP, _ONE_SIDED * np.sqrt(_excess(best)))
 
 
-def _excess(best: Solution, data_sets: Sequence[MeasuredTest]) -> float:
+def _excess(best: FitResult) -> float:
     """Reduced chi-square, 1 at the least."""
-    return max(reduced(best.model, data_sets, len(best.coordinates.names))[0], 1.0)
-
-
-def _allowed(best: Solution, data_sets: Sequence[MeasuredTest], covariance: Covariance, linear: Array) -> Array:
-    """Root of the rise of chi-square that each parameter's interval may reach."""
-    names = best.coordinates.names  # of what counts as held where it rests on a bound the covariance tells nothing
-    half = np.array([covariance.half(name) if name in covariance.names else 0.0 for name in names])
-    missed = any(data_set.model_error for data_set in data_sets)  # how far it bends parameters, no weight tells
-    widest = np.inf if missed else _WIDEST * Z95 * np.sqrt(_excess(best, data_sets))
-    return np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, widest)
+    return max(reduced(best.model, best.minimised, len(best.names))[0], 1.0)

@@ -1,27 +1,17 @@
-"""Least-squares fits of a model's parameters to data sets, within bounds, to the end."""
+"""Least-squares fits of a model's parameters to tests, within bounds, to the end."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.coordinates import (
-    Bounds,
-    Coordinates,
-    Solution,
-    at_bound,
-    jacobian,
-    residual,
-    starting_point,
-)
+from bushfit.fitting.coordinates import jacobian, residual
 from bushfit.fitting.descent import Descent
-from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.model.model import Model
 
 if TYPE_CHECKING:
@@ -33,33 +23,26 @@ _EVALUATIONS, _TOLERANCE = 400, 1e-9
 
 
 def solve(
-    model: Model,
-    data_sets: Sequence[MeasuredTest],
-    names: Sequence[str],
-    bounds: Bounds | None = None,
-    *,
-    evaluations: int = _EVALUATIONS,
-    tolerance: float = _TOLERANCE,
-    strict: bool = True,
-) -> Solution:
-    """Fit the named parameters by least squares, from the model's own values, the others held; without names all are.
+    problem: FitProblem, *, evaluations: int = _EVALUATIONS, tolerance: float = _TOLERANCE, strict: bool = True
+) -> FitResult:
+    """Minimise the sum of squares from the start values; a parameter may come to rest on a bound.
 
     Args:
-        bounds: limits inside the parameters' own; a parameter may come to rest on one.
+        problem: parameters to fit, tests and bounds; without parameters the model is evaluated alone.
         evaluations: of the model at most.
         tolerance: relative change of chi-square at which the fit stops.
-        strict: whether a fit that has used up its evaluations is an error, unless chi-square is flat where it is.
+        strict: True if a fit that has used up its evaluations is an error, unless chi-square is flat where it is.
 
     Returns:
-        End of the fit.
+        The minimum.
 
     Raises:
         FitError: fewer data than parameters, no finite response, or no convergence.
     """
-    if not names:
-        misfit = residual(model, data_sets)
-        return Solution(model, Coordinates((), ()), misfit, np.empty((0, misfit.size)), 1, {}, stopped=False)
-    found = Descent.start(model, data_sets, names, bounds or {}, tolerance).finished(evaluations).solution
+    if not problem.names:
+        misfit = residual(problem.model, problem.tests)
+        return FitResult(problem, problem.model, misfit, np.empty((0, misfit.size)))
+    found = Descent.start(problem, tolerance).finished(evaluations).solution
     if found.stopped and strict and not found.flat:
         raise FitError(
             "the fit did not converge",
@@ -69,16 +52,12 @@ def solve(
     return found
 
 
-def solve_with_lmfit(
-    model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], bounds: Bounds | None = None
-) -> Solution:
-    """Fit by lmfit's MINPACK, as the paper's procedure, static and dynamic fit in turn, is made.
+class _OutOfBoundsError(Exception):
+    """A step leaves the bounds."""
 
-    Args:
-        model: model with the start values.
-        data_sets: tests.
-        names: parameters to fit.
-        bounds: limits inside the parameters' own [SI].
+
+def solve_with_lmfit(problem: FitProblem) -> FitResult:
+    """Minimise by lmfit's MINPACK, as in the paper's procedure of static and dynamic fits in turn.
 
     Raises:
         FitError: as of `solve`, which goes on where a step leaves the bounds or MINPACK comes to no end.
@@ -87,52 +66,31 @@ def solve_with_lmfit(
         Two roads to one minimum: on the campaigns in configs/ and data/practice they end 1e-8 apart in the parameters.
         All other fits take `solve`, which needs 0.4 to 0.9 of the time and keeps to bounds.
     """
-    if names:
-        with suppress(_OutOfBoundsError, ValueError):  # lmfit's word for a residual that is not finite
-            found = _by_minpack(model, data_sets, names, bounds or {})
-            if not found.stopped:
-                return found
-    return solve(model, data_sets, names, bounds)
-
-
-class _OutOfBoundsError(Exception):
-    """A step leaves the bounds."""
-
-
-def _by_minpack(
-    model: Model,
-    data_sets: Sequence[MeasuredTest],
-    names: Sequence[str],
-    bounds: Bounds,
-) -> Solution:
+    if not problem.names:
+        return solve(problem)
     import lmfit
 
-    coordinates, start, low, high = starting_point(model, data_sets, names, bounds)
+    start, (low, high), tests = problem.start, problem.limits, problem.tests
+    free = _blank_parameters(start.size)
+    for parameter, value in zip(free.values(), start.tolist(), strict=True):
+        parameter.set(value=value)
 
-    @lru_cache(maxsize=2)  # data sets know again the model they answered last: the best so far, and the one tried
-    def model_at(point: tuple[float, ...]) -> Model:
+    @lru_cache(maxsize=2)  # tests know again the model they answered last: the best so far, and the one tried
+    def model_at(*point: float) -> Model:
         if not np.all((low <= point) & (point <= high)):
             raise _OutOfBoundsError
-        return model.with_values(coordinates.values(point))
+        return problem.model.with_values(problem.coordinates.values(point))
 
     def model_of(parameters: lmfit.Parameters) -> Model:
-        return model_at(tuple(parameter.value for parameter in parameters.values()))
+        return model_at(*(parameter.value for parameter in parameters.values()))
 
-    def misfit(parameters: lmfit.Parameters) -> Array:
-        return residual(model_of(parameters), data_sets)
-
-    def slopes(parameters: lmfit.Parameters) -> Array:
-        return jacobian(model_of(parameters), data_sets, names)
-
-    free = _blank_parameters(start.size)
-    for parameter, value in zip(free.values(), np.clip(start, low, high).tolist(), strict=True):
-        parameter.set(value=value)
-    with np.errstate(invalid="ignore", divide="ignore"):  # lmfit takes roots of a covariance nobody asked for
+    # a residual that is not finite is a ValueError of lmfit, which takes roots of a covariance nobody asked for
+    with suppress(_OutOfBoundsError, ValueError), np.errstate(invalid="ignore", divide="ignore"):
         fit = lmfit.minimize(
-            misfit,
+            lambda parameters: residual(model_of(parameters), tests),
             list(free.values()),  # which lmfit takes as they are, without a copy
             "leastsq",
-            Dfun=slopes,
+            Dfun=lambda parameters: jacobian(model_of(parameters), tests, problem.names),
             col_deriv=True,
             gtol=0.0,
             ftol=_TOLERANCE,
@@ -140,10 +98,12 @@ def _by_minpack(
             max_nfev=_EVALUATIONS,
             calc_covar=False,
         )
-    end = np.array([parameter.value for parameter in fit.params.values()])
-    best, met = model_of(fit.params), at_bound(names, end, low, high)
-    residuals, slope = residual(best, data_sets), jacobian(best, data_sets, names)
-    return Solution(best, coordinates, residuals, slope, int(fit.nfev), met, bool(fit.aborted))
+        if not fit.aborted:
+            best = model_of(fit.params)
+            slopes = jacobian(best, tests, problem.names)
+            at_bound = problem.at_bound(problem.coordinates.point(best.values))
+            return FitResult(problem, best, residual(best, tests), slopes, int(fit.nfev), at_bound)
+    return solve(problem)
 
 
 @cache

@@ -32,6 +32,7 @@ from bushfit.effects import BASE, History
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual
 from bushfit.fitting.preparation import prepare_loops, prepare_sweeps
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
@@ -211,7 +212,7 @@ def loop(model: Model, rows: int) -> Loop:
 
 def fitted(model: Model, loops: Sequence[Loop], sweeps: Sequence[Sweep]) -> Callable[[], object]:
     """From measurements to a solution."""
-    return lambda: solve(model, [*prepare_loops(loops), *prepare_sweeps(sweeps)], FIVE)
+    return lambda: solve(FitProblem(model, [*prepare_loops(loops), *prepare_sweeps(sweeps)], FIVE))
 
 
 @pytest.mark.parametrize("axis", ["rows of a loop", "frequencies", "amplitudes"])

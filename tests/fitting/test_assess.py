@@ -19,6 +19,7 @@ from bushfit.fitting.assess import FitStage, covariance, lack_of_fit, measured_r
 from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.preparation import MeasuredLoop, new_loop
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint, fit_two_step
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
@@ -166,9 +167,9 @@ def test_a_gain_that_does_not_weigh_moves_parameters_as_a_refit_says(small: Camp
     """What its standard error adds to the covariance are the squares of how far a loop that is off by it leads."""
     data = PreparedCampaign.from_campaign(small)
     loop = replace(data.loops[0], gain_error=0.01, gain_weighs=False)
-    fitted = solve(paper_model, (*data.sweeps, loop), FIVE).model
+    fitted = solve(FitProblem(paper_model, (*data.sweeps, loop), FIVE)).model
     off = replace(loop, drive=replace(loop.drive, force=1.01 * loop.drive.force))
-    moved = solve(fitted, (*data.sweeps, off), FIVE).model
+    moved = solve(FitProblem(fitted, (*data.sweeps, off), FIVE)).model
     shift = np.array([moved.values[name] - fitted.values[name] for name in FIVE])
     known, unknown = (
         covariance(fitted, [FitStage(tuple(FIVE), (*data.sweeps, each))])
@@ -223,13 +224,15 @@ def test_a_run_held_out_is_a_refit_without_it(levelled: Campaign) -> None:
     """One Gauss-Newton step against the real refit: the same to a tenth of the standard errors."""
     data = PreparedCampaign.from_campaign(replace(levelled, loops=()))
     (sweep,) = data.select_tests(None)
-    best = solve(Model.with_defaults(levelled.bushing, ("elastic", "springpot", "friction"), {}), [sweep], FIVE)
+    best = solve(
+        FitProblem(Model.with_defaults(levelled.bushing, ("elastic", "springpot", "friction"), {}), [sweep], FIVE)
+    )
     errors = np.sqrt(np.diag(np.linalg.inv(best.jacobian @ best.jacobian.T)))
     for level in LEVELS:
         rows = np.flatnonzero(np.tile(sweep.amplitude == level, 2))
         step = LeaveOut.from_fit(best.jacobian, best.residual).step(rows)
         assert step is not None
-        rest = solve(best.model, [sweep.without(np.flatnonzero(sweep.amplitude == level))], FIVE)
+        rest = solve(FitProblem(best.model, [sweep.without(np.flatnonzero(sweep.amplitude == level))], FIVE))
         moved = best.coordinates.point(rest.model.values) - best.coordinates.point(best.model.values)
         np.testing.assert_allclose(step / errors, moved / errors, atol=0.5)
 

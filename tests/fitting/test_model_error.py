@@ -23,6 +23,7 @@ from bushfit.fitting.coordinates import Coordinates, jacobian
 from bushfit.fitting.model_error import with_model_error
 from bushfit.fitting.preparation import MeasuredSweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.robust import estimate
 from bushfit.geometry import Direction
@@ -244,19 +245,19 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(rig: Rig) -> None:
     """In full, J^+ V J^+^T, V by one standard deviation of each independent source of error."""
     campaign = replace(spoiled(rig(3, shared=True), waves(0.03, 3)), loops=())
     data = PreparedCampaign.from_campaign(campaign)
-    plain = estimate(data.starting_model(data.effects, data.sweeps, {}), data.sweeps, FIVE, data.bounds)
+    plain = estimate(FitProblem(data.starting_model(data.effects, data.sweeps, {}), data.sweeps, FIVE, data.bounds))
     found, _ = with_model_error(plain, data.bounds)
     (sweep,) = found.weighed
     assert found.process is not None
     assert isinstance(sweep, MeasuredSweep)
-    model, random = found.solution.model, sweep.noise.scatter(sweep.name, sweep.held, sweep.step)
+    model, random = found.model, sweep.noise.scatter(sweep.name, sweep.held, sweep.step)
     run = np.unique(np.stack((sweep.held, sweep.repeat)), axis=1, return_inverse=True)[1]
     sources = [
         sweep.residual_change(found.process.shapes * sweep.stiffness(model), model),
         *(sweep.whiten(unit * np.diag(size).astype(complex)) for unit, size in zip((1.0, 1.0j), random, strict=True)),
         *(np.array(sweep.moved_together(run == i)) * np.array(sweep.noise.shared)[:, None] for i in np.unique(run)),
     ]
-    slopes = found.solution.coordinates.slopes(model.values)
+    slopes = found.coordinates.slopes(model.values)
     moved = np.linalg.pinv(jacobian(model, [sweep], FIVE).T) @ np.concatenate(sources).T * slopes[:, None]
-    known = covariance(model, [FitStage(FIVE, found.weighed, found.process)])
+    known = covariance(model, [FitStage(FIVE, found.weighed or found.minimised, found.process)])
     np.testing.assert_allclose(known.matrix, moved @ moved.T, rtol=1e-6)

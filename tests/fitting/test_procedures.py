@@ -27,6 +27,7 @@ from bushfit.campaign.schema import (
 from bushfit.errors import FitError
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import STATIC, fit_dynamic, fit_joint, fit_static, fit_two_step
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
@@ -349,7 +350,7 @@ def test_errors_of_levels_are_told(rig: Rig, paper_model: Model, error: float) -
     found, matters, freedom = [], [], []
     for seed in range(30):
         data = PreparedCampaign.from_campaign(off_by_level(rig(seed), error, seed))
-        solution = solve(paper_model, data.select_tests(BOTH), FIVE)
+        solution = solve(FitProblem(paper_model, data.select_tests(BOTH), FIVE))
         told = level_errors(data.select_tests(BOTH), solution.residual, solution.jacobian, (1.0, 1.0))
         found.append(np.square(told.error))
         matters.append(told.matters)

@@ -16,6 +16,7 @@ from bushfit.campaign.schema import FitSettings, ParameterSetting, RigSettings, 
 from bushfit.effects import BASE
 from bushfit.errors import FitError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.profile import limit95
 from bushfit.fitting.solve import solve
@@ -77,7 +78,7 @@ def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(rig: Rig, lar
     data = PreparedCampaign.from_campaign(rig(3, **plan(largest, loops=())))
     data_sets = data.select_tests(None)
     result = profiled(data.campaign)
-    best = solve(result.model, data_sets, FIVE)
+    best = solve(FitProblem(result.model, data_sets, FIVE))
     linear = np.sqrt(np.diag(np.linalg.inv(best.jacobian @ best.jacobian.T)))
     slopes = best.coordinates.slopes(best.model.values)
     allowed = result.covariance.half_width(np.eye(5)) / slopes / linear
@@ -86,7 +87,7 @@ def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(rig: Rig, lar
         others = [other for other in FIVE if other != name]
         for end in result.profile[name]:
             if end is not None:
-                refit = solve(result.model.with_values({name: end}), data_sets, others)
+                refit = solve(FitProblem(result.model.with_values({name: end}), data_sets, others))
                 rises[name, end] = (refit.chi_square - best.chi_square) / ratio**2
     assert len(rises) >= (10 if largest == 1e-3 else 5)
     assert all(abs(rise - 1.0) < 0.02 for rise in rises.values())
@@ -96,12 +97,12 @@ def test_what_rests_on_a_bound_is_told_by_how_far_from_it_the_tests_let_it_be(ri
     """Of rubber that is all springpot and friction the tests show how much of a spring there is at most."""
     rubber = paper_model.with_values({"mu": 1e3, "m": 6e5, "alpha": 0.15})
     data = PreparedCampaign.from_campaign(replace(rig(0, rubber, **plan(1e-3)), rig=RigSettings(gain_error=0.0)))
-    best = solve(fit_joint(data).model, data.select_tests(None), FIVE)
+    best = solve(FitProblem(fit_joint(data).model, data.select_tests(None), FIVE))
     assert best.at_bound == {"mu": "min"}
-    limit = limit95(best, data.select_tests(None), "mu", {})
+    limit = limit95(best, "mu")
     assert limit is not None
     held = best.model.with_values({"mu": limit})
-    rise = solve(held, data.select_tests(None), FIVE[1:]).chi_square - best.chi_square
+    rise = solve(FitProblem(held, data.select_tests(None), FIVE[1:])).chi_square - best.chi_square
     assert rise == pytest.approx(1.645**2 * max(best.chi_square / (best.residual.size - 5), 1.0), rel=0.05)
     (told,) = (line for line in fit_joint(data).warnings if line.startswith("mu ended"))
     assert "at most" in told

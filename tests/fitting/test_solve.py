@@ -14,12 +14,12 @@ from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE, with_base
 from bushfit.errors import FitError
-from bushfit.fitting.coordinates import Bounds, Coordinates, at_bound, residual, starting_point
+from bushfit.fitting.coordinates import Bounds, Coordinates, residual
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import cautions
-from bushfit.fitting.robust import WeightedFit
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction
@@ -60,29 +60,29 @@ def data_sets(rig: Callable[..., Campaign]) -> list[MeasuredTest]:
 def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(
     axial: list[MeasuredTest], paper_model: Model
 ) -> None:
-    solution = solve(paper_model, axial, FIVE, {"mu": (None, 1.05e6)})
+    solution = solve(FitProblem(paper_model, axial, FIVE, {"mu": (None, 1.05e6)}))
     assert dict(solution.at_bound) == {"mu": "max"}
     assert solution.model.values["mu"] == pytest.approx(1.05e6, rel=1e-2)
     assert solution.flat
-    free = solve(paper_model, axial, FIVE)
+    free = solve(FitProblem(paper_model, axial, FIVE))
     assert not free.at_bound
     assert free.chi_square < solution.chi_square
 
 
 def test_a_solver_that_runs_out_of_evaluations_says_so(axial: list[MeasuredTest], paper_model: Model) -> None:
     start = paper_model.with_values({name: 5.0 * paper_model.values[name] for name in ("mu", "sigma_fmax")})
-    assert solve(start, axial, FIVE, evaluations=2, strict=False).stopped
+    assert solve(FitProblem(start, axial, FIVE), evaluations=2, strict=False).stopped
     with pytest.raises(FitError, match="did not converge"):
-        solve(start, axial, FIVE, evaluations=2)
+        solve(FitProblem(start, axial, FIVE), evaluations=2)
 
 
 def test_a_fit_that_is_stopped_where_chi_square_is_flat_is_one_and_is_told(
     axial: list[MeasuredTest], result: Result
 ) -> None:
     near = result.model.with_values({"mu": 1.0001 * result.model.values["mu"]})
-    stopped = solve(near, axial, FIVE, evaluations=2)
+    stopped = solve(FitProblem(near, axial, FIVE), evaluations=2)
     assert (stopped.stopped, stopped.flat) == (True, True)
-    notes = cautions(stopped.model, WeightedFit(stopped, axial, axial, axial, ()), {}, result.covariance)
+    notes = cautions(stopped.model, stopped, {}, result.covariance)
     assert any(note.startswith("the fit was stopped after 2 evaluations") for note in notes)
 
 
@@ -101,7 +101,7 @@ def test_random_starts_end_at_one_minimum(
     for _ in range(many):
         start = dict(zip(FIVE, best * 10.0 ** rng.uniform(-1.0, 1.0, 5), strict=True))
         start["alpha"] = np.clip(10.0 ** rng.uniform(-2.0, 0.0), *result.model.parameters["alpha"].bounds)
-        solution = solve(result.model.with_values(start), axial, FIVE)
+        solution = solve(FitProblem(result.model.with_values(start), axial, FIVE))
         if solution.at_bound:
             tried = residual(result.model.with_values(start), axial)
             assert tried @ tried > read_off @ read_off
@@ -127,10 +127,11 @@ def test_it_ends_where_lmfit_ends(
 ) -> None:
     model = started(paper_model, data_sets, *effects)
     names = tuple(model.parameters)
-    found = Descent.start(model, data_sets, names, bounds).finished(100)
-    coordinates, start, low, high = starting_point(model, data_sets, names, bounds)
+    problem = FitProblem(model, data_sets, names, bounds)
+    found = Descent.start(problem).finished(100)
+    coordinates, start, (low, high) = problem.coordinates, problem.start, problem.limits
     parameters = lmfit.Parameters()
-    for name, value, least, most in zip("abcdefgh", np.clip(start, low, high), low, high, strict=False):
+    for name, value, least, most in zip("abcdefgh", start, low, high, strict=False):
         parameters.add(name, float(value), min=float(least), max=float(most))
 
     def misfit(tried: lmfit.Parameters) -> np.ndarray:
@@ -144,12 +145,12 @@ def test_it_ends_where_lmfit_ends(
     assert found.converged
     assert found.chi_square == pytest.approx(known.chisqr, abs=1e-2)
     assert np.max(np.abs(found.point - end) / errors) < 0.05
-    assert found.solution.at_bound == at_bound(names, end, low, high)
+    assert found.solution.at_bound == problem.at_bound(end)
 
 
 def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, data_sets: list[MeasuredTest]) -> None:
     model = started(paper_model, data_sets)
-    here = Descent.start(model, data_sets, tuple(model.parameters), {})
+    here = Descent.start(FitProblem(model, data_sets, tuple(model.parameters)))
     path = [here]
     while not here.converged:
         here = here.stepped()
@@ -165,7 +166,9 @@ def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, data_set
 def test_what_is_not_seen_stays(paper_model: Model, data_sets: list[MeasuredTest]) -> None:
     """An effect of no amount has no shape that data could tell."""
     model = started(paper_model, data_sets, "maxwell")
-    first = Descent.start(model, data_sets, tuple(model.parameters), {"maxwell.mu1": (0.0, 1e-9)}).finished(100)
+    first = Descent.start(FitProblem(model, data_sets, tuple(model.parameters), {"maxwell.mu1": (0.0, 1e-9)})).finished(
+        100
+    )
     assert first.model.values["maxwell.tau"] == pytest.approx(model.values["maxwell.tau"], rel=1e-9)
     assert first.solution.at_bound["maxwell.mu1"] in ("min", "max")
 
@@ -175,7 +178,7 @@ def test_too_few_points_are_refused(data_sets: list[MeasuredTest], paper_model: 
     columns = {name: getattr(sweep, name)[:2] for name in ("frequency", "amplitude", "stiffness", "repeat")}
     few = replace(data_sets[-1], sweep=replace(sweep, **columns))  # type: ignore[call-arg]
     with pytest.raises(FitError, match="too few points"):
-        Descent.start(paper_model, [few], tuple(paper_model.parameters), {})
+        Descent.start(FitProblem(paper_model, [few], tuple(paper_model.parameters)))
 
 
 def test_it_follows_the_bend_of_a_valley(paper_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,10 +195,10 @@ def test_it_follows_the_bend_of_a_valley(paper_model: Model, monkeypatch: pytest
         data = PreparedCampaign.from_campaign(simulate(damped, settings).campaign())
         data_sets = [*data.loops, *data.sweeps]
         model = started(paper_model, data_sets, "delay", "maxwell")
-        bent = Descent.start(model, data_sets, tuple(model.parameters), {}).finished(400)
+        bent = Descent.start(FitProblem(model, data_sets, tuple(model.parameters))).finished(400)
         with monkeypatch.context() as straight:
             straight.setattr("bushfit.fitting.descent._SAME_WAY", 2.0)
-            known = Descent.start(model, data_sets, tuple(model.parameters), {}).finished(400)
+            known = Descent.start(FitProblem(model, data_sets, tuple(model.parameters))).finished(400)
         assert bent.converged
         assert bent.chi_square < known.chi_square + 0.05
         taken.append((bent.evaluations, known.evaluations))
@@ -207,7 +210,8 @@ def elsewhere(model: Model, names: list[str], rng: np.random.Generator) -> Model
     """The model a decade about its values, each parameter by itself."""
     coordinates = Coordinates.of_parameters(model, names)
     point = coordinates.point({name: model.values[name] for name in names})
-    return model.with_values(coordinates.possible(point + rng.uniform(-2.3, 2.3, point.size)))
+    values = coordinates.values(point + rng.uniform(-2.3, 2.3, point.size))
+    return model.with_values({name: np.clip(value, *model.parameters[name].bounds) for name, value in values.items()})
 
 
 @pytest.mark.parametrize(
@@ -221,10 +225,12 @@ def test_no_random_start_ends_lower(root: Path, campaigns: tuple[str, ...]) -> N
         for family in FAMILIES:
             model = data.starting_model(with_base((*data.campaign.fit.effects, *family)), data_sets, {})
             names = list(data.free(tuple(model.parameters)))
-            own, ends = solve(model, data_sets, names, data.bounds).chi_square, list[float]()
+            own, ends = solve(FitProblem(model, data_sets, names, data.bounds)).chi_square, list[float]()
             for _ in range(STARTS):
                 try:
-                    ends.append(solve(elsewhere(model, names, rng), data_sets, names, data.bounds).chi_square)
+                    ends.append(
+                        solve(FitProblem(elsewhere(model, names, rng), data_sets, names, data.bounds)).chi_square
+                    )
                 except FitError:
                     errors += 1
             least = min(own, *ends)

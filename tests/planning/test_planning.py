@@ -18,6 +18,7 @@ from bushfit.errors import ModelError
 from bushfit.fitting.coordinates import residual
 from bushfit.fitting.preparation import MeasuredSweep, new_loop, new_sweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Covariance
@@ -131,7 +132,7 @@ def test_an_effect_shows_as_a_fit_without_it_misses_it(known: Knowledge) -> None
     truth = known.model.with_effect("delay", {"delay.tau": 2e-6})
     each = np.repeat(np.arange(5), counts[:5])
     sweeps = [_noise_free(known.model, truth, SWEEPS[i]) for i in each]
-    found = solve(known.model, sweeps, known.names).chi_square
+    found = solve(FitProblem(known.model, sweeps, known.names)).chi_square
     assert found == pytest.approx(expected * (2e-6 / get_effect("delay").amount.typical) ** 2, rel=0.02)
 
 
@@ -151,7 +152,7 @@ def test_rivals_are_as_far_apart_as_the_best_refit_of_either_leaves_them(known: 
     counts = np.array([1, 1, 1, 1, 2])
     one = known.model.with_effect("inertia", {"inertia.mass": 0.03})
     few = [_noise_free(known.model, one, test) for test in SWEEPS[:3]]
-    other = solve(known.model.with_effect("delay"), few, (*known.names, "delay.tau")).model
+    other = solve(FitProblem(known.model.with_effect("delay"), few, (*known.names, "delay.tau"))).model
     rivals = [replace(known, model=m, names=tuple(m.parameters), covariance=1e6 * np.eye(6)) for m in (one, other)]
     grid = CandidateGrid.from_tests(replace(known, noise=replace(NOISE, level=(0.0, 0.0))), SWEEPS)
     left = [residual(rival.model, grid.data_sets) for rival in rivals]
@@ -162,7 +163,7 @@ def test_rivals_are_as_far_apart_as_the_best_refit_of_either_leaves_them(known: 
     linear = rival_chi_squares([view.total(counts) for view in views])[0, 0, 1]
     runs = [test for test, count in zip(SWEEPS, counts, strict=True) for _ in range(count)]
     fits = [
-        solve(own, [_noise_free(known.model, truth, run) for run in runs], tuple(own.parameters)).chi_square
+        solve(FitProblem(own, [_noise_free(known.model, truth, run) for run in runs], tuple(own.parameters))).chi_square
         for own, truth in ((one, other), (other, one))
     ]
     print("linear", linear, "fits", fits)

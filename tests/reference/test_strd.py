@@ -11,7 +11,7 @@ from agreement import Agree, digits
 from strd import Problem, problems
 
 from bushfit.fitting.assess import FitStage, covariance
-from bushfit.fitting.coordinates import Solution
+from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.solve import solve
 
 PROBLEMS = problems()
@@ -24,11 +24,11 @@ EXACT_DATA = "Lanczos1"
 FINEST = 1e-14
 
 
-def fitted(problem: Problem, start: int, tolerance: float | None = None) -> Solution:
+def fitted(problem: Problem, start: int, tolerance: float | None = None) -> FitResult:
     names = tuple(problem.certified)
     stop = {} if tolerance is None else {"tolerance": tolerance}
     with np.errstate(over="ignore", invalid="ignore"):  # some starts lead astray before they lead home
-        return solve(problem.curve(start), [problem.data_set()], names, evaluations=1000, **stop)
+        return solve(FitProblem(problem.curve(start), [problem.data_set()], names), evaluations=1000, **stop)
 
 
 def test_the_files_are_whole() -> None:

@@ -16,6 +16,7 @@ from bushfit.campaign.campaign import load_campaign
 from bushfit.fitting.coordinates import residual
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, with_gains
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.solve import solve
 from bushfit.model.file import load_result
 
@@ -101,7 +102,7 @@ def against_truth(folder: Path, silent: Path, model: Path) -> float:
             PreparedCampaign.from_campaign(load_campaign(each / "bushing.toml")) for each in (folder, silent)
         )
     data_sets = with_gains((*tests.loops, *tests.sweeps), weigh=True)
-    told = solve(told, data_sets, tuple(told.values)).model
+    told = solve(FitProblem(told, data_sets, tuple(told.values))).model
     off = residual(told, data_sets)
     as_true = [_with(one, other) for one, other in zip(data_sets, (*true.loops, *true.sweeps), strict=True)]
     noise = off - residual(told, as_true)  # residuals are linear in what was measured: here the model falls out
