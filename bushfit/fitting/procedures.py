@@ -102,7 +102,9 @@ def fit_joint(
     notes = [model_error_warning(error) + NEXT] if error else []
     if errors.matters and not at_limit and not error:
         size = words_of(errors.error)
-        notes.append(f"levels disagree by more than their repeats: an error of {size} for each level is included in the noise")
+        notes.append(
+            f"levels disagree by more than their repeats: an error of {size} for each level is included in the noise"
+        )
     notes += unfitted(found.model, unused, NEXT)
     result = replace(
         _result(data, [found], notes=notes, unused=unused), usable=usable(found, unused), model_error=error
