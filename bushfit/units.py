@@ -138,7 +138,8 @@ def parse_quantity(value: object, *expected: str) -> float:
     text = str(value).strip()
     number = _NUMBER.match(text)
     if not isinstance(value, str | int | float) or isinstance(value, bool) or number is None:
-        raise refuse("this is no quantity", found=f'"{text}"' if isinstance(value, str) else text)
+        written = f'"{text}"' if isinstance(value, str) else text.lower() if isinstance(value, bool) else text
+        raise refuse("this is no quantity", found=written)
     suffix = text[number.end() :].strip()
     if not suffix:
         hint = None if expected[0] == "1" else f'write "{text} {unit}"'

@@ -276,4 +276,6 @@ Frequencies = Annotated[
 ]
 SHAKEN = Field(ge=1.0 / LARGEST_SHAKEN, le=LARGEST_SHAKEN)
 Share = Annotated[float, si("1"), Field(ge=0, lt=1)]
-Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]  # repeats or cycles
+Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
+#: Repeats or cycles of a simulated test; more would take minutes and gigabytes.
+Repeats = Annotated[int, Field(strict=True, ge=1, le=1000)]

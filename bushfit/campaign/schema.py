@@ -26,6 +26,7 @@ from bushfit.validation import (
     Length,
     Name,
     ParameterValue,
+    Repeats,
     Several,
     Share,
     Strain,
@@ -249,7 +250,7 @@ class SimulatedLoop(SimulatedTest):
 
     amplitude: Displacement = 0.0
     frequency: Frequency = 0.0
-    cycles: Count = 3
+    cycles: Repeats = 3
     waveform: Waveform = "sine"
     amplitudes: Several[Displacement] = ()
     frequencies: Several[Frequency] = ()
@@ -286,7 +287,7 @@ class SimulatedSweep(SimulatedTest):
     frequencies: Frequencies
     stepped: Stepped = "frequency"
     reached: Share = 0.0
-    repeats: Count | None = None
+    repeats: Repeats | None = None
 
     @property
     def levels(self) -> tuple[float, ...]:
@@ -353,7 +354,7 @@ class SimulateSettings:
     parameters: Annotated[Mapping[str, ParameterValue], table(parameter_values)] = field(default_factory=dict)
     effects: Annotated[Mapping[str, Mapping[str, ParameterValue]], table(effect_values)] = field(default_factory=dict)
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
-    repeats: Count = 1
+    repeats: Repeats = 1
     noise: Share = 0.0
     force_noise: Share = 0.0
     force_correlation: Share = 0.0

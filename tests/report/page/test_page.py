@@ -148,7 +148,7 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
     ("content", "words"),
     [
         (None, "there is no such file"),
-        (b"GIF89a", "found: a file that begins with b'GIF89a'"),
+        (b"GIF89a secret", "expected: PNG or SVG"),
         (b"\x89PNG\r\n\x1a\n" + bytes(64_000), "at most 64000 bytes"),
     ],
 )
