@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from bushfit.cli.options import DIRECTIONS, FILE, Function, Parameter, in_order, option, option_of, under
+from bushfit.cli.options import DIRECTIONS, FILE, Function, Parameter, add_parameters, option, option_of, under
 from bushfit.errors import BushfitError, MeasurementError
 
 #: What a test file does not say itself, as keys of a campaign, with metavar and words: of loops and sweeps, ...
@@ -77,7 +77,7 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
             test_options["units"] = _pairs(units, "--unit", "force=kN", column_roles())
             return function(test_options={key: value for key, value in test_options.items() if value}, **arguments)
 
-        return in_order(
+        return add_parameters(
             wrapped,
             click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
             under(

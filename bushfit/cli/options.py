@@ -37,13 +37,11 @@ def _named(ctx: click.Context, tables: str, key: str) -> Iterator[str]:
     While somebody types, no file is an error.
     """
     values = [path for value in ctx.params.values() for path in (value if isinstance(value, tuple) else [value])]
-    typed = {Path(path) for path in (*values, *ctx.args) if isinstance(path, str | Path)}
-    for path in (path for path in typed if path.suffix in _READ):
-        with suppress(OSError, ValueError):
-            document = _READ[path.suffix](path.read_text(encoding="utf-8"))
-            listed = document.get(tables) if isinstance(document, dict) else None
-            entries = listed if isinstance(listed, list) else []
-            yield from (str(entry[key]) for entry in entries if isinstance(entry, dict) and key in entry)
+    for path in {Path(path) for path in (*values, *ctx.args) if isinstance(path, str | Path)}:
+        with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
+            for entry in _READ[path.suffix](path.read_text(encoding="utf-8")).get(tables, ()):
+                with suppress(KeyError, TypeError):
+                    yield str(entry[key])
 
 
 def _offered(list_names: Callable[[click.Context], Iterable[str]], between: str = "") -> Offer:
@@ -55,11 +53,6 @@ def _offered(list_names: Callable[[click.Context], Iterable[str]], between: str 
         return [before + name for name in list_names(ctx) if name.startswith(incomplete[len(before) :])]
 
     return offer
-
-
-def _places(ctx: click.Context) -> Iterator[str]:
-    yield from DIRECTIONS
-    yield from _named(ctx, "specimens", "name")
 
 
 def _effects(_: click.Context) -> list[str]:
@@ -79,14 +72,8 @@ def _explanations(ctx: click.Context) -> Iterator[str]:
         )
 
 
-def _schemas(_: click.Context) -> Iterable[str]:
-    from bushfit.schemas import DESCRIBED
-
-    return DESCRIBED
-
-
-#: What is offered in place of an option: an explanation, a schema, or several effects between commas and plus signs.
-explanations, schemas, effect_lists = _offered(_explanations), _offered(_schemas), _offered(_effects, ",+")
+#: What is offered in place of an option: an explanation, or several effects between commas and plus signs.
+explanations, effect_lists = _offered(_explanations), _offered(_effects, ",+")
 
 
 class Option(click.Option):
@@ -135,19 +122,9 @@ class Command(click.Command):
 
 
 if TYPE_CHECKING:  # click before 8.2 has no generic types at run time
-    TextType: TypeAlias = click.ParamType[str]
     NumberType: TypeAlias = click.ParamType[float]
 else:
-    TextType = NumberType = click.ParamType
-
-
-class _Place(TextType):
-    """A direction, or a specimen of a campaign, which only the campaign knows."""
-
-    name = "place"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        return str(value) if str(value).strip() else self.fail("this is no direction: an empty text", param, ctx)
+    NumberType = click.ParamType
 
 
 class Folder(click.Path):
@@ -187,7 +164,7 @@ def command_called(name: str, *examples: str) -> Callable[[Function], click.Comm
     )
 
 
-def in_order(function: Function, *parameters: Parameter) -> Function:
+def add_parameters(function: Function, *parameters: Parameter) -> Function:
     """A command with options and arguments in the order of its help, before those that it has."""
     for parameter in reversed(parameters):
         function = parameter(function)
@@ -198,10 +175,9 @@ def under(heading: str, *parameters: Parameter) -> Parameter:
     """Options that stand under a heading of the help, in this order."""
 
     def decorate(function: Function) -> Function:
-        command_parameters: list[Any] = vars(function).setdefault("__click_params__", [])
-        before = len(command_parameters)
-        in_order(function, *parameters)
-        for parameter in command_parameters[before:]:
+        before = len(getattr(function, "__click_params__", ()))
+        add_parameters(function, *parameters)
+        for parameter in vars(function)["__click_params__"][before:]:
             parameter.heading = heading
         return function
 
@@ -214,9 +190,16 @@ def option_of(key: str) -> str:
 
 
 def place_option(words: str) -> Parameter:
-    """Directions or specimens by name, as `directions`."""
+    """Directions or specimens by name, as `directions`; which specimens there are, only the campaign knows."""
+
+    def check(ctx: click.Context, parameter: click.Parameter, places: tuple[str, ...]) -> tuple[str, ...]:
+        if not all(place.strip() for place in places):
+            raise click.BadParameter("this is no direction: an empty text", ctx, parameter)
+        return places
+
+    names = _offered(lambda ctx: (*DIRECTIONS, *_named(ctx, "specimens", "name")))
     return option(
-        "--direction directions", "PLACE", words, type=_Place(), multiple=True, shell_complete=_offered(_places)
+        "--direction directions", "PLACE", words, type=str, multiple=True, callback=check, shell_complete=names
     )
 
 
@@ -240,7 +223,6 @@ def format_options(*kinds: Written) -> list[Parameter]:
             type=click.Choice(get_args(Form)),
             default="csv",
             envvar="BUSHFIT_TABLE_FORMAT",
-            show_envvar=True,
         ),
         "pictures": option(
             "--plot-format",
@@ -250,7 +232,6 @@ def format_options(*kinds: Written) -> list[Parameter]:
             multiple=True,
             default=["png"],
             envvar="BUSHFIT_PLOT_FORMAT",
-            show_envvar=True,
         ),
         "pages": flag("--no-report", "Do not write the HTML page."),
     }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
@@ -21,7 +20,17 @@ from rich.markup import escape
 from rich.segment import Segment
 from rich.table import Table
 
-from bushfit.cli.options import Folder, Function, Parameter, Written, flag, format_options, in_order, option, under
+from bushfit.cli.options import (
+    Folder,
+    Function,
+    Parameter,
+    Written,
+    add_parameters,
+    flag,
+    format_options,
+    option,
+    under,
+)
 from bushfit.errors import printable
 from bushfit.progress import report_progress_to
 from bushfit.reading.tablefile import folder_name
@@ -110,24 +119,30 @@ class Output:
         """Print a line as it is, without markup."""
         self.console.print(text, markup=False)
 
+    def print_headline(self, name: str, verdict: str, action: str) -> None:
+        """Print the first two lines of a result: its verdict, and what to do."""
+        self.console.print(f"[bold]{escape(name)}:[/bold] {escape(verdict)}")
+        self.print(f"  {action}")
+
     def warn(self, warnings: Iterable[str]) -> None:
         """Keep warnings to be printed below the results."""
         self._warnings.update(dict.fromkeys(warnings))
 
     def print_warnings(self) -> None:
-        """Print the most important warnings that were kept, with -v all, each with its meaning for the use."""
+        """Print the most important of the warnings that were kept, one for each meaning for the use; with -v all."""
         if not self._warnings:
             return
         from bushfit.prediction.caveats import by_importance, use_of
 
         warnings = by_importance(self._warnings)
-        printed = warnings if self.verbose else warnings[:_MOST_WARNINGS]
+        distinct = {use_of(warning): warning for warning in reversed(warnings)}
+        printed = warnings if self.verbose else [*distinct.values()][::-1][:_MOST_WARNINGS]
         for warning in printed:
             self.console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
             if (use := use_of(warning)) != use_of(""):  # which is said of warnings of no known kind
                 self.print(f"  {use}")
         if remaining := len(warnings) - len(printed):
-            self.print(f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all; the result files contain them")
+            self.print(f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all, the result files hold them")
         self._warnings.clear()
 
     def print_table(
@@ -142,17 +157,20 @@ class Output:
             text_columns: number of columns with texts, which are wrapped; the other ones hold numbers, which are never
                 cut or wrapped.
         """
-        rows, console = list(rows), self.console
-        cells = _wrapped(columns, rows, text_columns, console.width)
-        if cells is None:
+        rows, console = [list(map(printable, row)) for row in rows], self.console
+        widths = _column_widths(columns, rows, text_columns, console.width)
+        if not widths:
             console.print(title, style="bold", markup=False)
             for row in rows:
-                console.print(_stacked(columns, row, text_columns), markup=False)
+                console.print(", ".join(filter(None, row[:text_columns])), markup=False)
+                for column, cell in zip(columns[text_columns:], row[text_columns:], strict=True):
+                    if cell:
+                        console.print(f"  {column}: {cell}" if column else f"  {cell}", markup=False)
             return
         table = Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, title_style="bold")
-        for index, column in enumerate(cells[0]):
-            table.add_column(escape(column), justify="right" if index >= text_columns else "left", no_wrap=True)
-        for row in cells[1:]:
+        for index, (column, width) in enumerate(zip(columns, widths, strict=True)):
+            table.add_column(escape(column), justify="right" if index >= text_columns else "left", width=width)
+        for row in rows:
             table.add_row(*map(escape, row))
         console.print(table)
 
@@ -203,7 +221,7 @@ def with_output(folder: str, *written: Written) -> Parameter:
                 finally:
                     output.print_warnings()
 
-        return in_order(
+        return add_parameters(
             wrapped,
             under(
                 "Output",
@@ -220,39 +238,18 @@ def with_output(folder: str, *written: Written) -> Parameter:
     return decorate
 
 
-def _wrapped(
-    columns: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int, width: int
-) -> list[list[str]] | None:
-    """Headers and rows, with headers and text columns wrapped between words to the width of the terminal.
-
-    Returns:
-        The headers, then the rows; None if they do not fit even so.
-    """
-    table = [list(map(printable, row)) for row in (columns, *rows)]
-    widths = [max(map(cell_len, column)) for column in zip(*table, strict=True)]
-    narrowest = [
-        max(cell_len(part) for cell in cells for part in (cell.split() if index < text_columns else [cell]) or [""])
-        for index, (header, *cells) in enumerate(zip(*table, strict=True))
-        for cells in [[*cells, *header.split()]]
-    ]
+def _column_widths(columns: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int, width: int) -> list[int]:
+    """Widths of columns that fit the terminal, headers and texts wrapped between words; none if they do not fit."""
+    widths, narrowest = [], []
+    for index, (header, *cells) in enumerate(zip(columns, *rows, strict=True)):
+        unbroken = [part for cell in cells for part in cell.split()] if index < text_columns else cells
+        widths.append(max(map(cell_len, (header, *cells))))
+        narrowest.append(max(map(cell_len, ("", *unbroken, *header.split()))))
     excess = sum(widths) + _GAP * len(widths) + 1 - width
     for index in sorted(range(len(widths)), key=lambda index: narrowest[index] - widths[index]):
         cut = max(0, min(excess, widths[index] - narrowest[index]))
         widths[index], excess = widths[index] - cut, excess - cut
-    if excess > 0:
-        return None
-    for row in table:
-        for index, cell in enumerate(row):
-            if cell_len(cell) > widths[index]:
-                row[index] = "\n".join(textwrap.wrap(cell, widths[index], break_on_hyphens=False))
-    return table
-
-
-def _stacked(columns: Sequence[str], row: Sequence[str], text_columns: int) -> str:
-    """A row of a table as a list: its texts on one line, and below it each number with its header."""
-    lines = [", ".join(filter(None, row[:text_columns]))]
-    pairs = zip(columns[text_columns:], row[text_columns:], strict=True)
-    return "\n".join([*lines, *(f"  {column}: {cell}" if column else f"  {cell}" for column, cell in pairs if cell)])
+    return widths if excess <= 0 else []
 
 
 @contextmanager
@@ -263,11 +260,7 @@ def _progress(console: Console) -> Iterator[None]:
         return
     from rich.progress import BarColumn, Progress, TextColumn
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(20),
-        TextColumn("{task.fields[rate]} [red]{task.fields[remark]}"),
-    )
+    columns = TextColumn("{task.description}"), BarColumn(20), TextColumn("{task.fields[state]}")
     bar = Progress(*columns, console=console, transient=True, redirect_stdout=False)
     lines, patient = dict[str, tuple[float, Any]](), True
 
@@ -276,9 +269,14 @@ def _progress(console: Console) -> Iterator[None]:
             bar.remove_task(lines.pop(description)[1])
         else:
             if description not in lines:
-                lines[description] = monotonic(), bar.add_task(description, total=total, rate="", remark="")
+                lines[description] = monotonic(), bar.add_task(description, total=total, state="")
             start, line = lines[description]
-            bar.update(line, completed=done, rate=_rate(done, total, monotonic() - start), remark=remark)
+            state = f"{done} of {total}"
+            if done:
+                pace = (monotonic() - start) / done
+                speed = f"{1.0 / pace:.3g} a second" if 0.0 < pace <= 1.0 else f"{pace:.2g} s each"
+                state += f", {speed}, {pace * (total - done):.0f} s left"
+            bar.update(line, completed=done, state=f"{state} [red]{remark}")
         show()
 
     def show() -> None:
@@ -302,11 +300,3 @@ def _progress(console: Console) -> Iterator[None]:
         timer.cancel()
         timer.join()
         bar.stop()
-
-
-def _rate(done: int, total: int, seconds: float) -> str:
-    """Progress in words: how many are done, how fast, and the seconds left."""
-    if not done:
-        return f"0 of {total}"
-    pace = f"{done / seconds:.3g} a second" if done >= seconds else f"{seconds / done:.2g} s each"
-    return f"{done} of {total}, {pace}, {seconds / done * (total - done):.0f} s left"

@@ -14,8 +14,8 @@ from bushfit.cli.options import (
     Function,
     Parameter,
     Size,
+    add_parameters,
     file_option,
-    in_order,
     option,
     option_of,
     place_option,
@@ -40,7 +40,7 @@ def campaign_options(soft_l1: str = "less weight on distant points, none on outl
     """
 
     def decorate(function: Function) -> Function:
-        return in_order(
+        return add_parameters(
             function,
             click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
             under(
@@ -92,7 +92,7 @@ def exit_above(max_nrmse: float | None, result: Result) -> None:
 
 def grid_options(default: str) -> Parameter:
     """Options of the grid of a prediction, by the keys of [predict]; `default` is the grid without them."""
-    return lambda function: in_order(
+    return lambda function: add_parameters(
         function,
         option("--frequencies", "GRID", f'"5:155:10 Hz" or "20, 50 Hz" [{default}].'),
         option("--amplitudes", "GRID", f'Zero-to-peak, "0.1, 0.5 mm" [{default}].'),

@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property, partial
-from itertools import combinations
+from functools import partial
 from string import ascii_uppercase
 from typing import Any
 
@@ -13,7 +12,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.commands.fit import fit, prepare_tests
 from bushfit.commands.loading import HasResult, as_result
-from bushfit.commands.predict import Numbers, columns_of, grid_of
+from bushfit.commands.predict import Numbers, grid_of, table_columns
 from bushfit.diagnosis.evidence import result_of
 from bushfit.diagnosis.families import FittedFamily, fit_families
 from bushfit.effects import Level
@@ -29,7 +28,7 @@ from bushfit.prediction.comparison import compare as compare_two
 from bushfit.prediction.grid import common_grid, requested_grid
 from bushfit.reading.measurement import Source, Sweep
 from bushfit.report import plots
-from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparedPair, ComparisonFile, FamilyEntry
+from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, FamilyEntry
 from bushfit.report.compared import SideBySide
 from bushfit.report.page import comparison_page
 from bushfit.report.results import ResultFile, figure_file, json_file, page_file, table_file
@@ -83,93 +82,28 @@ class ComparisonOutput:
         entries: the results, the reference first.
         comparisons: each result but the first against the first.
         families: model families, if these are compared.
+        labels: letters of the results in tables and sentences: A, B and so on.
+        advice: sentences on which family to use, and on how each family predicts what was held out.
+        words: sentences on what differs, one for each result and direction.
         notes: further warnings.
-        command: command that gives the same comparison.
+        warnings: warnings, each once, with the letters of the results that it is about.
+        document: content of compare.json.
+        files: document, tables, figure and page.
     """
 
     entries: Sequence[ComparedResult]
     comparisons: Sequence[Comparison]
-    families: Sequence[FittedFamily] = ()
-    notes: Sequence[str] = ()
-    command: str = ""
+    families: Sequence[FittedFamily]
+    labels: Sequence[str]
+    advice: Sequence[str]
+    words: Sequence[str]
+    notes: Sequence[str]
+    warnings: Sequence[str]
+    document: ComparisonFile
+    files: Sequence[ResultFile]
 
     def __repr__(self) -> str:
         return f"Comparison of {', '.join(entry.name for entry in self.entries)}"
-
-    @property
-    def labels(self) -> list[str]:
-        """Letters of the results in tables and sentences: A, B and so on."""
-        return list(ascii_uppercase[: len(self.entries)])
-
-    @cached_property
-    def words(self) -> list[str]:
-        """Sentences on what differs, one for each result and direction."""
-        pairs = zip(self.labels[1:], self.comparisons, strict=True)
-        return [f"{label} against A, {line}" for label, comparison in pairs for line in comparison.sentences()]
-
-    @cached_property
-    def advice(self) -> list[str]:
-        """Sentences on which family to use, and on how each family predicts what was held out."""
-        pairs = list(zip(self.labels, self.families, strict=False))
-        best = [_family_to_use(self.families, self.entries)] if self.families else []
-        return [*best, *(f"{label}, {family.name}: {family.words}" for label, family in pairs[1:])]
-
-    @cached_property
-    def warnings(self) -> list[str]:
-        """Warnings, each once, with the letters of the results that it is about."""
-        contrasts = [comparison.contrasts for comparison in self.comparisons]
-        predictions = [[pair.reference for pairs in contrasts for pair in pairs]]
-        predictions += [[pair.other for pair in pairs] for pairs in contrasts]
-        labels_of: dict[str, list[str]] = {}
-        for label, entry, predicted in zip(self.labels, self.entries, predictions, strict=True):
-            for line in warnings_of(entry.result, [prediction.warnings for prediction in predicted]):
-                labels_of.setdefault(line, []).append(label)
-        result_warnings = [f"{', '.join(labels)}: {line}" for line, labels in labels_of.items()]
-        return [*self.notes, *self._shared_tests(), *result_warnings]
-
-    def _shared_tests(self) -> list[str]:
-        """Warnings that results were fitted to the same files."""
-        if self.families:
-            return [
-                "families are fitted to the same tests: intervals of their differences assume independent tests and "
-                "are usually too wide; compare families by their probability and held-out error"
-            ]
-        pairs = zip(self.labels[1:], self.comparisons, strict=True)
-        return [
-            f"A and {label} were fitted to the same {', '.join(comparison.shared)}: intervals of their "
-            "difference assume independent tests and are usually too wide"
-            for label, comparison in pairs
-            if comparison.shared
-        ]
-
-    @cached_property
-    def document(self) -> ComparisonFile:
-        """Content of compare.json."""
-        entries, comparisons = (
-            zip(self.labels, self.entries, strict=True),
-            zip(self.labels[1:], self.comparisons, strict=True),
-        )
-        families = zip(self.labels, self.families, self.entries, strict=False)
-        return {
-            "schema": SCHEMA,
-            "compared": [_entry_document(label, entry) for label, entry in entries],
-            "pairs": [_pair_document(label, comparison) for label, comparison in comparisons],
-            "families": [_family_document(label, family, entry.result) for label, family, entry in families] or None,
-            "words": [*self.advice, *self.words],
-            "warnings": self.warnings,
-            "command": self.command,
-            "versions": {"bushfit": __version__, **versions()},
-        }
-
-    @cached_property
-    def files(self) -> Sequence[ResultFile]:
-        """Document, tables, figure and page."""
-        comparison = SideBySide.from_document(self.document)
-        names = ("parameters", *(["families"] if self.families else []), "differences")
-        files = [json_file("compare", self.document)]
-        files += [table_file(name, partial(lambda name: comparison.tables()[name], name)) for name in names]
-        files.append(figure_file("compare", lambda: plots.batch.comparison_figure(comparison)))
-        return [*files, page_file("compare", comparison_page, files)]
 
 
 def compare(
@@ -248,19 +182,89 @@ def _compared(
     command: str = "",
 ) -> ComparisonOutput:
     """Compare each result with the first, in the directions and on the grid asked for."""
-    results = [entry.result for entry in entries]
-    columns = _common_places(results, grid.directions)
-    grids = []
+    results, labels = [entry.result for entry in entries], list(ascii_uppercase[: len(entries)])
+    columns, grids = _common_places(results, grid.directions), []
     for places in columns:
         if len({place.motion for place in places}) > 1:
             found = ", ".join(f"{place}: {place.motion.words[0]}" for place in places)
             raise ModelError("a place that is not one kind of motion in all", found=found, expected="one kind")
         grids.append(requested_grid(common_grid(results, places, entries[0].sweeps), grid, places[0]))
-    comparisons = [
-        compare_two(results[0], result, [(places[0], places[index]) for places in columns], grids)
-        for index, result in enumerate(results[1:], start=1)
+    comparisons = with_holm(
+        [
+            compare_two(results[0], result, [(places[0], places[index]) for places in columns], grids)
+            for index, result in enumerate(results[1:], start=1)
+        ]
+    )
+    pairs = list(zip(labels[1:], comparisons, strict=True))
+    words = [f"{label} against A, {line}" for label, comparison in pairs for line in comparison.sentences()]
+    advice = [_family_to_use(families, entries)] if families else []
+    advice += [
+        f"{label}, {family.name}: {family.words}" for label, family in zip(labels[1:], families[1:], strict=False)
     ]
-    return ComparisonOutput(entries, with_holm(comparisons), families, notes, command)
+    warnings = [*notes, *_warnings(labels, entries, comparisons, are_families=bool(families))]
+    document: ComparisonFile = {
+        "schema": SCHEMA,
+        "compared": [_entry_document(label, entry) for label, entry in zip(labels, entries, strict=True)],
+        "pairs": [
+            {
+                "reference": "A",
+                "other": label,
+                "shared_inputs": list(comparison.shared),
+                "joint": {"p": comparison.joint[0], "parameters": comparison.joint[1]} if comparison.joint else None,
+                "parameters": [_plain(row) for row in comparison.parameters],
+                "places": {
+                    str(contrast.place): table_columns(contrast_table(comparison, contrast))
+                    for contrast in comparison.contrasts
+                },
+            }
+            for label, comparison in pairs
+        ],
+        "families": [
+            _family_document(label, family, result)
+            for label, family, result in zip(labels, families, results, strict=False)
+        ]
+        or None,
+        "words": [*advice, *words],
+        "warnings": warnings,
+        "command": command,
+        "versions": {"bushfit": __version__, **versions()},
+    }
+    shown = SideBySide.from_document(document)
+    names = ("parameters", *(["families"] if families else []), "differences")
+    files = [json_file("compare", document)]
+    files += [table_file(name, partial(lambda name: shown.tables()[name], name)) for name in names]
+    files.append(figure_file("compare", lambda: plots.batch.comparison_figure(shown)))
+    files.append(page_file("compare", comparison_page, files))
+    return ComparisonOutput(entries, comparisons, families, labels, advice, words, notes, warnings, document, files)
+
+
+def _warnings(
+    labels: Sequence[str],
+    entries: Sequence[ComparedResult],
+    comparisons: Sequence[Comparison],
+    *,
+    are_families: bool,
+) -> list[str]:
+    """Warnings of the results, each once with the letters of the results, after those that results share tests."""
+    shared = "intervals of their {} assume independent tests and are usually too wide"
+    if are_families:
+        warnings = [
+            f"families are fitted to the same tests: {shared.format('differences')}; compare families by their "
+            "probability and held-out error"
+        ]
+    else:
+        warnings = [
+            f"A and {label} were fitted to the same {', '.join(comparison.shared)}: {shared.format('difference')}"
+            for label, comparison in zip(labels[1:], comparisons, strict=True)
+            if comparison.shared
+        ]
+    predictions = [[pair.reference for comparison in comparisons for pair in comparison.contrasts]]
+    predictions += [[pair.other for pair in comparison.contrasts] for comparison in comparisons]
+    labels_of: dict[str, list[str]] = {}
+    for label, entry, predicted in zip(labels, entries, predictions, strict=True):
+        for line in warnings_of(entry.result, [prediction.warnings for prediction in predicted]):
+            labels_of.setdefault(line, []).append(label)
+    return [*warnings, *(f"{', '.join(of_line)}: {line}" for line, of_line in labels_of.items())]
 
 
 def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> list[list[Place]]:
@@ -270,11 +274,7 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
     fitted_places = [_fitted_places(result) for result in results]
     common = [name for name in fitted_places[0] if all(name in names for names in fitted_places)]
     places = [[result.place(name) for result in results] for name in common]
-    matching = [
-        place
-        for place in places
-        if all(place_a.motion is place_b.motion for place_a, place_b in combinations(place, 2))
-    ]
+    matching = [bodies for bodies in places if all(body.motion is bodies[0].motion for body in bodies)]
     return matching or [[_COMPOUND] * len(results)]
 
 
@@ -352,20 +352,6 @@ def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
         "nrmse": result.quality.nrmse if result.quality else None,
         "measured": result.measured and _plain(result.measured),
         "inputs": to_json_data(result.inputs, tuple[Source, ...]),
-    }
-
-
-def _pair_document(label: str, comparison: Comparison) -> ComparedPair:
-    """Numbers of one result against the first as compare.json has them."""
-    return {
-        "reference": "A",
-        "other": label,
-        "shared_inputs": list(comparison.shared),
-        "joint": {"p": comparison.joint[0], "parameters": comparison.joint[1]} if comparison.joint else None,
-        "parameters": [_plain(row) for row in comparison.parameters],
-        "places": {
-            str(contrast.place): columns_of(contrast_table(comparison, contrast)) for contrast in comparison.contrasts
-        },
     }
 
 

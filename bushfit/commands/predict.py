@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -30,6 +30,7 @@ from bushfit.prediction.stiffness import predict as predict_stiffness
 from bushfit.reading.measurement import SAME_TEMPERATURE, Loop, Sweep
 from bushfit.report import plots, tables
 from bushfit.report.results import ResultFile, figure_file, place_names, table_file
+from bushfit.report.tables import prediction_table
 from bushfit.units import CELSIUS
 
 if TYPE_CHECKING:
@@ -66,16 +67,26 @@ class PredictionOutput:
     files: Sequence[ResultFile] = ()
 
     def __repr__(self) -> str:
-        return f"Prediction of {self.result.name}: {', '.join(str(found.direction) for found in self.predictions)}"
+        places = ", ".join(str(prediction.direction) for prediction in self.predictions)
+        return f"Prediction of {self.result.name}: {places}"
 
     @property
     def document(self) -> Mapping[str, Any]:
         """Content of `predict --json`."""
-        document: dict[str, Any] = {str(p.direction): columns_of(tables.prediction_table(p)) for p in self.predictions}
+        document: dict[str, Any] = {str(p.direction): table_columns(prediction_table(p)) for p in self.predictions}
         for resonance in self.resonances:
             document[f"{resonance.place}_resonance"] = tables.shaken_table(resonance).to_dict(orient="list")
         if self.arms:
-            document["arms"] = [_arms_document(part) for part in self.arms]
+            document["arms"] = [
+                {
+                    "in_place_of": arms.stands_for,
+                    "shear_modulus_Pa": arms.modulus.tolist(),
+                    "relaxation_time_s": arms.time.tolist(),
+                    "band_Hz": arms.band,
+                    "largest_relative_error": arms.error,
+                }
+                for arms in self.arms
+            ]
         return {**document, "warnings": self.warnings}
 
     @property
@@ -137,11 +148,12 @@ def predict(
     Raises:
         ModelError: a direction, frequency, amplitude or temperature that the model cannot have.
     """
-    result = as_result(model)
+    result, sweeps = as_result(model), campaign.sweeps if campaign else ()
     if bushing:
         result, note = carried(result, bushing)
         notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
-    if temperature is not None and not result.model.knows_temperature:
+    knows_temperature = result.model.knows_temperature
+    if temperature is not None and not knows_temperature:
         raise ModelError(
             "the model has no effect of temperature",
             found=f"{temperature - CELSIUS:.4g} degC asked for",
@@ -149,16 +161,24 @@ def predict(
             hint="fit tests at several temperatures with --effect temperature",
         )
     requested = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
-    settings, sweeps = grid_settings(requested, campaign), campaign.sweeps if campaign else ()
+    settings = grid_settings(requested, campaign)
+    specimens = {specimen.name: specimen for specimen in (*result.specimens, *(campaign.specimens if campaign else ()))}
+    default = (*(_DIRECTIONS if result.model.bushing or not specimens else ()), *specimens.values())
+    places = [get_place(name, specimens.values()) for name in settings.directions or ()] or list(default)
     measured = _predictable_sweeps(result, campaign) if campaign else []
-    at_temperature = [sweep for sweep in measured if _is_at(result, sweep, temperature)]
-    places = _places(result, campaign, settings)
+    shown = [
+        sweep
+        for sweep in measured
+        if not knows_temperature
+        or (tested := sweep.circumstances.temperature) is None
+        or abs(np.mean(tested) - (temperature or REFERENCE)) <= SAME_TEMPERATURE
+    ]
     predictions = [
         predict_stiffness(
             result,
             place,
             *requested_grid(default_grid(result, place, sweeps), settings, place),
-            sweeps=at_temperature if campaign else None,
+            sweeps=shown if campaign else None,
             temperature=temperature,
         )
         for place in places
@@ -168,15 +188,20 @@ def predict(
         for place in places
         if mass and base_acceleration
     ]
-    output = PredictionOutput(
-        result,
-        predictions,
-        measured,
-        (*notes, *(f"{sweep.name}: {note}" for sweep in measured for note in sweep.notes)),
-        resonances,
-        _maxwell_arms(result, predictions, arms, temperature) if arms else (),
-    )
-    return replace(output, files=_files(output, at_temperature, wide=wide))
+    maxwell: tuple[Arms, ...] = ()
+    if arms:
+        frequency = np.concatenate([prediction.frequency for prediction in predictions])
+        band = float(frequency.min()), float(frequency.max())
+        maxwell = model_arms(result.model.without(Level.INSTRUMENT), band, arms, Circumstances(temperature))
+        if not maxwell:
+            raise ModelError(
+                "the model has nothing that Maxwell arms could represent",
+                place="--arms",
+                expected="a model whose stiffness depends on frequency, as by a springpot",
+            )
+    notes = (*notes, *(f"{sweep.name}: {note}" for sweep in measured for note in sweep.notes))
+    output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell)
+    return replace(output, files=_files(output, shown, wide=wide))
 
 
 def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
@@ -193,14 +218,6 @@ def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictS
     return PredictSettings(frequencies, amplitudes, rotations, places, strains)
 
 
-def _places(result: Result, campaign: Campaign | None, settings: PredictSettings) -> list[Place]:
-    """Directions and specimens to predict."""
-    specimens = {specimen.name: specimen for specimen in (*result.specimens, *(campaign.specimens if campaign else ()))}
-    if settings.directions:
-        return [get_place(name, specimens.values()) for name in settings.directions]
-    return [*(_DIRECTIONS if result.model.bushing or not specimens else ()), *specimens.values()]
-
-
 def _predictable_sweeps(result: Result, campaign: Campaign) -> list[MeasuredSweep]:
     """Sweeps of a campaign in directions that the model knows, each with what it was measured under."""
     tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
@@ -212,14 +229,6 @@ def _predictable_sweeps(result: Result, campaign: Campaign) -> list[MeasuredSwee
     ]
 
 
-def _is_at(result: Result, sweep: MeasuredSweep, temperature: float | None) -> bool:
-    """Return True if a sweep was made at the temperature of the prediction [K], or if that is not known."""
-    tested = sweep.circumstances.temperature
-    if tested is None or not result.model.knows_temperature:
-        return True
-    return bool(abs(np.mean(tested) - (temperature or REFERENCE)) <= SAME_TEMPERATURE)
-
-
 def split_by_fit(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[list[MeasuredSweep], list[MeasuredSweep]]:
     """Sweeps whose files the model was fitted to, and the other ones."""
     digests = {source.sha256 for source in result.inputs}
@@ -227,71 +236,40 @@ def split_by_fit(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[list[
     return fitted, [sweep for sweep in sweeps if sweep not in fitted]
 
 
-def _maxwell_arms(
-    result: Result, predictions: Sequence[Prediction], error: float, temperature: float | None
-) -> tuple[Arms, ...]:
-    """Maxwell arms within a relative error over the frequencies of all predictions."""
-    frequencies = [prediction.frequency for prediction in predictions]
-    band = float(min(map(min, frequencies))), float(max(map(max, frequencies)))
-    arms = model_arms(result.model.without(Level.INSTRUMENT), band, error, Circumstances(temperature))
-    if not arms:
-        raise ModelError(
-            "the model has nothing that Maxwell arms could represent",
-            place="--arms",
-            expected="a model whose stiffness depends on frequency, as by a springpot",
-        )
-    return arms
-
-
-def _files(output: PredictionOutput, at_temperature: Sequence[MeasuredSweep], *, wide: bool) -> list[ResultFile]:
-    """Tables and figures of a prediction; `at_temperature` are the sweeps that figures show."""
-    predictions = output.predictions
-    places = [prediction.direction for prediction in predictions]
+def _files(output: PredictionOutput, shown: Sequence[MeasuredSweep], *, wide: bool) -> list[ResultFile]:
+    """Tables and figures of a prediction; `shown` are the sweeps in its figures."""
+    result, places = output.result, [prediction.direction for prediction in output.predictions]
     names = place_names(places)
+
+    def draw(prediction: Prediction) -> Figure:
+        place = prediction.direction
+        measured = [sweep for sweep in shown if sweep.direction == place]
+        table = tables.sweeps_table(result.model, measured) if measured else None
+        title = result.name if isinstance(place, Direction) else str(place)
+        note = plots.style.first_sentences(warnings_of(result, [], (*prediction.warnings, *output.notes)))
+        return plots.prediction.prediction_figure(result, prediction, table, title, note)
+
+    def further(suffix: str, make: Callable[[Any], pd.DataFrame], parts: Sequence[Any]) -> Iterator[ResultFile]:
+        for name, part in zip(names, parts, strict=False):
+            stem = f"{name}_{suffix}"
+            while stem in names:  # of a specimen
+                stem += "_"
+            yield table_file(stem, partial(make, part))
+
+    def measured_table() -> pd.DataFrame:
+        fitted, not_fitted = split_by_fit(result, output.measured)
+        rows = tables.sweeps_table(result.model, [*fitted, *not_fitted])
+        counts = [sum(sweep.frequency.size for sweep in part) for part in (fitted, not_fitted)]
+        return rows.assign(fitted=np.repeat(["yes", "no"], counts))
+
     files = list[ResultFile]()
-    for name, prediction in zip(names, predictions, strict=True):
-        figure = partial(prediction_figure, output.result, prediction, at_temperature, output.notes)
-        files += [table_file(name, partial(tables.prediction_table, prediction)), figure_file(name, figure)]
-    if wide:
-        files += _suffixed_tables(names, "wide", tables.wide_table, predictions)
-    files += arms_files(output.result, output.arms, places)
-    files += _suffixed_tables(names, "resonance", tables.shaken_table, output.resonances)
-    return [*files, *measured_files(output.result, output.measured)]
-
-
-def prediction_figure(
-    result: Result, prediction: Prediction, sweeps: Sequence[MeasuredSweep], notes: Sequence[str]
-) -> Figure:
-    """Figure of a prediction with the measured sweeps.
-
-    Args:
-        result: fitted result.
-        prediction: stiffness and loss factor of one direction or specimen.
-        sweeps: measured sweeps; those of the same direction or specimen are shown.
-        notes: further warnings for the figure.
-
-    Returns:
-        The figure.
-    """
-    place = prediction.direction
-    measured = [sweep for sweep in sweeps if sweep.direction == place]
-    table = tables.sweeps_table(result.model, measured) if measured else None
-    title = result.name if isinstance(place, Direction) else str(place)
-    note = plots.style.first_sentences(warnings_of(result, [], (*prediction.warnings, *notes)))
-    return plots.prediction.prediction_figure(result, prediction, table, title, note)
-
-
-def _suffixed_tables(
-    names: Sequence[str], suffix: str, table: Callable[[Any], pd.DataFrame], results: Sequence[Any]
-) -> list[ResultFile]:
-    """Further tables of directions, such as axial_wide, under names that no specimen has."""
-    files = []
-    for name, result in zip(names, results, strict=False):
-        stem = f"{name}_{suffix}"
-        while stem in names:
-            stem += "_"
-        files.append(table_file(stem, partial(table, result)))
-    return files
+    for name, prediction in zip(names, output.predictions, strict=True):
+        files.append(table_file(name, partial(prediction_table, prediction)))
+        files.append(figure_file(name, partial(draw, prediction)))
+    files += further("wide", tables.wide_table, output.predictions if wide else ())
+    files += arms_files(result, output.arms, places)
+    files += further("resonance", tables.shaken_table, output.resonances)
+    return [*files, *([table_file("measured", measured_table)] if output.measured else [])]
 
 
 def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) -> list[ResultFile]:
@@ -313,34 +291,6 @@ def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) ->
     ]
 
 
-def measured_files(result: Result, sweeps: Sequence[MeasuredSweep]) -> list[ResultFile]:
-    """Table of the measured sweeps beside the model; nothing without sweeps.
-
-    Returns:
-        File measured.csv, not yet rendered, or an empty list.
-    """
-
-    def table() -> pd.DataFrame:
-        fitted, not_fitted = split_by_fit(result, sweeps)
-        rows = tables.sweeps_table(result.model, [*fitted, *not_fitted])
-        counts = [sum(sweep.frequency.size for sweep in part) for part in (fitted, not_fitted)]
-        rows["fitted"] = np.repeat(["yes", "no"], counts)
-        return rows
-
-    return [table_file("measured", table)] if sweeps else []
-
-
-def _arms_document(arms: Arms) -> dict[str, Any]:
-    """Maxwell arms as `predict --json` prints them."""
-    return {
-        "in_place_of": arms.stands_for,
-        "shear_modulus_Pa": arms.modulus.tolist(),
-        "relaxation_time_s": arms.time.tolist(),
-        "band_Hz": arms.band,
-        "largest_relative_error": arms.error,
-    }
-
-
-def columns_of(table: pd.DataFrame) -> dict[str, list[Any]]:
+def table_columns(table: pd.DataFrame) -> dict[str, list[Any]]:
     """Columns of a table by header, None in an empty cell."""
     return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}
