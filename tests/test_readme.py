@@ -164,8 +164,8 @@ def test_links_and_names_of_files_lead_somewhere(page: str) -> None:
 
 
 def test_the_readme_is_short(root: Path) -> None:
-    """At most 250 lines, and none that holds several; tables, pictures and output shown are as wide as they are."""
+    """At most 200 lines, and none that holds several; tables, pictures and output shown are as wide as they are."""
     text = (root / "README.md").read_text(encoding="utf-8")
     prose = re.sub(r"^```.*?^```|^(?:\||!\[).*?$", "", text, flags=re.MULTILINE | re.DOTALL)
-    assert len(text.splitlines()) <= 250
+    assert len(text.splitlines()) <= 200
     assert [line for line in prose.splitlines() if len(line) > 130] == []
