@@ -62,7 +62,7 @@ class Cycles:
         Returns:
             Cycles between upward crossings; none if the motion has fewer than four turning points.
         """
-        turns = motion_turns(time, motion).motion
+        turns, _ = motion_turns(time, motion)
         if turns.size < 4:
             return cls(time, np.empty(0), np.empty(0, dtype=np.intp), np.empty(0))
         height = motion[turns]
@@ -114,10 +114,13 @@ class Cycles:
         return fundamentals
 
 
-def stretches(changes: NDArray[np.bool_]) -> list[slice]:
-    """Split n entries into stretches at changes, a mask of the borders between entries, (n - 1,)."""
+def stretches(changes: NDArray[np.bool_], fewest: int = 1) -> list[slice]:
+    """Split n entries into stretches at changes, a mask of the borders between entries, (n - 1,).
+
+    Stretches of fewer entries than `fewest` are left out.
+    """
     border = np.concatenate(([0], 1 + np.flatnonzero(changes), [changes.size + 1])).tolist()
-    return [slice(first, end) for first, end in pairwise(border)]
+    return [slice(first, end) for first, end in pairwise(border) if end - first >= fewest]
 
 
 def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
@@ -238,32 +241,27 @@ def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
     count = level.size
     if count < 2 * _FEWEST_CYCLES:
         return 0
-    places = np.arange(_FEWEST_CYCLES, count - _FEWEST_CYCLES + 1)
+    # residual squares of straight lines through the first 1, 2, ... crossings, forwards and backwards
+    n = np.arange(1.0, count + 2.0)
+    values = np.stack((phase, phase[::-1])) - phase.mean()
+    sums, squares, moments = (np.cumsum(part, axis=1) for part in (values, values**2, (n - 1.0) * values))
+    sx, sxx = n * (n - 1.0) / 2.0, n * (n - 1.0) * (2.0 * n - 1.0) / 6.0
+    curvature = np.maximum(sxx - sx**2 / n, 1e-300)
+    forwards, backwards = np.maximum(squares - sums**2 / n - (moments - sx * sums / n) ** 2 / curvature, 0.0)
     # a cut after `k` cycles gives the crossings 0..k to the first part and k..count to the second
-    before, after = _line_squares(phase)[places], _line_squares(phase[::-1])[::-1][places]
-    first = np.cumsum(level)[places - 1] / places
-    second = (level.sum() - np.cumsum(level)[places - 1]) / (count - places)
-    level_gain = places * (count - places) / count * (first - second) ** 2
-    gain = _line_squares(phase)[-1] - before - after + level_gain
+    cuts = np.arange(_FEWEST_CYCLES, count - _FEWEST_CYCLES + 1)
+    first = np.cumsum(level)[cuts - 1] / cuts
+    second = (level.sum() - np.cumsum(level)[cuts - 1]) / (count - cuts)
+    level_gain = cuts * (count - cuts) / count * (first - second) ** 2
+    gain = forwards[-1] - forwards[cuts] - backwards[::-1][cuts] + level_gain
     best = int(np.argmax(gain))
-    k = int(places[best])
+    k = int(cuts[best])
     if gain[best] < _SPLIT_GAIN:
         return 0
     slopes = [np.polyfit(np.arange(part.size), part, 1)[0] * jitter for part in (phase[: k + 1], phase[k:])]
     other_frequency = abs(slopes[0] - slopes[1]) > _SPLIT_FREQUENCY
     other_amplitude = abs(first[best] - second[best]) * spread > _SPLIT_AMPLITUDE
     return k if other_frequency or other_amplitude else 0
-
-
-def _line_squares(values: Floats) -> Floats:
-    """Residual sums of squares of straight lines through the first 1, 2, ..., n values, (n,)."""
-    n = np.arange(1, values.size + 1, dtype=float)
-    x = n - 1.0
-    values = values - values.mean()
-    sy, syy, sxy = np.cumsum(values), np.cumsum(values**2), np.cumsum(x * values)
-    sx, sxx = n * (n - 1.0) / 2.0, n * (n - 1.0) * (2.0 * n - 1.0) / 6.0
-    spread = np.maximum(sxx - sx**2 / n, 1e-300)
-    return np.maximum(syy - sy**2 / n - (sxy - sx * sy / n) ** 2 / spread, 0.0)
 
 
 def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
@@ -288,7 +286,7 @@ def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
 
 
 def _truncation(series: Complex, most_cut: int) -> int:
-    """Number of entries to cut at the start of series, (k, m), for the smallest error of the means."""
+    """Number of entries, at most `most_cut`, to cut at the start of series, (k, m), for the least error of means."""
     if most_cut < 1:
         return 0
     back = (series - series.mean(axis=1, keepdims=True))[:, ::-1]

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.measurement import Floats, Loop, RecordPart
@@ -45,7 +44,7 @@ _TIMED = LoopFile(file="")
 
 
 @dataclass(frozen=True)
-class _SteadySpan:
+class SteadySpan:
     """A part of a record with constant amplitude and rate.
 
     Args:
@@ -64,7 +63,7 @@ class _SteadySpan:
         """Number of its cycles."""
         return (self.end - self.begin) / self.period
 
-    def is_like(self, span: "_SteadySpan") -> bool:
+    def is_like(self, span: "SteadySpan") -> bool:
         """Return True if two parts have one amplitude and one rate."""
         ranges, periods = np.log(self.range / span.range), np.log(self.period / span.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
@@ -92,12 +91,12 @@ def programme(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
     time, motion = _clock(loop)[step], loop.displacement[step]
     sound = ~lone_outliers(time, motion)
     time, motion = time[sound], motion[sound]
-    spans = _spans(loop, time, motion)
+    spans = steady_spans(loop, time, motion)
     if not spans:
         return (loop,)
     if all(span.is_like(spans[0]) for span in spans[1:]):
-        return (replace(loop, softening=_softening(loop, spans[0], from_rest=True)),)
-    return tuple(_loops(loop, time, spans, test))
+        return (replace(loop, softening=measure_softening(loop, spans[0], from_rest=True)),)
+    return tuple(cut_loops(loop, time, spans, test))
 
 
 def _clock(loop: Loop) -> Floats:
@@ -105,13 +104,21 @@ def _clock(loop: Loop) -> Floats:
     return loop.time if loop.timed else np.arange(loop.displacement.size, dtype=float)
 
 
-def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_SteadySpan]:
-    """The parts of a motion.
+def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
+    """Find the parts of a motion with constant amplitude and rate.
+
+    Args:
+        loop: record of the motion, for errors.
+        time: of each row [s], or row numbers, (n,).
+        motion: displacement without outliers [m or rad], (n,).
+
+    Returns:
+        Parts in order; none if there are fewer than three strokes.
 
     Raises:
         MeasurementError: there are cycles, but no two alike.
     """
-    turns, _, prominence = motion_turns(time, motion)
+    turns, prominence = motion_turns(time, motion)
     if turns.size < 4:
         return []
     height = motion[turns]
@@ -119,41 +126,35 @@ def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_SteadySpan]:
     across = middle_crossings(time, motion, turns, (height[1:] + height[:-1]) / 2.0)
     # ranges are alike within 3 %, which rigs keep better and step by more, and within three deviations of the noise
     same_size = 0.03 * size + 0.3 * prominence
-    spans: list[_SteadySpan] = []
+    spans: list[SteadySpan] = []
     for strokes in _alike_runs(size, same_size):
         halves = np.diff(across[strokes])
         for run in _alike_runs(halves, _SAME_RATE * halves):
             first, last = strokes.start + run.start, strokes.start + run.stop
-            period = 2.0 * float(across[last] - across[first]) / (last - first)
-            part = float(np.median(size[first : last + 1]))
-            spans.append(_SteadySpan(float(across[first]), float(across[last]), period, part))
-    if not spans:
-        _check_not_changing(loop, size[1:-1])
-        return []
-    joined: list[_SteadySpan] = []
-    for span in spans:
-        last = joined[-1] if joined else None
-        if last and last.is_like(span) and resumes_in_phase((span.begin - last.end) / last.period, step=0.5):
-            joined[-1] = replace(last, end=span.end)  # a disturbance broke it off
-        else:
-            joined.append(span)
-    before = [float(time[0]), *(span.end for span in joined[:-1])]
-    after = [*(span.begin for span in joined[1:]), float(time[-1])]
-    return [_to_its_ends(span, time, motion, *limits) for span, *limits in zip(joined, before, after, strict=True)]
-
-
-def _check_not_changing(loop: Loop, size: Floats) -> None:
-    """Refuse a record without a part whose strokes, of ranges [m or rad], go up and down by ever other amounts."""
-    if size.size >= 4 and np.ptp(np.log(size)) > 0.3:  # no rig misses its amplitude by a third
+            begin, end = float(across[first]), float(across[last])
+            period, stroke = 2.0 * (end - begin) / (last - first), float(np.median(size[first : last + 1]))
+            span, previous = SteadySpan(begin, end, period, stroke), spans[-1] if spans else None
+            gap = (begin - previous.end) / previous.period if previous else np.inf
+            if previous and previous.is_like(span) and resumes_in_phase(gap, step=0.5):
+                spans[-1] = replace(previous, end=end)  # a disturbance broke it off
+            else:
+                spans.append(span)
+    inner = size[1:-1]
+    if not spans and inner.size >= 4 and np.ptp(np.log(inner)) > 0.3:  # no rig misses its amplitude by a third
         unit, factor = loop.direction.display.displacement
         raise MeasurementError(
             "no part of the record is a loop",
             file=loop.source.file if loop.source else loop.name,
-            found=f"{size.size / 2.0:.2g} cycles from {factor * size.min() / 2.0:.3g} to "
-            f"{factor * size.max() / 2.0:.3g} {unit}, no two successive ones equal",
+            found=f"{inner.size / 2.0:.2g} cycles from {factor * inner.min() / 2.0:.3g} to "
+            f"{factor * inner.max() / 2.0:.3g} {unit}, no two successive ones equal",
             expected="at least two cycles of one amplitude and rate",
             hint="record more cycles of each amplitude, best five",
         )
+    if not spans:
+        return []
+    before = [float(time[0]), *(span.end for span in spans[:-1])]
+    after = [*(span.begin for span in spans[1:]), float(time[-1])]
+    return [_to_its_ends(span, time, motion, *limits) for span, *limits in zip(spans, before, after, strict=True)]
 
 
 def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
@@ -165,21 +166,16 @@ def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
     change = np.abs(np.diff(values))
     of_a_kind = np.concatenate(([False], np.abs(values[2:] - values[:-2]) <= reach[2:], [False]))
     drifts = (of_a_kind[1:] | of_a_kind[:-1]) & (change <= 3.0 * reach[1:])
-    for run in _long_stretches((change > np.minimum(reach[1:], reach[:-1])) & ~drifts):
+    for run in stretches((change > np.minimum(reach[1:], reach[:-1])) & ~drifts, fewest=2):
         run_values, ahead = values[run], 4  # strokes
         creeping = np.flatnonzero(np.abs(run_values[ahead:] - run_values[:-ahead]) > 1.5 * reach[run][ahead:])
         changes = np.zeros(run_values.size - 1, dtype=bool)
         changes[(creeping[:, None] + np.arange(ahead)).ravel()] = True
-        for part in _long_stretches(changes):
+        for part in stretches(changes, fewest=2):
             yield slice(run.start + part.start, run.start + part.stop)
 
 
-def _long_stretches(changes: NDArray[np.bool_]) -> list[slice]:
-    """Stretches between changes, (n - 1,), with two entries or more."""
-    return [run for run in stretches(changes) if run.stop - run.start > 1]
-
-
-def _to_its_ends(span: _SteadySpan, time: Floats, motion: Floats, before: float, after: float) -> _SteadySpan:
+def _to_its_ends(span: SteadySpan, time: Floats, motion: Floats, before: float, after: float) -> SteadySpan:
     """Extend a part by half a cycle on either side if the motion is periodic there.
 
     The part is not extended beyond `before`, the end of the previous part, and `after`, the beginning of the next one.
@@ -198,8 +194,18 @@ def _to_its_ends(span: _SteadySpan, time: Floats, motion: Floats, before: float,
     return replace(span, begin=begin, end=float(time[-1]) if time[-1] - end < near else end)
 
 
-def _loops(loop: Loop, time: Floats, spans: Sequence[_SteadySpan], test: LoopFile) -> Iterator[Loop]:
-    """Cut out a loop for each part; the first cycle is left out if two more remain."""
+def cut_loops(loop: Loop, time: Floats, spans: Sequence[SteadySpan], test: LoopFile) -> Iterator[Loop]:
+    """Cut out a loop for each part; the first cycle is left out if two more remain.
+
+    Args:
+        loop: the whole record.
+        time: clock of the rows in which the parts were found [s, or row numbers].
+        spans: the parts.
+        test: keys of the record in a campaign, for a record without time.
+
+    Returns:
+        Iterator over the loops.
+    """
     whole, last_end = _clock(loop), float(time[0])
     for number, span in enumerate(spans, start=1):
         begin = span.begin
@@ -216,7 +222,7 @@ def _loops(loop: Loop, time: Floats, spans: Sequence[_SteadySpan], test: LoopFil
             loop.select(rows),
             name=f"{loop.name}_part_{number}",
             part=RecordPart(rows.start, sentence),
-            softening=_softening(loop, span, from_rest=number == 1),
+            softening=measure_softening(loop, span, from_rest=number == 1),
         )
         yield part if loop.timed else replace(part, time=test.clock(part.displacement))
         last_end = span.end
@@ -228,8 +234,17 @@ def left_out(gaps: Iterable[str], cycles: float) -> str:
     return f"{' and '.join(parts)} are left out; {cycles:.3g} cycles are used"
 
 
-def _softening(loop: Loop, span: _SteadySpan, *, from_rest: bool) -> float | None:
-    """Relative excess of the first cycle's stiffness over the last; None within chance and the memory of rubber."""
+def measure_softening(loop: Loop, span: SteadySpan, *, from_rest: bool) -> float | None:
+    """Relative excess of the first cycle's stiffness over the last one.
+
+    Args:
+        loop: the whole record.
+        span: part of the record.
+        from_rest: whether the part begins from rest.
+
+    Returns:
+        Excess; None within chance and the memory of rubber.
+    """
     if span.cycles < 1.95:  # first and last are one
         return None
     first, first_error = _stiffness(loop, span.begin, span.period)

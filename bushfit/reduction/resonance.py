@@ -7,7 +7,6 @@ dK/K = dT/(T (T - 1)): K is known well where |T - 1| is large, from somewhat bel
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,29 +159,27 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
     Notes:
         Neighbouring rows are averaged to MOST_POINTS points by their flexibility 1/K = (1 - 1/T)/(M omega^2), to which
         an error of T contributes independently of |T - 1|. The relative standard error of T is the scatter of these
-        points about a smooth curve (see `_scatter`), which includes errors common to neighbouring rows. It includes an
-        error common to all points, such as the gain of an accelerometer, only where no smooth stiffness explains it,
-        and never that of a wrong mass.
+        points about a smooth curve (`transmissibility_scatter`), which includes errors common to neighbouring rows. It
+        includes an error common to all points, such as the gain of an accelerometer, only where no smooth stiffness
+        explains it, and never that of a wrong mass.
     """
-    turned = _is_turned(test)
+    turned = counts_phases_backwards(test)
     ratio = np.conj(test.transmissibility) if turned else test.transmissibility
     count = min(test.frequency.size, MOST_POINTS)
     starts = np.arange(count) * test.frequency.size // count
     rows = np.diff(np.append(starts, test.frequency.size))
 
-    def mean(values: NDArray[Any]) -> NDArray[Any]:
-        return np.add.reduceat(values, starts) / rows
-
     omega = 2.0 * np.pi * test.frequency
-    frequency = mean(test.frequency)
-    flexibility: Complex = mean((1.0 - 1.0 / ratio) / (mass * omega**2))
-    amplitude = mean(np.abs(ratio - 1.0) * test.base_acceleration / omega**2)
+    deformation = np.abs(ratio - 1.0) * test.base_acceleration / omega**2
+    sums = np.add.reduceat([test.frequency, deformation, (1.0 - 1.0 / ratio) / (mass * omega**2)], starts, axis=1)
+    flexibility = sums[2] / rows
+    frequency, amplitude = sums[:2].real / rows
     moving = flexibility != 0.0
     stiffness = np.where(moving, flexibility, 1.0 + 0j) ** -1
     thinned = transmissibility(stiffness, mass, frequency)
     error = np.full(count, np.inf)
     if np.count_nonzero(moving) >= 8:  # twice the terms of the smooth curve
-        around = _scatter(frequency[moving], amplitude[moving], thinned[moving])
+        around = transmissibility_scatter(frequency[moving], amplitude[moving], thinned[moving])
         error[moving] = around / np.abs(thinned[moving] - 1.0)
     is_kept = (error <= LARGEST_ERROR) & (stiffness.real > 0.0)
     if not is_kept.any():
@@ -206,11 +203,15 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
     )
 
 
-def _is_turned(test: ResonanceTest) -> bool:
+def counts_phases_backwards(test: ResonanceTest) -> bool:
     """Return True if the phases count the other way: with them, the loss is below zero.
 
-    Rows have the weight (ln |T|)^2: most at the resonance and far above it, where they determine K well, and the same
-    if base and mass are swapped, which then shows as a stiffness below zero.
+    Raises:
+        MeasurementError: phases that show no loss of either sign, or a storage stiffness below zero.
+
+    Notes:
+        Rows have the weight (ln |T|)^2: most at the resonance and far above it, where they determine K well, and the
+        same if base and mass are swapped, which then shows as a stiffness below zero.
     """
     ratio = test.transmissibility
     flexibility = (1.0 - 1.0 / ratio) / test.frequency**2
@@ -239,8 +240,16 @@ def _is_turned(test: ResonanceTest) -> bool:
     return loss < 0.0
 
 
-def _scatter(frequency: Floats, amplitude: Floats, ratio: Complex) -> Floats:
-    """Standard deviation of the real and of the imaginary part of dT/T at each point, (k,), by what lies around it.
+def transmissibility_scatter(frequency: Floats, amplitude: Floats, ratio: Complex) -> Floats:
+    """Standard deviation of the relative error of the transmissibility at each point, by the points around it.
+
+    Args:
+        frequency: [Hz], (k,).
+        amplitude: of the mount's deformation [m], (k,).
+        ratio: complex transmissibility T, (k,).
+
+    Returns:
+        Standard deviation of the real and of the imaginary part of dT/T, (k,).
 
     Notes:
         1/T = 1 - M omega^2/K is linear in the flexibility 1/K. That is fitted over all points by a function linear in

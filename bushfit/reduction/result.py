@@ -1,6 +1,6 @@
 """Result of a reduction of raw histories: operating points, stretches that make none, and warnings about both."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Required
@@ -111,72 +111,71 @@ class Reduction:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on what makes the points less good than they could be."""
-        return tuple(_warnings(self))
-
-
-def _warnings(reduction: Reduction) -> Iterator[str]:
-    """Sentences on outliers, missed levels, sampling, distortion, and stretches that make no point."""
-    unit, factor = reduction.direction.display.displacement
-    steps = reduction.steps
-    if reduction.outliers:
-        yield f"{reduction.outliers} row{'s' * (reduction.outliers > 1)} far from their neighbours left out"
-    yield from _preload(reduction)
-    slope = _amplitude_slope(steps)
-    for level in sorted({step.level for step in steps}):
-        miss = np.array([step.amplitude / level - 1.0 for step in steps if step.level == level])
-        if np.abs(miss).max() > MISSED_LEVEL:
-            low, high = (factor * level * (1.0 + end) for end in (miss.min(), miss.max()))
-            yield (
-                f"the rig reached {low:.4g} to {high:.4g} {unit} at the level of {factor * level:.4g} {unit}: |K| "
-                f"there is up to {number(100 * abs(slope) * np.abs(miss).max(), 2)} % off that at the level (fits "
-                "use the amplitude that was reached)"
+        """Sentences on outliers, means, missed levels, sampling, distortion, and stretches that make no point."""
+        steps, sentences = self.steps, list[str]()
+        unit, factor = self.direction.display.displacement
+        if self.outliers:
+            sentences.append(f"{self.outliers} row{'s' * (self.outliers > 1)} far from their neighbours left out")
+        sentences += preload_warnings(steps, self.direction)
+        # the steepest d ln|K| / d ln X between neighbouring levels at one frequency
+        ordered = sorted(steps, key=lambda step: (step.nominal_frequency, step.amplitude))
+        slopes = [
+            float(np.log(abs(upper.stiffness / lower.stiffness)) / np.log(upper.amplitude / lower.amplitude))
+            for lower, upper in pairwise(ordered)
+            if upper.nominal_frequency == lower.nominal_frequency and upper.level != lower.level
+        ]
+        steepest = max(map(abs, slopes), default=0.0)
+        for level in sorted({step.level for step in steps}):
+            miss = np.array([step.amplitude / level - 1.0 for step in steps if step.level == level])
+            if np.abs(miss).max() > MISSED_LEVEL:
+                low, high = (factor * level * (1.0 + end) for end in (miss.min(), miss.max()))
+                sentences.append(
+                    f"the rig reached {low:.4g} to {high:.4g} {unit} at the level of {factor * level:.4g} {unit}: |K| "
+                    f"there is up to {number(100 * steepest * np.abs(miss).max(), 2)} % off that at the level (fits "
+                    "use the amplitude that was reached)"
+                )
+        coarse = [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]
+        if coarse:
+            worst = min(coarse, key=lambda step: step.rows_per_cycle)
+            sentences.append(
+                f"{len(coarse)} of {len(steps)} points have fewer than {_FEW_ROWS_PER_CYCLE} rows a cycle "
+                f"({worst.rows_per_cycle:.3g} at {worst.frequency:.4g} Hz): harmonics above half the sampling rate "
+                "may fold onto the fundamental"
             )
-    coarse = [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]
-    if coarse:
-        worst = min(coarse, key=lambda step: step.rows_per_cycle)
-        yield (
-            f"{len(coarse)} of {len(steps)} points have fewer than {_FEW_ROWS_PER_CYCLE} rows a cycle "
-            f"({worst.rows_per_cycle:.3g} at {worst.frequency:.4g} Hz): harmonics above half the sampling rate "
-            "may fold onto the fundamental"
-        )
-    bent = [step for step in steps if step.displacement_distortion > 0.02]  # rigs in order have less
-    if bent:
-        worst = max(bent, key=lambda step: step.displacement_distortion)
-        yield (
-            f"the displacement is no clean sine at {len(bent)} of {len(steps)} points: up to "
-            f"{number(100 * worst.displacement_distortion, 2)} % harmonic distortion ({worst.frequency:.4g} Hz, "
-            f"{factor * worst.amplitude:.3g} {unit})"
-        )
-    rejected = [skip for skip in reduction.skipped if skip.steady]
-    for skip in rejected[:_MOST_LISTED]:
-        yield f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}"
-    if len(rejected) > _MOST_LISTED:
-        yield f"{len(rejected) - _MOST_LISTED} more stretches make no point"
+        bent = [step for step in steps if step.displacement_distortion > 0.02]  # rigs in order have less
+        if bent:
+            worst = max(bent, key=lambda step: step.displacement_distortion)
+            sentences.append(
+                f"the displacement is no clean sine at {len(bent)} of {len(steps)} points: up to "
+                f"{number(100 * worst.displacement_distortion, 2)} % harmonic distortion ({worst.frequency:.4g} Hz, "
+                f"{factor * worst.amplitude:.3g} {unit})"
+            )
+        rejected = [skip for skip in self.skipped if skip.steady]
+        sentences += [
+            f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}"
+            for skip in rejected[:_MOST_LISTED]
+        ]
+        if len(rejected) > _MOST_LISTED:
+            sentences.append(f"{len(rejected) - _MOST_LISTED} more stretches make no point")
+        return tuple(sentences)
 
 
-def _preload(reduction: Reduction) -> Iterator[str]:
-    """A sentence on the means that the steps were recorded about, where they are no sensor's zero."""
-    (motion, force, _), units = reduction.direction.motion.words, reduction.direction.display
-    steps, means = reduction.steps, []
-    for word, unit, found, largest in (
-        (motion, units.displacement, [s.mean_displacement for s in steps], max(s.amplitude for s in steps)),
-        (force, units.force, [s.mean_force for s in steps], max(abs(s.stiffness) * s.amplitude for s in steps)),
+def preload_warnings(steps: Sequence[Step], direction: Place) -> list[str]:
+    """A sentence on the means that the steps were recorded about, unless they are a sensor's zero.
+
+    Args:
+        steps: of one direction.
+        direction: of the steps.
+    """
+    (motion, force, _), units = direction.motion.words, direction.display
+    means = []
+    for word, unit, values, largest in (
+        (motion, units.displacement, [step.mean_displacement for step in steps], max(step.amplitude for step in steps)),
+        (force, units.force, [step.mean_force for step in steps], max(abs(s.stiffness) * s.amplitude for s in steps)),
     ):
-        if abs(np.median(found)) > 0.5 * largest:  # sensors are off zero by less
-            written, factor = display_unit(*unit, max(found, key=abs))
-            ends = dict.fromkeys(number(factor * end, 3) for end in sorted((min(found), max(found)), key=abs))
+        if abs(np.median(values)) > 0.5 * largest:  # sensors are off zero by less
+            written, factor = display_unit(*unit, max(values, key=abs))
+            ends = dict.fromkeys(number(factor * end, 3) for end in sorted((min(values), max(values)), key=abs))
             means.append(f"a mean {word} of {' to '.join(ends)} {written}")
-    if means:
-        yield f"recorded about {' and '.join(means)}; the model has no preload: the points refer to this mean"
-
-
-def _amplitude_slope(steps: Sequence[Step]) -> float:
-    """Steepest d ln|K| / d ln X between neighbouring levels at one frequency; 0 where there is only one level."""
-    ordered = sorted(steps, key=lambda step: (step.nominal_frequency, step.amplitude))
-    slopes = [
-        float(np.log(abs(upper.stiffness / lower.stiffness)) / np.log(upper.amplitude / lower.amplitude))
-        for lower, upper in pairwise(ordered)
-        if upper.nominal_frequency == lower.nominal_frequency and upper.level != lower.level
-    ]
-    return max(slopes, key=abs, default=0.0)
+    about = f"recorded about {' and '.join(means)}; the model has no preload: the points refer to this mean"
+    return [about] if means else []

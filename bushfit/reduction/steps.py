@@ -48,14 +48,13 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
     Raises:
         MeasurementError: no steady sine in any of them, or one far off every level.
     """
-    sound = [  # the fits need no even clock
-        one.select(~(lone_outliers(one.time, one.displacement) | lone_outliers(one.time, one.force)))
-        for one in histories
-    ]
-    outliers = sum(one.time.size for one in histories) - sum(one.time.size for one in sound)
-    found = [_steps_of(history, fewest_cycles) for history in track("histories reduced", sound)]
-    steps = [step for some, _ in found for step in some]
-    skipped = tuple(skip for _, some in found for skip in some)
+    outliers, steps, skipped = 0, list[Step](), list[SkippedStretch]()
+    for history in track("histories reduced", histories):
+        faults = lone_outliers(history.time, history.displacement) | lone_outliers(history.time, history.force)
+        outliers += int(faults.sum())
+        found, rejected = find_steps(history.select(~faults), fewest_cycles)  # the fits need no even clock
+        steps += found
+        skipped += rejected
     if not steps:
         raise MeasurementError(
             "no steady sine was found",
@@ -66,8 +65,7 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
             hint="a slow loop needs no reduction: name it under [[loops]]",
         )
     direction = histories[0].direction
-    _check_reach(steps, levels, direction)
-    return Reduction(direction, tuple(_grouped(steps, levels)), skipped, outliers)
+    return Reduction(direction, tuple(group_steps(steps, levels, direction)), tuple(skipped), outliers)
 
 
 def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
@@ -92,8 +90,8 @@ def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
     return found
 
 
-def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStretch]]:
-    """Steps of a history with at least `fewest` cycles, and the stretches without one."""
+def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStretch]]:
+    """Find the steps of a history with at least `fewest` cycles, and the stretches without one."""
     found: list[tuple[float, float, Step]] = []
     skipped: list[SkippedStretch] = []
     cycles = Cycles.count(history.time, history.displacement)
@@ -106,18 +104,24 @@ def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStret
             continue
         for part in parts:
             inside = slice(run.start + part.start, run.start + part.stop)
-            start, end = float(edges[part.start]), float(edges[part.stop])
-            why = _unusable(cycles, inside, fewest)
-            step = None if why else _step(history, cycles, inside, motion[part], force[part], fewest)
+            start, end, count = float(edges[part.start]), float(edges[part.stop]), part.stop - part.start
+            rows = (cycles.first_rows[inside.stop] - cycles.first_rows[inside.start]) / count
+            step, why = None, _CHANGING
+            if count < fewest:
+                why = f"{count} cycle{'s' * (count != 1)} of {count / (end - start):.4g} Hz, fewer than {fewest}"
+            elif rows < _FEWEST_ROWS_PER_CYCLE:
+                why = f"{rows:.2g} rows a cycle at {count / (end - start):.4g} Hz, "
+                why += f"fewer than {_FEWEST_ROWS_PER_CYCLE:g}"
+            else:
+                step = _step(history, cycles, inside, motion[part], force[part], fewest)
             if step:
                 found.append((start, end, step))
             else:
-                steady = part.stop - part.start >= fewest
-                skipped.append(SkippedStretch(history.name, start, end, why or _CHANGING, steady))
-    return _joined(found), skipped
+                skipped.append(SkippedStretch(history.name, start, end, why, count >= fewest))
+    return join_broken_steps(found), skipped
 
 
-def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
+def join_broken_steps(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
     """Join the parts of broken steps: the longest part remains.
 
     An outlier or a creeping amplitude breaks a step: its sine goes on in phase after a cycle or two. The frequencies of
@@ -138,18 +142,6 @@ def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
         joined.append(step)
         last_end = end
     return joined
-
-
-def _unusable(cycles: Cycles, inside: slice, fewest: int) -> str:
-    """Reason why cycles give no point that is known before a fit; empty if they may give one."""
-    count = inside.stop - inside.start
-    frequency = count / (cycles.edges[inside.stop] - cycles.edges[inside.start])
-    if count < fewest:
-        return f"{count} cycle{'s' * (count != 1)} of {frequency:.4g} Hz, fewer than {fewest}"
-    rows = (cycles.first_rows[inside.stop] - cycles.first_rows[inside.start]) / count
-    if rows < _FEWEST_ROWS_PER_CYCLE:
-        return f"{rows:.2g} rows a cycle at {frequency:.4g} Hz, fewer than {_FEWEST_ROWS_PER_CYCLE:g}"
-    return ""
 
 
 def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: Complex, fewest: int) -> Step | None:
@@ -202,32 +194,40 @@ def _creeps(values: Floats, smallest: float) -> bool:
     return bool(abs(slope) * values.size > smallest and abs(slope) > 4.0 * error)  # noise hardly ever goes that far
 
 
-def _check_reach(steps: Sequence[Step], levels: Sequence[float], direction: Place) -> None:
-    """Refuse a step far off every level that is stated."""
-    unit, factor = direction.display.displacement
-    for step in steps:
-        if levels and min(abs(step.amplitude / level - 1.0) for level in levels) > _LEVEL_REACH:
+def group_steps(steps: Sequence[Step], levels: Sequence[float], direction: Place) -> list[Step]:
+    """Group steps by frequency and amplitude.
+
+    Args:
+        steps: of one direction.
+        levels: amplitudes the test was meant to have [m or rad]; without them, close amplitudes make a level.
+        direction: of the steps.
+
+    Returns:
+        The steps with their nominal frequency, level and repeat.
+
+    Raises:
+        MeasurementError: a step is far off every level that is stated.
+    """
+    frequency, amplitude = np.array([(step.frequency, step.amplitude) for step in steps]).T
+    groups = _clusters(np.log(frequency), _SAME_FREQUENCY)
+    nominal = np.array([np.median(frequency[groups == group]) for group in groups])
+    if levels:
+        stated, (unit, factor) = np.array(levels, dtype=float), direction.display.displacement
+        level = stated[np.argmin(np.abs(np.log(amplitude[:, None] / stated)), axis=1)]
+        far = np.flatnonzero(np.abs(amplitude[:, None] / stated - 1.0).min(axis=1) > _LEVEL_REACH)
+        if far.size:
+            step = steps[far[0]]
             raise MeasurementError(
                 "a step is at none of the levels",
                 place=f"{step.name}, {step.start:.4g} to {step.end:.4g} s",
                 found=f"{factor * step.amplitude:.4g} {unit} at {step.frequency:.4g} Hz",
                 expected=f"within {100 * _LEVEL_REACH:g} % of "
-                + " or ".join(f"{factor * level:.4g} {unit}" for level in levels),
+                + " or ".join(f"{factor * value:.4g} {unit}" for value in levels),
                 hint="name all levels, zero-to-peak, or leave --levels out",
             )
-
-
-def _grouped(steps: Sequence[Step], levels: Sequence[float]) -> list[Step]:
-    """The steps with their nominal frequency, level and repeat."""
-    frequency, amplitude = np.array([(step.frequency, step.amplitude) for step in steps]).T
-    groups = _clusters(np.log(frequency), _SAME_FREQUENCY)
-    nominal = np.array([np.median(frequency[groups == group]) for group in groups])
-    if levels:
-        levels_asked = np.array(levels, dtype=float)
-        level = levels_asked[np.argmin(np.abs(np.log(amplitude[:, None] / levels_asked)), axis=1)]
     else:
         rank = _clusters(np.log(amplitude), _LEVEL_GAP)
-        level = np.array([amplitude[rank == group_number].mean() for group_number in rank])
+        level = np.array([amplitude[rank == number].mean() for number in rank])
     repeats: defaultdict[tuple[float, float], Iterator[int]] = defaultdict(lambda: count(1))
     return [
         replace(step, nominal_frequency=f, level=x, repeat=next(repeats[f, x]))

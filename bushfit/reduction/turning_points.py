@@ -1,7 +1,6 @@
 """Turning points of a motion: those of noise and of a ripple on the motion are left out."""
 
 from math import comb
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,22 +21,8 @@ _SAME_HALF_CYCLE = 0.1
 _PAUSE = 2.5
 
 
-def turning_points(values: Floats, prominence: float) -> Integers:
-    """Rows of the highs and lows that stand out by `prominence` or more, highs and lows in turn, ends included.
-
-    Args:
-        values: of a channel, (n,).
-        prominence: smallest difference between neighbouring turning points, in the unit of the values.
-
-    Returns:
-        Row numbers, (turns,), increasing.
-    """
-    moving = np.concatenate(([0], 1 + np.flatnonzero(np.diff(values) != 0.0)))
-    return prominent_turns(values, _reversals(values, moving), prominence)
-
-
-def _reversals(values: Floats, rows: Integers) -> Integers:
-    """Select the rows at which the values change direction, ends included."""
+def reversals(values: Floats, rows: Integers) -> Integers:
+    """Select the rows, of increasing numbers, at which the values change direction, ends included."""
     direction = np.sign(np.diff(values[rows]))
     inner = 1 + np.flatnonzero(direction[1:] != direction[:-1])
     return np.concatenate((rows[:1], rows[inner], rows[1:][-1:]))
@@ -78,29 +63,16 @@ def prominent_turns(values: Floats, turns: Integers, prominence: float) -> Integ
     return turns
 
 
-class MotionTurns(NamedTuple):
-    """Turning points of a motion, separated from those of a ripple that rides on it.
-
-    Args:
-        motion: rows of the turning points of the motion itself, (turns,).
-        ripple: rows of the turning points of the ripple, (ripple turns,); empty without a ripple.
-        prominence: smallest stroke that is not noise [m or rad].
-    """
-
-    motion: Integers
-    ripple: Integers
-    prominence: float
-
-
-def motion_turns(time: Floats, motion: Floats) -> MotionTurns:
-    """Separate the turning points of a motion from those of a ripple on it: hum, a hunting servo, a flickering sensor.
+def motion_turns(time: Floats, motion: Floats) -> tuple[Integers, float]:
+    """Find the turning points of a motion, without those of a ripple on it: hum, a hunting servo, a flickering sensor.
 
     Args:
         time: of each row [s], or row numbers, (n,).
         motion: displacement [m or rad], (n,).
 
     Returns:
-        The turning points of both. Noise has none.
+        Rows of the turning points, (turns,), increasing, highs and lows in turn, ends included; and the smallest stroke
+        that is not noise [m or rad].
 
     Notes:
         Strokes below 2 % of the record's range are candidates: rigs miss their own amplitude by more. A record may well
@@ -112,11 +84,12 @@ def motion_turns(time: Floats, motion: Floats) -> MotionTurns:
         it is a pause of the larger motion, and something else is tested meanwhile.
     """
     prominence = least_prominence(motion)
-    fine = turning_points(motion, prominence)
+    moving = np.concatenate(([0], 1 + np.flatnonzero(np.diff(motion) != 0.0)))
+    fine = prominent_turns(motion, reversals(motion, moving), prominence)
     small = max(prominence, _RIPPLE * float(np.ptp(motion)))
     coarse = prominent_turns(motion, fine, small)
     if coarse.size < 2 or coarse.size == fine.size:
-        return MotionTurns(fine, fine[:0], prominence)
+        return fine, prominence
     height = motion[coarse]
     crossings = middle_crossings(time, motion, coarse, stroke_middles(height))
     borders = np.concatenate(([time[0]], crossings, [time[-1]]))
@@ -132,7 +105,7 @@ def motion_turns(time: Floats, motion: Floats) -> MotionTurns:
         rippled[[0, -1]] = rippled[[1, -2]]  # the record cuts the first and the last half cycle short
     rippled &= duration < _PAUSE * neighbour
     ripple = rippled[half[fine]] & ~np.isin(fine, coarse)
-    return MotionTurns(_reversals(motion, fine[~ripple]), fine[ripple], prominence)
+    return reversals(motion, fine[~ripple]), prominence
 
 
 def stroke_middles(height: Floats) -> Floats:
