@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from bushfit.diagnosis import document
+from bushfit.model.covariance import Z95
 from bushfit.model.result import End
 
 #: Value of the key `schema`, which names the layout of the file; a row of another layout is done again.
@@ -39,6 +40,20 @@ class Estimate:
         """
         low, high, stderr = (x if x is not None and math.isfinite(x) else None for x in (low, high, stderr))
         return cls(value, low, high, stderr, unit)
+
+    @classmethod
+    def normal(cls, value: float, stderr: float, unit: str) -> "Estimate":
+        """Make an estimate with normal errors.
+
+        Args:
+            value: the value, in `unit`.
+            stderr: standard error, in `unit`.
+            unit: SI unit.
+
+        Returns:
+            The estimate with its 95 % interval.
+        """
+        return cls(value, value - Z95 * stderr, value + Z95 * stderr, stderr, unit)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -46,7 +46,7 @@ class Workers:
     Args:
         place: where the workers are, for messages.
         open: makes an executor; called again if the last one is broken.
-        count: number of workers; raises an OSError if the connection to them is lost.
+        count: number of workers; raises a BatchError if the connection to them is lost.
         close: called at the end.
     """
 
@@ -109,18 +109,20 @@ def dask_workers(address: str) -> Workers:
             raise ValueError(f"a Dask {kind.lower()} answers there")
         client: Any = Client(address, timeout=_ANSWER_SECONDS, set_as_default=False)
     except Exception as error:  # whatever a foreign service answers
-        raise BatchError(
-            "no Dask scheduler answers there",
-            place="--scheduler",
-            found=address or "an empty address",
-            expected="the address of a Dask scheduler, such as tcp://10.0.0.5:8786",
-            hint=str(error) or "start one with: dask scheduler; dask worker ADDRESS",
-        ) from None
+        problem, found = "no Dask scheduler answers there", address or "an empty address"
+        expected = "the address of a Dask scheduler, such as tcp://10.0.0.5:8786"
+        hint = str(error) or "start one with: dask scheduler; dask worker ADDRESS"
+        raise BatchError(problem, place="--scheduler", found=found, expected=expected, hint=hint) from None
 
     def count() -> int:
-        if client.status != "running":
-            raise OSError("the connection is lost")
-        return sum(client.nthreads().values())
+        try:
+            if client.status == "running":
+                return sum(client.nthreads().values())
+            found = "the connection is lost"
+        except (OSError, RuntimeError) as error:
+            found = str(error) or address
+        hint = "the same command with --resume continues from here"
+        raise BatchError("the Dask scheduler is lost", found=found, hint=hint)
 
     return Workers(address, partial(client.get_executor, pure=False), count, partial(client.close, _ANSWER_SECONDS))
 
@@ -160,7 +162,7 @@ def run_rows(
     try:
         while queue or out:
             if time.monotonic() > looked + _LOOK_SECONDS:
-                looked, count = time.monotonic(), _count(workers)
+                looked, count = time.monotonic(), workers.count()
                 width, alone_since = _ROWS_PER_WORKER * max(1, count), 0.0 if count else alone_since or looked
                 if alone_since == looked:
                     warn(f"no worker at {workers.place}: waiting {NO_WORKER_SECONDS:.0f} s for one")
@@ -182,7 +184,7 @@ def run_rows(
                 except BatchError:
                     raise
                 except (Exception, CancelledError) as error:
-                    _count(workers)
+                    workers.count()
                     if not out:  # all of the broken pool have come back
                         executor.shutdown(wait=False)
                         executor = workers.open()
@@ -199,14 +201,6 @@ def run_rows(
             future.cancel()
         executor.shutdown(wait=False)
         workers.close()
-
-
-def _count(workers: Workers) -> int:
-    try:
-        return workers.count()
-    except (OSError, RuntimeError) as error:
-        hint = "the same command with --resume continues from here"
-        raise BatchError("the Dask scheduler is lost", found=str(error) or workers.place, hint=hint) from None
 
 
 def _check_alive(executor: Executor) -> None:

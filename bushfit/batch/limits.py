@@ -13,7 +13,7 @@ Notes:
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -32,7 +32,6 @@ from bushfit.batch.quantities import (
     PartQuantity,
     Point,
     PointText,
-    point_quantity,
 )
 from bushfit.campaign.quantities import with_sizes
 from bushfit.campaign.toml import read_toml
@@ -88,25 +87,6 @@ class Bounds:
             half = abs(self.nominal) * self.tolerance
             low, high = max(low, self.nominal - half), min(high, self.nominal + half)
         return low, high
-
-    def resolve(self, values: Array) -> tuple[float, float, str]:
-        """Lowest and highest allowed value, with `sigma` held against the batch.
-
-        Args:
-            values: of the parts, (n,), without NaN.
-
-        Returns:
-            Both limits, and the reason why `sigma` cannot be judged, or an empty text.
-        """
-        low, high = self.fixed
-        if self.sigma is None:
-            return low, high, ""
-        if values.size < self.at_least:
-            return low, high, f"{values.size} parts, and at_least = {self.at_least}: sigma is not judged"
-        median, deviation = scatter(values)
-        if deviation == 0.0:
-            return low, high, "more than half of the parts agree to the digit: sigma is not judged"
-        return max(low, median - self.sigma * deviation), min(high, median + self.sigma * deviation), ""
 
 
 def _read_stiffness(raw: object, info: ValidationInfo) -> object:
@@ -179,61 +159,78 @@ class Limits:
     guard: Annotated[bool, Field(strict=True)] = False
 
     def __post_init__(self) -> None:
-        for name, count in Counter(name for name, _ in self.at_points).items():
+        names = [f"{STIFFNESS} {bounds.at}" for bounds in self.stiffness]
+        names += [f"{LOSS_FACTOR} {bounds.at}" for bounds in self.loss_factor]
+        for name, count in Counter(names).items():
             if count > 1:
                 problem = CampaignError(f"{count} tables for one point", found=name, hint="put them in one table")
                 raise ValueError(problem)
 
     @property
-    def at_points(self) -> list[tuple[str, StiffnessBounds | LossFactorBounds]]:
-        pairs = ((STIFFNESS, self.stiffness), (LOSS_FACTOR, self.loss_factor))
-        return [(point_quantity(bounds.at, name).name, bounds) for name, tables in pairs for bounds in tables]
-
-    @property
     def points(self) -> tuple[Point, ...]:
-        return tuple(dict.fromkeys(bounds.at for _, bounds in self.at_points))
+        return tuple(dict.fromkeys(bounds.at for bounds in (*self.stiffness, *self.loss_factor)))
 
     @property
     def bounds(self) -> dict[str, Bounds]:
         """Limits by the name of the quantity."""
+        at_points: dict[str, Bounds] = {f"{STIFFNESS} {bounds.at}": bounds for bounds in self.stiffness}
+        at_points |= {f"{LOSS_FACTOR} {table.at}": table for table in self.loss_factor}
         largest = {quantity.name: getattr(self, key) for key, quantity in FIT_QUALITY.items()}
         of_fit = {name: Bounds(max=limit) for name, limit in largest.items() if limit is not None}
-        return {**self.parameters, **dict(self.at_points), **of_fit}
+        return {**self.parameters, **at_points, **of_fit}
 
 
-def read_limits(path: Path) -> Limits:
+def read_limits(path: Path, rows: Sequence[Row]) -> Limits:
     """Read a limits file.
 
+    Args:
+        path: of the file.
+        rows: of the batch that is judged by it.
+
+    Returns:
+        The limits.
+
     Raises:
-        CampaignError: keys or values that are not understood, or no limit at all.
+        CampaignError: keys or values that are not understood, no limit at all, or `verdicts` and a row without diagnose
+            or run.
     """
     limits = read_toml(path, Limits, description="a limits file")
     if not (limits.bounds or limits.verdicts):
         raise CampaignError("there is no limit in it", file=path, expected='such as [parameters.mu] with max = "2 MPa"')
+    silent = [row.name for row in rows if not row.settings.diagnoses] if limits.verdicts else []
+    if silent:
+        found = silent[0] + (f" and {len(silent) - 1} more" if len(silent) > 1 else "") + " without it"
+        hint = '--command diagnose, or commands = ["diagnose"] in the manifest (or run, which diagnoses too)'
+        raise CampaignError("a limit on verdicts needs diagnose", file=path, place="verdicts", found=found, hint=hint)
     return limits
 
 
-def check_limits(limits: Limits, path: Path, rows: Iterable[Row]) -> None:
-    """Check that these rows can be judged by the limits.
+def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[str, tuple[float, float]], list[str]]:
+    """Resolve limits that are relative to the batch.
 
     Args:
         limits: the limits file.
-        path: of the file, for the error.
-        rows: of the batch.
+        values: of each quantity over the batch, (n,), NaN where a part has none.
 
-    Raises:
-        CampaignError: `verdicts`, and a row without diagnose or run.
+    Returns:
+        Lowest and highest allowed value of each quantity, and notes on limits that the batch cannot be judged by.
     """
-    silent = [row.name for row in rows if not row.settings.diagnoses] if limits.verdicts else []
-    if silent:
-        more = f" and {len(silent) - 1} more" if len(silent) > 1 else ""
-        raise CampaignError(
-            "a limit on verdicts needs diagnose",
-            file=path,
-            place="verdicts",
-            found=f"{silent[0]}{more} without it",
-            hint='--command diagnose, or commands = ["diagnose"] in the manifest (or run, which diagnoses too)',
-        )
+    allowed, notes = dict[str, tuple[float, float]](), list[str]()
+    for name, bounds in limits.bounds.items():
+        allowed[name] = bounds.fixed
+        if bounds.sigma is None:
+            continue
+        known = values.get(name, np.empty(0))
+        known = known[np.isfinite(known)]
+        median, deviation = scatter(known) if known.size else (0.0, 0.0)
+        if known.size < bounds.at_least:
+            notes.append(f"{name}: {known.size} parts, and at_least = {bounds.at_least}: sigma is not judged")
+        elif deviation == 0.0:
+            notes.append(f"{name}: more than half of the parts agree to the digit: sigma is not judged")
+        else:
+            (low, high), reach = bounds.fixed, bounds.sigma * deviation
+            allowed[name] = max(low, median - reach), min(high, median + reach)
+    return allowed, notes
 
 
 def describe_poor_fit(record: RowFile, limits: Limits | None) -> str:
@@ -288,7 +285,7 @@ def judge_part(
         result = judge_value(estimate, low, high)
         if bound:
             result = max(result, "conditional pass", key=RESULTS.index)
-        outcomes[name] = result, source + _limit_sentence(quantities[name], estimate, (low, high), result, bound)
+        outcomes[name] = result, source + limit_sentence(quantities[name], estimate, (low, high), result, bound)
     if limits.verdicts and record.verdict not in limits.verdicts:
         sentence = f"verdict {record.verdict or 'not known'}, allowed {', '.join(limits.verdicts)}"
         outcomes["verdict"] = "fail", sentence
@@ -315,43 +312,29 @@ def judge_value(estimate: Estimate, low: float, high: float) -> LimitResult:
     return "fail" if upper < low or lower > high else "conditional fail"
 
 
-def _limit_sentence(
+def limit_sentence(
     quantity: PartQuantity, estimate: Estimate, allowed: tuple[float, float], result: LimitResult, bound: str | None
 ) -> str:
-    """Value, interval and the nearer limit in words: "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail"."""
-    displayed = quantity.displayed(estimate.value)
-
-    def written(x: float) -> str:
-        return number(x * displayed.factor, 4)
-
-    unit = "" if displayed.unit == "-" else f" {displayed.unit}"
-    interval = (
-        ""
-        if estimate.low is None or estimate.high is None
-        else f" ({written(estimate.low)} to {written(estimate.high)})"
-    )
-    finite = [limit for limit in allowed if math.isfinite(limit)]
-    nearest = min(finite, key=lambda limit: abs(limit - estimate.value), default=None)
-    parts = [f"{quantity.name} {written(estimate.value)}{unit}{interval}"]
-    parts += [f"limit {written(nearest)}"] if nearest is not None else []
-    parts += [f"at the {bound} of its fit"] if bound else []
-    return ", ".join(parts) + (f": {result}" if result.startswith("conditional") else "")
-
-
-def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[str, tuple[float, float]], list[str]]:
-    """Resolve limits that are relative to the batch.
+    """Write a value, its interval and the nearer limit: "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail".
 
     Args:
-        limits: the limits file.
-        values: of each quantity over the batch, (n,), NaN where a part has none.
+        quantity: name and unit.
+        estimate: of the quantity [SI].
+        allowed: lowest and highest allowed value [SI].
+        result: of the comparison.
+        bound: end of its range at which the fit has the parameter; None if at neither.
 
     Returns:
-        Lowest and highest allowed value of each quantity, and notes on limits that the batch cannot be judged by.
+        The sentence, in the unit in which engineers write the value.
     """
-    allowed, notes = dict[str, tuple[float, float]](), list[str]()
-    for name, bounds in limits.bounds.items():
-        finite_values = values.get(name, np.empty(0))
-        low, high, idle = bounds.resolve(finite_values[np.isfinite(finite_values)])
-        allowed[name] = low, high
-        notes += [f"{name}: {idle}"] if idle else []
-    return allowed, notes
+    displayed = quantity.displayed(estimate.value)
+    ends = [number(end * displayed.factor, 4) for end in (estimate.low, estimate.high) if end is not None]
+    finite = [limit for limit in allowed if math.isfinite(limit)]
+    sentence = f"{quantity.name} {number(estimate.value * displayed.factor, 4)}"
+    sentence += f" {displayed.unit}" if displayed.unit != "-" else ""
+    sentence += f" ({' to '.join(ends)})" if len(ends) == 2 else ""
+    if finite:
+        nearest = min(finite, key=lambda limit: abs(limit - estimate.value))
+        sentence += f", limit {number(nearest * displayed.factor, 4)}"
+    sentence += f", at the {bound} of its fit" if bound else ""
+    return sentence + (f": {result}" if result.startswith("conditional") else "")

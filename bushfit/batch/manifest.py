@@ -8,10 +8,9 @@ import io
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cache, partial
-from itertools import chain, count
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -60,7 +59,7 @@ Candidates = Annotated[tuple[Annotated[str, converter(partial(_check_name, get_c
 
 @dataclass(frozen=True, kw_only=True)
 class RowSettings:
-    """RowSettings of a row; None where the row leaves a setting to the manifest, and the manifest to the default.
+    """Settings of a row; None where the row leaves a setting to the manifest, and the manifest to the default.
 
     Args:
         commands: run alone, or any of fit, diagnose, predict [fit].
@@ -79,18 +78,10 @@ class RowSettings:
     model: Text | None = None
 
     def with_defaults(self, defaults: RowSettings) -> RowSettings:
-        """These settings, with those of `defaults` where they are None."""
-        return replace(defaults, **{key: value for key, value in vars(self).items() if value is not None})
-
-    @property
-    def settings(self) -> RowSettings:
-        """The settings of a row or manifest without its other keys."""
-        return RowSettings(**{setting.name: getattr(self, setting.name) for setting in fields(RowSettings)})
-
-    @property
-    def predicts(self) -> bool:
-        """True if the row is predicted; the tables of a prediction are always written."""
-        return not {"run", "predict"}.isdisjoint(self.commands or ())
+        """These settings, with those of `defaults` where they are None, and without the other keys of their table."""
+        names = [setting.name for setting in fields(RowSettings)]
+        stated = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        return RowSettings(**{**{name: getattr(defaults, name) for name in names}, **stated})
 
     @property
     def diagnoses(self) -> bool:
@@ -177,7 +168,7 @@ def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
     if strange := [name for name in (source, *more) if more and Path(name).suffix.lower() != ".toml"]:
         expected = "one manifest, or campaign files alone"
         raise CampaignError("this is no campaign", file=strange[0], expected=expected, hint=_INIT_HINT)
-    if more or (_PATTERN.search(source) and not _exists(path)):
+    if more or (_PATTERN.search(source) and not os.path.exists(path)):  # noqa: PTH110
         title, base, entries = "batch", Path(), [Entry(campaign=name) for name in (source, *more)]
     elif path.suffix.lower() == ".toml":
         try:
@@ -186,58 +177,51 @@ def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
             if error.found not in ('"bushing"', '"specimens"'):
                 raise
             content = ManifestFile(bushings=(Entry(campaign=path.name),))  # a campaign is a batch of one
-        settings, points = settings.with_defaults(content.settings), content.at
-        entries = list(content.bushings)
+        settings, points, entries = settings.with_defaults(content), content.at, list(content.bushings)
     elif path.suffix.lower() in (".csv", ".tsv", ".txt"):
-        entries = list(_read_csv_manifest(path))
+        entries = read_csv_entries(path)
     else:
-        raise CampaignError(
-            "this is no manifest",
-            file=path,
-            expected='a .toml or .csv file, or a pattern in quotes such as "bushings/*/campaign.toml"',
-            hint=f'"{path}/*/campaign.toml" in quotes' if os.path.isdir(path) else _INIT_HINT,  # noqa: PTH112
-        )
-    listed = entries if more else list(_expand_patterns(entries, base, source))
-    return Manifest(title, _make_rows(listed, base, settings, source), points)
+        expected = 'a .toml or .csv file, or a pattern in quotes such as "bushings/*/campaign.toml"'
+        hint = f'"{path}/*/campaign.toml" in quotes' if os.path.isdir(path) else _INIT_HINT  # noqa: PTH112
+        raise CampaignError("this is no manifest", file=path, expected=expected, hint=hint)
+    listed = entries if more else [entry for one in entries for entry in expand_pattern(one, base, source)]
+    if not listed:
+        raise CampaignError("the manifest has no rows", file=source, expected="a campaign on each line")
+    return Manifest(title, make_rows(listed, base, settings, source), points)
 
 
-def _exists(path: Path) -> bool:
-    return os.path.exists(path)  # noqa: PTH110 - Path.exists raises for names that are too long and locked folders
+def read_csv_entries(path: Path) -> list[Entry]:
+    """Read the entries of a CSV manifest, whose header names the keys.
 
-
-def _read_csv_manifest(path: Path) -> Iterator[Entry]:
-    """Entries of a CSV manifest, whose header names the keys."""
+    Raises:
+        CampaignError: columns that are unknown or repeated, a quote that swallows the lines after it, or values that
+            are not understood.
+    """
     text = read_utf8(path, CampaignError).decode("utf-8-sig")
     delimiter = max(",;\t", key=text.lstrip().partition("\n")[0].count)
-    lines = _csv_lines(path, text, delimiter)
-    header = next((cells for _, cells in lines), [])
-    keys = [key.name for key in fields(Entry)]
-    for column in header:
-        if column not in keys:
-            error = unknown_key(column, keys)
-            error.file, error.place, error.hint = path, "header", error.hint or _INIT_HINT
-            raise error
-        if header.count(column) > 1:
-            problem = f'two columns are called "{column}"'
-            raise CampaignError(problem, file=path, place="header", expected="each column once")
-    for place, cells in lines:
-        if len(cells) > len(header):
-            found, expected = str(len(cells)), str(len(header))
-            raise CampaignError("more cells than columns", file=path, place=place, found=found, expected=expected)
-        filled = {key: cell for key, cell in zip(header, cells, strict=False) if cell}
-        yield validate_tables(filled, path, Entry, place=place)
-
-
-def _csv_lines(path: Path, text: str, delimiter: str) -> Iterator[tuple[str, list[str]]]:
-    """Place and cells of each line that is not empty; a CampaignError if a quote swallows the lines after it."""
-    reader, line = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True), 0
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
+    keys, header, entries, line = [key.name for key in fields(Entry)], list[str](), list[Entry](), 0
     try:
-        for cells in reader:
+        for row in reader:
             if reader.line_num > line + 1:
                 raise csv.Error("a quoted cell goes on in the next line")
             line += 1
-            if any(cells := [cell.strip() for cell in cells]):
-                yield f"line {line}", cells
+            cells, place = [cell.strip() for cell in row], f"line {line}"
+            if not header:
+                header = cells if any(cells) else []
+                if unknown := [column for column in header if column not in keys]:
+                    error = unknown_key(unknown[0], keys)
+                    error.file, error.place, error.hint = path, "header", error.hint or _INIT_HINT
+                    raise error
+                if repeated := [column for column in header if header.count(column) > 1]:
+                    problem, expected = f'two columns are called "{repeated[0]}"', "each column once"
+                    raise CampaignError(problem, file=path, place="header", expected=expected)
+            elif len(cells) > len(header):
+                found, expected = str(len(cells)), str(len(header))
+                raise CampaignError("more cells than columns", file=path, place=place, found=found, expected=expected)
+            elif any(cells):
+                filled = {key: cell for key, cell in zip(header, cells, strict=False) if cell}
+                entries.append(validate_tables(filled, path, Entry, place=place))
     except csv.Error as error:
         raise CampaignError(
             "a quote is not closed",
@@ -247,63 +231,91 @@ def _csv_lines(path: Path, text: str, delimiter: str) -> Iterator[tuple[str, lis
             expected="one line for each bushing, and quotes in pairs",
             hint="a quote that belongs to a name is written twice, in a cell in quotes",
         ) from None
+    return entries
 
 
-def _expand_patterns(entries: Iterable[Entry], base: Path, source: str) -> Iterator[Entry]:
-    """Entries with patterns replaced by the files that match, sorted."""
-    for entry in entries:
-        if not _PATTERN.search(entry.campaign) or _exists(base / entry.campaign):
-            yield entry
-            continue
-        matches = sorted(glob.glob(entry.campaign, root_dir=base, recursive=True))  # noqa: PTH207 - Path.glob refuses ".."
-        if not matches or entry.name:
-            problem = "a pattern cannot have a name" if matches else "the pattern matches no file"
-            expected = "campaign files, counted from the folder of the manifest"
-            raise CampaignError(problem, file=source, place="campaign", found=entry.campaign, expected=expected)
-        yield from (replace(entry, campaign=match) for match in matches)
+def expand_pattern(entry: Entry, base: Path, source: str) -> list[Entry]:
+    """Replace an entry whose campaign is a pattern by one for each file that matches.
+
+    Args:
+        entry: of the manifest.
+        base: folder from which its campaign is counted.
+        source: manifest, for errors.
+
+    Returns:
+        Entries in the order of the files' names; the entry itself if its campaign is a file.
+
+    Raises:
+        CampaignError: no file matches, or a pattern has a name.
+    """
+    if not _PATTERN.search(entry.campaign) or os.path.exists(base / entry.campaign):  # noqa: PTH110
+        return [entry]
+    matches = sorted(glob.glob(entry.campaign, root_dir=base, recursive=True))  # noqa: PTH207 - Path.glob refuses ".."
+    if not matches or entry.name:
+        problem = "a pattern cannot have a name" if matches else "the pattern matches no file"
+        expected = "campaign files, counted from the folder of the manifest"
+        raise CampaignError(problem, file=source, place="campaign", found=entry.campaign, expected=expected)
+    return [replace(entry, campaign=match) for match in matches]
 
 
-def _make_rows(entries: Sequence[Entry], base: Path, settings: RowSettings, source: str) -> list[Row]:
-    """Rows with a name and a folder each.
+def make_rows(entries: Sequence[Entry], base: Path, settings: RowSettings, source: str) -> list[Row]:
+    """Give each entry a name, a folder and complete settings.
 
     A part is called as the entry says, else as its file; files of the same name, as their folders. A folder is the name
     made safe for every system, and numbered if another row has the same, upper and lower case being one.
+
+    Args:
+        entries: of the manifest, without patterns.
+        base: folder from which campaigns are counted.
+        settings: for entries that state none.
+        source: manifest, for errors.
+
+    Returns:
+        Rows in the order of the entries; rows of equal settings share one object.
+
+    Raises:
+        CampaignError: settings that contradict each other, or that no command uses.
     """
-    if not entries:
-        raise CampaignError("the manifest has no rows", file=source, expected="a campaign on each line")
-    _check_used(settings, {entry.commands or settings.commands or _DEFAULT_COMMANDS for entry in entries}, source)
+    check_used(settings, {entry.commands or settings.commands or _DEFAULT_COMMANDS for entry in entries}, source)
     stems = Counter(Path(entry.campaign).stem for entry in entries)
-    used_folders: set[str] = set()
-    complete = cache(
-        lambda row_settings: _complete(row_settings, settings, base, source)
-    )  # rows share one object, for memory
-    rows = []
+    used_folders, namesakes = set[str](), Counter[str]()
+    completed, rows = dict[RowSettings, RowSettings](), list[Row]()
     for entry in entries:
         path = Path(entry.campaign)
-        shared = stems[path.stem] > 1 and path.parent.name not in ("", "..")
-        name = entry.name or (path.parent.name if shared else path.stem)
-        plain = folder_name(name)
-        numbered = (f"{plain} {number}" for number in count(2))
-        folder = next(folder for folder in chain([plain], numbered) if folder.casefold() not in used_folders)
+        is_shared = stems[path.stem] > 1 and path.parent.name not in ("", "..")
+        name = entry.name or (path.parent.name if is_shared else path.stem)
+        folder = plain = folder_name(name)
+        while folder.casefold() in used_folders:
+            namesakes[plain] += 1
+            folder = f"{plain} {namesakes[plain] + 1}"
         used_folders.add(folder.casefold())
-        try:
-            merged = complete(entry.settings)
-        except CampaignError as error:
-            error.place = f"{entry.campaign}, {error.place}"
-            raise
-        rows.append(Row(name, folder, entry.campaign, os.path.abspath(base / path), merged, entry.subgroup))  # noqa: PTH100 - links stay as named
+        stated = entry.with_defaults(RowSettings())
+        if stated not in completed:
+            try:
+                completed[stated] = complete_settings(stated, settings, base, source)
+            except CampaignError as error:
+                error.place = f"{entry.campaign}, {error.place}"
+                raise
+        campaign = os.path.abspath(base / path)  # noqa: PTH100 - links stay as named
+        rows.append(Row(name, folder, entry.campaign, campaign, completed[stated], entry.subgroup))
     return rows
 
 
-def _check_used(settings: RowSettings, rows: Collection[tuple[Command, ...]], source: str) -> None:
-    """Raise a CampaignError for a setting that no command of these rows uses."""
+def check_used(settings: RowSettings, rows: Collection[tuple[Command, ...]], source: str) -> None:
+    """Check that a command uses each setting.
+
+    Args:
+        settings: stated for all rows.
+        rows: commands of the rows.
+        source: manifest, for errors.
+
+    Raises:
+        CampaignError: a setting that no command of these rows uses.
+    """
     for name, users in _COMMANDS_USING.items():
-        used_by = [
-            # predict then uses the fitted model
-            {"diagnose"} if name == "model" and "fit" in commands else set(users)
-            for commands in rows
-        ]
-        is_used = any(not names.isdisjoint(commands) for names, commands in zip(used_by, rows, strict=True))
+        # after a fit, predict uses the fitted model
+        unused = [{*users} - ({"predict"} if name == "model" and "fit" in commands else set()) for commands in rows]
+        is_used = any(not names.isdisjoint(commands) for names, commands in zip(unused, rows, strict=True))
         if getattr(settings, name) is not None and not is_used:
             another = "" if ("run",) in rows else f"--command {users[0]} too, or "
             raise CampaignError(
@@ -316,9 +328,22 @@ def _check_used(settings: RowSettings, rows: Collection[tuple[Command, ...]], so
             )
 
 
-def _complete(row_settings: RowSettings, defaults: RowSettings, base: Path, source: str) -> RowSettings:
-    """RowSettings of a row with every default filled in, checked against each other."""
-    settings = row_settings.with_defaults(defaults)
+def complete_settings(stated: RowSettings, defaults: RowSettings, base: Path, source: str) -> RowSettings:
+    """Fill in every default of a row's settings, and check them against each other.
+
+    Args:
+        stated: settings of the row.
+        defaults: of the manifest and the command line.
+        base: folder from which the model is counted.
+        source: manifest, for errors.
+
+    Returns:
+        Complete settings.
+
+    Raises:
+        CampaignError: settings that contradict each other, or that no command of the row uses.
+    """
+    settings = stated.with_defaults(defaults)
     commands = settings.commands or _DEFAULT_COMMANDS
     if "run" in commands and set(commands) != {"run"}:
         raise CampaignError(
@@ -327,15 +352,11 @@ def _complete(row_settings: RowSettings, defaults: RowSettings, base: Path, sour
             place="commands",
             found=", ".join(commands),
             expected='commands = ["run"], or any of fit, diagnose, predict without it',
-            hint="--command run alone" if row_settings.commands is None else None,
+            hint="--command run alone" if stated.commands is None else None,
         )
-    _check_used(row_settings, [commands], source)
+    check_used(stated, [commands], source)
     if commands == ("predict",) and not settings.model:
-        raise CampaignError(
-            "predict has no model to predict from",
-            file=source,
-            place="commands",
-            expected='commands = ["fit", "predict"], or model = "model.json"',
-        )
+        expected = 'commands = ["fit", "predict"], or model = "model.json"'
+        raise CampaignError("predict has no model to predict from", file=source, place="commands", expected=expected)
     model = os.path.abspath(base / settings.model) if settings.model else None  # noqa: PTH100
     return replace(settings, commands=commands, model=model)

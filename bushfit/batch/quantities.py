@@ -13,8 +13,7 @@ from bushfit.batch.document import Estimate
 from bushfit.effects import get_parameter, is_parameter, parameter_names
 from bushfit.errors import UnitError, did_you_mean
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion
-from bushfit.model.covariance import Z95
-from bushfit.reading.measurement import Sweep, loss_factor
+from bushfit.reading.measurement import Sweep
 from bushfit.units import display_unit, is_compatible, parse_quantity
 from bushfit.validation import converter
 
@@ -138,18 +137,14 @@ def measured_at(sweeps: Iterable[Sweep], point: Point, noise: float) -> dict[str
         Mean of the repeats by the name of the quantity; empty if no sweep has the point.
     """
     for sweep in sweeps:
-        frequency, amplitude = sweep.frequency / point.frequency - 1.0, sweep.amplitude / point.amplitude - 1.0
-        near = (np.abs(frequency) <= _SAME_FREQUENCY) & (np.abs(amplitude) <= _SAME_AMPLITUDE)
+        near = np.abs(sweep.frequency / point.frequency - 1.0) <= _SAME_FREQUENCY
+        near &= np.abs(sweep.amplitude / point.amplitude - 1.0) <= _SAME_AMPLITUDE
         if str(sweep.direction) == point.place and near.any():
-            mean = sweep.stiffness[near].mean(keepdims=True)
-            stiffness, loss, error = abs(complex(mean[0])), float(loss_factor(mean)[0]), noise / near.sum() ** 0.5
-            values = (
-                (STIFFNESS, stiffness, stiffness * error, point.motion.stiffness_unit),
-                (LOSS_FACTOR, loss, (1.0 + loss**2) * error, "1"),
-            )
+            mean, error = complex(sweep.stiffness[near].mean()), noise / near.sum() ** 0.5
+            stiffness, loss = abs(mean), mean.imag / mean.real
             return {
-                f"{name} {point}": Estimate(value, value - Z95 * stderr, value + Z95 * stderr, stderr, unit)
-                for name, value, stderr, unit in values
+                f"{STIFFNESS} {point}": Estimate.normal(stiffness, stiffness * error, point.motion.stiffness_unit),
+                f"{LOSS_FACTOR} {point}": Estimate.normal(loss, (1.0 + loss**2) * error, "1"),
             }
     return {}
 
@@ -165,16 +160,15 @@ def measured_curve(sweeps: Iterable[Sweep]) -> dict[str, float]:
     """
     for sweep in sweeps:
         constant, step = (np.array([float(f"{x:.3g}") for x in values]) for values in (sweep.held, sweep.step))
-        levels = [
-            level for level in np.unique(constant) if sweep.stepped and np.unique(step[constant == level]).size >= 3
-        ]
-        if levels:
-            level = levels[(len(levels) - 1) // 2]
-            steps = np.unique(step[constant == level])
-            curve = {}
-            for x in steps[np.linspace(0, steps.size - 1, min(steps.size, _CURVE_POINTS)).round().astype(int)].tolist():
-                frequency, amplitude = (x, float(level)) if sweep.stepped == "frequency" else (float(level), x)
-                point = Point(str(sweep.direction), frequency, amplitude, sweep.direction.motion.displacement_unit)
-                curve[str(point)] = float(np.abs(sweep.stiffness[(constant == level) & (step == x)]).mean())
-            return curve
+        levels = [level for level in np.unique(constant) if np.unique(step[constant == level]).size >= 3]
+        if not levels or not sweep.stepped:
+            continue
+        level = float(levels[(len(levels) - 1) // 2])
+        steps = np.unique(step[constant == level])
+        curve = {}
+        for x in steps[np.linspace(0, steps.size - 1, min(steps.size, _CURVE_POINTS)).round().astype(int)].tolist():
+            frequency, amplitude = (x, level) if sweep.stepped == "frequency" else (level, x)
+            point = Point(str(sweep.direction), frequency, amplitude, sweep.direction.motion.displacement_unit)
+            curve[str(point)] = float(np.abs(sweep.stiffness[(constant == level) & (step == x)]).mean())
+        return curve
     return {}

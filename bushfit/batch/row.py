@@ -1,7 +1,7 @@
 """One row, as a worker does it: the commands on a campaign, and a record of their results."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -10,14 +10,7 @@ from typing import Any
 from bushfit.batch import store
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.manifest import Row, RowSettings
-from bushfit.batch.quantities import (
-    FIT_QUALITY,
-    LOSS_FACTOR,
-    STIFFNESS,
-    Point,
-    measured_at,
-    measured_curve,
-)
+from bushfit.batch.quantities import FIT_QUALITY, LOSS_FACTOR, STIFFNESS, Point, measured_at, measured_curve
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.commands.diagnose import diagnose
 from bushfit.commands.fit import fit
@@ -30,17 +23,19 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.file import load_result
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
-from bushfit.prediction.stiffness import Band
 from bushfit.prediction.stiffness import predict as predict_stiffness
 from bushfit.reading.files import view_bytes
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.results import Formats, encode_all
 from bushfit.version import __version__
 
+#: Share of a parameter's typical value up to which the amount of an added effect is zero.
+_ZERO = 1e-3
+
 
 @dataclass(frozen=True)
 class RowTask:
-    """RowSettings that all rows of a batch share.
+    """Settings that all rows of a batch share.
 
     Args:
         output: folder of the batch.
@@ -68,36 +63,29 @@ class RowTask:
         if self.version != __version__:
             hint = "install the same version on all workers"
             raise BatchError("a worker runs another bushfit", found=__version__, expected=self.version, hint=hint)
-        _limit_threads()
+        limit_threads()
         key = store.row_key(row, self.points, self.formats)
         if self.resume and (earlier := store.load_row(self.output, row, key)):
             return earlier, True
-        start = time.perf_counter()
-        files: Mapping[str, bytes] = {}
+        start, files = time.perf_counter(), dict[str, bytes]()
         try:
             record, files = evaluate(row, self.points, self.formats)
         except BushfitError as error:
-            record = failed_row(str(error))
+            record = RowFile(status="failed", error=str(error))
         except Exception as error:  # whatever happens to a row costs that row, and is reported
             kind = "out of memory" if isinstance(error, MemoryError) else "a fault in bushfit itself"
-            record = failed_row(f"{kind}: {type(error).__name__}: {error}")
-        seconds = round(time.perf_counter() - start, 4)
+            record = RowFile(status="failed", error=f"{kind}: {type(error).__name__}: {error}")
         digests = {name: store.digest(content) for name, content in files.items()}
-        record = replace(record, key=key, seconds=seconds, files=digests)
+        record = replace(record, key=key, seconds=round(time.perf_counter() - start, 4), files=digests)
         try:
             store.save_row(self.output, row, files, record)
         except OSError as error:
-            return failed_row(f"the results cannot be written: {error}"), False
+            record = RowFile(status="failed", error=f"the results cannot be written: {error}")
         return record, False
 
 
-def failed_row(error: str) -> RowFile:
-    """Record of a row without results."""
-    return RowFile(status="failed", error=error)
-
-
 @cache
-def _limit_threads() -> Any:
+def limit_threads() -> Any:
     """Run linear algebra on one thread in this process: the cores are for rows, and sums keep their order."""
     from threadpoolctl import threadpool_limits
 
@@ -118,40 +106,52 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
     Raises:
         BushfitError: inputs that cannot be used.
     """
-    campaign = load_campaign(Path(row.campaign))
-    result, diagnosis, files = _run_commands(campaign, row.settings, formats)
+    campaign, model = load_campaign(Path(row.campaign)), row.settings.model
+    result, diagnosis, files = run_commands(campaign, row.settings, formats)
     tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
-    inputs = {Path(row.campaign).name: campaign.sha256}
-    inputs |= {str(test.source.file): test.source.sha256 for test in tests if test.source}
-    if row.settings.model:
-        inputs[row.settings.model] = store.digest(view_bytes(Path(row.settings.model), ModelError))
-    values, warnings = estimate_quantities(result, points)
-    noise = result.quality.noise if result.quality else 0.0
-    measured = [measured_at(campaign.sweeps, point, noise) for point in points]
-    alternatives = list[str]()
-    if diagnosis:
-        alternatives += [name for effect in diagnosis.effects for name in effect.alternatives]
-        alternatives += [twin for name in diagnosis.result.unresolved for twin in get_effect(name).twins]
+    sources = [test.source for test in tests if test.source]
+    inputs = {Path(row.campaign).name: campaign.sha256} | {str(source.file): source.sha256 for source in sources}
+    inputs |= {model: store.digest(view_bytes(Path(model), ModelError))} if model else {}
+    quantities, warnings = estimate_quantities(result, points)
+    measured, at_bound = dict[str, Estimate](), dict(result.at_bound)
+    for point in points:
+        measured |= measured_at(campaign.sweeps, point, result.quality.noise if result.quality else 0.0)
+    for name in result.at_bound:
+        parameter = result.model.parameters[name]
+        amount = result.model.values[name] - (parameter.neutral or 0.0)
+        if "." in name and parameter.neutral is not None and abs(amount) <= _ZERO * parameter.typical:
+            del at_bound[name]  # an added effect of zero is a result and not a bound
+    found = diagnosis.effects if diagnosis else ()
+    twins = [twin for name in (diagnosis.result.unresolved if diagnosis else ()) for twin in get_effect(name).twins]
     record = RowFile(
         status="done",
         inputs=inputs,
         campaign_name=campaign.name,
         verdict=diagnosis.verdict if diagnosis else None,
-        effects=[effect.label for effect in diagnosis.effects] if diagnosis else (),
-        alternatives=alternatives,
+        effects=[effect.label for effect in found],
+        alternatives=[*(name for effect in found for name in effect.alternatives), *twins],
         warnings=warnings_of(result, warnings, diagnosis.notes if diagnosis else ()),
-        quantities=values,
-        measured={name: estimate for table in measured for name, estimate in table.items()},
-        at_bound={name: end for name, end in result.at_bound.items() if not is_zero_effect(result, name)},
+        quantities=quantities,
+        measured=measured,
+        at_bound=at_bound,
         curve=measured_curve(campaign.sweeps),
     )
     return record, files
 
 
-def _run_commands(
+def run_commands(
     campaign: Campaign, settings: RowSettings, formats: Formats
 ) -> tuple[Result, Diagnosis | None, dict[str, bytes]]:
-    """Run those of fit, diagnose and predict that the row states, each from the result before; or the whole chain."""
+    """Run those of fit, diagnose and predict that the row states, each from the result before; or the whole chain.
+
+    Args:
+        campaign: of the row.
+        settings: of the row, complete.
+        formats: files to make; the tables of a prediction always are.
+
+    Returns:
+        The last result, the diagnosis if there is one, and the files by name.
+    """
     commands, with_tables = settings.commands or (), replace(formats, tables=True)
     if "run" in commands:
         ran = run(campaign)
@@ -169,21 +169,14 @@ def _run_commands(
             files["joint.json"] = files.pop("model.json")
     if "diagnose" in commands and data:
         options = {name: getattr(settings, name) for name in ("max_effects", "tolerance", "adopt", "without")}
-        options_given = {name: value for name, value in options.items() if value is not None}
-        diagnosed = diagnose(data, model=start, joint=joint, **options_given)
+        stated = {name: value for name, value in options.items() if value is not None}
+        diagnosed = diagnose(data, model=start, joint=joint, **stated)
         result, diagnosis = diagnosed.result, diagnosed.diagnosis
         files |= encode_all(diagnosed.files, formats)
     assert result is not None  # the manifest refuses rows without fit, diagnose or model
     if "predict" in commands:
         files |= encode_all(predict(result, campaign).files, with_tables)
     return result, diagnosis, files
-
-
-def is_zero_effect(result: Result, name: str) -> bool:
-    """True for a parameter of an added effect whose amount is zero, which is a result and not a bound."""
-    parameter = result.model.parameters[name]
-    neutral = parameter.neutral if "." in name else None
-    return neutral is not None and abs(result.model.values[name] - neutral) <= 1e-3 * parameter.typical
 
 
 def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[str, Estimate], list[Sequence[str]]]:
@@ -207,13 +200,13 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
         if place.motion != point.motion:
             expected = f"an amplitude in {place.display.displacement.name}"
             raise BatchError("this amplitude is none of the place", found=str(point), expected=expected)
-        prediction = predict_stiffness(result, place, [point.frequency], [point.amplitude])
-        bands: tuple[tuple[str, Band, str], ...] = (
-            (STIFFNESS, prediction.stiffness, place.motion.stiffness_unit),
-            (LOSS_FACTOR, prediction.loss_factor, "1"),
-        )
-        for name, band, unit in bands:
+        predicted = predict_stiffness(result, place, [point.frequency], [point.amplitude])
+        bands = {
+            STIFFNESS: (predicted.stiffness, place.motion.stiffness_unit),
+            LOSS_FACTOR: (predicted.loss_factor, "1"),
+        }
+        for name, (band, unit) in bands.items():
             value, low, high = (float(values[0]) for values in (band.value, band.low, band.high))
             estimates[f"{name} {point}"] = Estimate.finite(value, low, high, None, unit)
-        warnings.append(prediction.warnings)
+        warnings.append(predicted.warnings)
     return estimates, warnings

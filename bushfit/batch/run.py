@@ -5,11 +5,9 @@ from __future__ import annotations
 import shutil
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 import numpy as np
@@ -18,7 +16,6 @@ from bushfit.batch import store
 from bushfit.batch.document import RowFile
 from bushfit.batch.executor import Workers, run_rows
 from bushfit.batch.junit import junit_report
-from bushfit.batch.row import failed_row
 from bushfit.batch.summary import BatchPlan, BatchResult
 from bushfit.errors import OutputError
 from bushfit.progress import track
@@ -54,31 +51,18 @@ def check_output(plan: BatchPlan, *, force: bool) -> None:
     check_free(output, [], overwrite=True)
     existing = [name for name in (*FILES, store.ROWS_FOLDER) if (output / name).exists()]
     if existing and not replaces:
-        raise OutputError(
-            "there are results already",
-            file=output,
-            found=", ".join(existing),
-            hint="--resume evaluates what is missing; --force evaluates all again; -o/--output names another folder",
-        )
+        hint = "--resume evaluates what is missing; --force evaluates all again; -o/--output names another folder"
+        raise OutputError("there are results already", file=output, found=", ".join(existing), hint=hint)
     if plan.junit:
-        with _naming_junit(plan.junit):
-            report, folder = plan.junit.resolve(), output.resolve()
+        report, folder = plan.junit.resolve(), output.resolve()
+        try:
             if report in [folder / name for name in FILES] or folder / store.ROWS_FOLDER in (report, *report.parents):
-                problem = "the report cannot be inside the results of the rows or replace the table"
-                raise OutputError(problem, file=plan.junit)
+                raise OutputError("the report cannot be inside the results of the rows or replace the table")
             check_free(plan.junit.parent, [plan.junit.name], overwrite=replaces)
-
-
-@contextmanager
-def _naming_junit(junit: Path) -> Iterator[None]:
-    """Let errors of writing the JUnit report name the option --junit."""
-    try:
-        yield
-    except OutputError as error:
-        if error.file:
-            error.file, error.place = junit, "--junit"
+        except OutputError as error:
+            error.file, error.place = plan.junit, "--junit"
             error.hint = "name another file with --junit; --force replaces an existing report"
-        raise
+            raise
 
 
 def run_batch(
@@ -103,17 +87,18 @@ def run_batch(
         BatchError: the workers are lost; finished rows are kept.
         OutputError: the results cannot be written, or another batch is at work in the folder.
     """
-    output = plan.task.output
+    output, start = plan.task.output, time.perf_counter()
     try:
         with store.batch_folder(output):
             for name in FILES:  # they belong to the results that are about to be replaced
                 (output / name).unlink(missing_ok=True)
-            result = run_parts(plan, workers, warn)
+            notes = clear_earlier(plan)
+            records, kept_count = run_parts(plan, workers, warn)
+            result = BatchResult(plan, records, kept_count, time.perf_counter() - start, notes)
             files = encode_all(batch_files(result), plan.formats)
             before_writing(result)
             if plan.junit:
-                with _naming_junit(plan.junit):
-                    write_files(plan.junit.parent, {plan.junit.name: junit_report(result)})
+                write_files(plan.junit.parent, {plan.junit.name: junit_report(result)})
             for name, content in files.items():
                 staged = output / store.STAGE / name
                 staged.write_bytes(content)
@@ -123,8 +108,25 @@ def run_batch(
         raise unwritable(output, error) from error
 
 
-def run_parts(plan: BatchPlan, workers: Workers, warn: Callable[[str], object]) -> BatchResult:
-    """Do all rows, and remove or report the results of rows of an earlier batch.
+def clear_earlier(plan: BatchPlan) -> list[str]:
+    """Remove the results of rows of an earlier batch that are no rows of this one; a batch that resumes keeps them.
+
+    Returns:
+        A sentence on them; empty if there are none.
+    """
+    current = {row.folder for row in plan.rows}
+    records = (plan.task.output / store.ROWS_FOLDER).glob(f"*/{store.ROW_FILE}")
+    folders = [record.parent for record in records if record.parent.name not in current]
+    outcome = "are still in bushings/ (--force removes them)" if plan.task.resume else "were removed from bushings/"
+    for folder in () if plan.task.resume else folders:
+        shutil.rmtree(folder)
+    return (
+        [f"results of {len(folders)} bushings of an earlier batch, no rows of this one, {outcome}"] if folders else []
+    )
+
+
+def run_parts(plan: BatchPlan, workers: Workers, warn: Callable[[str], object]) -> tuple[list[RowFile], int]:
+    """Do all rows.
 
     Args:
         plan: the batch.
@@ -132,25 +134,18 @@ def run_parts(plan: BatchPlan, workers: Workers, warn: Callable[[str], object]) 
         warn: called with a sentence when a cluster has no workers.
 
     Returns:
-        Results of all rows.
+        Their records in the order of the manifest, and the number of those kept from an earlier run.
     """
-    start, count, notes = time.perf_counter(), len(plan.rows), list[str]()
-    if folders := store.list_earlier(plan.task.output, plan.rows):
-        outcome = "are still in bushings/ (--force removes them)" if plan.task.resume else "were removed from bushings/"
-        if not plan.task.resume:
-            for folder in folders:
-                shutil.rmtree(folder)
-        notes = [f"results of {len(folders)} bushings of an earlier batch, no rows of this one, {outcome}"]
-    records: list[RowFile] = [failed_row("")] * count
-    kept_count, failed = 0, Counter[bool]()
-    finished = run_rows(plan.rows, plan.task, lambda why: (failed_row(why), False), workers, warn)
+    count, counts = len(plan.rows), Counter[str]()
+    records = [RowFile(status="failed")] * count
+    finished = run_rows(plan.rows, plan.task, lambda why: (RowFile(status="failed", error=why), False), workers, warn)
     for number, (record, was_kept) in track(
-        "bushings", finished, count, lambda: f"{failed[True]} failed" if failed[True] else ""
+        "bushings", finished, count, lambda: f"{counts['failed']} failed" if counts["failed"] else ""
     ):
         records[number] = replace(record, inputs={}, files={})  # only a later run asks for these
-        kept_count += was_kept
-        failed[record.status == "failed"] += 1
-    return BatchResult.from_records(plan, records, kept_count, time.perf_counter() - start, notes)
+        counts[record.status] += 1
+        counts["kept"] += was_kept
+    return records, counts["kept"]
 
 
 def batch_files(result: BatchResult) -> list[ResultFile]:
@@ -185,13 +180,14 @@ def make_panels(result: BatchResult) -> list[Panel]:
 
     panels = []
     for name, quantity in result.quantities.items():
-        figures, allowed = result.figures.get(name, np.full((4, 1), np.nan)), result.allowed.get(name, ())
-        is_known = np.isfinite(figures[0])
-        if is_known.sum() >= (1 if allowed else 3):
-            displayed = quantity.displayed(float(np.median(figures[0, is_known])))
-            judgements = enumerate(result.judgements)
-            missed = {k for k, judged in judgements if judged and name in judged.misses and is_known[k]}
-            limits, ends = tuple(limit * displayed.factor for limit in allowed), figures[1:3] * displayed.factor
-            interval = ends if np.isfinite(ends).all(axis=0).any() else None
-            panels.append(Panel(displayed.header, figures[0] * displayed.factor, limits, missed, interval))
+        allowed = result.allowed[0].get(name, ())
+        values, low, high, _ = result.figures.get(name, np.full((4, 1), np.nan))
+        is_known = np.isfinite(values)
+        if is_known.sum() < (1 if allowed else 3):
+            continue
+        displayed = quantity.displayed(float(np.median(values[is_known])))
+        missed = {k for k, part in enumerate(result.document.parts) if name in part.misses and is_known[k]}
+        limits, ends = tuple(limit * displayed.factor for limit in allowed), np.stack((low, high)) * displayed.factor
+        interval = ends if np.isfinite(ends).all(axis=0).any() else None
+        panels.append(Panel(displayed.header, values * displayed.factor, limits, missed, interval))
     return panels

@@ -13,11 +13,7 @@ import shutil
 import uuid
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict
-from functools import cache
 from pathlib import Path
-from typing import Any
-
-from pydantic import TypeAdapter
 
 from bushfit.batch.document import ROW_SCHEMA, RowFile
 from bushfit.batch.manifest import Row
@@ -25,6 +21,7 @@ from bushfit.batch.quantities import Point
 from bushfit.errors import BushfitError, OutputError
 from bushfit.reading.files import view_bytes
 from bushfit.report.results import Formats
+from bushfit.validation import to_json_data, validate_tables
 from bushfit.version import __version__
 
 #: Record of a row, in its folder.
@@ -46,11 +43,12 @@ def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
     Returns:
         SHA-256 of settings, points, formats and the version of bushfit.
     """
+    predicts = not {"run", "predict"}.isdisjoint(row.settings.commands or ())  # whose tables are always written
     settings = {
         "settings": asdict(row.settings),
         "points": [str(point) for point in points],
         "tables": formats.tables,
-        "table_form": formats.table_form if formats.tables or row.settings.predicts else None,
+        "table_form": formats.table_form if formats.tables or predicts else None,
         "pictures": formats.picture_forms if formats.pictures else (),
         "pages": formats.pages and row.settings.diagnoses,
     }
@@ -70,7 +68,7 @@ def load_row(output: Path, row: Row, key: str) -> RowFile | None:
     """
     folder, campaign_folder = output / ROWS_FOLDER / row.folder, Path(row.campaign).parent
     with contextlib.suppress(OSError, ValueError, BushfitError):
-        record = row_adapter().validate_json((folder / ROW_FILE).read_bytes())
+        record = validate_tables(json.loads((folder / ROW_FILE).read_bytes()), None, RowFile)
         if record.key == key and record.status == "done":
             files = {campaign_folder / name: sha for name, sha in record.inputs.items()}
             files |= {folder / name: sha for name, sha in record.files.items()}
@@ -91,42 +89,26 @@ def save_row(output: Path, row: Row, files: Mapping[str, bytes], record: RowFile
     Raises:
         OSError: the disk is full or cannot be written.
     """
-    folder, staged = output / ROWS_FOLDER / row.folder, output / STAGE / uuid.uuid4().hex
+    folder, staged, earlier = output / ROWS_FOLDER / row.folder, *(output / STAGE / uuid.uuid4().hex for _ in "12")
     staged.mkdir()
     try:
-        for name, content in files.items():
+        document = json.dumps(to_json_data(record, RowFile), separators=(",", ":")).encode() + b"\n"
+        for name, content in {**files, ROW_FILE: document}.items():
             (staged / name).write_bytes(content)
-        (staged / ROW_FILE).write_bytes(row_adapter().dump_json(record) + b"\n")
-        while True:
-            earlier = output / STAGE / uuid.uuid4().hex
-            with contextlib.suppress(FileNotFoundError):
-                folder.rename(earlier)
-                shutil.rmtree(earlier, ignore_errors=True)
-            try:
-                staged.rename(folder)
-                return
-            except OSError:
-                if not folder.exists():  # else a worker that was given up for lost has just written the same row
-                    raise
+        with contextlib.suppress(FileNotFoundError):
+            folder.rename(earlier)
+        try:
+            staged.rename(folder)
+        except OSError:
+            if not folder.exists():  # else a worker that was given up for lost has just written the same row
+                raise
     finally:
-        shutil.rmtree(staged, ignore_errors=True)
-
-
-@cache
-def row_adapter() -> TypeAdapter[Any]:
-    """pydantic's reader and writer of `row.json`, built once."""
-    return TypeAdapter(RowFile)
+        for path in (staged, earlier):
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
-
-
-def list_earlier(output: Path, rows: Collection[Row]) -> list[Path]:
-    """Folders of rows of an earlier batch that are no rows of this one, sorted."""
-    current = {row.folder for row in rows}
-    records = (output / ROWS_FOLDER).glob(f"*/{ROW_FILE}")
-    return sorted(record.parent for record in records if record.parent.name not in current)
 
 
 @contextlib.contextmanager
@@ -134,37 +116,26 @@ def batch_folder(output: Path) -> Iterator[None]:
     """Keep other batches out of the folder; files that a killed batch left half written are removed.
 
     Returns:
-        A context in which the folder is reserved.
+        A context in which the folder is reserved, where the file system has locks.
 
     Raises:
         OutputError: another batch is running in this folder.
     """
     (output / ROWS_FOLDER).mkdir(parents=True, exist_ok=True)
-    descriptor = _lock(output / ROWS_FOLDER)
-    try:
+    with contextlib.ExitStack() as opened:
+        if os.name == "posix":
+            import fcntl
+
+            descriptor = os.open(output / ROWS_FOLDER, os.O_RDONLY)
+            opened.callback(os.close, descriptor)  # the lock ends with it, or with this process
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                hint = "wait for its end, or name another folder with -o"
+                raise OutputError("another batch is running in this folder", file=output, hint=hint) from None
+            except OSError:  # a file system without locks
+                pass
         shutil.rmtree(output / STAGE, ignore_errors=True)
         (output / STAGE).mkdir()
+        opened.callback(shutil.rmtree, output / STAGE, ignore_errors=True)
         yield
-    finally:
-        shutil.rmtree(output / STAGE, ignore_errors=True)
-        if descriptor is not None:
-            os.close(descriptor)
-
-
-def _lock(folder: Path) -> int | None:
-    """Lock a folder until the descriptor is closed or this process ends; None where there are no such locks."""
-    if os.name != "posix":
-        return None
-    import fcntl
-
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(descriptor)
-        hint = "wait for its end, or name another folder with -o"
-        raise OutputError("another batch is running in this folder", file=folder.parent, hint=hint) from None
-    except OSError:  # a file system without locks
-        os.close(descriptor)
-        return None
-    return descriptor

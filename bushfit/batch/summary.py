@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -71,115 +71,109 @@ class BatchResult:
         records: of the rows, in the order of the manifest.
         kept_count: number of rows kept from an earlier run.
         seconds: that the run took [s].
-        figures: value, low and high end of the 95 % interval, and standard error by quantity [SI], (4, n); NaN if
-            unknown.
-        quantities: all quantities of the batch by name.
-        allowed: lowest and highest allowed value of each quantity with limits [SI].
-        judgements: result of each part against the limits; None without limits, and for a row that failed.
-        poor_fits: how far the model of each part misses its tests, in words; empty if it does not.
-        curves: measured |K| at each point of the curve that most parts share, by column, (n,), NaN where not measured.
-        curve_deviation: of each measured curve from the median, relative, geometric mean over its points, (n,).
-        compared: values and standard errors that the parts are compared by, by name, (n,) each.
-        deviations: of each part from the others, in their standard deviations, by name, (n,).
-        outliers: whether each part differs from the others beyond chance, by name, (n,).
-        notes: on limits that were not judged and on results of an earlier batch.
+        notes: on results of an earlier batch in the folder.
     """
 
     plan: BatchPlan
     records: Sequence[RowFile]
     kept_count: int
     seconds: float
-    figures: Mapping[str, Array]
-    quantities: Mapping[str, PartQuantity]
-    allowed: Mapping[str, tuple[float, float]]
-    judgements: Sequence[Judgement | None]
-    poor_fits: Sequence[str]
-    curves: Mapping[str, Array]
-    curve_deviation: Array
-    compared: Mapping[str, tuple[Array, Array]]
-    deviations: Mapping[str, Array]
-    outliers: Mapping[str, Array]
     notes: Sequence[str]
 
-    @classmethod
-    def from_records(
-        cls, plan: BatchPlan, records: Sequence[RowFile], kept_count: int, seconds: float, notes: Sequence[str]
-    ) -> BatchResult:
-        """Judge the parts by the limits and compare them with each other.
-
-        Args:
-            plan: the batch.
-            records: of the rows, in the order of the manifest.
-            kept_count: number of rows kept from an earlier run.
-            seconds: that the run took [s].
-            notes: on results of an earlier batch in the folder.
-
-        Returns:
-            The results, with each part's judgement and its deviation from the other parts.
-        """
-        figures, limits = dict[str, Array](), plan.limits
-        for index, record in enumerate(records):
+    @cached_property
+    def figures(self) -> dict[str, Array]:
+        """Value, low and high end of the 95 % interval, and standard error by quantity [SI], (4, n); NaN if unknown."""
+        figures = dict[str, Array]()
+        for index, record in enumerate(self.records):
             for name, estimate in record.quantities.items():
-                column = figures.setdefault(name, np.full((4, len(records)), np.nan))
+                column = figures.setdefault(name, np.full((4, len(self.records)), np.nan))
                 numbers = (estimate.value, estimate.low, estimate.high, estimate.stderr)
                 column[:, index] = np.array(numbers, dtype=float)
-        quantities = list_quantities(figures, plan.task.points)
-        values = {name: column[0] for name, column in figures.items()}
-        allowed, idle = resolve_limits(limits, values) if limits else ({}, [])
-        judgements = [
-            judge_part(record, limits, allowed, quantities) if limits and record.status == "done" else None
-            for record in records
-        ]
-        poor_fits = [describe_poor_fit(record, limits) for record in records]
-        curves, shared = dict[str, Array](), Counter(tuple(record.curve) for record in records if record.curve)
+        return figures
+
+    @cached_property
+    def quantities(self) -> dict[str, PartQuantity]:
+        """All quantities of the batch by name."""
+        return list_quantities(self.figures, self.plan.task.points)
+
+    @cached_property
+    def allowed(self) -> tuple[dict[str, tuple[float, float]], list[str]]:
+        """Lowest and highest allowed value of each quantity with limits [SI], and notes on limits not judged."""
+        values = {name: column[0] for name, column in self.figures.items()}
+        return resolve_limits(self.plan.limits, values) if self.plan.limits else ({}, [])
+
+    @cached_property
+    def curves(self) -> dict[str, Array]:
+        """Measured |K| at each point of the curve that most parts share, by column, (n,), NaN where not measured."""
+        shared, curves = Counter(tuple(record.curve) for record in self.records if record.curve), dict[str, Array]()
         points, sharing = max(shared.items(), key=lambda item: item[1], default=((), 0))
-        for point in points if sharing >= FEWEST else ():  # measured |K| at the points that most parts have
-            header = point_quantity(parse_point(point), STIFFNESS)
-            measured = np.array([record.curve.get(point, np.nan) for record in records])
-            curves[f"measured {header.header}"] = header.factor * measured
-        logarithms = np.log([*curves.values()])
-        deviation = logarithms - np.nanmedian(logarithms, axis=1, keepdims=True) if curves else np.empty((0, 0))
-        curve_deviation = np.expm1(deviation.mean(axis=0)) if curves else np.full(len(records), np.nan)
-        # not compared are the quality of a fit, parameters at a bound, and what a poor fit determines
-        compared, poor = dict[str, tuple[Array, Array]](), np.array([bool(reason) for reason in poor_fits])
-        for name in (name for name in quantities if name in figures and name not in FIT_NAMES):
-            value, low, high, stderr = figures[name]
-            at_bound = np.array([name in record.at_bound for record in records])
+        for point in points if sharing >= FEWEST else ():
+            quantity = point_quantity(parse_point(point), STIFFNESS)
+            measured = np.array([record.curve.get(point, np.nan) for record in self.records])
+            curves[f"measured {quantity.header}"] = quantity.factor * measured
+        return curves
+
+    @cached_property
+    def curve_deviation(self) -> Array:
+        """Relative deviation of each measured curve from the median, geometric mean over its points, (n,)."""
+        if not self.curves:
+            return np.full(len(self.records), np.nan)
+        logarithms = np.log([*self.curves.values()])
+        return np.expm1((logarithms - np.nanmedian(logarithms, axis=1, keepdims=True)).mean(axis=0))
+
+    @cached_property
+    def compared(self) -> dict[str, tuple[Array, Array]]:
+        """Values and standard errors that the parts are compared by, by name, (n,) each.
+
+        Left out are the quality of a fit, parameters at a bound, and what a poor fit determines.
+        """
+        compared = dict[str, tuple[Array, Array]]()
+        is_poor = np.array([bool(describe_poor_fit(record, self.plan.limits)) for record in self.records])
+        for name in (name for name in self.quantities if name in self.figures and name not in FIT_NAMES):
+            value, low, high, stderr = self.figures[name]
+            is_unknown = is_poor | np.array([name in record.at_bound for record in self.records])
             errors = np.where(np.isfinite(stderr), stderr, (high - low) / (2.0 * Z95))
-            compared[name] = np.where(at_bound | poor, np.nan, value), errors
-        compared[_CURVE] = curve_deviation, np.full(len(records), np.nan)
-        compared = {name: pair for name, pair in compared.items() if np.isfinite(pair[0]).sum() >= FEWEST}
-        return cls(
-            plan, records, kept_count, seconds, figures, quantities, allowed, judgements, poor_fits, curves,
-            curve_deviation, compared, *find_outliers(compared), [*idle, *notes],
-        )  # fmt: skip
+            compared[name] = np.where(is_unknown, np.nan, value), errors
+        compared[_CURVE] = self.curve_deviation, np.full(len(self.records), np.nan)
+        return {name: pair for name, pair in compared.items() if np.isfinite(pair[0]).sum() >= FEWEST}
+
+    @cached_property
+    def outliers(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Deviation of each part from the others, and whether it differs beyond chance, by name, (n,) each."""
+        return find_outliers(self.compared)
 
     @cached_property
     def document(self) -> BatchFile:
         """The results as `batch.json` has them."""
         columns = {name: quantity.tabled for name, quantity in self.quantities.items() if name in self.figures}
-        labels = self.labels
-        parts = [self.part_table(index, columns, labels) for index in range(len(self.records))]
+        parts = [self.part_table(index, columns) for index in range(len(self.records))]
         count = int(max((np.isfinite(values).sum() for values, _ in self.compared.values()), default=0))
-        names = {
-            "failed": [part.name for part in parts if part.error],
-            "missed": [part.name for part in parts if part.misses],
-            "conditional": [part.name for part in parts if part.result == "conditional pass" and not part.misses],
-            "not judged": [part.name for part in parts if part.result == "not judged"],
-            "differ": [part.name for part in parts if part.deviations],
-        }
+        failed = [part.name for part in parts if part.error]
+        missed = [part.name for part in parts if part.misses]
+        not_judged = [part.name for part in parts if part.result == "not judged"]
+        differ = [part.name for part in parts if part.deviations]
+        total = f"{len(parts)} part{'s' * (len(parts) != 1)}"
+        if self.plan.limits is None:
+            headline = f"{len(parts) - len(failed)} of {total} evaluated" if failed else f"{total} evaluated"
+        elif missed:
+            headline = f"{len(missed)} of {total} fail{'s' * (len(missed) == 1)}"
+        else:
+            headline = f"{len(parts) - len(failed) - len(not_judged)} of {total} pass"
+        headline += f"; {len(not_judged)} not judged: poor fit" if not_judged else ""
+        headline += f"; {len(failed)} could not be evaluated" if failed else ""
+        headline += f"; {len(differ)} differ{'s' * (len(differ) == 1)} from the others" if differ else ""
         return BatchFile(
             title=self.plan.title,
             rows=len(parts),
-            done=len(parts) - len(names["failed"]),
+            done=len(parts) - len(failed),
             limits=Counter(part.result for part in parts if part.result),
-            failed=names["failed"],
-            missed=names["missed"],
-            conditional=names["conditional"],
-            not_judged=names["not judged"],
-            differ=names["differ"],
-            headline=self.headline(names),
-            warnings=self.warnings(),
+            failed=failed,
+            missed=missed,
+            conditional=[part.name for part in parts if part.result == "conditional pass" and not part.misses],
+            not_judged=not_judged,
+            differ=differ,
+            headline=headline,
+            warnings=self.warnings(parts),
             detectable=smallest_deviation(count, len(self.compared)),
             quantities={column.header: self.quantity_table(name, column) for name, column in columns.items()},
             curve_points=[*self.curves],
@@ -203,50 +197,47 @@ class BatchResult:
             Entry of `batch.json`, in the unit of the column.
         """
         values = self.figures[name][0] * column.factor
-        finite_values = values[np.isfinite(values)]
-        median, sigma = scatter(finite_values)
-        detectable = None
+        known, detectable = values[np.isfinite(values)], None
         if name in self.compared:
-            usual = values[np.isfinite(self.compared[name][0]) & ~self.outliers[name]]
-            limit = smallest_deviation(int(np.isfinite(self.compared[name][0]).sum()), len(self.compared))
-            detectable = limit and limit * float(usual.std(ddof=1))
-        low, high = (end * column.factor for end in self.allowed.get(name, (-np.inf, np.inf)))
-        fixed = self.plan.limits.bounds[name].fixed if self.plan.limits and name in self.allowed else (-np.inf, np.inf)
-        fixed = fixed if name not in FIT_NAMES else (-np.inf, np.inf)
-        cp, cpk = capability(finite_values, *(end * column.factor for end in fixed))
-        minimum, maximum = (end if np.isfinite(end) else None for end in (low, high))
-        return QuantityTable(
-            parts=finite_values.size,
-            median=median,
-            sigma=sigma,
-            detectable=detectable,
-            min=minimum,
-            max=maximum,
-            cp=cp,
-            cpk=cpk,
-        )
+            is_compared = np.isfinite(self.compared[name][0])
+            limit = smallest_deviation(int(is_compared.sum()), len(self.compared))
+            detectable = limit and limit * float(values[is_compared & ~self.outliers[1][name]].std(ddof=1))
+        low, high = self.allowed[0].get(name, (-np.inf, np.inf))
+        fixed = (-np.inf, np.inf)
+        if self.plan.limits and name in self.allowed[0] and name not in FIT_NAMES:
+            fixed = self.plan.limits.bounds[name].fixed
+        median, sigma = scatter(known)
+        cp, cpk = capability(known, *(end * column.factor for end in fixed))
+        minimum, maximum = (end * column.factor if np.isfinite(end) else None for end in (low, high))
+        return QuantityTable(known.size, median, sigma, detectable, minimum, maximum, cp, cpk)
 
-    def part_table(
-        self, index: int, columns: Mapping[str, PartQuantity], labels: Mapping[str, Sequence[str]]
-    ) -> PartTable:
+    def part_table(self, index: int, columns: Mapping[str, PartQuantity]) -> PartTable:
         """Make the entry of one part in `batch.json`.
 
         Args:
             index: number of the part.
             columns: quantities by name, in the units of their columns.
-            labels: texts of all parts, by column.
 
         Returns:
             Result, deviations from the other parts, and values.
         """
-        row, record, judgement = self.plan.rows[index], self.records[index], self.judgements[index] or Judgement(None)
-        outlying = {
-            name: float(self.deviations[name][index]) for name, differs in self.outliers.items() if differs[index]
-        }
+        row, record, limits = self.plan.rows[index], self.records[index], self.plan.limits
+        judgement = Judgement(None)
+        if limits and record.status == "done":
+            judgement = judge_part(record, limits, self.allowed[0], self.quantities)
+        deviations, outliers = self.outliers
+        outlying = {name: float(deviations[name][index]) for name, differs in outliers.items() if differs[index]}
         outlying = dict(sorted(outlying.items(), key=lambda item: (not is_parameter(item[0]), -abs(item[1]))))
         relative = {_CURVE: self.curve_deviation[index]}
         for name in outlying.keys() - {_CURVE}:
             relative[name] = self.figures[name][0, index] / np.nanmedian(self.figures[name][0]) - 1.0
+        labels = dict[str, str]()
+        if any(row.settings.diagnoses for row in self.plan.rows):
+            labels["verdict"] = record.verdict or ""
+            labels["named effects"] = ", ".join(record.effects)
+            labels["cannot be told from"] = ", ".join(record.alternatives)
+        labels["on a bound"] = ", ".join(f"{name} ({end})" for name, end in record.at_bound.items())
+        labels |= {"campaign name": record.campaign_name, "subgroup": row.subgroup or ""}
         values = [self.figures[name][0, index] * column.factor for name, column in columns.items()]
         curve = [float(column[index]) for column in self.curves.values()]
         return PartTable(
@@ -256,78 +247,45 @@ class BatchResult:
             result=judgement.result,
             misses=judgement.misses,
             doubtful=judgement.doubtful,
-            poor_fit=self.poor_fits[index],
+            poor_fit=describe_poor_fit(record, limits),
             deviations={name: round(z, 2) for name, z in outlying.items()},
             differs="; ".join(f"{name} {number(100.0 * relative[name], 3, '+')} %" for name in outlying),
             warnings=record.warnings,
-            labels={name: texts[index] for name, texts in labels.items()},
+            labels=labels,
             values=[float(value) if np.isfinite(value) else None for value in values],
             curve=curve if curve and np.isfinite(curve).all() else None,
         )
 
-    @property
-    def labels(self) -> dict[str, list[str]]:
-        """Texts of each row in the table, by column."""
-        records, labels = self.records, dict[str, list[str]]()
-        if any(row.settings.diagnoses for row in self.plan.rows):
-            labels["verdict"] = [record.verdict or "" for record in records]
-            labels["named effects"] = [", ".join(record.effects) for record in records]
-            labels["cannot be told from"] = [", ".join(record.alternatives) for record in records]
-        bounds = [record.at_bound.items() for record in records]
-        labels["on a bound"] = [", ".join(f"{name} ({end})" for name, end in ends) for ends in bounds]
-        labels["campaign name"] = [record.campaign_name for record in records]
-        labels["subgroup"] = [row.subgroup or "" for row in self.plan.rows]
-        return labels
-
-    def headline(self, names: Mapping[str, Sequence[str]]) -> str:
-        """Write the sentence on the number of parts that pass, fail or differ.
+    def warnings(self, parts: Sequence[PartTable]) -> list[str]:
+        """Warnings of the whole batch, the important ones first.
 
         Args:
-            names: of the parts that failed, missed a limit, were not judged or differ, by kind.
-
-        Returns:
-            Such as "2 of 40 parts fail; 1 differs from the others".
-        """
-        count, missed, failed = len(self.records), len(names["missed"]), len(names["failed"])
-        parts = "1 part" if count == 1 else f"{count} parts"
-        if self.plan.limits is None:
-            clauses = [f"{count - failed} of {parts} evaluated" if failed else f"{parts} evaluated"]
-        elif missed:
-            clauses = [f"{missed} of {parts} fail{'s' * (missed == 1)}"]
-        else:
-            clauses = [f"{count - failed - len(names['not judged'])} of {parts} pass"]
-        counted = {
-            "not judged: poor fit": len(names["not judged"]),
-            "could not be evaluated": failed,
-            "differ from the others": len(names["differ"]),
-        }
-        clauses += [f"{number} {words}" for words, number in counted.items() if number]
-        return "; ".join(clauses).replace("1 differ from", "1 differs from")
-
-    def warnings(self) -> list[str]:
-        """Warnings of the whole batch, the important ones first.
+            parts: entries of `batch.json`.
 
         Returns:
             Sentences that name the parts.
         """
-        names = [row.name for row in self.plan.rows]
-        outside = [any(BEYOND in line for line in record.warnings) for record in self.records]
-        at_bound = dict[str, list[str]]()
-        for name, record in zip(names, self.records, strict=True):
+
+        def listed(names: Sequence[str]) -> str:
+            more = f" and {len(names) - _NAMES_LISTED} more" if len(names) > _NAMES_LISTED else ""
+            return ", ".join(names[:_NAMES_LISTED]) + more
+
+        at_bound, outside, warnings = dict[str, list[str]](), list[str](), list[str]()
+        for part, record in zip(parts, self.records, strict=True):
             for parameter in record.at_bound:
-                at_bound.setdefault(parameter, []).append(name)
-        poor = [name for name, reason in zip(names, self.poor_fits, strict=True) if reason]
-        warnings = []
-        if poor:
+                at_bound.setdefault(parameter, []).append(part.name)
+            if any(BEYOND in line for line in record.warnings):
+                outside.append(part.name)
+        if poor := [part.name for part in parts if part.poor_fit]:
             judged = "; their limits are judged on measured points, if such points exist" if self.plan.limits else ""
-            warnings.append(f"the model misses the tests of {_listed(poor)}: do not use their parameters{judged}")
-        warnings += self.notes
+            warnings.append(f"the model misses the tests of {listed(poor)}: do not use their parameters{judged}")
+        warnings += [*self.allowed[1], *self.notes]
         if at_bound:
-            clauses = [f"{parameter} of {_listed(parts)}" for parameter, parts in at_bound.items()]
+            clauses = [f"{parameter} of {listed(names)}" for parameter, names in at_bound.items()]
             warnings.append(f"at a bound of the fit, because the tests do not determine them: {'; '.join(clauses)}")
-        if any(outside):
-            parts = [name for name, is_outside in zip(names, outside, strict=True) if is_outside]
-            warnings.append(f"a point is outside the tested range, where no test confirms the model: {_listed(parts)}")
+        if outside:
+            sentence = "a point is outside the tested range, where no test confirms the model"
+            warnings.append(f"{sentence}: {listed(outside)}")
         return warnings
 
     def table(self) -> pd.DataFrame:
@@ -340,45 +298,36 @@ class BatchResult:
         """
         import pandas as pd
 
-        rows, judgements, parts = self.plan.rows, self.judgements, self.document.parts
-        texts: dict[str, Sequence[str]] = {
-            "name": [row.name for row in rows],
-            "campaign": [row.listed for row in rows],
-            "folder": [part.folder for part in parts],
-            "status": [record.status for record in self.records],
-            "error": [part.error for part in parts],
+        def texts(cells: Iterable[str]) -> pd.Series[str]:
+            return pd.Series(list(cells), dtype=object)
+
+        parts, unknown = self.document.parts, np.full((4, len(self.records)), np.nan)
+        columns: dict[str, Any] = {
+            "name": texts(part.name for part in parts),
+            "campaign": texts(row.listed for row in self.plan.rows),
+            "folder": texts(part.folder for part in parts),
+            "status": texts(record.status for record in self.records),
+            "error": texts(part.error for part in parts),
         }
         if self.plan.limits:
-            texts["limits"] = [(judged and judged.result) or "" for judged in judgements]
-            texts["out of limits"] = ["; ".join(judged.misses.values()) if judged else "" for judged in judgements]
-            texts["on the edge"] = ["; ".join(judged.doubtful.values()) if judged else "" for judged in judgements]
-        last = ("on a bound", "campaign name", "subgroup")
-        texts |= {name: column for name, column in self.labels.items() if name not in last}
-        numbers, unknown = dict[str, Array](), np.full((4, len(self.records)), np.nan)
+            columns["limits"] = texts(part.result or "" for part in parts)
+            columns["out of limits"] = texts("; ".join(part.misses.values()) for part in parts)
+            columns["on the edge"] = texts("; ".join(part.doubtful.values()) for part in parts)
+        labels = {name: texts(part.labels[name] for part in parts) for name in parts[0].labels}
+        last = {name: labels.pop(name) for name in ("on a bound", "campaign name", "subgroup")}
+        columns |= labels
         for name, quantity in self.quantities.items():
             endings = _PARAMETER_COLUMNS if is_parameter(name) else {"": 0} if name in FIT_NAMES else _POINT_COLUMNS
             column = quantity.tabled
             for ending, line in endings.items():
-                numbers[column.header + ending] = self.figures.get(name, unknown)[line] * column.factor
-        ending_texts = {
-            "on a bound": self.labels["on a bound"],
-            "warnings": [BETWEEN.join(record.warnings) for record in self.records],
-            "campaign name": self.labels["campaign name"],
-            "subgroup": self.labels["subgroup"],
-            "differs in": [part.differs for part in parts],
-            "poor fit": self.poor_fits,
+                columns[column.header + ending] = self.figures.get(name, unknown)[line] * column.factor
+        columns |= {
+            "on a bound": last.pop("on a bound"),
+            "warnings": texts(BETWEEN.join(record.warnings) for record in self.records),
+            **last,
+            "differs in": texts(part.differs for part in parts),
+            "poor fit": texts(part.poor_fit for part in parts),
         }
-        deviations = {f"robust z of {name} [-]": z for name, z in self.deviations.items()}
-        curve = {"measured stiffness off the median [%]": 100.0 * self.curve_deviation} if self.curves else {}
-
-        def as_objects(columns: Mapping[str, Sequence[str]]) -> dict[str, pd.Series[str]]:
-            return {name: pd.Series(cells, dtype=object) for name, cells in columns.items()}
-
-        return pd.DataFrame(
-            {**as_objects(texts), **numbers, **as_objects(ending_texts), **deviations, **curve, **self.curves}
-        )
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _NAMES_LISTED} more" if len(names) > _NAMES_LISTED else ""
-    return ", ".join(names[:_NAMES_LISTED]) + more
+        columns |= {f"robust z of {name} [-]": z for name, z in self.outliers[0].items()}
+        columns |= {"measured stiffness off the median [%]": 100.0 * self.curve_deviation} if self.curves else {}
+        return pd.DataFrame({**columns, **self.curves})

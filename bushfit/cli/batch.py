@@ -93,7 +93,7 @@ def command(
 
     # Workers import their modules while this process reads the manifest.
     workers = local_workers(jobs or os.cpu_count() or 1) if scheduler is None else dask_workers(scheduler)
-    from bushfit.batch.limits import check_limits, read_limits
+    from bushfit.batch.limits import read_limits
     from bushfit.batch.manifest import RowSettings, read_manifest
     from bushfit.batch.quantities import parse_point
     from bushfit.batch.row import RowTask
@@ -104,9 +104,7 @@ def command(
     names = tuple(get_effect(name).name for name in effects)
     settings = RowSettings(commands=commands or None, directions=directions or None, effects=names or None)
     listed = read_manifest(manifest[0], settings, *manifest[1:])
-    judged_by = read_limits(limits) if limits else None
-    if limits and judged_by:
-        check_limits(judged_by, limits, listed.rows)
+    judged_by = read_limits(limits, listed.rows) if limits else None
     with error_location(place="--at"):
         points = (*listed.points, *map(parse_point, operating_points), *(judged_by.points if judged_by else ()))
     formats = replace(output.formats, tables=tables, pictures=plots and output.formats.pictures, pages=reports)

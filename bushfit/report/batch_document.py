@@ -12,7 +12,7 @@ BATCH_SCHEMA: Literal["bushfit/batch/2"] = "bushfit/batch/2"
 LimitResult = Literal["pass", "conditional pass", "not judged", "conditional fail", "fail"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class QuantityTable:
     """Scatter, limits and capability of a quantity over the parts, in the unit of its column."""
 
