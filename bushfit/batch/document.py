@@ -65,31 +65,21 @@ class RowFile:
     error: Annotated[str, Field(description="Why the row failed; empty if it is done.")] = ""
     seconds: Annotated[float, Field(description="Computing time of the row [s].")] = 0.0
     key: Annotated[str, Field(description="Hash of the settings of the row and of the version of bushfit.")] = ""
-    inputs: Annotated[Mapping[str, str], Field(description="SHA-256 of campaign, tests and model, by file.")] = field(
-        default_factory=dict
-    )
-    files: Annotated[Mapping[str, str], Field(description="SHA-256 of the result files beside this one.")] = field(
-        default_factory=dict
-    )
+    inputs: Annotated[Mapping[str, str], Field(description="SHA-256 of each input file.")] = field(default_factory=dict)
+    files: Annotated[Mapping[str, str], Field(description="SHA-256 of each result file.")] = field(default_factory=dict)
     campaign_name: Annotated[str, Field(description="Name that the campaign gives the part.")] = ""
     verdict: Annotated[document.Verdict | None, Field(description="Verdict of diagnose; null without it.")] = None
     effects: Annotated[Sequence[str], Field(description="Effects that diagnose named.")] = ()
-    alternatives: Annotated[
-        Sequence[str], Field(description="Effects that the tests cannot distinguish from them.")
-    ] = ()
+    alternatives: Annotated[Sequence[str], Field(description="Effects that these tests cannot distinguish.")] = ()
     warnings: Annotated[Sequence[str], Field(description="Warnings of the fit and of the predictions.")] = ()
     quantities: Annotated[
         Mapping[str, Estimate],
         Field(description="Parameters, NRMSE, reduced chi-square, stiffness and loss factor at the points, by name."),
     ] = field(default_factory=dict)
     measured: Annotated[
-        Mapping[str, Estimate],
-        Field(description="Stiffness and loss factor as measured at the points, where a sweep has the point."),
+        Mapping[str, Estimate], Field(description="Stiffness and loss factor as measured at the points, where known.")
     ] = field(default_factory=dict)
-    at_bound: Annotated[Mapping[str, End], Field(description="Parameters at a bound of their fit.")] = field(
-        default_factory=dict
-    )
+    at_bound: Annotated[Mapping[str, End], Field(description="Parameters at a bound.")] = field(default_factory=dict)
     curve: Annotated[
-        Mapping[str, float],
-        Field(description="|K| [SI] of the first sweep at its middle level, by operating point."),
+        Mapping[str, float], Field(description="|K| [SI] of the first sweep at its middle level, by operating point.")
     ] = field(default_factory=dict)

@@ -72,8 +72,8 @@ class Bounds:
     at_least: Annotated[int, Field(ge=3)] = 10
 
     def __post_init__(self) -> None:
-        is_stated = [value is not None for value in (self.min, self.max, self.nominal, self.sigma)]
-        if not any(is_stated) or (self.nominal is None) != (self.tolerance is None):
+        is_empty = {self.min, self.max, self.nominal, self.sigma} == {None}
+        if is_empty or (self.nominal is None) != (self.tolerance is None):
             expected = "min, max, nominal with tolerance, or sigma"
             raise ValueError(CampaignError("these keys make no limit", expected=expected))
         if self.min is not None and self.max is not None and self.min >= self.max:
@@ -168,16 +168,17 @@ class Limits:
 
     @property
     def points(self) -> tuple[Point, ...]:
-        return tuple(dict.fromkeys(bounds.at for bounds in (*self.stiffness, *self.loss_factor)))
+        tables: tuple[StiffnessBounds | LossFactorBounds, ...] = (*self.stiffness, *self.loss_factor)
+        return tuple(dict.fromkeys(table.at for table in tables))
 
     @property
     def bounds(self) -> dict[str, Bounds]:
         """Limits by the name of the quantity."""
-        at_points: dict[str, Bounds] = {f"{STIFFNESS} {bounds.at}": bounds for bounds in self.stiffness}
-        at_points |= {f"{LOSS_FACTOR} {table.at}": table for table in self.loss_factor}
+        bounds: dict[str, Bounds] = {**self.parameters}
+        bounds |= {f"{STIFFNESS} {stiffness.at}": stiffness for stiffness in self.stiffness}
+        bounds |= {f"{LOSS_FACTOR} {loss_factor.at}": loss_factor for loss_factor in self.loss_factor}
         largest = {quantity.name: getattr(self, key) for key, quantity in FIT_QUALITY.items()}
-        of_fit = {name: Bounds(max=limit) for name, limit in largest.items() if limit is not None}
-        return {**self.parameters, **at_points, **of_fit}
+        return bounds | {name: Bounds(max=limit) for name, limit in largest.items() if limit is not None}
 
 
 def read_limits(path: Path, rows: Sequence[Row]) -> Limits:
@@ -242,23 +243,9 @@ def describe_poor_fit(record: RowFile, limits: Limits | None) -> str:
     return f"the model misses the tests: NRMSE {number(100 * nrmse.value, 3)} %, above {number(100 * largest, 3)} %"
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """Result of a part, the limits it misses, and those that it passes conditionally or that were not judged.
-
-    Args:
-        result: the worst of all; None without limits.
-        misses, doubtful: sentences by the name of the quantity.
-    """
-
-    result: LimitResult | None = "pass"
-    misses: Mapping[str, str] = field(default_factory=dict)
-    doubtful: Mapping[str, str] = field(default_factory=dict)
-
-
 def judge_part(
     record: RowFile, limits: Limits, allowed: Mapping[str, tuple[float, float]], quantities: Mapping[str, PartQuantity]
-) -> Judgement:
+) -> tuple[LimitResult, dict[str, str], dict[str, str]]:
     """Judge a part by the limits.
 
     Args:
@@ -268,20 +255,21 @@ def judge_part(
         quantities: how each is written.
 
     Returns:
-        The worst result, and sentences on the limits that are missed or doubtful.
+        The worst result; and sentences by quantity on the limits that the part misses, and on those that it passes
+        conditionally or that were not judged.
     """
     poor, outcomes = describe_poor_fit(record, limits), dict[str, tuple[LimitResult, str]]()
     for name in dict.fromkeys((*allowed, *record.at_bound)):
         low, high = allowed.get(name, (-math.inf, math.inf))
-        estimate, bound, source = record.quantities.get(name), record.at_bound.get(name), ""
+        bound, source = record.at_bound.get(name), ""
+        estimate = record.quantities.get(name)
+        if estimate and poor and name not in FIT_NAMES:
+            estimate, bound, source = record.measured.get(name), None, "measured "
         if estimate is None:
-            outcomes[name] = "fail", f"{name} is not known"
+            outcomes[name] = (
+                ("not judged", f"{name} not judged: poor fit") if source else ("fail", f"{name} is not known")
+            )
             continue
-        if poor and name not in FIT_NAMES:
-            if name not in record.measured:
-                outcomes[name] = "not judged", f"{name} not judged: poor fit"
-                continue
-            estimate, bound, source = record.measured[name], None, "measured "
         result = judge_value(estimate, low, high)
         if bound:
             result = max(result, "conditional pass", key=RESULTS.index)
@@ -289,11 +277,11 @@ def judge_part(
     if limits.verdicts and record.verdict not in limits.verdicts:
         sentence = f"verdict {record.verdict or 'not known'}, allowed {', '.join(limits.verdicts)}"
         outcomes["verdict"] = "fail", sentence
-    tolerated = RESULTS[1 : RESULTS.index("conditional pass" if limits.guard else "conditional fail")]
-    doubtful = {name: text for name, (result, text) in outcomes.items() if result in ("not judged", *tolerated)}
+    tolerated = ("not judged",) if limits.guard else ("not judged", "conditional pass")
+    doubtful = {name: sentence for name, (result, sentence) in outcomes.items() if result in tolerated}
     misses = {name: text for name, (result, text) in outcomes.items() if result != "pass" and name not in doubtful}
     worst = max((result for result, _ in outcomes.values()), key=RESULTS.index, default=RESULTS[0])
-    return Judgement(worst, misses, doubtful)
+    return worst, misses, doubtful
 
 
 def judge_value(estimate: Estimate, low: float, high: float) -> LimitResult:

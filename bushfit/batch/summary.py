@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 
 from bushfit.batch.comparison import FEWEST, capability, find_outliers, smallest_deviation
 from bushfit.batch.document import RowFile
-from bushfit.batch.limits import Judgement, Limits, describe_poor_fit, judge_part, resolve_limits
+from bushfit.batch.limits import Limits, describe_poor_fit, judge_part, resolve_limits
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import FIT_NAMES, STIFFNESS, PartQuantity, list_quantities, parse_point, point_quantity
 from bushfit.batch.row import RowTask
@@ -222,9 +222,9 @@ class BatchResult:
             Result, deviations from the other parts, and values.
         """
         row, record, limits = self.plan.rows[index], self.records[index], self.plan.limits
-        judgement = Judgement(None)
+        result, misses, doubtful = None, dict[str, str](), dict[str, str]()
         if limits and record.status == "done":
-            judgement = judge_part(record, limits, self.allowed[0], self.quantities)
+            result, misses, doubtful = judge_part(record, limits, self.allowed[0], self.quantities)
         deviations, outliers = self.outliers
         outlying = {name: float(deviations[name][index]) for name, differs in outliers.items() if differs[index]}
         outlying = dict(sorted(outlying.items(), key=lambda item: (not is_parameter(item[0]), -abs(item[1]))))
@@ -244,9 +244,9 @@ class BatchResult:
             name=row.name,
             folder=f"{ROWS_FOLDER}/{row.folder}" if record.status == "done" else "",
             error=" ".join(record.error.split()),
-            result=judgement.result,
-            misses=judgement.misses,
-            doubtful=judgement.doubtful,
+            result=result,
+            misses=misses,
+            doubtful=doubtful,
             poor_fit=describe_poor_fit(record, limits),
             deviations={name: round(z, 2) for name, z in outlying.items()},
             differs="; ".join(f"{name} {number(100.0 * relative[name], 3, '+')} %" for name in outlying),
@@ -298,36 +298,31 @@ class BatchResult:
         """
         import pandas as pd
 
-        def texts(cells: Iterable[str]) -> pd.Series[str]:
-            return pd.Series(list(cells), dtype=object)
-
-        parts, unknown = self.document.parts, np.full((4, len(self.records)), np.nan)
+        records, parts, unknown = self.records, self.document.parts, np.full((4, len(self.records)), np.nan)
         columns: dict[str, Any] = {
-            "name": texts(part.name for part in parts),
-            "campaign": texts(row.listed for row in self.plan.rows),
-            "folder": texts(part.folder for part in parts),
-            "status": texts(record.status for record in self.records),
-            "error": texts(part.error for part in parts),
+            "name": [part.name for part in parts],
+            "campaign": [row.listed for row in self.plan.rows],
+            "folder": [part.folder for part in parts],
+            "status": [record.status for record in records],
+            "error": [part.error for part in parts],
         }
         if self.plan.limits:
-            columns["limits"] = texts(part.result or "" for part in parts)
-            columns["out of limits"] = texts("; ".join(part.misses.values()) for part in parts)
-            columns["on the edge"] = texts("; ".join(part.doubtful.values()) for part in parts)
-        labels = {name: texts(part.labels[name] for part in parts) for name in parts[0].labels}
-        last = {name: labels.pop(name) for name in ("on a bound", "campaign name", "subgroup")}
+            columns["limits"] = [part.result or "" for part in parts]
+            columns["out of limits"] = ["; ".join(part.misses.values()) for part in parts]
+            columns["on the edge"] = ["; ".join(part.doubtful.values()) for part in parts]
+        labels = {name: [part.labels[name] for part in parts] for name in parts[0].labels}
+        bounds, *last = (labels.pop(name) for name in ("on a bound", "campaign name", "subgroup"))
         columns |= labels
         for name, quantity in self.quantities.items():
             endings = _PARAMETER_COLUMNS if is_parameter(name) else {"": 0} if name in FIT_NAMES else _POINT_COLUMNS
-            column = quantity.tabled
             for ending, line in endings.items():
-                columns[column.header + ending] = self.figures.get(name, unknown)[line] * column.factor
-        columns |= {
-            "on a bound": last.pop("on a bound"),
-            "warnings": texts(BETWEEN.join(record.warnings) for record in self.records),
-            **last,
-            "differs in": texts(part.differs for part in parts),
-            "poor fit": texts(part.poor_fit for part in parts),
-        }
+                figures = self.figures.get(name, unknown)[line]
+                columns[quantity.tabled.header + ending] = figures * quantity.tabled.factor
+        columns["on a bound"] = bounds
+        columns["warnings"] = [BETWEEN.join(record.warnings) for record in records]
+        columns["campaign name"], columns["subgroup"] = last
+        columns["differs in"] = [part.differs for part in parts]
+        columns["poor fit"] = [part.poor_fit for part in parts]
         columns |= {f"robust z of {name} [-]": z for name, z in self.outliers[0].items()}
         columns |= {"measured stiffness off the median [%]": 100.0 * self.curve_deviation} if self.curves else {}
-        return pd.DataFrame({**columns, **self.curves})
+        return pd.DataFrame(columns | self.curves)

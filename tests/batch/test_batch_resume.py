@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 import os
 import signal
 import subprocess
@@ -21,10 +20,11 @@ import pytest
 from trees import PATTERN, command, kept, list_many, stamps, tree, wait_for
 
 from bushfit.batch import store
+from bushfit.batch.document import RowFile
 from bushfit.batch.executor import local_workers, run_rows
 from bushfit.batch.manifest import Row, RowSettings, read_manifest
 from bushfit.batch.quantities import parse_point
-from bushfit.batch.row import RowTask, failed_row
+from bushfit.batch.row import RowTask
 from bushfit.errors import BatchError
 from bushfit.report.results import Formats
 
@@ -177,20 +177,11 @@ def test_a_worker_that_dies_costs_a_second_try_and_only_what_always_kills_is_giv
     assert len(list(tmp_path.iterdir())) == len(once + deadly)
 
 
-def test_workers_that_die_between_rows_are_replaced(tmp_path: Path) -> None:
-    found = run_rows(range(100, 140), partial(double, folder=tmp_path), lambda why: why, local_workers(2))
-    done = [next(found)]
-    for worker in multiprocessing.active_children():
-        worker.kill()  # once one is gone, the pool itself ends the others
-        worker.join()
-    assert dict([*done, *found]) == {n: str(2 * (100 + n)) for n in range(40)}
-
-
 def test_a_worker_of_another_version_or_none_that_lives_ends_the_batch(tmp_path: Path) -> None:
     row = Row("a", "a", "a.toml", "a.toml", RowSettings())
     task = RowTask(tmp_path, (), Formats(False, False), resume=False, version="0.0.0")
     with pytest.raises(BatchError, match=r"another bushfit[\s\S]*0\.0\.0"):
-        list(run_rows([row], task, lambda why: (failed_row(why), False), local_workers(1)))
+        list(run_rows([row], task, lambda why: (RowFile(status="failed", error=why), False), local_workers(1)))
     dead = replace(local_workers(2), open=partial(ProcessPoolExecutor, 2, get_context("spawn"), initializer=die))
     with pytest.raises(BatchError, match="no worker process starts"):
         list(run_rows([1, 2], str, lambda why: why, dead))
