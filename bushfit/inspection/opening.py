@@ -28,7 +28,7 @@ from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.source import Channels, Sheet
 from bushfit.reading.stated import LoopFile, SweepFile
-from bushfit.reading.stiffness import refuse_ambiguous_damping
+from bushfit.reading.stiffness import hint_of_derived, refuse_ambiguous_damping
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
 from bushfit.reduction.programme import programme
@@ -94,7 +94,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         kind=NoTestError,
         found=", ".join(best.headers) + f" (understood: {understood})" if understood else None,
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
-        hint=f"correct the header, or name the column: {best.columns_key(lacking, unit)}",
+        hint=hint_of_derived(best) or f"correct the header, or name the column: {best.columns_key(lacking, unit)}",
     )
 
 

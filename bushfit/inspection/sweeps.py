@@ -27,7 +27,7 @@ _FAR = 8.0
 #: less does not matter to a fit, and a parabola follows rubber to a few per cent.
 _SMALLEST_OUTLIER, _SMALLEST_FROM_CURVE = 0.01, 0.1
 #: Points of a run that show an outlier, and up to which the curve is a line.
-_FEWEST_POINTS, _FEW_POINTS = 6, 8
+_FEWEST_POINTS, _FEW_POINTS = 5, 8
 #: Distance of ln |K| from the other repeats from which a block is an outlier; chosen: mountings differ by less.
 _SMALLEST_BLOCK_OFFSET = 0.02
 #: Blocks whose scatter can be judged.

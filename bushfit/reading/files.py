@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from bushfit.errors import BushfitError, MeasurementError, did_you_mean
+from bushfit.reading.headers import WORDS
 
 #: Bytes of the largest file that is read: three times a loop of 10 million rows.
 _LARGEST_BYTES = 1 << 30
@@ -27,6 +28,14 @@ _MARKS = (
 _LEAST_ZERO_SHARE = 0.3
 #: Runs of bytes beyond ASCII that are compared; chosen: many times those of a header.
 _MOST_RUNS = 1 << 16
+#: Known words in Chinese and Japanese; chosen: of two characters or more, which are no chance.
+_EASTERN = frozenset(
+    word
+    for table in WORDS.values()
+    for words in table.values()
+    for word in words
+    if len(word) > 1 and min(word) > "\u3000"
+)
 #: A run of bytes beyond ASCII.
 _HIGH_RUN = re.compile(rb"[\x80-\xff]+")
 #: Two bytes of GB2312: its punctuation and its 3755 commonest characters. Western accents make few such pairs.
@@ -202,8 +211,8 @@ def detect(data: bytes) -> str:
     Notes:
         Test files are ASCII but for a few letters of their header, too few for detectors that count letters, such as
         charset-normalizer and chardet. Here the bytes decide, in this order: a byte order mark; zeros beside ASCII
-        (UTF-16); valid UTF-8; pairs of common Chinese characters (GB18030); and Western Latin for the rest (cp1252, or
-        Latin-1 if cp1252 lacks a byte).
+        (UTF-16); valid UTF-8; more known words in Shift-JIS than in GB18030; pairs of common Chinese characters
+        (GB18030); and Western Latin for the rest (cp1252, or Latin-1 if cp1252 lacks a byte).
     """
     for mark, encoding in _MARKS:
         if data.startswith(mark):
@@ -217,8 +226,11 @@ def detect(data: bytes) -> str:
     if not_utf8(data) is None:
         return "utf-8"
     runs = _HIGH_RUN.findall(data)[:_MOST_RUNS]
-    chinese = sum(_COMMON_CHINESE.fullmatch(run) is not None for run in runs)
-    for encoding in ("gb18030", "cp1252") if 2 * chinese > len(runs) else ("cp1252", "gb18030"):
+    is_chinese = 2 * sum(_COMMON_CHINESE.fullmatch(run) is not None for run in runs) > len(runs)
+    order = ("gb18030", "cp1252") if is_chinese else ("cp1252", "gb18030")
+    decoded = {encoding: data[:HEAD_BYTES].decode(encoding, "ignore") for encoding in ("gb18030", "cp932")}
+    known = {encoding: sum(word in text for word in _EASTERN) for encoding, text in decoded.items()}
+    for encoding in ("cp932", *order) if known["cp932"] > known["gb18030"] else order:
         with suppress(UnicodeDecodeError):
             data.decode(encoding)
             return encoding
@@ -232,6 +244,6 @@ def _undecodable(data: bytes, file: Path, bad: int, encoding: str) -> Measuremen
         file=file,
         place=line_of(data, bad),
         found=f"byte 0x{data[bad]:02x}",
-        expected="a table as text (UTF-8, UTF-16, Latin-1 or GB18030), a workbook, or a recording such as .tdms",
+        expected="a table as text (such as UTF-8, UTF-16, Latin-1, GB18030), a workbook, or a recording such as .tdms",
         hint='export it as "CSV UTF-8", or state encoding = "..." in the campaign',
     )

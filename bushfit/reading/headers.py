@@ -215,12 +215,17 @@ class Vocabulary:
             if name not in self._stated and role not in self._roles.setdefault(name, []):
                 self._roles[name].append(role)
         self._known: dict[str, Heading | None] = {}
+        self._names = {role: usual[0] for role, usual in names.items()} | dict(columns)
 
     def heading(self, header: str) -> Heading | None:
         """Meaning of a header cell; None if it names no role."""
         if header not in self._known:
             self._known[header] = self._read(header) if len(header) <= _LONGEST_HEADER else None
         return self._known[header]
+
+    def name_of(self, role: str) -> str:
+        """Stated name of a role, or else its first usual one."""
+        return self._names[role]
 
     def roles(self, cells: Sequence[str]) -> set[str]:
         """Roles that header cells name."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bushfit.reading.headers import AGREEING_PAIRS, OF_MOTION, PAIRS, AmplitudeConvention, Column, Vocabulary
+from bushfit.reading.headers import AGREEING_PAIRS, OF_MOTION, PAIRS, WORDS, AmplitudeConvention, Column, Vocabulary
 from bushfit.reading.measurement import Complex, Floats
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.table import Table
@@ -20,6 +20,14 @@ LEAST_LOSS_FACTOR = 0.005
 _THROUGHOUT = 0.95
 #: Share of |K| within which redundant columns agree; chosen: some are rounded to few digits.
 _AGREEMENT = 0.02
+#: Ways on for quantities from which a user can compute a column, by kind.
+_WAYS_ON = {
+    "compliance": "a complex compliance is the reciprocal of the stiffness: write K* = 1 / J*, with its real and "
+    "imaginary part or its magnitude and phase, into columns of the file",
+    "decrement": 'divide the logarithmic decrement by pi, and write the quotient as "loss factor [-]" into the file',
+    "quality": 'write the reciprocal of the quality factor as "loss factor [-]" into the file',
+}
+_DERIVED = Vocabulary(WORDS["derived"], {})
 #: Damping that can be a loss factor or a damping ratio.
 _DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissement", "amortiguamiento", "阻尼"]}, {})
 
@@ -42,12 +50,19 @@ def stiffness_pair(table: Table) -> tuple[str, str]:
     for role in {role: None for pair in PAIRS for role in pair if role in OF_MOTION}:
         table.refuse_other_motion(role)
     refuse_ambiguous_damping(table)
+    hint = hint_of_derived(table)
     usual = ", or ".join(" and ".join(pair) for pair in AGREEING_PAIRS).replace("_", " ")
     raise table.header_error(
         "no pair of columns gives a complex stiffness",
         expected=f"{usual}, or a force amplitude and its phase",
-        hint='correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
+        hint=hint or 'correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
     )
+
+
+def hint_of_derived(table: Table) -> str | None:
+    """Next step if a table has a quantity from which the user can compute a column of a sweep; None if it has none."""
+    headings = (_DERIVED.heading(header) for header in table.headers if header)
+    return next((_WAYS_ON[heading.role] for heading in headings if heading), None)
 
 
 def refuse_ambiguous_damping(table: Table) -> None:

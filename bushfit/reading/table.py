@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from bushfit.reading.cells import MOST_LEFT_OUT, Cells, Row
 from bushfit.reading.classification import classify
 from bushfit.reading.headers import OF_MOTION, PAIRS, Column, Vocabulary, is_angular, of_motion, split_convention
 from bushfit.reading.labelled import Rows, find_labels, select_rows
-from bushfit.reading.layout import DELIMITERS, FileFormat, Line, find_layout, is_comment
+from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, Line, find_layout, is_comment
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import Numerals, weigh
 from bushfit.reading.parts import OpenedFile, open_file
@@ -88,8 +87,8 @@ class Table(Cells):
         numbered = {role: "\0" if text.isdecimal() else text for role, text in columns.items()}
         vocabulary = Vocabulary(of_motion(names, motion), numbered)
 
-        def lay_out(source: RowSource) -> tuple[RowSource, Any, bool]:
-            """Return lines and layout of the table in a part of the file, and True if it was wide."""
+        def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
+            """Return lines and layout of the table in a part of the file."""
             delimiter = DELIMITERS[file_format.delimiter] if file_format.delimiter else None
             delimiter = "" if isinstance(source, Sheet) else delimiter
             layout = source.layout or find_layout(
@@ -97,15 +96,15 @@ class Table(Cells):
             )
             may_be_wide = "amplitude" in names and file_format.header_line is None
             if may_be_wide and (wide := unpivot(source, opened.file, vocabulary, layout, delimiter)):
-                return *wide, True
-            return *combined(source, layout, vocabulary), False
+                return wide
+            return combined(source, layout, vocabulary)
 
         try:
             layouts = {id(part): lay_out(part) for part in opened.parts}
             part = opened.choose(lambda part: len(vocabulary.roles(layouts[id(part)][1].headers) - {"time"}) > 1)
         except csv.Error as error:
             raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
-        source, layout, is_wide = layouts[id(part)]
+        source, layout = layouts[id(part)]
         if file_format.header_line not in (None, layout.header_line):
             found = f"header_line = {file_format.header_line}"
             problem, hint = "there is no header on this line", "lines count from 1"
@@ -120,8 +119,6 @@ class Table(Cells):
             ways = " or ".join(f"columns = {{ {entry} }}" for entry in entries)
             hint = f"name the columns by their numbers in the campaign, and their units: {ways}"
             raise table.header_error("there is no header", found=None, expected=_EXPECTED_HEADER, hint=hint)
-        if is_wide:
-            vocabulary, columns = Vocabulary({role: (role,) for role in names}, {}), {}
         roles, notes, clocks = classify(table, names, motion, vocabulary, columns, stated_units or {})
         essential = ({"displacement", "force"}, *(set(pair) for pair in PAIRS))
         present = next((pair for pair in essential if pair <= set(roles)), set(roles) & {"displacement", "force"})

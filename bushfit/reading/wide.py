@@ -11,11 +11,10 @@ cell ("K* 0.1 mm [N/mm]") or in several. Of merged header cells only the leftmos
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import accumulate, groupby
 from pathlib import Path
-from typing import NamedTuple
 
 from bushfit import units
 from bushfit.errors import MeasurementError
@@ -48,17 +47,19 @@ _GROUPED = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 #: Separator of the two roles in a corner: "f [Hz] \ A [mm]".
 _CORNER = re.compile(r"\s*[\\|]\s*|\s+/\s+")
 
+#: Line number and cells of a row.
+_Row = tuple[int, list[str | float]]
 
-class _Meaning(NamedTuple):
+
+@dataclass(frozen=True)
+class _Meaning:
     """Meaning of a header cell, or of all header cells of a column; None for what is not stated.
 
     Args:
-        role: quantity in the column.
+        role: quantity in the column, with its unit.
         unit: of the quantity.
         level: number of the frequency or amplitude at which the quantity was measured.
-        stepped: role of the level, "frequency" or "amplitude".
-        level_unit: unit of the level.
-        convention: of an amplitude.
+        stepped: role of the level, with level_unit and the convention of an amplitude.
     """
 
     role: str | None = None
@@ -68,27 +69,14 @@ class _Meaning(NamedTuple):
     level_unit: str | None = None
     convention: AmplitudeConvention | None = None
 
-    def completed_by(self, second: "_Meaning") -> "_Meaning":
+    def __or__(self, second: "_Meaning") -> "_Meaning":
         """This meaning, with what it does not state from another one."""
-        return second._replace(**{name: value for name, value in self._asdict().items() if value is not None})
+        return replace(second, **{name: value for name, value in vars(self).items() if value is not None})
 
 
-class _Series(NamedTuple):
-    """Column of a wide table.
-
-    Args:
-        meaning: of its header.
-        first: meaning of the first column of its block.
-        points: line number, cell of the first column, and cell of this column, for each row.
-    """
-
-    meaning: _Meaning
-    first: _Meaning
-    points: list[tuple[int, str | float, str | float]]
-
-
-#: Line number and cells of a row.
-_Row = tuple[int, list[str | float]]
+#: Column of a wide table: meaning of its header, meaning of the first column of its block, and for each row line
+#: number, cell of the first column, and cell.
+_Series = tuple[_Meaning, _Meaning, list[tuple[int, str | float, str | float]]]
 
 
 def unpivot(
@@ -104,7 +92,7 @@ def unpivot(
         delimiter: as stated; "" for a workbook; None to try all.
 
     Returns:
-        Source and layout of the long table, whose headers are names of roles; None if the file has no wide table.
+        Source and layout of the long table; None if the file has no wide table.
 
     Raises:
         MeasurementError: the blocks differ, or do not state their quantity.
@@ -121,11 +109,10 @@ def unpivot(
                 rows.append((number, [c[:_LONGEST_HEADER] if isinstance(c, str) else c for c in cells]))
         blocks = list(_find_blocks(rows, vocabulary))
         if series := [column for headers, data in blocks for column in _read_block(headers, data, vocabulary)]:
-            sheet, long_layout = _long_table(series, source, file, mark)
             texts = (text for headers, _ in blocks for row in headers for text in row)
-            parsed = ((text, [_read_header(part, vocabulary) for part in _CORNER.split(text)]) for text in texts)
-            written = tuple(text for text, parts in parsed if any(part.role or part.stepped for part in parts))
-            return sheet, replace(long_layout, written=written)
+            written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
+            sheet, long_layout = _long_table(series, source, file, vocabulary)
+            return sheet, replace(long_layout, delimiter=mark, written=written)
     return None
 
 
@@ -149,9 +136,8 @@ def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple
         width = max(len(cells) for _, cells in part)
         padded = [(line, cells + [""] * (width - len(cells))) for line, cells in part]
         headers = [[str(cell) for cell in cells] for _, cells in padded[: -len(numbers)]]
-        bottom = headers[-1] if headers else [""] * width
-        corners = [[meaning.stepped for meaning in _read_corner(cell, vocabulary)] for cell in bottom]
-        repeated = [n for n in range(start + 1, width) if any(corners[n]) and corners[n] == corners[start]]
+        corners = [[m.stepped for m in _read_corner(cell, vocabulary) if not m.level] for cell in (headers or [[]])[-1]]
+        repeated = [n for n in range(start + 1, len(corners)) if any(corners[n]) and corners[n] == corners[start]]
         for first, last in zip([start, *repeated], [*repeated, width], strict=True):
             data = [(line, cells[first:last]) for line, cells in padded[-len(numbers) :]]
             yield [cells[first:last] for cells in headers], data
@@ -170,28 +156,26 @@ def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: 
             break
         levels = {meaning.stepped for meaning in row.values() if meaning.level}
         for corner in _read_corner(cells[0], vocabulary):
-            if corner.role is not None:
+            if corner.role is not None or corner.level:
                 continue
-            axis = corner._replace(level_unit=corner.level_unit or corner.unit, unit=None)
+            axis = replace(corner, level_unit=corner.level_unit or corner.unit, unit=None)
             if corner.stepped in levels - {None} or (levels and down.stepped not in (None, corner.stepped)):
-                across = across.completed_by(axis)
+                across |= axis
             else:
-                down = down.completed_by(axis)
-        meanings = {column: meaning.completed_by(row[column]) for column, meaning in meanings.items()}
+                down |= axis
+        meanings = {column: meaning | row[column] for column, meaning in meanings.items()}
     stepped = next((meaning.stepped for meaning in (*meanings.values(), across) if meaning.stepped), None)
     stepped = stepped or next((role for role in _STEPPED if down.stepped and role != down.stepped), None)
-    if stepped is None or len(columns) < 2:
+    meanings = {n: meaning | across | _Meaning(stepped=stepped) for n, meaning in meanings.items()}
+    if stepped is None or len(columns) < 2 or not all(meaning.level for meaning in meanings.values()):
         return []
-    meanings = {n: m.completed_by(across)._replace(stepped=m.stepped or stepped) for n, m in meanings.items()}
-    if not all(meaning.level for meaning in meanings.values()):
-        return []
-    down = down._replace(stepped=_STEPPED[stepped == _STEPPED[0]])
-    return [_Series(m, down, [(line, cells[0], cells[n]) for line, cells in data]) for n, m in meanings.items()]
+    down = replace(down, stepped=_STEPPED[stepped == _STEPPED[0]])
+    return [(meaning, down, [(line, cells[0], cells[n]) for line, cells in data]) for n, meaning in meanings.items()]
 
 
 def _read_corner(text: str, vocabulary: Vocabulary) -> list[_Meaning]:
-    """Meanings of a corner that names one role or two, without levels: "f [Hz]", "f [Hz] \\ A [mm]"."""
-    return [meaning for part in _CORNER.split(text) if not (meaning := _read_header(part, vocabulary)).level]
+    """Meanings of a cell that names one role or two: "f [Hz]", "f [Hz] \\ A [mm]"."""
+    return [_read_header(part, vocabulary) for part in _CORNER.split(text)]
 
 
 def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
@@ -199,15 +183,18 @@ def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
     whole, convention = split_convention(text.replace("_", " "))
     if is_like_number(text):
         return _Meaning(level=text)
-    if (named := _named(text, vocabulary)) and units.is_unit(named.unit or named.level_unit or "1"):
+    match = _LEVEL.search(whole)
+    stepped = _role_of_unit(match["unit"]) if match else None
+    named = _named(text, vocabulary)
+    if named and units.is_unit(named.unit or named.level_unit or "1"):
         number = _LEVEL.fullmatch(named.unit or named.level_unit or "")
         if not (number and _role_of_unit(number["unit"])):  # "tan delta 1 %" has a level, and no unit of 1 %
             return named
-    if text and units.is_unit(unit := whole.strip("[]() ")):
+    is_level = match is not None and stepped is not None and match.span() == (0, len(whole))  # 1 mm is no unit
+    if text and not is_level and units.is_unit(unit := whole.strip("[]() ")):
         return _Meaning(unit=unit, convention=convention)
-    if not (match := _LEVEL.search(whole)):
+    if match is None:
         return _Meaning()
-    stepped = _role_of_unit(match["unit"])
     rest = whole[: match.start()] + " " + whole[match.end() if stepped else match.end("number") :]
     rest = _JOINTS.sub(" ", rest).strip()
     level = _Meaning(
@@ -219,11 +206,9 @@ def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
     if not rest:
         return level
     if named := _named(rest, vocabulary):
-        return level.completed_by(named._replace(convention=convention))
-    unit = rest.strip("[]() ")
-    return (
-        level._replace(level_unit=unit, stepped=role) if not stepped and (role := _role_of_unit(unit)) else _Meaning()
-    )
+        return level | replace(named, convention=convention)
+    role = None if stepped else _role_of_unit(unit := rest.strip("[]() "))
+    return replace(level, level_unit=unit, stepped=role) if role else _Meaning()
 
 
 def _named(text: str, vocabulary: Vocabulary) -> _Meaning | None:
@@ -240,76 +225,62 @@ def _role_of_unit(unit: str | None) -> str | None:
     return next((role for si, role in roles.items() if unit and units.is_compatible(unit, si)), None)
 
 
-def _long_table(series: Sequence[_Series], source: RowSource, file: Path, delimiter: str) -> tuple[RowSource, Layout]:
-    """Long table of the columns of all blocks, with its layout."""
-    by_role: dict[str | None, list[_Series]] = {}
-    for column in sorted(series, key=lambda column: _number(column.meaning.level)):
-        by_role.setdefault(column.meaning.role, []).append(column)
-    by_role = {role: by_role[role] for role in dict.fromkeys(column.meaning.role for column in series)}
-    down = {(column.first.stepped, column.first.level_unit, column.first.convention) for column in series}
-    meanings = [column.meaning for column in series]
-    across = {(meaning.stepped, meaning.level_unit, meaning.convention) for meaning in meanings}
-    quantities = dict.fromkeys((meaning.role, meaning.unit, None) for meaning in meanings)
-    counts_twice = len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role)
-    _check_blocks(series, by_role, source, file, counts_twice=counts_twice)
+def _long_table(
+    series: Sequence[_Series], source: RowSource, file: Path, vocabulary: Vocabulary
+) -> tuple[RowSource, Layout]:
+    """Long table of the columns of all blocks, with its layout.
+
+    Raises:
+        MeasurementError: a block does not state its quantity, blocks have other levels, or one thing has two units.
+    """
+    by_role: dict[str | None, list[_Series]] = {meaning.role: [] for meaning, *_ in series}
+    for one in sorted(series, key=lambda one: _number(one[0].level)):
+        by_role[one[0].role].append(one)
+    down = {(first.stepped, first.level_unit, first.convention) for _, first, _ in series}
+    across = {(meaning.stepped, meaning.level_unit, meaning.convention) for meaning, *_ in series}
+    quantities = dict.fromkeys((meaning.role, meaning.unit, None) for meaning, *_ in series)
+    levels = [
+        [(_number(meaning.level), [_number(text) for _, text, _ in points]) for meaning, _, points in columns]
+        for columns in by_role.values()
+    ]
+    problem = None
+    if None in by_role:
+        problem = "a block of this wide table does not say what it holds"
+        expected = "a quantity such as K* [N/mm] or tan delta above each block, or in each header"
+    elif any(block != levels[0] for block in levels):
+        problem, expected = "the blocks of this wide table differ", "the same frequencies and amplitudes in all blocks"
+    elif len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role):
+        problem = "this wide table counts one thing in two ways"
+        expected = "one unit for each quantity, and levels of one kind"
+    if problem:
+        plural = {"frequency": "frequencies", "amplitude": "amplitudes", None: "amplitudes"}
+        kinds = Counter((m.role, m.unit, m.stepped, len(points)) for m, _, points in series)
+        raise MeasurementError(
+            problem,
+            file=file,
+            place=f'sheet "{source.sheet}"' if source.sheet else f"line {series[0][2][0][0] - 1}",
+            found="; ".join(
+                f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of "
+                f"{count} {plural[stepped]}, {rows} rows"
+                for (role, unit, stepped, rows), count in kinds.items()
+            ),
+            expected=expected,
+            hint="correct the wide table, or write it as a long one: a row for each frequency and amplitude",
+        )
     headers = [
-        f"{role}{COUNTED[convention]}{f' [{unit}]' if unit else ''}".replace("_", " ")
+        f"{vocabulary.name_of(role or '')}{COUNTED[convention]}{f' [{unit}]' if unit else ''}"
         for role, unit, convention in (*down, *across, *quantities)
     ]
     numbers: list[int] = []
     rows: list[list[str | float]] = []
     for columns in zip(*by_role.values(), strict=True):
-        text = columns[0].meaning.level or ""
+        text = columns[0][0].level or ""
         level = text if _GROUPED.fullmatch(text) else _number(text)
-        for points in zip(*(column.points for column in columns), strict=True):
+        for points in zip(*(points for *_, points in columns), strict=True):
             numbers.append(points[0][0])
             rows.append([points[0][1], level, *(cell for _, _, cell in points)])
     sheet = Combined(source.sheet or "", rows, numbers=numbers)
-    return sheet, Layout(delimiter, tuple(headers), min(numbers) - 1, ("",) * len(headers), None)
-
-
-def _check_blocks(
-    series: Sequence[_Series],
-    by_role: Mapping[str | None, Sequence[_Series]],
-    source: RowSource,
-    file: Path,
-    *,
-    counts_twice: bool,
-) -> None:
-    """Refuse blocks that do not make one table.
-
-    Raises:
-        MeasurementError: a block does not state its quantity, blocks have other levels, or one thing has two units.
-    """
-    levels = [
-        [(_number(column.meaning.level), [_number(text) for _, text, _ in column.points]) for column in columns]
-        for columns in by_role.values()
-    ]
-    if None in by_role:
-        problem = "a block of this wide table does not say what it holds"
-        expected = "a quantity such as K* [N/mm] or tan delta above each block, or in each header"
-    elif any(block != levels[0] for block in levels):
-        problem = "the blocks of this wide table differ"
-        expected = "the same frequencies and amplitudes in all blocks"
-    elif counts_twice:
-        problem = "this wide table counts one thing in two ways"
-        expected = "one unit for each quantity, and levels of one kind"
-    else:
-        return
-    plural = {"frequency": "frequencies", "amplitude": "amplitudes", None: "amplitudes"}
-    kinds = Counter((c.meaning.role, c.meaning.unit, c.meaning.stepped, len(c.points)) for c in series)
-    raise MeasurementError(
-        problem,
-        file=file,
-        place=f'sheet "{source.sheet}"' if source.sheet else f"line {series[0].points[0][0] - 1}",
-        found="; ".join(
-            f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of "
-            f"{count} {plural[stepped]}, {rows} rows"
-            for (role, unit, stepped, rows), count in kinds.items()
-        ),
-        expected=expected,
-        hint="correct the wide table, or write it as a long one: a row for each frequency and amplitude",
-    )
+    return sheet, Layout("", tuple(headers), min(numbers) - 1, ("",) * len(headers), None)
 
 
 def _number(text: str | float | None) -> float:
