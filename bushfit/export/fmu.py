@@ -17,7 +17,7 @@ import sys
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -201,15 +201,19 @@ def model_description(order: Order, model: TimeModel, name: str, guid: str) -> b
     source_files = ET.SubElement(simulation, "SourceFiles")
     for file in (*(file for file in _SHARED if file.endswith(".c")), "model.c"):
         ET.SubElement(source_files, "File", {"name": file})
-    variables = _variables(model)
-    _define_units(ET.SubElement(root, "UnitDefinitions"), model, {real["unit"] for _, real in variables})
+    definitions = ET.SubElement(root, "UnitDefinitions")
     ET.SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": "1", "stepSize": "0.001"})
-    listed = ET.SubElement(root, "ModelVariables")
-    for variable, real in variables:
-        scalar = ET.SubElement(listed, "ScalarVariable", variable)
-        ET.SubElement(scalar, "Real", {key: value for key, value in real.items() if value})
+    variables, displays = ET.SubElement(root, "ModelVariables"), display_units(model.places)
+    add_variables(variables, model, displays)
+    for unit in sorted({real.attrib["unit"] for real in variables.iter("Real") if "unit" in real.attrib}):
+        definition = ET.SubElement(definitions, "Unit", {"name": unit})
+        if unit in _BASE_UNITS:
+            ET.SubElement(definition, "BaseUnit", {base: str(power) for base, power in _BASE_UNITS[unit].items()})
+        if unit in displays:
+            display = {"name": displays[unit].name, "factor": repr(displays[unit].factor)}
+            ET.SubElement(definition, "DisplayUnit", display)
     structure = ET.SubElement(root, "ModelStructure")
-    outputs = [index for index, (variable, _) in enumerate(variables, start=1) if variable["causality"] == "output"]
+    outputs = [index for index, variable in enumerate(variables, start=1) if variable.attrib["causality"] == "output"]
     for kind in ("Outputs", "InitialUnknowns"):
         unknowns = ET.SubElement(structure, kind)
         for index in outputs:
@@ -218,50 +222,45 @@ def model_description(order: Order, model: TimeModel, name: str, guid: str) -> b
     return ET.tostring(root, encoding="utf-8", xml_declaration=True)
 
 
-def _variables(model: TimeModel) -> list[tuple[dict[str, str], dict[str, str]]]:
-    """Attributes of each scalar variable and of its real value: inputs, outputs, then values of the model."""
-    count, displays, variables = _OFFSET + len(model.values), _display_units(model.places), []
-    for place in model.places:
+def add_variables(variables: ET.Element, model: TimeModel, displays: Mapping[str, Unit]) -> None:
+    """Add the scalar variables of a model: displacements and forces of its places, then its values.
+
+    Args:
+        variables: element to add them to.
+        model: the model as lists.
+        displays: display units by SI unit.
+    """
+
+    def add(name: str, reference: int, attributes: Mapping[str, str], unit: str, real: Mapping[str, str]) -> None:
+        names = {"name": _xml_text(name), "valueReference": str(reference)}
+        variable = ET.SubElement(variables, "ScalarVariable", {**names, **attributes})
+        ET.SubElement(variable, "Real", {**({} if unit == "1" or not unit else {"unit": unit}), **real})
+
+    count = _OFFSET + len(model.values)
+    for index, place in enumerate(model.places):
         displacement, force, _ = place.motion.words
-        kinds: tuple[tuple[str, str, str, dict[str, str], dict[str, str]], ...] = (
-            (displacement, "input", place.motion.displacement_unit, {"start": "0"}, {}),
-            (force, "output", place.motion.force_unit, {}, {"initial": "calculated"}),
-        )
-        for block, (word, causality, unit, start, initial) in enumerate(kinds):
-            reference = count + block * len(model.places) + model.places.index(place)
-            variable = {"name": _xml_text(f"{word}.{place}"), "valueReference": str(reference), "causality": causality}
-            display = displays[unit].name if unit in displays else ""
-            real = {"unit": "" if unit == "1" else unit, "displayUnit": display, **start}
-            variables.append(({**variable, "variability": "continuous", **initial}, real))
+        units = place.motion.displacement_unit, place.motion.force_unit
+        shown, reacted = ({"displayUnit": displays[unit].name} if unit in displays else {} for unit in units)
+        moved = {"causality": "input", "variability": "continuous"}
+        add(f"{displacement}.{place}", count + index, moved, units[0], {**shown, "start": "0"})
+        resisting = {"causality": "output", "variability": "continuous", "initial": "calculated"}
+        add(f"{force}.{place}", count + len(model.places) + index, resisting, units[1], reacted)
     for reference, value in enumerate(model.values, start=_OFFSET):
-        kind = {"causality": "parameter", "variability": "tunable"} if value.settable else {
-            "causality": "local", "variability": "constant",
-        }  # fmt: skip
-        variable = {
-            "name": _xml_text(value.name),
-            "valueReference": str(reference),
-            "description": _xml_text(value.meaning),
-        }
-        limits = dict(zip(("min", "max"), map(repr, value.bounds), strict=True)) if value.settable else {}
-        unit = "" if value.unit == "1" else value.unit
-        variables.append(
-            ({**variable, **kind, "initial": "exact"}, {"unit": unit, **limits, "start": repr(value.value)})
+        attributes = {"description": _xml_text(value.meaning), "causality": "local", "variability": "constant"}
+        limits = {}
+        if value.settable:
+            attributes |= {"causality": "parameter", "variability": "tunable"}
+            limits = {"min": repr(value.bounds[0]), "max": repr(value.bounds[1])}
+        add(
+            value.name,
+            reference,
+            {**attributes, "initial": "exact"},
+            value.unit,
+            {**limits, "start": repr(value.value)},
         )
-    return variables
 
 
-def _define_units(definitions: ET.Element, model: TimeModel, used: Collection[str]) -> None:
-    """Add a definition of every used unit: its exponents of SI base units, and its display unit."""
-    displays = _display_units(model.places)
-    for name in sorted(filter(None, used)):
-        unit = ET.SubElement(definitions, "Unit", {"name": name})
-        if name in _BASE_UNITS:
-            ET.SubElement(unit, "BaseUnit", {base: str(power) for base, power in _BASE_UNITS[name].items()})
-        if name in displays:
-            ET.SubElement(unit, "DisplayUnit", {"name": displays[name].name, "factor": repr(displays[name].factor)})
-
-
-def _display_units(places: Sequence[Place]) -> dict[str, Unit]:
+def display_units(places: Sequence[Place]) -> dict[str, Unit]:
     """Display units of displacements and forces by SI unit, where the two differ."""
     pairs = [
         pair

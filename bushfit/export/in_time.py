@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.effects import Branch, Effect, Level, Modifier, place_suffix, qualified_name
-from bushfit.effects.contract import Array, Circumstances
+from bushfit.effects.contract import Circumstances
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
 from bushfit.export.contract import Order
@@ -84,27 +84,30 @@ def time_model(order: Order) -> TimeModel:
     model, under = order.result.model.without(Level.INSTRUMENT), order.under
     omitted = [effect.name for effect in model.records if effect.name == UNNAMED or effect.settles]
     model = model.without(*omitted)
-    fixed_modifiers = [
-        effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor
-    ]
     for effect in model.records:
-        _check_effect(effect)
-    arms = model_arms(model, arm_band(order), order.accuracy, under)
-    local_values = [
-        model.values_at(
-            prediction.direction, _geometric_mean(prediction.frequency), _geometric_mean(prediction.amplitude), under
-        )
-        for prediction in order.predictions
-    ]
-    values, names = _values(model, order.places, local_values, arms)
+        has_law = isinstance(effect, Modifier) or fields_of(effect) or (isinstance(effect, Branch) and effect.size)
+        if effect.harmonic_only or not has_law:
+            raise ModelError(
+                "an FMU follows a motion through time, for which this effect has no law",
+                place=effect.name,
+                found="a law of the steady first harmonic alone" if effect.harmonic_only else "a law that no FMU has",
+                expected="effects with a law in time",
+                hint="fit a model without it, or export the stiffness over frequency and amplitude in another format",
+            )
+    # loops are slow, and a triangle has overtones: two decades below and one above the frequencies of fit and grid
+    fitted = [order.result.measured.frequency] if order.result.measured else []
+    frequencies = np.concatenate([*(prediction.frequency for prediction in order.predictions), *fitted])
+    band = float(frequencies.min()) / 100.0, float(frequencies.max()) * 10.0
+    arms = model_arms(model, band, order.accuracy, under)
+    values, names = _values(order, model, arms)
     losses = [f"the long memory of the rubber: {part.sentence}, fading below" for part in arms]
     for prediction in order.predictions:
-        losses += [*_steady_losses(model, fixed_modifiers, omitted, prediction, under), *band_losses(prediction)]
+        losses += [*_steady_losses(model, omitted, prediction, under), *band_losses(prediction)]
     sizes = values_under(model, under)
     return TimeModel(
         order.places,
         values,
-        tuple(_fields(model, place, own_names, arms) for place, own_names in zip(order.places, names, strict=True)),
+        tuple(_fields(model, place, place_names, arms) for place, place_names in zip(order.places, names, strict=True)),
         tuple(model.bushing.outer_radius if model.bushing and place.is_rotation else 1.0 for place in order.places),
         tuple(part.size for part in arms),
         tuple(
@@ -117,47 +120,28 @@ def time_model(order: Order) -> TimeModel:
     )
 
 
-def arm_band(order: Order) -> tuple[float, float]:
-    """Frequency band of the Maxwell arms [Hz]: two decades below and one above the frequencies of fit and grid.
-
-    Loops are slow, and a triangle has overtones.
-    """
-    grids = [prediction.frequency for prediction in order.predictions]
-    fitted = [order.result.measured.frequency] if order.result.measured else []
-    frequencies = np.concatenate([*grids, *fitted])
-    return float(frequencies.min()) / 100.0, float(frequencies.max()) * 10.0
+def fields_of(effect: Effect) -> list[str]:
+    """C fields that the parameters of an effect set, in their order; none if the C sources lack its law."""
+    kind = f"{effect.name.partition('.')[0]}." if place_suffix(effect.name) else effect.name
+    return FIELDS.get(kind, [])
 
 
-def _fields_key(effect: Effect) -> str:
-    """Key of an effect in FIELDS."""
-    return f"{effect.name.partition('.')[0]}." if place_suffix(effect.name) else effect.name
+def middle_point(prediction: Prediction) -> tuple[float, float]:
+    """Geometric middle of the frequencies [Hz] and of the amplitudes [m, rad or 1] of a prediction."""
+    frequency, amplitude = (float(np.sqrt(x.min() * x.max())) for x in (prediction.frequency, prediction.amplitude))
+    return frequency, amplitude
 
 
-def _check_effect(effect: Effect) -> None:
-    """Refuse an effect that cannot run in time."""
-    supported = isinstance(effect, Modifier) or _fields_key(effect) in FIELDS
-    if effect.harmonic_only or not (supported or (isinstance(effect, Branch) and effect.size)):
-        raise ModelError(
-            "an FMU follows a motion through time, for which this effect has no law",
-            place=effect.name,
-            found="a law of the steady first harmonic alone" if effect.harmonic_only else "a law that no FMU has",
-            expected="effects with a law in time",
-            hint="fit a model without it, or export the stiffness over frequency and amplitude in another format",
-        )
-
-
-def _geometric_mean(values: Array) -> float:
-    """Geometric mean of the ends of a range."""
-    return float(np.sqrt(values.min() * values.max()))
-
-
-def _values(
-    model: Model, places: tuple[Place, ...], local_values: list[dict[str, float]], arms: tuple[Arms, ...]
-) -> tuple[tuple[FmuValue, ...], list[dict[str, str]]]:
+def _values(order: Order, model: Model, arms: tuple[Arms, ...]) -> tuple[tuple[FmuValue, ...], list[dict[str, str]]]:
     """Values of the FMU, and the names of the values of each place by parameter.
 
     A parameter that modifiers make different between places becomes one value per place, `<parameter>.<place>`.
     """
+    places = order.places
+    local_values = [
+        model.values_at(prediction.direction, *middle_point(prediction), order.under)
+        for prediction in order.predictions
+    ]
     fitted_sizes, sizes = {part.size for part in arms}, {qualified_size(branch) for branch in model.viscoelastic}
     values: dict[FmuValue, None] = {}
     names = [dict[str, str]() for _ in places]
@@ -193,30 +177,27 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
     fields |= {f"size[{index}]": names[part.size] for index, part in enumerate(arms)}
     for effect in model.records:
         acts = (isinstance(effect, Branch) or effect in layers) and place_suffix(effect.name) in (None, str(place))
-        if acts and _fields_key(effect) in FIELDS:
+        if acts and fields_of(effect):
             parameters = (names[qualified_name(effect, parameter)] for parameter in effect.parameters)
-            fields |= dict(zip(FIELDS[_fields_key(effect)], parameters, strict=True))
+            fields |= dict(zip(fields_of(effect), parameters, strict=True))
     return fields
 
 
-def _steady_losses(
-    model: Model, fixed_modifiers: list[str], omitted: list[str], prediction: Prediction, under: Circumstances
-) -> list[str]:
-    """Sentence on the error in steady stiffness at a place from held modifiers and omitted effects."""
-    if not (fixed_modifiers or omitted):
+def _steady_losses(model: Model, omitted: list[str], prediction: Prediction, under: Circumstances) -> list[str]:
+    """Sentence on the error in steady stiffness at a place from fixed modifiers and omitted effects."""
+    fixed = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor]
+    if not (fixed or omitted):
         return []
-    place, frequency, amplitude = prediction.direction, prediction.frequency, prediction.amplitude
-    middle = _geometric_mean(frequency), _geometric_mean(amplitude)
-    plain, values = model.without(*fixed_modifiers), model.values_at(place, *middle)
+    place, (frequency, amplitude) = prediction.direction, middle_point(prediction)
+    plain, values = model.without(*fixed), model.values_at(place, frequency, amplitude)
     written = plain.with_values({name: values[name] for name in plain.values})
-    stiffness = written.stiffness(place, frequency, amplitude, under=under)
+    stiffness = written.stiffness(place, prediction.frequency, prediction.amplitude, under=under)
     complete = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
     error = float(np.max(np.abs(stiffness / complete - 1.0)))
     if error < 1e-6 and not omitted:  # rounding
         return []
-    (length, factor), *_ = place.display
-    point = f"{number(middle[0], 3)} Hz and {number(factor * middle[1], 3)} {length}"
-    parts = [f"{', '.join(fixed_modifiers)}, fixed as at {point}"] * bool(fixed_modifiers) + [
-        ", ".join(omitted)
-    ] * bool(omitted)
-    return [f"{place}: {'; '.join(parts)}: stiffness off by up to {number(100.0 * error, 2)} % over the grid"]
+    unit, factor = place.display.displacement
+    point = f"{number(frequency, 3)} Hz and {number(factor * amplitude, 3)} {unit}"
+    parts = [f"{', '.join(fixed)}, fixed as at {point}" if fixed else "", ", ".join(omitted)]
+    effects = "; ".join(filter(None, parts))
+    return [f"{place}: {effects}: stiffness off by up to {number(100.0 * error, 2)} % over the grid"]
