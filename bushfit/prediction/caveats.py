@@ -56,12 +56,11 @@ def use_of(warning: str) -> str:
 
 def by_importance(warnings: Iterable[str]) -> list[str]:
     """Warnings in the order of their importance for the use of the numbers."""
-
-    def rank(warning: str) -> int:
-        use = use_of(warning)
-        return next(index for index, pattern in enumerate(_RANKS) if re.search(pattern, use))
-
-    return sorted(warnings, key=rank)
+    ranked = [
+        (next(rank for rank, pattern in enumerate(_RANKS) if re.search(pattern, use_of(warning))), warning)
+        for warning in warnings
+    ]
+    return [warning for _, warning in sorted(ranked, key=lambda pair: pair[0])]
 
 
 def warnings_of(result: Result, predicted: Iterable[Iterable[str]] = (), notes: Iterable[str] = ()) -> list[str]:

@@ -87,22 +87,6 @@ class Contrast:
     def place(self) -> Place:
         return self.reference.direction
 
-    @classmethod
-    def between(cls, reference: Prediction, compared: Prediction) -> Contrast:
-        """Difference of two predictions at the same points.
-
-        Args:
-            reference, compared: predictions.
-
-        Returns:
-            Differences with 95 % bands.
-
-        Notes: the distance from the difference to an end of its band is the root sum of squares of the distances in the
-        two bands (G. Zou, A. Donner, Stat. Med. 27 (2008) 1693).
-        """
-        stiffness = _subtract(_logarithm(compared.stiffness), _logarithm(reference.stiffness))
-        return cls(reference, compared, stiffness, _subtract(compared.loss_factor, reference.loss_factor))
-
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
@@ -181,14 +165,15 @@ def compare(
     """
     frequencies = np.concatenate([frequency for frequency, _ in grids])
     middle = float(np.sqrt(frequencies.min() * frequencies.max()))
-    parameters, joint = _parameters(reference, compared, middle)
-    contrasts = tuple(
-        Contrast.between(predict(reference, one, *grid), predict(compared, two, *grid))
-        for (one, two), grid in zip(places, grids, strict=True)
-    )
+    parameters, joint = compare_parameters(reference, compared, middle)
+    contrasts = []
+    for (place, compared_place), grid in zip(places, grids, strict=True):
+        one, two = predict(reference, place, *grid), predict(compared, compared_place, *grid)
+        stiffness = two.stiffness.logarithm().minus(one.stiffness.logarithm())
+        contrasts.append(Contrast(one, two, stiffness, two.loss_factor.minus(one.loss_factor)))
     files = {source.sha256 for source in compared.inputs}
     shared = tuple(str(source.file) for source in reference.inputs if source.sha256 in files)
-    return Comparison(parameters, joint, contrasts, shared)
+    return Comparison(parameters, joint, tuple(contrasts), shared)
 
 
 def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
@@ -201,12 +186,14 @@ def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
         The comparisons, with `holm` in each tested parameter.
     """
     adjusted = iter(holm([row.p for comparison in comparisons for row in comparison.parameters if row.p is not None]))
-
-    def with_adjusted(row: ParameterContrast) -> ParameterContrast:
-        return row if row.p is None else replace(row, holm=next(adjusted))
-
     return [
-        replace(comparison, parameters=tuple(map(with_adjusted, comparison.parameters))) for comparison in comparisons
+        replace(
+            comparison,
+            parameters=tuple(
+                row if row.p is None else replace(row, holm=next(adjusted)) for row in comparison.parameters
+            ),
+        )
+        for comparison in comparisons
     ]
 
 
@@ -219,52 +206,49 @@ def holm(probabilities: Sequence[float]) -> list[float]:
     return adjusted.tolist()
 
 
-def _logarithm(band: Band) -> Band:
-    """ln of a positive quantity, its ends and root relative to its value."""
-    ends = {end: np.log(band.value) + getattr(band, end) / band.value - 1.0 for end in ("low", "high")}
-    return Band(np.log(band.value), **ends, root=band.root / band.value)
-
-
 def relative(logarithm: Array) -> Array:
     """Relative difference of two quantities from the logarithm of their ratio, which is limited to +-ln(1e10)."""
     return np.expm1(np.clip(logarithm, -_FURTHEST, _FURTHEST))
 
 
-def _subtract(minuend: Band, subtrahend: Band) -> Band:
-    """Difference of two quantities with independent errors."""
-    value = minuend.value - subtrahend.value
-    low = value - np.hypot(minuend.value - minuend.low, subtrahend.high - subtrahend.value)
-    high = value + np.hypot(minuend.high - minuend.value, subtrahend.value - subtrahend.low)
-    return Band(value, low, high, np.concatenate((minuend.root, -subtrahend.root)))
-
-
-def _parameters(
+def compare_parameters(
     reference: Result, compared: Result, frequency: float
 ) -> tuple[tuple[ParameterContrast, ...], tuple[float, int] | None]:
     """Compare the parameters that both results have, one by one and all together.
 
-    A constant whose unit has an exponent is also compared as a modulus at the frequency [Hz].
+    Args:
+        reference, compared: fitted results.
+        frequency: at which a constant whose unit has an exponent is also compared as a modulus [Hz].
+
+    Returns:
+        A row for each comparison, and the probability by chance of all differences together, with their number.
 
     Notes: strictly positive parameters are compared by their logarithm. m [Pa s^alpha] and alpha make the modulus
     m (2 pi f)^alpha, which is comparable at any alpha.
     """
-    rows, compared_parameters = list[tuple[str, str | None]](), compared.model.parameters
+    results, rows = (reference, compared), list[tuple[str, str | None]]()
     for name, parameter in reference.model.parameters.items():
-        if name in compared_parameters:
-            exponent = _exponent(name, parameter)
-            varies = exponent is not None and not _equally_held(exponent, reference, compared)
-            rows += [(name, None), (name, exponent)] if varies else [(name, None)]
-    (one, slopes), (two, compared_slopes) = (
-        _side(result, rows, 2.0 * np.pi * frequency) for result in (reference, compared)
-    )
-    covariance = _of_difference((slopes, reference.covariance), (compared_slopes, compared.covariance))
-    difference, error = two - one, np.sqrt(np.diag(covariance.matrix))
+        if name in compared.model.parameters:
+            rows.append((name, None))
+            exponent = exponent_of(name, parameter)
+            if exponent and (
+                any(result.covariance.stderr(exponent) for result in results)
+                or len({result.model.values[exponent] for result in results}) > 1
+            ):
+                rows.append((name, exponent))
+    sides = [quantities_of(result, rows, 2.0 * np.pi * frequency) for result in results]
+    (one, slopes), (two, compared_slopes) = sides
+    pairs = (slopes, reference.covariance), (compared_slopes, compared.covariance)
+    matrix = np.sum([part @ covariance.matrix @ part.T for part, covariance in pairs], axis=0)
+    spread = tuple(part @ group @ part.T for part, covariance in pairs for group in covariance.spread)
+    covariance = Covariance(tuple(map(str, range(len(rows)))), matrix, spread)
+    difference, error = two - one, np.sqrt(np.diag(matrix))
     half, freedom = covariance.half_width(np.eye(len(rows))), covariance.freedom(np.eye(len(rows)))
     contrasts, tested = list[ParameterContrast](), list[int]()
     for i, (name, exponent) in enumerate(rows):
         parameter = reference.model.parameters[name]
         of_ratio = parameter.log or exponent is not None
-        bounds = dict.fromkeys(result.at_bound[name] for result in (reference, compared) if name in result.at_bound)
+        bounds = dict.fromkeys(result.at_bound[name] for result in results if name in result.at_bound)
         note = f"at its {' and '.join(bounds)}" if bounds else ""
         if not note and not np.isfinite(difference[i]):
             note = "zero in one"
@@ -272,8 +256,8 @@ def _parameters(
             note = "held in both"
         if not note and exponent is None:
             tested.append(i)
-        if not note and exponent is None and rows[i + 1 : i + 2] == [(name, _exponent(name, parameter))]:
-            note = f"only at equal {_exponent(name, parameter)}"
+            if rows[i + 1 : i + 2] == [(name, exponent_of(name, parameter))]:
+                note = f"only at equal {exponent_of(name, parameter)}"
         label = f"{name} at {number(frequency, 3)} Hz" if exponent else name
         unit = _EXPONENT.sub("", parameter.unit).removesuffix("*s") if exponent else parameter.unit
         values = [float(np.exp(value) if of_ratio else value) for value in (one[i], two[i])]
@@ -284,23 +268,27 @@ def _parameters(
             p = 2.0 * float(stdtr(freedom[i], -abs(difference[i]) / error[i]))
             row = replace(row, difference=value, interval=(low, high), p=p)
         contrasts.append(row)
-    return tuple(contrasts), _joint(difference[tested], covariance.matrix[np.ix_(tested, tested)], freedom[tested])
+    return tuple(contrasts), chance_of(difference[tested], matrix[np.ix_(tested, tested)], freedom[tested])
 
 
-def _exponent(name: str, parameter: Parameter) -> str | None:
+def exponent_of(name: str, parameter: Parameter) -> str | None:
     """Name of the parameter that is the exponent in the unit of another; None if the unit has no exponent."""
     match = _EXPONENT.search(parameter.unit)
     return match and "".join(name.rpartition(".")[:2]) + match[1]
 
 
-def _equally_held(name: str, *results: Result) -> bool:
-    """Check for a parameter that was fixed at the same value in all results."""
-    free = any(result.covariance.stderr(name) for result in results)
-    return not free and len({result.model.values[name] for result in results}) == 1
+def quantities_of(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) -> tuple[Array, Array]:
+    """Compute compared quantities of a result.
 
+    Args:
+        result: fitted result.
+        rows: names of a parameter and of its exponent, or None for the parameter alone.
+        omega: angular frequency at which a parameter with an exponent is a modulus [rad/s].
 
-def _side(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) -> tuple[Array, Array]:
-    """Quantities of rows, (r,), and their derivatives with respect to the parameters of the covariance, (r, k)."""
+    Returns:
+        Quantities, or their logarithms if they are positive, (r,), and their derivatives with respect to the parameters
+        of the covariance, (r, k).
+    """
     values, names = result.model.values, list(result.covariance.names)
     quantities, slopes = np.empty(len(rows)), np.zeros((len(rows), len(names)))
     for i, (name, exponent) in enumerate(rows):
@@ -318,18 +306,16 @@ def _side(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) 
     return quantities, slopes
 
 
-def _of_difference(*sides: tuple[Array, Covariance]) -> Covariance:
-    """Covariance of the differences of r quantities of independent results, from their slopes, (r, k) each."""
-    rows = range(len(sides[0][0]))
-    matrix = sum(
-        (slopes @ covariance.matrix @ slopes.T for slopes, covariance in sides), start=np.zeros((len(rows), len(rows)))
-    )
-    spread = [slopes @ part @ slopes.T for slopes, covariance in sides for part in covariance.spread]
-    return Covariance(tuple(map(str, rows)), matrix, tuple(spread))
+def chance_of(difference: Array, matrix: Array, freedom: Array) -> tuple[float, int] | None:
+    """Probability by chance of several differences together.
 
+    Args:
+        difference: (k,).
+        matrix: covariance of the differences, (k, k).
+        freedom: degrees of freedom of each difference, (k,).
 
-def _joint(difference: Array, matrix: Array, freedom: Array) -> tuple[float, int] | None:
-    """Probability by chance of differences (k,) with covariance (k, k), and the number of independent ones.
+    Returns:
+        Probability, and the number of independent differences; None without differences.
 
     Notes: Hotelling's T^2 with the fewest degrees of freedom of any; infinitely many make it chi-square.
     """

@@ -133,16 +133,6 @@ def _inside(values: Array, ranges: Sequence[Any]) -> Array:
     return values[np.all([(values >= a * (1 - MARGIN)) & (values <= b * (1 + MARGIN)) for a, b in ranges], axis=0)]
 
 
-def _levelled(sweeps: Sequence[Sweep]) -> list[Sweep]:
-    """Sweeps of one place in which amplitudes of one level, as each sweep has it, are the same."""
-    controlled = [sweep for sweep in sweeps if sweep.stepped]
-    points = np.hstack([np.empty((2, 0)), *(np.stack((sweep.amplitude, sweep.frequency)) for sweep in controlled)])
-    amplitude = np.unique(points, axis=1)[0]  # each point once, however often it was repeated
-    level = dict(zip(amplitude, nominal(amplitude), strict=True))
-    changed = (replace(sweep, amplitude=np.array([level[x] for x in sweep.amplitude])) for sweep in controlled)
-    return [*changed, *(sweep for sweep in sweeps if not sweep.stepped)]
-
-
 def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
     """Distinct frequencies or amplitudes of sweeps of one place.
 
@@ -153,14 +143,22 @@ def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitu
     Returns:
         Values [Hz, m, rad or 1], increasing; at most ten over the range of values that no program has set.
     """
-    sweeps = _levelled(sweeps) if axis == "amplitude" else sweeps
-    parts: tuple[list[Array], list[Array]] = [], []
+    set_values, free_values = [np.empty(0)], [np.empty(0)]
+    levels: dict[float, float] = {}
+    if axis == "amplitude":  # amplitudes of one level, as each sweep has it, are the same
+        controlled = [np.stack((sweep.amplitude, sweep.frequency)) for sweep in sweeps if sweep.stepped]
+        points = np.unique(np.hstack([np.empty((2, 0)), *controlled]), axis=1)  # once, however often it was repeated
+        levels = dict(zip(points[0].tolist(), nominal(points[0]).tolist(), strict=True))
     for sweep in sweeps:
-        as_it_came = sweep.stepped is None or sweep.stepped == axis == "amplitude"
-        parts[as_it_came].append(getattr(sweep, axis))
-    planned, came = (_distinct(np.concatenate([np.empty(0), *part])) for part in parts)
-    spanned = came if came.size <= _MOST_STEPS else _even(came[0], came[-1], _MOST_STEPS)
-    return _distinct(np.concatenate([planned, spanned]))
+        values = getattr(sweep, axis)
+        if sweep.stepped:
+            values = np.array([levels.get(value, value) for value in values.tolist()])
+        is_free = sweep.stepped is None or sweep.stepped == axis == "amplitude"
+        (free_values if is_free else set_values).append(values)
+    spanned = _distinct(np.concatenate(free_values))
+    if spanned.size > _MOST_STEPS:
+        spanned = _even(spanned[0], spanned[-1], _MOST_STEPS)
+    return _distinct(np.concatenate([_distinct(np.concatenate(set_values)), spanned]))
 
 
 def _even(low: float, high: float, count: int) -> Array:

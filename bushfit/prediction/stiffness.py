@@ -56,6 +56,22 @@ class Band:
     high: Array
     root: Array = field(default_factory=lambda: np.empty((0, 1)))
 
+    def logarithm(self) -> Band:
+        """Natural log of a positive quantity, with the ends of its band relative to its value."""
+        low, high = (np.log(self.value) + end / self.value - 1.0 for end in (self.low, self.high))
+        return Band(np.log(self.value), low, high, self.root / self.value)
+
+    def minus(self, subtrahend: Band) -> Band:
+        """Difference of two quantities with independent errors.
+
+        Notes: the distance from the difference to an end of its band is the root sum of squares of the distances in the
+        two bands (G. Zou, A. Donner, Stat. Med. 27 (2008) 1693).
+        """
+        value = self.value - subtrahend.value
+        low = value - np.hypot(self.value - self.low, subtrahend.high - subtrahend.value)
+        high = value + np.hypot(self.high - self.value, subtrahend.value - subtrahend.low)
+        return Band(value, low, high, np.concatenate((self.root, -subtrahend.root)))
+
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
