@@ -10,7 +10,7 @@ import click
 from bushfit.cli.options import FILE, command_called, effect_lists, option, place_option, under
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_options, grid_values
-from bushfit.errors import error_location
+from bushfit.errors import error_location, quote_path
 from bushfit.progress import track
 
 if TYPE_CHECKING:
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Value of --families without names.
 _ALL = "all"
+#: Probability by chance, below which a parameter is said to differ.
+_CHANCE = 0.05
 
 
 @command_called(
@@ -74,13 +76,15 @@ def command(
             for name in names:
                 all(map(get_effect, name.split("+")))
         campaign = load_campaign(sources[0])
-        folder = output.free_folder(campaign.name, "compare.json", form="{} families")
+        name = campaign.name
+        folder = output.free_folder(name, "compare.json", form="{} families")
         compared = compare(campaign, families=names, **settings)
     else:
         entries = [_entry(source, directions) for source in track("results fitted", sources)]
-        folder = output.free_folder(" and ".join(entry.name for entry in entries), "compare.json")
+        name = " and ".join(entry.name for entry in entries)
+        folder = output.free_folder(name, "compare.json")
         compared = compare(*entries, **settings)
-    _print_comparison(output, compared)
+    _print_comparison(output, name, compared)
     inputs = [source if source.suffix == ".toml" else model_file(source) for source in sources]
     output.write(folder, compared.files, compared.document, inputs)
 
@@ -96,32 +100,43 @@ def _entry(source: Path, directions: tuple[str, ...]) -> ComparedResult:
     return compared_result(loaded, str(source), digest, directions)
 
 
-def _print_comparison(output: Output, compared: ComparisonOutput) -> None:
-    """Print the letters of the results, and what differs; of families, how they fit the tests."""
-    from bushfit.report.compared import FAMILY_HEADS, SideBySide
-
-    differences = compared.words if output.verbose or not compared.families else []
-    for line in (*compared.advice, *compared.notes, *differences):
-        output.print(line)
-    for label, entry in zip(compared.labels, compared.entries, strict=True):
-        output.print(f"{label}: {entry.name} ({entry.source})")
-    if output.verbose or not compared.families:
-        _print_parameters(output, compared)
-    if compared.families:
-        title = "families; held out: root mean square in units of noise (1: noise alone)"
-        output.print_table(title, FAMILY_HEADS, SideBySide.from_document(compared.document).family_cells())
-    output.warn(line for line in compared.warnings if line not in compared.notes)
-
-
-def _print_parameters(output: Output, compared: ComparisonOutput) -> None:
-    """Print the parameters of each result beside those of the first."""
-    from bushfit.report.compared import chance, parameter_cells
+def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> None:
+    """Print which results differ by more than chance, what to do, the letters of the results, and the numbers."""
+    from bushfit.report.compared import FAMILY_HEADS, SideBySide, chance, parameter_cells
 
     first, *labels = compared.labels
-    for label, comparison in zip(labels, compared.comparisons, strict=True):
+    if compared.families:
+        verdict, *advice = compared.advice
+        best = max(compared.families, key=lambda family: family.probability)
+        effects = "" if best is compared.families[0] else "".join(f" --effect {name}" for name in best.name.split("+"))
+        action = f"next: bushfit fit {quote_path(Path(compared.entries[0].source))}{effects}"
+        sentences = [*advice, *compared.notes, *(compared.words if output.verbose else ())]
+    else:
+        different = [
+            f"{label} in {', '.join(names)}"
+            for label, comparison in zip(labels, compared.comparisons, strict=True)
+            if (names := [row.name for row in comparison.parameters if row.holm is not None and row.holm < _CHANCE])
+        ]
+        verdict = f"differences from {first} beyond chance: {'; '.join(different)}"
+        action = "use each result for its own part; differences.csv lists stiffness and loss factor at each point"
+        if not different:
+            verdict = f"no parameter differs from that of {first} by more than chance"
+            action = "the results may replace each other within the intervals below"
+        sentences = [*compared.notes, *compared.words]
+    output.print_headline(name, verdict, action)
+    for sentence in sentences:
+        output.print(sentence)
+    for label, entry in zip(compared.labels, compared.entries, strict=True):
+        output.print(f"{label}: {entry.name} ({entry.source})")
+    shown = compared.comparisons if output.verbose or not compared.families else ()
+    for label, comparison in zip(labels, shown, strict=False):
         title = f"parameters of {label} against {first}; p: probability of such a difference by chance (Holm)"
         columns = ("parameter", first, label, "difference", "95 % interval", "p", "unit")
         output.print_table(title, columns, map(parameter_cells, comparison.parameters))
         if comparison.joint:
             p, count = comparison.joint
             output.print(f"all {count} together, with correlations: p {chance(p)}")
+    if compared.families:
+        title = "families; held out: root mean square in units of noise (1: noise alone)"
+        output.print_table(title, FAMILY_HEADS, SideBySide.from_document(compared.document).family_cells())
+    output.warn(line for line in compared.warnings if line not in compared.notes)

@@ -105,13 +105,13 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
     output.warn(diagnosed.document["warnings"])
 
 
-def print_verdict(output: Output, diagnosed: DiagnosisOutput) -> None:
-    """Print the verdict, its summary, and the probability of what may be missing."""
+def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") -> None:
+    """Print the verdict, what to do, the summary, and the probability of what may be missing."""
     from bushfit.diagnosis.record import odds_in_words
 
     colour = _COLOURS.get(diagnosed.headline, "yellow")
     output.console.print(f"[bold]{escape(diagnosed.name)}:[/bold] [bold {colour}]{escape(diagnosed.headline)}[/]")
-    for line in (diagnosed.diagnosis.summary, *odds_in_words(diagnosed.document)):
+    for line in filter(None, (action, diagnosed.diagnosis.summary, *odds_in_words(diagnosed.document))):
         output.console.print(f"  {escape(line)}")
     if diagnosed.diagnosis.adopt:
         output.console.print(f"  to adopt: {escape(diagnosed.diagnosis.adopt)}")

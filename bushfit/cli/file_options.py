@@ -42,6 +42,7 @@ _NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, 
 #: Types of what is stated, by key; else a text.
 TYPES: dict[str, "click.ParamType[Any]"] = {
     "direction": click.Choice(DIRECTIONS),
+    "delimiter": click.Choice(["comma", "semicolon", "tab", "pipe", "caret", "blanks"]),
     "waveform": click.Choice(["sine", "triangle"]),
     "amplitude": click.Choice(["zero-to-peak", "peak-to-peak", "rms"]),
     **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),
@@ -75,7 +76,9 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
             test_options = {key: arguments.pop(key) for key in option_keys}
             test_options["columns"] = _pairs(columns, "--column", "force=Kraft", column_roles())
             test_options["units"] = _pairs(units, "--unit", "force=kN", column_roles())
-            return function(test_options={key: value for key, value in test_options.items() if value}, **arguments)
+            return function(
+                test_options={key: value for key, value in test_options.items() if value not in (None, {})}, **arguments
+            )
 
         return add_parameters(
             wrapped,

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bushfit.cli.options import command_called, effect_option, file_option, flag, place_option, under
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.printing import print_fit
+from bushfit.cli.printing import print_step
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
+from bushfit.errors import quote_path
+from bushfit.units import number
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
@@ -106,9 +109,24 @@ def _finish(output: Output, folder: Path, fitted: FitOutput, model: Path | None,
     """Print and write the output of a fit; `model` is the model file that was read."""
     from bushfit.commands.provenance import input_files
 
-    campaign = fitted.data.campaign
+    campaign, result, file = fitted.data.campaign, fitted.result, quote_path(fitted.data.campaign.path)
+    written = quote_path(folder / f"{fitted.files[0].name}.json")
+    verdict, action = "nothing was fitted: the tests are not compared", f"bushfit predict {written}"
+    if quality := result.quality:
+        misses = any(re.search(r"\bmiss(es)? the (tests|data)\b", line) for line in result.warnings)
+        figures = (
+            f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)}"
+        )
+        verdict = f"the model {'misses' if misses else 'meets'} the tests: {figures} (1 is noise alone)"
+        if misses:
+            action = f"bushfit diagnose {file} finds what the model lacks"
+    if fitted.files[0].name == "static":
+        action = f"bushfit fit-dynamic {file} --static {written} fits m and alpha"
+    elif left_open := result.left_open:
+        verdict, action = left_open, f"bushfit plan {file} --hours 1 chooses tests that determine them"
+    output.print_headline(campaign.name, verdict, f"next: {action}")
+    for title, step in fitted.steps:
+        print_step(output, f"{campaign.name}: {title}", step)
     output.warn(fitted.data.notes)
-    print_fit(output, campaign.name, fitted)
-    inputs = [*input_files(campaign), *([model] if model else [])]
-    output.write(folder, fitted.files, fitted.document, inputs)
-    exit_above(max_nrmse, fitted.result)
+    output.write(folder, fitted.files, fitted.document, [*input_files(campaign), *([model] if model else [])])
+    exit_above(max_nrmse, result)

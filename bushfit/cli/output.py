@@ -142,7 +142,7 @@ class Output:
             if (use := use_of(warning)) != use_of(""):  # which is said of warnings of no known kind
                 self.print(f"  {use}")
         if remaining := len(warnings) - len(printed):
-            self.print(f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all, the result files hold them")
+            self.print(f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all; the result files contain them")
         self._warnings.clear()
 
     def print_table(

@@ -14,7 +14,6 @@ from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction
 
 if TYPE_CHECKING:
     from bushfit.commands.predict import PredictionOutput
-    from bushfit.prediction.stiffness import Prediction
 
 #: Largest number of amplitudes of a direction that the terminal shows; the CSV has all.
 _MOST_AMPLITUDES = 8
@@ -76,8 +75,7 @@ def command(
         "arms": positive(arms, "--arms", "1"),
     }
     predicted = predict(result, loaded, wide=wide, **settings)
-    for prediction in predicted.predictions:
-        output.print(_summary(prediction))
+    _print_summary(output, predicted)
     print_predictions(output, predicted)
     for resonance in predicted.resonances:
         frequency, largest = resonance.peak
@@ -91,17 +89,26 @@ def command(
     output.write(folder, predicted.files, predicted.document, inputs)
 
 
-def _summary(prediction: Prediction) -> str:
-    """Range of stiffness and loss factor of a prediction, in one line."""
+def _print_summary(output: Output, predicted: PredictionOutput) -> None:
+    """Print what may be done with the prediction, and the range of stiffness and loss factor of each place."""
+    from bushfit.prediction.caveats import by_importance, use_of
     from bushfit.units import format_range
 
-    force, loss = prediction.direction.display.stiffness, prediction.loss_factor.value
-    stiffness = force.factor * prediction.stiffness.value
-    return (
-        f"{prediction.direction}: {prediction.direction.motion.words[2]} "
-        f"{format_range(force.name, stiffness.min(), stiffness.max())}, loss factor "
-        f"{format_range('', loss.min(), loss.max()).strip()}, {format_range('Hz', *prediction.frequency[[0, -1]])}"
-    )
+    places = [str(prediction.direction) for prediction in predicted.predictions]
+    verdict, action = f"{', '.join(places)} predicted with 95 % bands", "May be used: there are no warnings."
+    if warnings := by_importance(predicted.warnings):
+        verdict += f", with {len(warnings)} warning{'s' * (len(warnings) > 1)}"
+        place, colon, _ = warnings[0].partition(": ")
+        action = f"{place}{colon}{use_of(warnings[0])}" if place in places else use_of(warnings[0])
+    output.print_headline(predicted.result.name, verdict, action)
+    for prediction in predicted.predictions:
+        force, loss = prediction.direction.display.stiffness, prediction.loss_factor.value
+        stiffness = force.factor * prediction.stiffness.value
+        output.print(
+            f"{prediction.direction}: {prediction.direction.motion.words[2]} "
+            f"{format_range(force.name, stiffness.min(), stiffness.max())}, loss factor "
+            f"{format_range('', loss.min(), loss.max()).strip()}, {format_range('Hz', *prediction.frequency[[0, -1]])}"
+        )
 
 
 def print_predictions(output: Output, predicted: PredictionOutput) -> None:

@@ -5,32 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rich.markup import escape
-
 from bushfit.cli.output import Output
 from bushfit.units import format_range, number
 
 if TYPE_CHECKING:
-    from bushfit.commands.fit import FitOutput
     from bushfit.model.result import Misfit, Result, Usable
 
 #: Correlation between two parameters above which it is shown without -v: the data determine only their combination.
 _STRONG_CORRELATION = 0.9
 #: Largest number of tests that are shown without -v, those with the largest misfit.
 _MOST_TESTS = 8
-
-
-def print_fit(output: Output, name: str, fitted: FitOutput) -> None:
-    """Print the quality of a fit, parameters that the tests leave open, and each step."""
-    result = fitted.result
-    if left_open := result.left_open:
-        output.console.print(f"[bold]{escape(name)}:[/bold] [yellow]{escape(left_open)}[/]")
-    if result.quality:
-        misfit, chi_square = number(100 * result.quality.nrmse, 2), number(result.quality.reduced_chi_square, 3)
-        verdict = f"fitted with NRMSE {misfit} %, reduced chi-square {chi_square} (1 is noise alone)"
-        output.console.print(f"[bold]{escape(name)}:[/bold] {verdict}")
-    for title, result in fitted.steps:
-        print_step(output, f"{name}: {title}", result)
 
 
 def print_step(output: Output, title: str, result: Result) -> None:

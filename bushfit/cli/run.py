@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ from bushfit.cli.diagnose import print_findings, print_verdict
 from bushfit.cli.options import command_called
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.predict import print_predictions
-from bushfit.cli.printing import print_fit, print_origin, print_result, print_step
+from bushfit.cli.printing import print_origin, print_result, print_step
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
 from bushfit.units import display_unit, format_aligned, number
 
@@ -50,77 +49,83 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     data = prepare_tests(campaign, loss)
     output.warn(data.notes)
     outcome = run(data)
-    print_run(output, campaign.name, outcome)
+    print_run(output, campaign.name, outcome, f"use {folder / 'model.json'}, {_model_description(outcome)}")
     output.write(folder, outcome.files, outcome.document, input_files(campaign))
-    output.print(_model_to_use(folder, outcome))
     exit_above(max_nrmse, outcome.result)
 
 
-def print_run(output: Output, name: str, outcome: RunOutput) -> None:
-    """Print the result, with -v the steps before it, and the procedure of the paper in one line."""
+def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> None:
+    """Print the result, with -v the steps before it, and the procedure of the paper in one line.
+
+    Args:
+        output: output of the command.
+        name: name of the campaign.
+        outcome: results of the whole chain.
+        action: what to do, below the verdict.
+    """
     diagnosed, result = outcome.diagnosed, outcome.result
     if diagnosed:
-        print_verdict(output, diagnosed)
+        print_verdict(output, diagnosed, action)
     else:
-        output.print(f"{name}: every parameter is fixed, so there is nothing to diagnose")
+        output.print_headline(name, "every parameter is fixed, so there is nothing to diagnose", action)
     print_result(output, f"{name}: {'model with the added effects' if outcome.added else 'joint fit'}", result)
-    if diagnosed and diagnosed.diagnosis.verdict != "consistent":
+    if diagnosed and (output.verbose or diagnosed.diagnosis.verdict != "consistent"):
         print_findings(output, diagnosed)
     if result.measured:
         _print_range(output, outcome)
     print_origin(output, result)
     print_predictions(output, outcome.predicted)
+    two_step, joint = outcome.two_step, outcome.joint.result
     if output.verbose:
-        _print_steps(output, name, outcome)
-    two_step = outcome.two_step and two_step_line(outcome.two_step, outcome.joint.result)
-    output.print(two_step or f"two-step procedure (the paper's): left out, because {outcome.reason_left_out}")
+        for title, step in outcome.static.steps if outcome.static else ():
+            print_step(output, f"{name}: {title}", step)
+        if two_step:
+            _print_two_steps(output, name, two_step, joint)
+        if outcome.added:
+            print_step(output, f"{name}: joint fit", joint)
+    left_out = f"{outcome.reason_left_out}: the two-step procedure is skipped"
+    output.print(two_step_line(two_step, joint) if two_step else left_out)
 
 
-def _model_to_use(folder: Path, outcome: RunOutput) -> str:
-    """Sentence on which of the model files to use."""
-    description = "the joint fit"
+def _model_description(outcome: RunOutput) -> str:
+    """Description of the model to use."""
     if outcome.diagnosed and outcome.added:
         effects = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
-        description = f"with {effects}; joint.json is the fit without"
-    elif outcome.diagnosed and outcome.diagnosed.diagnosis.changed:  # a mistake in the record is named
-        description = "the joint fit to the uncorrected tests: correct the record first, then run again"
-    return f"the model to use: {folder / 'model.json'}, {description}"
+        return f"with {effects}; joint.json is without"
+    if outcome.diagnosed and outcome.diagnosed.diagnosis.changed:  # a mistake in the record is named
+        return "the joint fit to the uncorrected tests: correct the record first, then run again"
+    return "the joint fit"
 
 
 def _print_range(output: Output, outcome: RunOutput) -> None:
     """Print the tested range of each direction, whether or not its tests were fitted."""
     measured = outcome.result.measured
     fitted = measured.directions if measured else ()
-    output.console.print("tested range; outside this range the model extrapolates", style="bold")
+    output.console.print("tested range; outside of it the model extrapolates", style="bold")
     for direction in dict.fromkeys(data_set.direction for data_set in outcome.data.data_sets):
         unit, factor = direction.display.displacement
         tests = [data_set for data_set in outcome.data.data_sets if data_set.direction == direction]
         frequency, amplitude = (
-            [min(values.min() for values in arrays), max(values.max() for values in arrays)]
+            " to ".join(
+                dict.fromkeys(
+                    number(end, 3)
+                    for end in (min(values.min() for values in arrays), max(values.max() for values in arrays))
+                )
+            )
             for arrays in ([test.frequency for test in tests], [factor * test.amplitude for test in tests])
         )
         use = "" if str(direction) in fitted else ", not fitted"
-        output.print(f"  {direction}: {_span(frequency, 3)} Hz, {_span(amplitude, 3)} {unit}{use}")
-
-
-def _span(ends: Sequence[float], digits: int) -> str:
-    return " to ".join(dict.fromkeys(number(end, digits) for end in ends))
+        output.print(f"  {direction}: {frequency} Hz, {amplitude} {unit}{use}")
 
 
 def two_step_line(two_step: TwoStep, joint: Result) -> str:
     """Line that compares the two-step procedure with the joint fit; at a bound, errors do not count."""
-    found = two_step.result
-    errors = {name: (found.covariance.stderr(name), joint.covariance.stderr(name)) for name in joint.fitted}
-    standard_errors = {
-        name: (two_step_error, joint_error)
-        for name, (two_step_error, joint_error) in errors.items()
-        if two_step_error and joint_error
-    }
-    difference = {
-        n: abs(found.model.values[n] - joint.model.values[n]) / two_step_error
-        for n, (two_step_error, _) in standard_errors.items()
-    }
-    ratio = {name: two_step_error / joint_error for name, (two_step_error, joint_error) in standard_errors.items()}
+    found, difference, ratio = two_step.result, dict[str, float](), dict[str, float]()
+    for name in joint.fitted:
+        errors = found.covariance.stderr(name), joint.covariance.stderr(name)
+        if errors[0] and errors[1]:
+            difference[name] = abs(found.model.values[name] - joint.model.values[name]) / errors[0]
+            ratio[name] = errors[0] / errors[1]
     passes = len(two_step.passes)
     parts = [f"{passes} pass{'es' * (passes > 1)}"]
     if found.at_bound:
@@ -143,54 +148,27 @@ def two_step_line(two_step: TwoStep, joint: Result) -> str:
     return f"two-step procedure (the paper's): {', '.join(parts)} (static.json, dynamic.json; -v shows it)"
 
 
-def _print_steps(output: Output, name: str, outcome: RunOutput) -> None:
-    """Print every step: the two-step procedure, the joint fit, and the diagnosis in full."""
-    if outcome.static:
-        print_fit(output, name, outcome.static)
-    if outcome.two_step:
-        _print_passes(output, outcome.two_step)
-        print_step(output, f"{name}: static and dynamic fit in turn", outcome.two_step.result)
-    if outcome.added:
-        print_fit(output, name, outcome.joint)
-    if outcome.two_step:
-        _print_cost(output, outcome.two_step.result, outcome.joint.result)
-    if outcome.diagnosed and outcome.diagnosed.diagnosis.verdict == "consistent":
-        print_findings(output, outcome.diagnosed)
-
-
-def _print_passes(output: Output, two_step: TwoStep) -> None:
-    parameters, last = two_step.result.model.parameters, two_step.passes[-1]
-    units = {name: display_unit(parameters[name].unit, 1.0, value) for name, value in last.items()}
-    headers = [f"{name} [{unit}]" for name, (unit, _) in units.items()]
-    # from the last pass, whose decimals the others have
-    columns = [
-        format_aligned([p[name] * factor for p in two_step.passes[::-1]], 5, 2) for name, (_, factor) in units.items()
+def _print_two_steps(output: Output, name: str, two_step: TwoStep, joint: Result) -> None:
+    """Print the passes of the two-step procedure, its result, and its values and errors beside the joint fit."""
+    result, last = two_step.result, two_step.passes[-1]
+    units = {name: display_unit(result.model.parameters[name].unit, 1.0, value) for name, value in last.items()}
+    columns = [  # aligned from the last pass, whose decimals the others have
+        format_aligned([values[name] * factor for values in two_step.passes[::-1]], 5, 2)[::-1]
+        for name, (_, factor) in units.items()
     ]
-    rows = ((str(count), *row) for count, row in enumerate(list(zip(*columns, strict=True))[::-1], start=1))
-    output.print_table("static and dynamic fit in turn, by pass", ["pass", *headers], rows)
-
-
-def _print_cost(output: Output, two_step: Result, joint: Result) -> None:
-    """Print the values and errors of the two-step procedure beside those of the joint fit."""
-    columns = ("parameter", "two-step", "std error", "joint", "std error", "unit", "difference", "error ratio")
+    headers = ["pass", *(f"{name} [{unit}]" for name, (unit, _) in units.items())]
+    rows = [(str(count), *row) for count, row in enumerate(zip(*columns, strict=True), start=1)]
+    output.print_table("static and dynamic fit in turn, by pass", headers, rows)
+    print_step(output, f"{name}: static and dynamic fit in turn", result)
     rows = []
-    for name in (name for name in joint.fitted if name in two_step.model.values):
-        two_step_value, joint_value = two_step.model.values[name], joint.model.values[name]
-        errors = two_step.covariance.stderr(name), joint.covariance.stderr(name)
-        ratio = f"{errors[0] / errors[1]:.1f}" if errors[0] and errors[1] else ""
+    for name in (name for name in joint.fitted if name in result.model.values):
+        value, joint_value = result.model.values[name], joint.model.values[name]
+        errors = result.covariance.stderr(name), joint.covariance.stderr(name)
         unit, factor = display_unit(joint.model.parameters[name].unit, 1.0, joint_value)
-        error_texts = ["" if error is None else format_aligned([error * factor], 2)[0] for error in errors]
-        second, first = format_aligned([joint_value * factor, two_step_value * factor], 4, minimum_digits=2)
-        rows.append(
-            (
-                name,
-                first,
-                error_texts[0],
-                second,
-                error_texts[1],
-                unit,
-                f"{100 * (two_step_value / joint_value - 1):+.1f} %",
-                ratio,
-            )
-        )
-    output.print_table("two-step procedure compared with the joint fit", columns, rows)
+        error, joint_error = ("" if error is None else format_aligned([error * factor], 2)[0] for error in errors)
+        joint_text, text = format_aligned([joint_value * factor, value * factor], 4, minimum_digits=2)
+        difference = f"{100 * (value / joint_value - 1):+.1f} %"
+        ratio = f"{errors[0] / errors[1]:.1f}" if errors[0] and errors[1] else ""
+        rows.append((name, text, error, joint_text, joint_error, unit, difference, ratio))
+    headers = ["parameter", "two-step", "std error", "joint", "std error", "unit", "difference", "error ratio"]
+    output.print_table("two-step procedure compared with the joint fit", headers, rows)

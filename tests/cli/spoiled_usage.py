@@ -57,6 +57,8 @@ USAGE = [
     ("diagnose|campaign.toml|--adopt|milliseconds:sweep", "this mistake cannot have been made there", "one of milliseconds:loop"),
     ("diagnose|campaign.toml|--adopt|complement:sweep", "this mistake cannot have been made there", "another mistake: no test has room for this one"),
     ("diagnose|campaign.toml|--adopt|magic:sweep", "unknown mistake", "MISTAKE:TEST with one of peak_to_peak, zero_to_peak,"),
+    ("inspect|loop.csv|--delimiter|x", "Invalid value for '--delimiter': 'x' is not one of 'comma'"),
+    ("inspect|loop.csv|--header-line|0", "there is no header on this line", "found: header_line = 0"),
     ("report|nowhere", "nowhere: a folder of results is needed", "found: nothing"),
     ("report|model.json", "model.json: a folder of results is needed", "found: a file"),
     ("predict|campaign.toml", "campaign.toml: a fitted model is needed", "found: a campaign", "try: bushfit run campaign.toml makes one"),

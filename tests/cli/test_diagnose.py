@@ -193,9 +193,9 @@ def test_run_uses_the_tests_as_they_are_and_warns(bushfit: Run, work: Path) -> N
     said = " ".join(done.stderr.split())
     assert "sweep_axial.csv are peak-to-peak" in said
     assert f"(or bushfit diagnose CAMPAIGN --adopt {LABEL})" in said, "run takes no --adopt"
-    last = done.stderr.splitlines()[-1]
-    assert last.startswith("the model to use: ")
-    assert last.endswith("fit to the uncorrected tests: correct the record first, then run again")
+    action = done.stderr.splitlines()[1]
+    assert action.startswith("  use ")
+    assert action.endswith("fit to the uncorrected tests: correct the record first, then run again")
     model = document(work / "ran/model.json")
     assert model["effects"] == ["elastic", "springpot", "friction"]
     assert any("fitted to the tests as they are" in warning for warning in model["warnings"])
