@@ -130,7 +130,7 @@ def test_the_mount_against_its_prediction(
     losses = [f"{np.median(loss[band]):+.3f}" for band in bands]
     losses.append("{:+.2f} to {:+.2f}".format(*np.quantile(loss, (0.05, 0.95))))
     assert row("stiffness, measured over predicted") == stiffness
-    assert row("loss factor, measured less predicted") == losses
+    assert row("loss factor, measured minus predicted") == losses
 
 
 def test_its_band_after_one_factor_and_the_second_coupon(campaign: Campaign, compound: Result, root: Path) -> None:
@@ -152,7 +152,7 @@ def test_its_band_after_one_factor_and_the_second_coupon(campaign: Campaign, com
     assert f"{100 * inside:.0f} % of its points" in text
     low, high = compound.interval("stiffness_factor.DMA 2") or (0.0, 0.0)
     value = dict(compound.model.values)["stiffness_factor.DMA 2"]
-    assert f"{value:.3f} times as stiff as the first, 95 % {low:.3f} to {high:.3f}" in text
+    assert f"{value:.3f} times as stiff as the first (95 % interval {low:.3f} to {high:.3f})" in text
     assert 1.02 < value < 1.06, "1.04 to 1.05 read off where both were tested"
 
 
@@ -174,7 +174,7 @@ def test_its_resonances_and_the_reduced_files(
     small = ["{:.1f} / {:.1f} Hz".format(*peaks["01g", name]) for name in MASSES]
     lower = [[100.0 * (1.0 - peaks["1g", n][k] / peaks["01g", n][k]) for k in (0, 1)] for n in MASSES]
     assert row("at 0.1 g, measured / predicted") == small
-    assert row("lower at 1 g by, measured / predicted") == ["{:.1f} / {:.1f} %".format(*pair) for pair in lower]
+    assert row("decrease at 1 g, measured / predicted") == ["{:.1f} / {:.1f} %".format(*pair) for pair in lower]
 
 
 @pytest.mark.slow
