@@ -92,15 +92,18 @@ def command(
 
 def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
     """Print a diagnosis: the verdict, the gap and where it is, the next test, and then the details."""
+    from bushfit.effects import BASE
+
     diagnosis = diagnosed.diagnosis
     print_verdict(output, diagnosed)
     print_findings(output, diagnosed)
-    for effect in diagnosed.document["effects"]:
+    for effect in diagnosed.document["effects"] if diagnosis.verdict != "ambiguous" else ():
         output.console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
     if output.verbose:
         _print_candidates(output, diagnosis)
-    if diagnosis.added or output.verbose:
-        title = "model with the added effects" if diagnosis.added else "model"
+    has_more = tuple(diagnosis.result.model.effects) != BASE
+    if has_more or output.verbose:
+        title = "model with the added effects" if has_more else "model"
         print_parameters(output, title, diagnosis.result)
     output.warn(diagnosed.document["warnings"])
 
@@ -114,7 +117,8 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") 
     for line in filter(None, (action, diagnosed.diagnosis.summary, *odds_in_words(diagnosed.document))):
         output.console.print(f"  {escape(line)}")
     if diagnosed.diagnosis.adopt:
-        output.console.print(f"  to adopt: {escape(diagnosed.diagnosis.adopt)}")
+        first = " the first" if diagnosed.diagnosis.verdict == "ambiguous" else ""
+        output.console.print(f"  to adopt{first}: {escape(diagnosed.diagnosis.adopt)}")
 
 
 def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
@@ -161,7 +165,7 @@ def _print_effect(output: Output, effect: Mapping[str, Any]) -> None:
         interval = f"95 % {' to '.join(ends)}" if ends else "no interval"
         console.print(f"    {parameter} = {f'{value} {unit}'.removesuffix(' -')}, {interval}")
     if effect["twins"]:
-        names = " or ".join((effect["name"], *effect["twins"]))
+        names = f"{effect['name']} from {' or '.join(effect['twins'])}"
         if effect["alternatives"]:
             console.print(f"    the tests cannot distinguish {names}")
         else:

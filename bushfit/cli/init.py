@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -111,6 +112,9 @@ def command(
         _print_bushing(output, bushing[0])
     for inspection in inspections:
         _print_inspection(output, inspection)
+    for sentence, count in Counter(inspection.assumed for inspection in inspections).items():
+        if sentence:
+            output.print(f"{count} test{'s' * (count > 1)}: {sentence}")
     print_left_out(output, left_out)
     document: InspectionDocument = {
         "campaign": written[target],
@@ -252,14 +256,12 @@ def _print_bushing(output: Output, bushing: Bushing) -> None:
 
 
 def _print_inspection(output: Output, inspection: Inspection) -> None:
-    """Print one line on a file, then what was assumed and what is odd."""
+    """Print one line on a file, then anything unusual in it."""
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     facts = [f"{key}: {value}" for key, value in inspection.facts.items() if key in wanted or key.startswith("from ")]
     name = inspection.file.parent / inspection.label
     output.print(f"{name}: {inspection.kind}, {inspection.direction}; {'; '.join(facts)}")
     output.warn([f"{inspection.label}: {sentence}" for sentence in inspection.odd])
-    if inspection.assumed:
-        output.print(f"  {inspection.assumed}")
 
 
 @dataclass(frozen=True)

@@ -83,9 +83,8 @@ def diagnose(
         BushfitError: tests or settings that cannot support the diagnosis.
     """
     data, start = prepare_tests(campaign), as_result(model) if model else None
-    settings = DiagnosisSettings(
-        max_effects, tolerance, tuple(adopt), tuple(without), start.unresolved if start else ()
-    )
+    unresolved = [name for name in start.unresolved if name not in adopt] if start else []
+    settings = DiagnosisSettings(max_effects, tolerance, tuple(adopt), tuple(without), tuple(unresolved))
     _require_free_parameter(data, start.model if start else None, settings)
     diagnosis = _with_plan(workflow.diagnose(data, start.model if start else None, settings), data.campaign)
     if not (diagnosis.changed or start or adopt):  # the model to use is that of fit

@@ -103,7 +103,7 @@ def _read_sweep(
     low, high = (factor * end for end in spans[line.stepped == "amplitude"])
     trend = _trend(line.stepped or "frequency", line.step, pieces[worst])
     if len(touched) > 1 and line.stepped:
-        trend = f"most at {line.words}, there {trend}"
+        trend = f"most at {line.words}, {trend} there"
     across = [
         line.words
         for line, piece in zip(lines, pieces, strict=True)
@@ -119,7 +119,7 @@ def _read_sweep(
 def _trend(stepped: str, step: Array, misfit: Array) -> str:
     """Sentence on the misfit along a line: flat, or with the axis that gives the highest correlation."""
     if np.var(misfit) < _FLAT * np.mean(np.square(misfit)):
-        return f"much the same at every {stepped}"
+        return f"nearly constant over {stepped}"
     shapes = {
         f"with the logarithm of {stepped}": np.log(step),
         f"in proportion to {stepped}": step,

@@ -197,7 +197,8 @@ class DiagnosisWriter:
             ]
         elif led:
             names = [Named(name, self._probability(led), lookalikes) for name in led.names]
-        words = f"these tests cannot distinguish {' from '.join(labels.values())}"
+        *first_labels, last_label = labels.values()
+        words = f"these tests cannot distinguish between {', '.join(first_labels)} and {last_label}"
         fitted = [composition for composition in compositions if composition.best.effects and composition.best.refitted]
         models = [composition.best.weighed.state.evidence.model for composition in fitted]
         advice = deciding_test(

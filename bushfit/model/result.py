@@ -283,10 +283,11 @@ class Result:
         if not self.alternatives:
             return []
         added = (sorted(set(alternative.model.effects) - {*self.model.effects}) for alternative in self.alternatives)
-        names = " or ".join(dict.fromkeys(" and ".join(alternative) for alternative in added if alternative))
-        lacking = f"the tests cannot distinguish {names}: the prediction uses the plain model, and"
+        names = list(dict.fromkeys(" + ".join(alternative) for alternative in added if alternative))
+        choice = "cannot distinguish between" if len(names) > 1 else "do not show whether the model lacks"
+        lacking = f"the tests {choice} {' and '.join(names)}: the prediction uses the plain model, and"
         open_values = "the tests permit other values of the parameters:"
-        return [f"{lacking if names else open_values} its bands, low to high, include each alternative"]
+        return [f"{lacking if names else open_values} the bands, low to high, include each alternative"]
 
     def place(self, name: str) -> Place:
         """The specimen of this name, or else the direction; a ModelError where it is neither."""

@@ -86,7 +86,7 @@ def test_a_region_that_lies_on_either_side_of_the_model_says_so(measured: Measur
     tampered = both(off(1, 1.06, amplitude=LEVELS[0]), off(1, 0.95, amplitude=LEVELS[2]))(measured(plan=SHARED))
     reading = one(locate(fitted(tampered)), "radial", "storage").reading
     assert "above the model" in reading
-    assert "most at 0.1 mm, there much the same at every frequency" in reading
+    assert "most at 0.1 mm, nearly constant over frequency there" in reading
     assert reading.endswith("; below it at 0.5 mm")
 
 

@@ -45,7 +45,7 @@ def test_the_class_of_a_rig_that_is_assumed_is_said(measured: Measured) -> None:
         (RigSettings(gain_error=4e-3, phase_error=3.5e-3), ""),
     ):
         assumed = PreparedCampaign.from_campaign(replace(campaign, rig=rig)).assumed
-        assert [note.partition(" class, ")[2] for note in assumed] == [words] * bool(words)
+        assert [note.partition(" class of the rig, ")[2] for note in assumed] == [words] * bool(words)
 
 
 #: 3 % of give in the axial direction, 17 % in the radial, measured at a few frequencies.
