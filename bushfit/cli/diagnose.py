@@ -113,8 +113,8 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") 
     from bushfit.diagnosis.record import odds_in_words
 
     colour = _COLOURS.get(diagnosed.headline, "yellow")
-    output.console.print(f"[bold]{escape(diagnosed.name)}:[/bold] [bold {colour}]{escape(diagnosed.headline)}[/]")
-    for line in filter(None, (action, diagnosed.diagnosis.summary, *odds_in_words(diagnosed.document))):
+    output.print_headline(diagnosed.name, diagnosed.headline, action, f"bold {colour}")
+    for line in (diagnosed.diagnosis.summary, *odds_in_words(diagnosed.document)):
         output.console.print(f"  {escape(line)}")
     if diagnosed.diagnosis.adopt:
         first = " the first" if diagnosed.diagnosis.verdict == "ambiguous" else ""

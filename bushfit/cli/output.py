@@ -81,6 +81,7 @@ class Output:
     table_format: Form = Formats.table_form
     plot_format: Sequence[Picture] = Formats.picture_forms
     _warnings: dict[str, None] = field(default_factory=dict)
+    _headlines: list[str] = field(default_factory=list)
 
     @property
     def formats(self) -> Formats:
@@ -119,10 +120,12 @@ class Output:
         """Print a line as it is, without markup."""
         self.console.print(text, markup=False)
 
-    def print_headline(self, name: str, verdict: str, action: str) -> None:
-        """Print the first two lines of a result: its verdict, and what to do."""
-        self.console.print(f"[bold]{escape(name)}:[/bold] {escape(verdict)}")
-        self.print(f"  {action}")
+    def print_headline(self, name: str, verdict: str, action: str = "", colour: str = "default") -> None:
+        """Print the first two lines of a result: its verdict, which no warning repeats, and what to do."""
+        self._headlines.append(verdict)
+        self.console.print(f"[bold]{escape(name)}:[/bold] [{colour}]{escape(verdict)}[/]")
+        if action:
+            self.print(f"  {action}")
 
     def warn(self, warnings: Iterable[str]) -> None:
         """Keep warnings to be printed below the results."""
@@ -135,6 +138,8 @@ class Output:
         from bushfit.prediction.caveats import by_importance, use_of
 
         warnings = by_importance(self._warnings)
+        if not self.verbose:
+            warnings = [line for line in warnings if not any(line in verdict for verdict in self._headlines)]
         distinct = {use_of(warning): warning for warning in reversed(warnings)}
         printed = warnings if self.verbose else [*distinct.values()][::-1][:_MOST_WARNINGS]
         for warning in printed:

@@ -151,8 +151,7 @@ def with_contradictions(found: Sequence[_Kind], conditions: Sequence[Array]) -> 
         first, later = sorted((int(owner[one]), int(owner[second])))
         if first != later:  # a file that contradicts itself tells so
             sentence = (
-                f"it repeats {found[first].name}, and their stiffness differs by "
-                f"{number(100.0 * separation, 2)} % apart"
+                f"it repeats {found[first].name}, and their stiffness differs by {number(100.0 * separation, 2)} %"
             )
             marked[later] = replace(found[later], contradiction=sentence)
     return marked
