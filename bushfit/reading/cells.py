@@ -77,7 +77,11 @@ class Cells:
         return [cells for _, cells in islice(self.rows(), _FIRST)] or [[""] * len(self.headers)]
 
     def all_rows(self) -> Iterator[tuple[int, Sequence[str | float], str | None]]:
-        """Line number, cells, and fault of each row that is filled; see `fault`."""
+        """Yield line number, cells, and fault of each row that is filled.
+
+        Yields:
+            As of `rows`, with None for data or else the reason of `fault`.
+        """
         try:
             for line in self.source.lines(self.layout.lines_before_data):
                 if self.layout.numbered or not is_comment(line.content, self.layout.delimiter):
@@ -89,14 +93,10 @@ class Cells:
             raise self.error("the table cannot be read", found=str(error)) from error
 
     def fault(self, cells: Sequence[str | float]) -> str | None:
-        """Reason why a row is no data.
+        """Return the reason why a row is no data; None for data.
 
-        Args:
-            cells: of the row, as many as the header has or more.
-
-        Returns:
-            None for data; "other" for a row that is clearly none, such as a remark or a mean; "missing" for a known
-            placeholder instead of a number; "word" for another one; and "doubtful" for a row that looks like data.
+        "other" is a row that is clearly none, such as a remark or a mean; "missing" one with a known placeholder
+        instead of a number; "word" one with another word; and "doubtful" one that looks like data.
         """
         texts = [str(cell) for cell in cells]
         first = next((text for text in texts if text), "")
@@ -120,13 +120,10 @@ class Cells:
         return None
 
     def note_left_out(self, rows: Sequence[Row] | None = None) -> Iterator[str]:
-        """Sentence on the rows that are left out because they hold no data of the test.
-
-        Args:
-            rows: line number and cells of each row that may be left out; default all in the table.
+        """Describe the rows without data, by default of the whole table.
 
         Yields:
-            One sentence if there are such rows.
+            One sentence if there are any.
 
         Raises:
             MeasurementError: so many of these rows look like data that their meaning is in doubt.
@@ -155,16 +152,13 @@ class Cells:
     def bad_row(
         self, line: int, cells: Sequence[str | float], count: int = 1, column: Column | None = None
     ) -> MeasurementError:
-        """Create the error for a row that does not fit the header, or has a cell that is no number.
+        """Return the error for a row that does not fit the header, or has a cell that is no number.
 
         Args:
             line: line number.
             cells: its cells.
             count: number of such rows.
             column: with the bad cell; default the first needed one without a number.
-
-        Returns:
-            The error.
         """
         also = f", and {count - 1} more such rows" if count > 1 else ""
         needed = [column for column in self.roles.values() if column.index in self.needed]
@@ -206,7 +200,7 @@ class Cells:
         kind: type[MeasurementError] = MeasurementError,
         **details: Any,
     ) -> MeasurementError:
-        """Create an error with its place.
+        """Return an error with its place.
 
         Args:
             problem: in one clause.
@@ -218,13 +212,7 @@ class Cells:
         return kind(problem, file=self.file, place=self.place(line, column), **details)
 
     def header_error(self, problem: str, found: str | None = None, **details: Any) -> MeasurementError:
-        """Create an error in the header.
-
-        Args:
-            problem: in one clause.
-            found: default the cells of the header, if the file is understood as a table of numbers.
-            details: further arguments of `error`.
-        """
+        """Return an error in the header; `found` is by default its cells, if the file is understood as a table."""
         if found is None and self.is_table:
             found = ", ".join(self.headers)
         found = found or f"{len(self.headers)} cell{'s' * (len(self.headers) != 1)}, without the name of a column"
@@ -236,15 +224,7 @@ class Cells:
         return len(self.roles) > 1 or any(is_row(list(map(str, cells))) for cells in self.first_rows[:_MOST_LISTED])
 
     def place(self, line: int | None, column: Column | None) -> str | None:
-        """Location in the file in words, as "line 3, column "Time [s]"".
-
-        Args:
-            line: line number, if it is known.
-            column: if it is known.
-
-        Returns:
-            Sheet, line and column; None if all are unknown.
-        """
+        """Return the location in the file as "line 3, column "Time [s]""; None if all is unknown."""
         source = self.source
         parts = [
             f'{word_for_part(self.file)} "{source.sheet}"' if source.sheet else None,

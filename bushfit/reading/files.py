@@ -89,16 +89,13 @@ def view_bytes(
 def read_utf8(
     file: Path, kind: type[BushfitError], *, largest: int = _LARGEST_BYTES, hint: str = "thin it out"
 ) -> bytes:
-    """Read the bytes of a text file in UTF-8.
+    """Return the bytes of a text file in UTF-8, with the byte order mark if there is one.
 
     Args:
         file: path.
         kind: class of errors.
         largest: number of bytes that is allowed.
         hint: next step if the file is larger.
-
-    Returns:
-        Bytes, with the byte order mark if there is one.
 
     Raises:
         kind: as `view_bytes`, or the file is not UTF-8 text.
@@ -117,14 +114,7 @@ def read_utf8(
 
 
 def not_utf8(data: bytes) -> int | None:
-    """Find the first byte that is not valid UTF-8 text.
-
-    Args:
-        data: bytes of a text.
-
-    Returns:
-        Index of the byte; None if all are valid.
-    """
+    """Return the index of the first byte that is not valid UTF-8 text; None if all are valid."""
     if (zero := data.find(0)) >= 0:
         return zero
     decoder = codecs.getincrementaldecoder("utf-8")()
@@ -143,14 +133,7 @@ def line_of(data: bytes, index: int) -> str:
 
 
 def sha256(data: bytes) -> Future[str]:
-    """Compute the SHA-256 of a file; of a large one in a thread.
-
-    Args:
-        data: bytes of the file.
-
-    Returns:
-        Future with the hexadecimal digits.
-    """
+    """Return the SHA-256 of a file in hexadecimal digits; of a large one in a thread."""
     if len(data) <= CHUNK_BYTES:
         digest = Future[str]()
         digest.set_result(hashlib.sha256(data).hexdigest())

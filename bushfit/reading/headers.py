@@ -320,7 +320,7 @@ def plain(name: str) -> str:
 
 
 def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None]:
-    """Name, unit and amplitude convention of a header whose name has no known meaning."""
+    """Return name, unit and amplitude convention of a header whose name has no known meaning."""
     text, convention = split_convention(header)
     for name, unit, certain in _splits(text):
         if certain and unit is None and units.is_unit(name) and name != "-":

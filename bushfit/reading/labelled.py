@@ -60,12 +60,7 @@ def same_text(text: str, reference: str) -> bool:
 
 
 def column_texts(cells: Cells, index: int) -> ColumnTexts:
-    """Texts of a column; an empty cell, such as a merged one, has the text of the cell above.
-
-    Args:
-        cells: of the table.
-        index: of the column.
-    """
+    """Return the texts of a column; an empty cell, such as a merged one, has the text of the cell above."""
     raw = _large_texts(cells).get(index)
     if raw is None:
         column = [row[index] for _, row in cells.rows()]
@@ -105,14 +100,7 @@ def _may_separate(cells: Cells, index: int) -> bool:
 
 
 def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
-    """Find the columns that state direction, specimen_number and run.
-
-    Args:
-        cells: of the table.
-
-    Returns:
-        Index of the column and its texts, (n,), by these keys.
-    """
+    """Return index and texts, (n,), of the columns that state direction, specimen_number and run, by these keys."""
     labels: dict[str, tuple[int, Sequence[str]]] = {}
     for index, header in enumerate(cells.headers):
         heading = _LABELS.heading(header) if header else None

@@ -105,14 +105,7 @@ class Layout:
 
 
 def split(content: Content, delimiter: str) -> list[str]:
-    """Split a line into cells.
-
-    Args:
-        content: of the line.
-        delimiter: between cells; " " for runs of blanks.
-
-    Returns:
-        Cells, without blanks around them and without empty cells at the end.
+    """Return the cells of a line, without blanks around them and without empty cells at the end.
 
     Raises:
         csv.Error: a line or a quoted cell is far too long.
@@ -194,15 +187,7 @@ def _is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
 
 
 def header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
-    """Split a header into cells in all plausible ways.
-
-    Args:
-        content: of the line.
-        delimiter: between cells; " " for runs of blanks.
-
-    Yields:
-        Cells, without empty ones at the end.
-    """
+    """Return the cells of a header in all plausible ways, without empty cells at the end."""
     if isinstance(content, str) and len(content := content.rstrip(f" \t{delimiter}")) > _LONGEST_HEADER:
         return
     content = _WIDE_GAP.sub("  ", content) if isinstance(content, str) else content

@@ -118,13 +118,9 @@ NO_LABELS = Labels()
 
 
 def labels_in_names(*names: str) -> Labels:
-    """Find the labels of a test in names.
+    """Return the labels of a test in names, of its sheet, file and so on, in their order of precedence.
 
-    Args:
-        names: of its sheet, file and so on, in their order of precedence.
-
-    Returns:
-        Labels. Numbers without a unit, such as dates and numbers of parts, are no amplitudes.
+    Numbers without a unit, such as dates and numbers of parts, are no amplitudes.
     """
     labels = NO_LABELS
     for name in names:
@@ -167,13 +163,9 @@ def _labels_in_name(name: str) -> Labels:
 
 
 def labels_above(lines: Iterable[Line]) -> Labels:
-    """Find the labels of a test in lines of a name and a value, such as "Temperature: 23 degC".
+    """Return the labels of a test in lines of a name and a value, such as "Temperature: 23 degC", above a table.
 
-    Args:
-        lines: above a table or between its blocks.
-
-    Returns:
-        Labels. Unknown names and quantities without a unit are left out.
+    Unknown names and quantities without a unit are left out.
     """
     labels = NO_LABELS
     for line in lines:
@@ -221,14 +213,9 @@ def _is_quantity(text: str, unit: str) -> bool:
 
 
 def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction | None:
-    """Find the direction that texts name.
+    """Return the direction that headers or names state; None for none or several.
 
-    Args:
-        texts: headers or names.
-        short: True if the abbreviations "ax", "rad" and "tors" count too, as in names of files.
-
-    Returns:
-        The direction; None if the texts name none or several.
+    `short` admits the abbreviations "ax", "rad" and "tors", as in names of files.
     """
     folded = unicodedata.normalize("NFKD", " ".join(texts)).encode("ascii", "ignore").decode().casefold()
     directions = {direction for start, direction in _WORD_STARTS.items() if re.search(rf"(?<![a-z]){start}", folded)}
@@ -238,16 +225,13 @@ def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction |
 
 
 def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool, sheet: str | None = None) -> Direction | None:
-    """Find the direction that a test file names: in the name of its sheet, else in its own name, else in its headers.
+    """Return the direction in the name of a sheet, else in that of a file, else in its headers; None for none.
 
     Args:
         file: path.
         headers: of the table.
-        turns: True if the displacement is an angle, so that the direction is torsion unless another rotation is named.
+        turns: True if the displacement is an angle: the direction is torsion unless another rotation is named.
         sheet: name of the sheet, if there is one.
-
-    Returns:
-        The direction; None if it is not stated.
     """
     names = (named_direction([name], short=True) for name in (sheet or "", file.stem))
     direction = next(filter(None, names), None) or named_direction(headers)

@@ -52,13 +52,7 @@ class OpenedFile:
     parts: Sequence[RowSource]
 
     def choose(self, is_usable: Callable[[RowSource], bool]) -> RowSource:
-        """Choose the part that contains the table.
-
-        Args:
-            is_usable: function that returns True if a part contains such a table.
-
-        Returns:
-            The only usable part.
+        """Return the only part for which a function returns True.
 
         Raises:
             MeasurementError: no part, or more than one, is usable.
@@ -78,14 +72,7 @@ class OpenedFile:
 
 
 def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
-    """Open a text in any encoding, a workbook or a recording.
-
-    Args:
-        file: path.
-        file_format: format as the user states it; `sheet` selects a part.
-
-    Returns:
-        Content of the file.
+    """Return the content of a text in any encoding, a workbook or a recording; `file_format.sheet` selects a part.
 
     Raises:
         MeasurementError: the file cannot be read, or has no such part.
@@ -119,11 +106,7 @@ def parts_of(file: Path) -> Sequence[Sheet]:
 
 
 def read_parts(data: bytes, file: Path) -> Sequence[tuple[Sheet, bool]]:
-    """Sheets of a workbook, or groups of a recording, each with True if it is visible; none for a text.
-
-    Args:
-        data: bytes of the file.
-        file: path, for errors.
+    """Return the sheets of a workbook, or groups of a recording, each with True if it is visible; none for a text.
 
     Raises:
         MeasurementError: a workbook or recording that cannot be read.
@@ -137,15 +120,12 @@ def read_parts(data: bytes, file: Path) -> Sequence[tuple[Sheet, bool]]:
 
 
 def read_sheets(data: bytes, file: Path, kind: type[BushfitError] = MeasurementError) -> Sequence[tuple[Sheet, bool]]:
-    """Read the sheets of a workbook.
+    """Return the sheets of a workbook, each with True if it is visible; if none is visible, all are.
 
     Args:
         data: bytes of the file.
         file: path, for errors.
         kind: class of errors.
-
-    Returns:
-        Sheets, each with True if it is visible; if none is visible, all are.
 
     Raises:
         kind: no workbook, or one with more cells than can be read.

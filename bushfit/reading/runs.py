@@ -96,13 +96,9 @@ def runs_of(
 
 
 def nominal(amplitude: Floats) -> Floats:
-    """Find the level of each amplitude: the median of a narrow group that is far from all others.
+    """Return the level of each amplitude above zero, (n,): the median of a narrow group that is far from all others.
 
-    Args:
-        amplitude: nominal or reached, above zero, (n,).
-
-    Returns:
-        Levels, (n,); the amplitudes themselves if gaps do not separate them into narrow groups of several points.
+    The amplitudes themselves if gaps do not separate them into narrow groups of several points.
     """
     distinct, index = np.unique(amplitude, return_inverse=True)
     logs = np.log(distinct)

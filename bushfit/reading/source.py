@@ -107,15 +107,9 @@ class Text:
         return None if frame is None else {index: frame[index].to_numpy() for index in indices}
 
     def texts(self, layout: Layout, indices: Sequence[int]) -> dict[int, tuple[list[str], NDArray[np.intp]]] | None:
-        """Read columns of texts with pandas.
+        """Return the different texts of columns, and the position of that of each row among them, (n,), by index.
 
-        Args:
-            layout: header and delimiter.
-            indices: of the columns.
-
-        Returns:
-            Different texts of each column, and the position of that of each row among them, (n,), by index; None if
-            rows differ in length, or cells may contain delimiters.
+        None if rows differ in length, or cells may contain delimiters.
         """
         if layout.delimiter == " " or self.has('"', layout):
             return None
@@ -155,14 +149,9 @@ class Text:
         return None if is_skipping else frame
 
     def suspicious(self, layout: Layout, largest_share: float) -> list[tuple[int, int, int]] | None:
-        """Find lines below the header that have letters, dashes or an empty cell.
+        """Return number, start and end of the lines below the header that have letters, dashes or an empty cell.
 
-        Args:
-            layout: header and delimiter.
-            largest_share: share of such lines at most.
-
-        Returns:
-            Line number, start and end of each line; None if there are too many.
+        None if their share is too large.
         """
         mark = re.escape(layout.delimiter.encode())
         pattern = re.compile(

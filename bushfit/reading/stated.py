@@ -36,14 +36,7 @@ _SHEAR = converter(lambda raw, _: None if raw == "shear" else raw, {"enum": [*Di
 
 
 def motion_quantity(suffix: str = "") -> BeforeValidator:
-    """Validator that converts a text to SI, with the unit of displacement of the table's direction or specimen.
-
-    Args:
-        suffix: of the SI unit, such as "/s" for a speed.
-
-    Returns:
-        Validator for values in m, rad or 1, times the suffix.
-    """
+    """Return a validator of texts in m, rad or 1, by the table's direction or specimen, times a suffix such as "/s"."""
 
     def convert(raw: Any, info: ValidationInfo) -> float:
         direction = info.data.get("direction")
@@ -93,14 +86,7 @@ def place_tested(specimen: object, direction: object, specimens: Sequence[Specim
 
 
 def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
-    """Replace the keys direction and specimen in [simulate] by the direction or specimen itself.
-
-    Args:
-        tables: parsed [simulate] of a campaign file.
-        specimens: of the campaign.
-
-    Returns:
-        The tables with a direction or specimen under the key direction; values that are no tables are unchanged.
+    """Return parsed [simulate] with the keys direction and specimen replaced by the direction or specimen itself.
 
     Raises:
         CampaignError: as of `place_tested`.

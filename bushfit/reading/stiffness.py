@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bushfit.reading.headers import AGREEING_PAIRS, OF_MOTION, PAIRS, WORDS, AmplitudeConvention, Column, Vocabulary
+from bushfit.reading.headers import AGREEING_PAIRS, OF_MOTION, PAIRS, WORDS, Column, Vocabulary
 from bushfit.reading.measurement import Complex, Floats
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.table import Table
@@ -33,13 +33,7 @@ _DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissemen
 
 
 def stiffness_pair(table: Table) -> tuple[str, str]:
-    """Find the first of PAIRS for which a table has columns.
-
-    Args:
-        table: of the sweep.
-
-    Returns:
-        The two roles.
+    """Return the first of PAIRS for which a table has columns.
 
     Raises:
         MeasurementError: there is none, or the damping can be read in two ways.
@@ -50,12 +44,12 @@ def stiffness_pair(table: Table) -> tuple[str, str]:
     for role in {role: None for pair in PAIRS for role in pair if role in OF_MOTION}:
         table.refuse_other_motion(role)
     refuse_ambiguous_damping(table)
-    hint = hint_of_derived(table)
     usual = ", or ".join(" and ".join(pair) for pair in AGREEING_PAIRS).replace("_", " ")
     raise table.header_error(
         "no pair of columns gives a complex stiffness",
         expected=f"{usual}, or a force amplitude and its phase",
-        hint=hint or 'correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
+        hint=hint_of_derived(table)
+        or 'correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
     )
 
 
@@ -66,10 +60,10 @@ def hint_of_derived(table: Table) -> str | None:
 
 
 def refuse_ambiguous_damping(table: Table) -> None:
-    """Refuse a damping that can be a loss factor or a damping ratio.
+    """Refuse a damping that can be a loss factor or a damping ratio, beside a stiffness or an amplitude of the force.
 
     Raises:
-        MeasurementError: there is such a column beside a stiffness or an amplitude of the force.
+        MeasurementError: there is such a column.
     """
     damping = next((header for header in table.headers if header and _DAMPING.heading(header)), None)
     if damping and {"stiffness", "storage_stiffness", "force_amplitude"} & set(table.roles):
@@ -81,32 +75,6 @@ def refuse_ambiguous_damping(table: Table) -> None:
             expected="one of them, or a damping coefficient in N s/mm",
             hint=f"{' or '.join(keys)} or {coefficient} in the campaign",
         )
-
-
-def force_amplitude_convention(table: Table, column: Column, of_motion: AmplitudeConvention) -> AmplitudeConvention:
-    """Convention of the amplitudes of the force: that of their header, or zero-to-peak if the motion has the same.
-
-    Args:
-        table: of the sweep.
-        column: of the amplitudes of the force.
-        of_motion: convention of the amplitudes of the displacement.
-
-    Returns:
-        Convention of the amplitudes of the force.
-
-    Raises:
-        MeasurementError: only the header of the displacement states peak-to-peak or rms.
-    """
-    if column.convention is None and of_motion != "zero-to-peak":
-        forms = {"peak-to-peak": "p-p", "rms": "rms"}
-        keys = (f'units = {{ force_amplitude = "{column.unit} {form}" }}' for form in (forms[of_motion], "0-p"))
-        raise table.header_error(
-            "the header does not state how the amplitudes of the force are counted",
-            found=f'"{column.header}" beside a displacement that is {of_motion}',
-            expected="p-p, rms or 0-p in the header",
-            hint=f"{' or '.join(keys)} in the campaign",
-        )
-    return column.convention or "zero-to-peak"
 
 
 def with_positive_loss(
@@ -127,54 +95,44 @@ def with_positive_loss(
         phase that is negative throughout is that of the displacement relative to the force.
     """
     corrected, notes = dict(values), []
-    if (phase := values.get("phase")) is not None:
+    if (phase := corrected.get("phase")) is not None:
         header = columns["phase"].header
-        wrapped = np.angle(np.exp(1j * phase))
         if np.abs(phase).max() > np.pi * (1.0 + 1e-9):
+            phase = np.angle(np.exp(1j * phase))
             notes.append(f'"{header}" exceeds 180 deg and is wrapped')
-        else:
-            wrapped = phase
-        automatic = test.force_sign is None and np.median(np.abs(wrapped)) > np.pi / 2.0
-        if test.force_sign == -1 or automatic:
-            wrapped = np.angle(-np.exp(1j * wrapped))
+        automatic = test.force_sign is None and np.median(np.abs(phase)) > np.pi / 2.0
         if automatic:
             notes.append(
                 f'"{header}" exceeds 90 deg: the force has the opposite sign, and the phase is turned by 180 deg; '
                 "force_sign = 1 in the campaign keeps it"
             )
-        corrected["phase"] = wrapped
+        corrected["phase"] = np.angle(-np.exp(1j * phase)) if automatic or test.force_sign == -1 else phase
+    size = np.median(values.get("storage_stiffness", values.get("stiffness", np.ones(1))))
     for role in ("phase", "loss_factor", "loss_stiffness", "damping_coefficient", "damping_ratio"):
         if role not in corrected or role not in columns:
             continue
-        size = (
-            corrected[role] / np.median(values.get("storage_stiffness", values.get("stiffness", 1.0)))
-            if role == "loss_stiffness"
-            else corrected[role]
-        )
-        automatic = test.phase_sign is None and np.mean(size < -LEAST_LOSS_FACTOR) > _THROUGHOUT
-        if test.phase_sign == -1 or automatic:
-            corrected[role] = -corrected[role]
+        share = corrected[role] / (size if role == "loss_stiffness" else 1.0)
+        automatic = test.phase_sign is None and np.mean(share < -LEAST_LOSS_FACTOR) > _THROUGHOUT
         if automatic:
             notes.append(
                 f'"{columns[role].header}" is negative throughout and is read with the opposite sign; '
                 "phase_sign = 1 in the campaign keeps it"
             )
+        corrected[role] = -corrected[role] if automatic or test.phase_sign == -1 else corrected[role]
     return corrected, tuple(notes)
 
 
 def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tuple[Complex, Floats]:
-    """Complex stiffness and loss factor.
+    """Return the complex stiffness [N/m or N m/rad, or Pa], (n,), and the loss factor [-], (n,).
 
     Args:
         pair: one of PAIRS.
         values: in SI by role, (n,) each.
 
-    Returns:
-        Complex stiffness [N/m or N m/rad, or Pa], (n,), and loss factor [-], (n,), NaN from a phase of 90 deg on.
-
     Notes:
         K* = K' + i K'' with K'' = 2 pi f c of a damping coefficient c, and tan delta = 2 zeta of a damping ratio zeta.
-        A force amplitude F at a displacement amplitude x gives |K*| = F / x.
+        A force amplitude F at a displacement amplitude x gives |K*| = F / x. The loss factor is NaN from a phase of
+        90 deg on.
     """
     size, loss = values[pair[0]], values[pair[1]]
     if pair[0] == "force_amplitude":
@@ -192,17 +150,23 @@ def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tu
     return storage * (1.0 + 1j * factor), factor
 
 
-def check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
-    """Refuse ratios that are stated in %, and a loss that no bushing has.
+def check_stiffness(
+    table: Table, pair: tuple[str, str], values: Mapping[str, Floats], stiffness: Complex, loss_factor: Floats
+) -> None:
+    """Refuse a loss that no bushing has, ratios that are stated in %, and rows in which other columns give another
+    stiffness; their loss may have the other sign.
 
     Args:
         table: of the sweep.
-        column: of the loss.
+        pair: of PAIRS that gave the stiffness.
+        values: in SI by role, (n,) each.
+        stiffness: complex [N/m or N m/rad, or Pa], (n,).
         loss_factor: [-], (n,).
 
     Raises:
-        MeasurementError: such a loss.
+        MeasurementError: such a loss, or such a row.
     """
+    column = table.roles[pair[1]]
     if np.mean(loss_factor < -LEAST_LOSS_FACTOR) > _THROUGHOUT:
         raise table.error(
             "the loss has the opposite sign",
@@ -212,12 +176,13 @@ def check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
             hint="take phase_sign out of the campaign, or state phase_sign = -1",
         )
     largest = float(np.nan_to_num(np.abs(loss_factor), nan=np.inf).max())
-    if column.role == "loss_factor" and column.scale != 1.0 and 0.0 < largest < LEAST_LOSS_FACTOR:
+    scale = table.column("loss_factor", "1").scale if pair[1] == "loss_factor" else 1.0
+    if scale != 1.0 and 0.0 < largest < LEAST_LOSS_FACTOR:
         raise table.error(
             "no rubber loses so little",
             column=column,
-            found=f"{largest / column.scale:.3g} {column.unit} at most",
-            expected=f"a loss factor above {LEAST_LOSS_FACTOR / column.scale:g} {column.unit} somewhere",
+            found=f"{largest / scale:.3g} {column.unit} at most",
+            expected=f"a loss factor above {LEAST_LOSS_FACTOR / scale:g} {column.unit} somewhere",
             hint=f'if these are ratios, write "[-]" for "[{column.unit}]" in the header',
         )
     low, high = _LOSS_FACTORS
@@ -228,20 +193,6 @@ def check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
         f"a loss factor (loss over storage stiffness) from {low:g} to {high:g}",
         "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]; or is it 90 deg less the loss?",
     )
-
-
-def check_agreement(table: Table, pair: tuple[str, str], values: Mapping[str, Floats], stiffness: Complex) -> None:
-    """Refuse rows in which other columns give another stiffness; their loss may have the other sign.
-
-    Args:
-        table: of the sweep.
-        pair: of PAIRS that gave the stiffness.
-        values: in SI by role, (n,) each.
-        stiffness: complex [N/m or N m/rad, or Pa], (n,).
-
-    Raises:
-        MeasurementError: there is such a row.
-    """
     for redundant_pair in AGREEING_PAIRS:
         if redundant_pair == pair or not set(redundant_pair) <= set(values):
             continue

@@ -11,25 +11,12 @@ from numpy.typing import NDArray
 
 from bushfit import units as si
 from bushfit.geometry import STRAINING, Place, strain_factor_of_files
-from bushfit.reading.headers import (
-    AGREEING_PAIRS,
-    SWEEP_COLUMNS,
-    ZERO_TO_PEAK,
-    AmplitudeConvention,
-    Column,
-)
+from bushfit.reading.headers import AGREEING_PAIRS, SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column
 from bushfit.reading.labelled import column_texts, note_not_understood
 from bushfit.reading.measurement import SAME_TEMPERATURE, Floats, Sweep
 from bushfit.reading.runs import runs_of
 from bushfit.reading.stated import SweepFile
-from bushfit.reading.stiffness import (
-    check_agreement,
-    check_loss,
-    complex_stiffness,
-    force_amplitude_convention,
-    stiffness_pair,
-    with_positive_loss,
-)
+from bushfit.reading.stiffness import check_stiffness, complex_stiffness, stiffness_pair, with_positive_loss
 from bushfit.reading.table import Table
 
 #: Columns whose values must be positive.
@@ -70,7 +57,7 @@ def read_sweep(
         test: what the file does not state. The temperature selects rows of a file with several temperatures.
         name: of the sweep; default the stem of the file.
         shared: True if the file contains other tests too.
-        at_amplitude: amplitude of all rows [m or rad, or strain], counted like the amplitudes of file and campaign.
+        at_amplitude: amplitude of all rows [m or rad, or strain], counted as `test.amplitude` says.
 
     Returns:
         The sweep, with amplitudes zero-to-peak.
@@ -81,39 +68,39 @@ def read_sweep(
     rows = test.rows_of_test(shared=shared)
     table = Table.open(file, SWEEP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
     pair = stiffness_pair(table)
-    stated_values = {"frequency": test.at_frequency, "amplitude": at_amplitude}
-    constants = {role: value for role, value in stated_values.items() if value is not None}
-    wanted = sweep_columns(table, direction, pair, constants)
-    convention = amplitude_convention(table, wanted.get("amplitude"), test.amplitude)
-    to_peak = ZERO_TO_PEAK[convention]
-    if at_amplitude is not None:  # counted like the column of the file
+    constants = {"frequency": test.at_frequency}
+    if at_amplitude is not None:
         constants["amplitude"] = (
-            at_amplitude * strain_factor_of_files(direction) * ZERO_TO_PEAK[test.amplitude or "zero-to-peak"] / to_peak
+            at_amplitude * strain_factor_of_files(direction) * ZERO_TO_PEAK[test.amplitude or "zero-to-peak"]
         )
-    values, notes = table.read_with_notes(wanted, fewest_rows=_FEWEST_SWEEP_ROWS)
-    table = table.needing(wanted)
-    table.check_positive(_POSITIVE, wanted, values)
-    for role, value in constants.items():
-        values[role] = check_stated(table, wanted.get(role), values, value)
-    if pair[0] == "force_amplitude":
-        force_convention = force_amplitude_convention(table, wanted["force_amplitude"], convention)
-        values["force_amplitude"] = values["force_amplitude"] * ZERO_TO_PEAK[force_convention] / to_peak
-    values, more = with_positive_loss(values, wanted, test)
+    stated = {role: value for role, value in constants.items() if value is not None}
+    columns = sweep_columns(table, direction, pair, stated, test.amplitude)
+    values, notes = table.read_with_notes(columns, fewest_rows=_FEWEST_SWEEP_ROWS)
+    table = table.needing(columns)
+    table.check_positive(_POSITIVE, columns, values)
+    for role, value in stated.items():
+        if role in columns:
+            table.refuse(
+                np.abs(values[role] - value) > _STATED_AGREEMENT * value,
+                columns[role],
+                f"the {role} is not the one that is stated",
+                f"at_{role} as the campaign states it, {value / columns[role].scale:.6g} {columns[role].unit}, "
+                f"within {100 * _STATED_AGREEMENT:g} %",
+                f"take at_{role} out of the campaign: the file has a column for it",
+            )
+        values.setdefault(role, np.full(values[pair[0]].size, value))
+    values, corrections = with_positive_loss(values, columns, test)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         stiffness, loss_factor = complex_stiffness(pair, values)
-    check_loss(table, wanted[pair[1]], loss_factor)
-    check_agreement(table, pair, values, stiffness)
-    repeat = repeat_numbers(table, wanted, values)
-    selected, temperature, degrees = rows_at_temperature(table, values, test.temperature)
-    frequency, level = values["frequency"][selected], to_peak * values["amplitude"][selected]
+    check_stiffness(table, pair, values, stiffness, loss_factor)
+    selected, temperature, degrees = _rows_at_temperature(table, values, test.temperature)
+    repeat = _repeat_numbers(table, values)
+    frequency, amplitude = values["frequency"][selected], values["amplitude"][selected]
     reached = values["amplitude_reached"][selected] if "amplitude_reached" in values else None
-    if reached is not None:
-        reached_convention = wanted["amplitude_reached"].convention
-        reached = reached * (ZERO_TO_PEAK[reached_convention] if reached_convention else to_peak)
-    runs = runs_of(frequency, level, None if repeat is None else repeat[selected], test.stepped)
-    if reached is None and not np.array_equal(runs.amplitude, level):
-        reached = level
-    notes = (*notes, *more, *note_not_understood(table, table.row_labels, selected, frequency, runs.amplitude))
+    runs = runs_of(frequency, amplitude, None if repeat is None else repeat[selected], test.stepped)
+    if reached is None and not np.array_equal(runs.amplitude, amplitude):
+        reached = amplitude
+    unknown = note_not_understood(table, table.row_labels, selected, frequency, runs.amplitude)
     return Sweep(
         name or file.stem,
         direction,
@@ -122,7 +109,7 @@ def read_sweep(
         stiffness[selected],
         runs.repeat,
         test.noise,
-        test.source(table.sha256, temperature, notes),
+        test.source(table.sha256, temperature, (*notes, *corrections, *unknown)),
         reached,
         runs.stepped,
         values["relative_error"][selected] if "relative_error" in values else None,
@@ -132,139 +119,102 @@ def read_sweep(
 
 
 def sweep_columns(
-    table: Table, direction: Place, pair: tuple[str, str], constants: Mapping[str, float]
+    table: Table,
+    direction: Place,
+    pair: tuple[str, str],
+    stated: Mapping[str, float],
+    convention: AmplitudeConvention | None,
 ) -> dict[str, Column]:
-    """Columns of a sweep with their factors to SI, in the order in which they are checked.
+    """Columns of a sweep with their factors to SI, and to zero-to-peak, in the order in which they are checked.
 
     Args:
         table: of the sweep.
         direction: of the bushing, or the specimen.
         pair: of PAIRS.
-        constants: frequency or amplitude that the campaign states, which then need no column.
+        stated: frequency or amplitude that the campaign states, which then need no column.
+        convention: of the amplitudes, if the campaign states it.
 
     Returns:
         Columns by role: those that are needed, those of other pairs if their units fit, and optional ones. A
         temperature counts from the zero of its unit.
+
+    Raises:
+        MeasurementError: a column is missing, or it is not known how its amplitudes are counted.
+        UnitError: a unit that is missing or does not fit.
     """
-    motion = direction.motion
+    motion, roles = direction.motion, table.roles
     seconds = "Pa*s" if motion is STRAINING else motion.stiffness_unit.replace("/", "*s/", 1)
     units = dict.fromkeys(SWEEP_COLUMNS, "1") | {"frequency": "Hz", "phase": "rad", "temperature": "K"}
     units |= dict.fromkeys(("amplitude", "amplitude_reached"), motion.displacement_unit)
     units |= dict.fromkeys(("stiffness", "storage_stiffness", "loss_stiffness"), motion.stiffness_unit)
     units |= {"force_amplitude": motion.force_unit, "damping_coefficient": seconds}
-    needed = [role for role in ("frequency", "amplitude") if role in table.roles or role not in constants]
-    degrees = table.roles.get("temperature")
-    optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
-    optional = [role for role in optional if role != "repeat" or table.holds_numbers(table.roles[role].index)]
-    optional += ["temperature"] if degrees and degrees.unit and table.holds_numbers(degrees.index) else []
-    redundant = [
-        role for pair_of_roles in AGREEING_PAIRS if set(pair_of_roles) <= set(table.roles) for role in pair_of_roles
-    ]
-    redundant = [role for role in redundant if units[role] == "1" or table.agrees(role, units[role])]
-    columns = {
-        role: table.column(role, units[role], _HINTS.get(role)) for role in (*needed, *pair, *optional, *redundant)
-    }
-    for role in ("amplitude", "amplitude_reached"):
-        if role in columns:
-            columns[role] = replace(columns[role], scale=strain_factor_of_files(direction) * columns[role].scale)
-    return columns if degrees is None or not table.holds_numbers(degrees.index) else {"temperature": degrees, **columns}
-
-
-def amplitude_convention(
-    table: Table, column: Column | None, stated_convention: AmplitudeConvention | None
-) -> AmplitudeConvention:
-    """Determine the convention of the amplitudes.
-
-    Args:
-        table: of the sweep.
-        column: of the amplitude; None if there is none.
-        stated_convention: in the campaign.
-
-    Returns:
-        Convention in the header, or else in the campaign; zero-to-peak if neither states one.
-
-    Raises:
-        MeasurementError: header and campaign state different conventions.
-    """
-    if column is None:
-        return stated_convention or "zero-to-peak"
-    if column.convention and stated_convention and column.convention != stated_convention:
+    numeric = {role for role, column in roles.items() if table.holds_numbers(column.index)}
+    wanted = [role for role in ("frequency", "amplitude") if role in roles or role not in stated] + [*pair]
+    wanted += [role for role in ("amplitude_reached", "relative_error") if role in roles]
+    wanted += ["repeat"] if "repeat" in numeric else []
+    wanted += ["temperature"] if "temperature" in numeric and roles["temperature"].unit else []
+    redundant = (role for other_pair in AGREEING_PAIRS if set(other_pair) <= set(roles) for role in other_pair)
+    wanted += [role for role in redundant if units[role] == "1" or table.agrees(role, units[role])]
+    columns = {role: table.column(role, units[role], _HINTS.get(role)) for role in wanted}
+    counted = columns["amplitude"].convention if "amplitude" in columns else None
+    if counted and convention and counted != convention:
         raise table.header_error(
             "header and campaign state different counts of the amplitude",
-            column=column,
-            found=f'{column.convention} in the header, amplitude = "{stated_convention}" in the campaign',
+            column=columns["amplitude"],
+            found=f'{counted} in the header, amplitude = "{convention}" in the campaign',
             expected="one convention",
             hint="correct one of them; what the header says needs no key in the campaign",
         )
-    return column.convention or stated_convention or "zero-to-peak"
+    counted = counted or convention or "zero-to-peak"
+    force = columns.get("force_amplitude")
+    if force and not force.convention and counted != "zero-to-peak":
+        form = {"peak-to-peak": "p-p", "rms": "rms"}[counted]
+        raise table.header_error(
+            "the header does not state how the amplitudes of the force are counted",
+            found=f'"{force.header}" beside a displacement that is {counted}',
+            expected="p-p, rms or 0-p in the header",
+            hint=" or ".join(f'units = {{ force_amplitude = "{force.unit} {end}" }}' for end in (form, "0-p"))
+            + " in the campaign",
+        )
+    strain = strain_factor_of_files(direction)
+    for role, factor in (("amplitude", strain), ("amplitude_reached", strain), ("force_amplitude", 1.0)):
+        if column := columns.get(role):
+            to_peak = ZERO_TO_PEAK[column.convention or counted]
+            columns[role] = replace(column, scale=to_peak * factor * column.scale)
+    return {"temperature": roles["temperature"], **columns} if "temperature" in numeric else columns
 
 
-def check_stated(table: Table, column: Column | None, values: Mapping[str, Floats], stated_value: float) -> Floats:
-    """Amplitude or frequency of each row: its column, which must agree with the stated one, or else the stated one.
-
-    Args:
-        table: of the sweep.
-        column: for the amplitude or frequency; None if there is none.
-        values: in SI by role, (n,) each.
-        stated_value: amplitude or frequency in SI.
-
-    Returns:
-        Amplitude or frequency in SI, (n,).
-
-    Raises:
-        MeasurementError: the column does not agree.
-    """
-    if column is None:
-        return np.full(next(iter(values.values())).size, stated_value)
-    table.refuse(
-        np.abs(values[column.role] - stated_value) > _STATED_AGREEMENT * stated_value,
-        column,
-        f"the {column.role} is not the one that is stated",
-        f"at_{column.role} as the campaign states it, {stated_value / column.scale:.6g} {column.unit}, within 10 %",
-        f"take at_{column.role} out of the campaign: the file has a column for it",
-    )
-    return values[column.role]
-
-
-def rows_at_temperature(
-    table: Table, values: Mapping[str, Floats], stated_temperature: float | None
+def _rows_at_temperature(
+    table: Table, values: Mapping[str, Floats], stated: float | None
 ) -> tuple[NDArray[np.intp], float | None, Floats | float | None]:
-    """Select the rows at the temperature of a test.
-
-    Args:
-        table: of the sweep.
-        values: by role, (n,) each; the temperature in its unit.
-        stated_temperature: temperature [K].
-
-    Returns:
-        Indices of the rows, temperature of the test [K], as stated or else the mean, and that of each row [K].
+    """Rows at the stated temperature [K], temperature of the test, as stated or else the mean, and that of each row.
 
     Raises:
         MeasurementError: rows at several temperatures, or none near the stated one.
     """
     rows = np.arange(values["frequency"].size)
     if "temperature" not in values:
-        return rows, stated_temperature, stated_temperature
+        return rows, stated, stated
     unit = table.roles["temperature"].unit
-    if unit is None and stated_temperature is None and np.ptp(values["temperature"]) <= ONE_TEST:
+    if unit is None and stated is None and np.ptp(values["temperature"]) <= ONE_TEST:
         return rows, None, None
     column = table.column("temperature", "K")
     celsius = values["temperature"] + (si.kelvin_scale(unit or "") or (1.0, 0.0))[1] - si.CELSIUS
     kelvin = celsius + si.CELSIUS
-    if stated_temperature is None:
+    if stated is None:
         if np.ptp(celsius) <= ONE_TEST:
             return rows, round(float(celsius.mean()), 2) + si.CELSIUS, kelvin
         problem, expected = "this file contains tests at several temperatures", "one temperature"
     else:
-        rows = np.flatnonzero(np.abs(kelvin - stated_temperature) <= SAME_TEMPERATURE)
+        rows = np.flatnonzero(np.abs(kelvin - stated) <= SAME_TEMPERATURE)
         if rows.size >= _FEWEST_SWEEP_ROWS:
-            return rows, stated_temperature, kelvin[rows]
+            return rows, stated, kelvin[rows]
         problem = "too few rows are near the temperature that is stated"
-        degrees = f"{stated_temperature - si.CELSIUS:.4g} degC"
+        degrees = f"{stated - si.CELSIUS:.4g} degC"
         expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {SAME_TEMPERATURE:g} K of {degrees}"
     ordered = np.sort(celsius)
     means = [part.mean() for part in np.split(ordered, np.flatnonzero(np.diff(ordered) > SAME_TEMPERATURE) + 1)]
-    nearest = min(means, key=lambda mean: abs(mean + si.CELSIUS - (stated_temperature or 0.0)))
+    nearest = min(means, key=lambda mean: abs(mean + si.CELSIUS - (stated or 0.0)))
     raise table.error(
         problem,
         column=column,
@@ -274,26 +224,18 @@ def rows_at_temperature(
     )
 
 
-def repeat_numbers(
-    table: Table, columns: Mapping[str, Column], values: Mapping[str, Floats]
-) -> NDArray[np.int64] | None:
-    """Read the repeat number of each row.
-
-    Args:
-        table: of the sweep.
-        columns: by role.
-        values: by role, (n,) each.
-
-    Returns:
-        Numbers, (n,), in order of appearance if the column contains texts; None without such a column.
+def _repeat_numbers(table: Table, values: Mapping[str, Floats]) -> NDArray[np.int64] | None:
+    """Repeat number of each row, (n,), in order of appearance if the column contains texts; None without a column.
 
     Raises:
         MeasurementError: a number that is no whole number.
     """
-    if "repeat" in table.roles and "repeat" not in values:
-        return column_texts(table, table.roles["repeat"].index).codes.astype(np.int64) + 1
-    if (repeat := values.get("repeat")) is None:
+    if "repeat" not in table.roles:
         return None
+    column = table.roles["repeat"]
+    if "repeat" not in values:
+        return column_texts(table, column.index).codes.astype(np.int64) + 1
+    repeat = values["repeat"]
     is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)
-    table.refuse(~is_count, columns["repeat"], "this is no repeat number", "a whole number")
+    table.refuse(~is_count, column, "this is no repeat number", "a whole number")
     return repeat.astype(np.int64)

@@ -214,15 +214,7 @@ class Table(Cells):
         return column is not None and column.unit is not None and units.is_compatible(column.unit, expected)
 
     def columns_key(self, role: str, unit: str) -> str:
-        """Suggest keys of a campaign that name the column of a role.
-
-        Args:
-            role: of the column.
-            unit: its SI unit.
-
-        Returns:
-            A key for each of the first three headers without a role that have a fitting unit, or one with "...".
-        """
+        """Return keys of a campaign for up to three free headers that fit the SI unit of a role, or one with "..."."""
         taken = {column.index for column in self.roles.values()}
         free = [
             (header, split_convention(units.split_header(split_convention(header)[0])[1] or in_row)[0])
@@ -235,12 +227,8 @@ class Table(Cells):
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
         """Refuse headers that name a role in a test of the other kind of motion: strain, or displacement.
 
-        Args:
-            role: of the column.
-            headers: that are known to do so; default those of the table that do.
-
         Raises:
-            MeasurementError: there is such a header.
+            MeasurementError: the table has such a header, or one is given.
         """
         other_motion = TRANSLATION if self.motion is STRAINING else STRAINING
         kinds = ["displacement and force or stiffness", "strain and modulus"]
@@ -264,10 +252,6 @@ class Table(Cells):
         self, wanted: Mapping[str, Column], *, fewest_rows: int
     ) -> tuple[dict[str, Floats], tuple[str, ...]]:
         """Read columns: with pandas if all rows are data of one notation, else row by row.
-
-        Args:
-            wanted: columns by role, with their factors to SI.
-            fewest_rows: that the table must have.
 
         Returns:
             Values in SI by role, (n,) each, and sentences on rows that are left out and on columns known by their unit.

@@ -53,15 +53,12 @@ def ending(form: Form) -> str:
 
 
 def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
-    """Convert a table to the bytes of a file.
+    """Return the bytes of the file of a table.
 
     Args:
         name: of the sheet of a workbook.
         table: to write.
         form: of the file.
-
-    Returns:
-        Bytes of the file.
 
     Raises:
         OutputError: a table that is too large for a sheet.
@@ -70,14 +67,9 @@ def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
 
 
 def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
-    """Convert a table to the bytes of a CSV file.
+    """Return the bytes of a CSV file, in which None and NaN are empty cells.
 
-    Args:
-        table: to write.
-        decimal_comma: True for semicolons, decimal commas and a byte order mark.
-
-    Returns:
-        Bytes of the file; None and NaN are empty cells.
+    `decimal_comma` selects semicolons, decimal commas and a byte order mark.
     """
     text, point, delimiter, encoding = io.StringIO(), ".", ",", "utf-8"
     if decimal_comma:
@@ -160,13 +152,7 @@ def _write(book: Workbook, name: str, table: pd.DataFrame) -> None:
 
 
 def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
-    """Convert tables to the bytes of a workbook.
-
-    Args:
-        tables: by the name of their sheet, which is changed if Excel does not allow it.
-
-    Returns:
-        Bytes of the workbook.
+    """Return the bytes of a workbook with a sheet for each table, under names that Excel allows.
 
     Raises:
         OutputError: a table that is too large for a sheet.
@@ -203,13 +189,6 @@ def _sheet_name(title: str, used: set[str]) -> str:
 
 
 def folder_name(name: str) -> str:
-    """Convert a text to the name of one folder that all operating systems allow.
-
-    Args:
-        name: any text.
-
-    Returns:
-        Name of 1 to 60 characters without separators, so that paths stay below the 260 characters of Windows.
-    """
+    """Return a name of 1 to 60 characters for a folder, as all operating systems allow it."""
     safe = _UNSAFE_IN_FOLDERS.sub("_", name)[:60].strip(" .") or "campaign"
     return f"_{safe}" if _DEVICES.fullmatch(safe) else safe

@@ -24,14 +24,10 @@ _LARGEST_DAY_STEP = 1e-4
 
 
 def clock(text: str) -> float | None:
-    """Seconds of a clock, or of a date and clock since 1970.
+    """Return the seconds of a clock, or of a date and clock since 1970; None if the text is none.
 
-    Args:
-        text: such as "20:07:10.100", "8:07:10 PM" or "2026-11-26T20:07:10". In 07:10:100 the last part is milliseconds.
-
-    Returns:
-        Time [s]; None if the text is no clock. Days and months that are ambiguous are read as day and month; only the
-        differences between rows are used.
+    In 07:10:100 the last part is milliseconds. Days and months that are ambiguous are read as day and month; only the
+    differences between rows are used.
     """
     text = _ZONE.sub("", text.strip())
     date, days = _DATE.match(text), 0.0
@@ -58,14 +54,9 @@ def clock(text: str) -> float | None:
 
 
 def are_day_numbers(values: Floats) -> bool:
-    """Return True if numbers are dates of a spreadsheet, in days.
+    """Return True if numbers, (n,), are dates of a spreadsheet in days: from 1954 to 2119, and seconds apart.
 
-    Args:
-        values: numbers as the file has them, (n,).
-
-    Returns:
-        True if all lie between 1954 and 2119 and differ by seconds. As seconds, the same numbers would be a record
-        with steps below 0.1 ms that begins hours after zero.
+    As seconds, the same numbers would be a record with steps below 0.1 ms that begins hours after zero.
     """
     low, high = _DAY_NUMBERS
     in_range = values.size > 1 and low <= float(values.min()) and float(values.max()) <= high
@@ -78,14 +69,9 @@ def without_midnight(seconds: Floats) -> Floats:
 
 
 def spread(time: Floats) -> Floats | None:
-    """Time of evenly sampled rows whose recorded time was rounded, so that it repeats.
+    """Return even times of rows whose recorded time [s], (n,), was rounded, so that it repeats.
 
-    Args:
-        time: recorded time [s], (n,).
-
-    Returns:
-        Even times, (n,), all within one step of the recorded ones; None if time goes back, or if no even sampling
-        rounds to these times.
+    None if time goes back, or if no even sampling rounds to these times.
 
     Notes:
         With q the smallest step between different times, an even clock t0 + i dt is rounded to within q. The line

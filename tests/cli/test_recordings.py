@@ -166,7 +166,8 @@ def test_what_a_file_does_not_tell_is_stated_as_of_csv(typed: Run, tmp_path: Pat
     assert "mu" in values(typed("fit-static", "x/campaign.toml", "-o", "y", "--no-plots", "--json"))
     (tmp_path / "axial.mat").rename(tmp_path / "test.mat")
     assert (
-        'test.mat, group "top level": nothing says in' in typed("init", "test.mat", *stated, *GEOMETRY, status=2).stderr
+        'test.mat, group "top level": the direction of this test is not stated'
+        in typed("init", "test.mat", *stated, *GEOMETRY, status=2).stderr
     )
 
 
