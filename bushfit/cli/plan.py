@@ -6,6 +6,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +19,9 @@ from bushfit.errors import error_location
 from bushfit.units import display_unit, number
 
 if TYPE_CHECKING:
-    from bushfit.commands.plan import PlanFile, PlanOutput, Shown
+    from bushfit.commands.plan import PlanOutput
     from bushfit.planning.campaign import Check
+    from bushfit.planning.document import PlanFile, Shown
 
 #: Hours of the rig at most: months, as a typing error.
 _MOST_HOURS = 2000.0
@@ -90,7 +92,7 @@ def command(
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.commands.loading import load_source
-    from bushfit.commands.plan import plan, with_check
+    from bushfit.commands.plan import plan
 
     if aim not in (None, "rivals") and rivals:
         raise click.UsageError("'--rivals' goes with '--for rivals'.")
@@ -116,7 +118,7 @@ def command(
         outcome = plan(opened, settings_campaign, **settings)
     _print_plan(output, outcome)
     if count and outcome.plan.planned.tests:
-        outcome = with_check(outcome, _simulate_plan(output, outcome, count, seed))
+        outcome = replace(outcome, check=_simulate_plan(output, outcome, count, seed))
     output.write(folder, outcome.files, outcome.document, [source, *([campaign] if campaign else [])])
     if outcome.plan.planned.tests:
         output.print(f"next: make the tests in the order of {folder / output.formats.table('plan')}")

@@ -2,15 +2,12 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import chain
-from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
-from pydantic import Field
-from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign, model_of
 from bushfit.campaign.schema import PredictSettings, RigSettings, SimulatedLoop
@@ -22,20 +19,10 @@ from bushfit.geometry import Direction, Place, get_place
 from bushfit.model.result import Result
 from bushfit.planning.campaign import Check, campaign_toml
 from bushfit.planning.compound import guess_parameters
-from bushfit.planning.contract import (
-    Aim,
-    Knowledge,
-    Plan,
-    PlanRequest,
-    Points,
-    Target,
-    Test,
-    motions,
-    operating_points,
-)
+from bushfit.planning.contract import Aim, Knowledge, Plan, PlanRequest, Points, Target, Test, operating_points
+from bushfit.planning.document import PlanFile, plan_document
 from bushfit.planning.knowledge import from_campaign, from_result, rig_of
 from bushfit.planning.plan import plan as choose_tests
-from bushfit.planning.problem import RIVALS_APART
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
 from bushfit.report import plots
 from bushfit.report.results import ResultFile, figure_file, json_file, raw_file, table_file
@@ -50,110 +37,6 @@ _COLUMNS = (
     *("order", "direction", "test", "amplitude", "frequency [Hz]", "cycles", "repeat", "force up to", "minutes"),
     *("minutes so far", "what for"),
 )
-
-
-class PlannedRun(TypedDict):
-    """One run of the rig, in the order of the plan."""
-
-    place: Annotated[str, Field(description="Direction, or name of the specimen.")]
-    kind: Annotated[Literal["loop", "sweep"], Field(description="Kind of test.")]
-    stepped: Annotated[
-        Literal["frequency", "amplitude"] | None,
-        Field(description="Quantity that a sweep steps through while the other is constant; null for a loop."),
-    ]
-    amplitudes: Annotated[list[float], Field(description="Zero-to-peak amplitudes in the unit.")]
-    unit: Annotated[str, Field(description='SI unit of the amplitudes: "m", "rad" or "1".')]
-    frequencies_Hz: Annotated[list[float], Field(description="Frequencies of the points, or of the loop [Hz].")]
-    cycles: Annotated[int | None, Field(description="Cycles of a loop; null for a sweep.")]
-    minutes: Annotated[float, Field(description="Duration with the change of direction before it [min].")]
-
-
-class Reached(TypedDict):
-    """A standard error before further tests, with the planned tests, and with the standard programme."""
-
-    before: Annotated[float, Field(description="Without further tests.")]
-    planned: Annotated[float, Field(description="With the tests of the plan.")]
-    standard: Annotated[float, Field(description="With the standard programme of as many hours instead.")]
-
-
-class TargetEntry(Reached):
-    """Half of a 95 % interval over its value, the widest of all points at which predictions are wanted."""
-
-    asked: Annotated[float, Field(description="Largest half width that was asked for.")]
-    met: Annotated[bool, Field(description="Whether the planned tests reach the target.")]
-    why: Annotated[str | None, Field(description="Reason why the target is not reached; null if it is.")]
-
-
-class Shown(TypedDict):
-    """Smallest amount of an effect that a test at the 5 % level detects in 90 % of the cases."""
-
-    parameter: Annotated[str, Field(description="Parameter of the effect that the amount is of.")]
-    unit: Annotated[str, Field(description='SI unit of the amount; "1" for a ratio.')]
-    planned: Annotated[float | None, Field(description="With the tests of the plan; null if no amount is detected.")]
-    standard: Annotated[float | None, Field(description="With the standard programme.")]
-
-
-class Rivalry(TypedDict):
-    """Models that explain the tests equally well."""
-
-    effects: Annotated[list[str], Field(description="Effect that each of the models adds.")]
-    planned: Annotated[
-        float,
-        Field(
-            description="Expected chi-square between the two nearest models, after the best refit of either, with the "
-            "tests of the plan."
-        ),
-    ]
-    standard: Annotated[float, Field(description="The same with the standard programme.")]
-    enough: Annotated[float, Field(description="Chi-square above which nine of ten campaigns separate the models.")]
-
-
-class Checked(TypedDict):
-    """Simulations of the plan, each fitted."""
-
-    campaigns: Annotated[int, Field(description="Number of simulated campaigns.")]
-    failed: Annotated[int, Field(description="Number of campaigns that could not be fitted.")]
-    seed: Annotated[int, Field(description="Seed of the first campaign; the others count on from it.")]
-    predicted: Annotated[dict[str, float], Field(description="Relative standard error that the plan predicts.")]
-    found: Annotated[dict[str, float], Field(description="Relative standard error from the scatter of the fits.")]
-    ci95: Annotated[dict[str, list[float]], Field(description="Ends of the 95 % interval of the latter.")]
-
-
-class PlanFile(TypedDict):
-    """plan.json: the tests of a plan and their expected results."""
-
-    schema: Annotated[str, Field(description="Name and version of this schema.")]
-    source: Annotated[str, Field(description="Origin of what is knowledge before further tests.")]
-    aim: Annotated[Aim, Field(description="Aim of the plan.")]
-    hours: Annotated[float, Field(description="Largest duration on the rig [h].")]
-    tests: Annotated[list[PlannedRun], Field(description="Runs of the rig in their order.")]
-    hours_planned: Annotated[float, Field(description="Duration of the planned tests [h].")]
-    hours_standard: Annotated[
-        float,
-        Field(description="Duration of the standard programme, repeated as often as fits into that of the plan [h]."),
-    ]
-    hours_left: Annotated[float, Field(description="Hours of the rig that no test takes [h].")]
-    enough: Annotated[str | None, Field(description="Reason why hours are left; null if they are used.")]
-    targets: Annotated[dict[str, TargetEntry], Field(description="Targets by name; empty if none was given.")]
-    parameters: Annotated[dict[str, Reached], Field(description="Relative standard error of each parameter.")]
-    stiffness: Annotated[
-        dict[str, Reached],
-        Field(description="Root mean square relative standard error of the stiffness, by direction or specimen."),
-    ]
-    loss_factor: Annotated[
-        dict[str, Reached], Field(description="Root mean square standard error of the loss factor, likewise.")
-    ]
-    visible: Annotated[dict[str, Shown], Field(description="Smallest detectable amount of each effect.")]
-    drift: Annotated[
-        dict[str, float],
-        Field(
-            description="Largest shift of a parameter over its standard error if the gain drifts by 1 % over the "
-            "session, in the order of the plan and in that by direction and level."
-        ),
-    ]
-    rivals: Annotated[Rivalry | None, Field(description="Models to separate; null if there are none.")]
-    check: Annotated[Checked | None, Field(description="Simulations of the plan; null if none were asked for.")]
-    warnings: Annotated[list[str], Field(description="Limits of the plan.")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,59 +66,7 @@ class PlanOutput:
     @cached_property
     def document(self) -> PlanFile:
         """Content of plan.json."""
-        plan, request, names = self.plan, self.plan.request, self.plan.knowledge.names
-        programmes = (plan.before, plan.planned, plan.standard)
-        halves = zip(*(programme.halves for programme in programmes), strict=True)
-        rivals: Rivalry | None = None
-        if plan.planned.rival_chi_square is not None and plan.standard.rival_chi_square is not None:
-            rivals = {
-                "effects": [rival.model.effects[-1] for rival in plan.knowledge.rivals],
-                "planned": plan.planned.rival_chi_square,
-                "standard": plan.standard.rival_chi_square,
-                "enough": RIVALS_APART,
-            }
-        return {
-            "schema": "bushfit/plan/1",
-            "source": plan.knowledge.source,
-            "aim": request.aim,
-            "hours": request.hours,
-            "tests": [_run(*pair) for pair in zip(plan.planned.tests, plan.planned.minutes.tolist(), strict=True)],
-            "hours_planned": plan.planned.hours,
-            "hours_standard": plan.standard.hours,
-            "hours_left": request.hours - plan.planned.hours,
-            "enough": plan.enough,
-            "targets": {
-                str(target): {"asked": target.half, **_reached(half), "met": reason is None, "why": reason}
-                for target, reason, half in zip(request.targets, plan.missed, halves, strict=True)
-            },
-            "parameters": {
-                name: _reached([programme.errors[index] for programme in programmes])
-                for index, name in enumerate(names)
-            },
-            "stiffness": dict(self._root_mean_squares([programme.stiffness for programme in programmes])),
-            "loss_factor": dict(self._root_mean_squares([programme.loss for programme in programmes])),
-            "visible": dict(self._smallest_amounts()),
-            "drift": {"planned": plan.planned.drift, "standard": plan.standard.drift},
-            "rivals": rivals,
-            "check": _checked(self.check) if self.check else None,
-            "warnings": list(plan.notes),
-        }
-
-    def _root_mean_squares(self, errors: Sequence[Array]) -> Iterator[tuple[str, Reached]]:
-        """Root mean square of errors at the points of each direction, for each programme."""
-        points = self.plan.request.points
-        ends = np.cumsum([part.frequency.size for part in points])[:-1]
-        for part, *errors_there in zip(points, *(np.split(error, ends) for error in errors), strict=True):
-            yield str(part.place), _reached([float(np.sqrt(np.mean(np.square(error)))) for error in errors_there])
-
-    def _smallest_amounts(self) -> Iterator[tuple[str, Shown]]:
-        """Smallest detectable amount of each effect."""
-        for planned, standard in zip(self.plan.planned.detectable, self.plan.standard.detectable, strict=True):
-            amounts = [item.amount if np.isfinite(item.amount) else None for item in (planned, standard)]
-            yield (
-                planned.effect,
-                Shown(parameter=planned.parameter, unit=planned.unit, planned=amounts[0], standard=amounts[1]),
-            )
+        return plan_document(self.plan, self.check)
 
 
 def plan(
@@ -300,11 +131,6 @@ def plan(
     wanted = tuple(chain.from_iterable(named))
     request = PlanRequest(aim, hours, rig, places, points, tuple(parameters) or knowledge.names, wanted)
     return PlanOutput(choose_tests(knowledge, request))
-
-
-def with_check(output: PlanOutput, check: Check) -> PlanOutput:
-    """Output of a plan together with its simulations."""
-    return replace(output, check=check)
 
 
 def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | None) -> Knowledge:
@@ -384,36 +210,3 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
 def _distinct(values: Array) -> str:
     """Distinct numbers of an array, in their order."""
     return " ".join(dict.fromkeys(number(value, 4) for value in values.tolist()))
-
-
-def _run(test: Test, minutes: float) -> PlannedRun:
-    """One run as plan.json has it."""
-    amplitudes, frequencies = map(list, motions(test))
-    return {
-        "place": str(test.direction),
-        "kind": "loop" if isinstance(test, SimulatedLoop) else "sweep",
-        "stepped": None if isinstance(test, SimulatedLoop) else test.stepped,
-        "amplitudes": amplitudes,
-        "unit": test.direction.motion.displacement_unit,
-        "frequencies_Hz": frequencies,
-        "cycles": test.cycles if isinstance(test, SimulatedLoop) else None,
-        "minutes": minutes,
-    }
-
-
-def _reached(errors: Sequence[Any]) -> Reached:
-    before, planned, standard = map(float, errors)
-    return {"before": before, "planned": planned, "standard": standard}
-
-
-def _checked(check: Check) -> Checked:
-    """Simulations as plan.json has them."""
-    low, high = check.interval
-    return {
-        "campaigns": len(check.deviations) + check.failed,
-        "failed": check.failed,
-        "seed": check.seed,
-        "predicted": dict(zip(check.names, check.predicted.tolist(), strict=True)),
-        "found": dict(zip(check.names, check.observed.tolist(), strict=True)),
-        "ci95": {name: list(ends) for name, *ends in zip(check.names, low.tolist(), high.tolist(), strict=True)},
-    }

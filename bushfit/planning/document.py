@@ -1,0 +1,206 @@
+"""plan.json: the tests of a plan and their expected results."""
+
+from collections.abc import Iterable
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from bushfit.campaign.schema import SimulatedLoop
+from bushfit.planning.campaign import Check
+from bushfit.planning.contract import Aim, Plan, motions
+from bushfit.planning.problem import RIVALS_APART
+
+
+class PlannedRun(TypedDict):
+    """One run of the rig, in the order of the plan."""
+
+    place: Annotated[str, Field(description="Direction, or name of the specimen.")]
+    kind: Annotated[Literal["loop", "sweep"], Field(description="Kind of test.")]
+    stepped: Annotated[
+        Literal["frequency", "amplitude"] | None,
+        Field(description="Quantity that a sweep steps through while the other is constant; null for a loop."),
+    ]
+    amplitudes: Annotated[list[float], Field(description="Zero-to-peak amplitudes in the unit.")]
+    unit: Annotated[str, Field(description='SI unit of the amplitudes: "m", "rad" or "1".')]
+    frequencies_Hz: Annotated[list[float], Field(description="Frequencies of the points, or of the loop [Hz].")]
+    cycles: Annotated[int | None, Field(description="Cycles of a loop; null for a sweep.")]
+    minutes: Annotated[float, Field(description="Duration with the change of direction before it [min].")]
+
+
+class Reached(TypedDict):
+    """A standard error before further tests, with the planned tests, and with the standard programme."""
+
+    before: Annotated[float, Field(description="Without further tests.")]
+    planned: Annotated[float, Field(description="With the tests of the plan.")]
+    standard: Annotated[float, Field(description="With the standard programme of as many hours instead.")]
+
+
+class TargetEntry(Reached):
+    """Half of a 95 % interval over its value, the widest of all points at which predictions are wanted."""
+
+    asked: Annotated[float, Field(description="Largest half width that was asked for.")]
+    met: Annotated[bool, Field(description="Whether the planned tests reach the target.")]
+    why: Annotated[str | None, Field(description="Reason why the target is not reached; null if it is.")]
+
+
+class Shown(TypedDict):
+    """Smallest amount of an effect that a test at the 5 % level detects in 90 % of the cases."""
+
+    parameter: Annotated[str, Field(description="Parameter of the effect that the amount is of.")]
+    unit: Annotated[str, Field(description='SI unit of the amount; "1" for a ratio.')]
+    planned: Annotated[float | None, Field(description="With the tests of the plan; null if no amount is detected.")]
+    standard: Annotated[float | None, Field(description="With the standard programme.")]
+
+
+class Rivalry(TypedDict):
+    """Models that explain the tests equally well."""
+
+    effects: Annotated[list[str], Field(description="Effect that each of the models adds.")]
+    planned: Annotated[
+        float,
+        Field(
+            description="Expected chi-square between the two nearest models, after the best refit of either, with the "
+            "tests of the plan."
+        ),
+    ]
+    standard: Annotated[float, Field(description="The same with the standard programme.")]
+    enough: Annotated[float, Field(description="Chi-square above which nine of ten campaigns separate the models.")]
+
+
+class Checked(TypedDict):
+    """Simulations of the plan, each fitted."""
+
+    campaigns: Annotated[int, Field(description="Number of simulated campaigns.")]
+    failed: Annotated[int, Field(description="Number of campaigns that could not be fitted.")]
+    seed: Annotated[int, Field(description="Seed of the first campaign; the others count on from it.")]
+    predicted: Annotated[dict[str, float], Field(description="Relative standard error that the plan predicts.")]
+    found: Annotated[dict[str, float], Field(description="Relative standard error from the scatter of the fits.")]
+    ci95: Annotated[dict[str, list[float]], Field(description="Ends of the 95 % interval of the latter.")]
+
+
+class PlanFile(TypedDict):
+    """plan.json: the tests of a plan and their expected results."""
+
+    schema: Annotated[str, Field(description="Name and version of this schema.")]
+    source: Annotated[str, Field(description="Origin of what is knowledge before further tests.")]
+    aim: Annotated[Aim, Field(description="Aim of the plan.")]
+    hours: Annotated[float, Field(description="Largest duration on the rig [h].")]
+    tests: Annotated[list[PlannedRun], Field(description="Runs of the rig in their order.")]
+    hours_planned: Annotated[float, Field(description="Duration of the planned tests [h].")]
+    hours_standard: Annotated[
+        float,
+        Field(description="Duration of the standard programme, repeated as often as fits into that of the plan [h]."),
+    ]
+    hours_left: Annotated[float, Field(description="Hours of the rig that no test takes [h].")]
+    enough: Annotated[str | None, Field(description="Reason why hours are left; null if they are used.")]
+    targets: Annotated[dict[str, TargetEntry], Field(description="Targets by name; empty if none was given.")]
+    parameters: Annotated[dict[str, Reached], Field(description="Relative standard error of each parameter.")]
+    stiffness: Annotated[
+        dict[str, Reached],
+        Field(description="Root mean square relative standard error of the stiffness, by direction or specimen."),
+    ]
+    loss_factor: Annotated[
+        dict[str, Reached], Field(description="Root mean square standard error of the loss factor, likewise.")
+    ]
+    visible: Annotated[dict[str, Shown], Field(description="Smallest detectable amount of each effect.")]
+    drift: Annotated[
+        dict[str, float],
+        Field(
+            description="Largest shift of a parameter over its standard error if the gain drifts by 1 % over the "
+            "session, in the order of the plan and in that by direction and level."
+        ),
+    ]
+    rivals: Annotated[Rivalry | None, Field(description="Models to separate; null if there are none.")]
+    check: Annotated[Checked | None, Field(description="Simulations of the plan; null if none were asked for.")]
+    warnings: Annotated[list[str], Field(description="Limits of the plan.")]
+
+
+def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:
+    """Content of plan.json.
+
+    Args:
+        plan: the plan.
+        check: simulations of the plan, if they were asked for.
+    """
+    request, planned, standard = plan.request, plan.planned, plan.standard
+    programmes = (plan.before, planned, standard)
+    rivals: Rivalry | None = None
+    if planned.rival_chi_square is not None and standard.rival_chi_square is not None:
+        rivals = {
+            "effects": [rival.model.effects[-1] for rival in plan.knowledge.rivals],
+            "planned": planned.rival_chi_square,
+            "standard": standard.rival_chi_square,
+            "enough": RIVALS_APART,
+        }
+    targets: dict[str, TargetEntry] = {}
+    halves = zip(*(programme.halves for programme in programmes), strict=True)
+    for target, reason, half in zip(request.targets, plan.missed, halves, strict=True):
+        targets[str(target)] = {"asked": target.half, **_reached(half), "met": reason is None, "why": reason}
+    predicted: dict[str, dict[str, Reached]] = {"stiffness": {}, "loss": {}}
+    ends = np.cumsum([points.frequency.size for points in request.points])[:-1]
+    for quantity, by_place in predicted.items():
+        by_programme = (np.split(getattr(programme, quantity), ends) for programme in programmes)
+        for points, *errors in zip(request.points, *by_programme, strict=True):
+            by_place[str(points.place)] = _reached(np.sqrt(np.mean(np.square(error))) for error in errors)
+    visible: dict[str, Shown] = {}
+    for one, other in zip(planned.detectable, standard.detectable, strict=True):
+        amounts = [item.amount if np.isfinite(item.amount) else None for item in (one, other)]
+        visible[one.effect] = {
+            "parameter": one.parameter, "unit": one.unit, "planned": amounts[0], "standard": amounts[1],
+        }  # fmt: skip
+    tests: list[PlannedRun] = []
+    for test, minutes in zip(planned.tests, planned.minutes.tolist(), strict=True):
+        (amplitudes, frequencies), is_loop = motions(test), isinstance(test, SimulatedLoop)
+        tests.append(
+            {
+                "place": str(test.direction),
+                "kind": "loop" if is_loop else "sweep",
+                "stepped": None if isinstance(test, SimulatedLoop) else test.stepped,
+                "amplitudes": list(amplitudes),
+                "unit": test.direction.motion.displacement_unit,
+                "frequencies_Hz": list(frequencies),
+                "cycles": test.cycles if isinstance(test, SimulatedLoop) else None,
+                "minutes": minutes,
+            }
+        )
+    parameter_errors = zip(plan.knowledge.names, *(programme.errors for programme in programmes), strict=True)
+    return {
+        "schema": "bushfit/plan/1",
+        "source": plan.knowledge.source,
+        "aim": request.aim,
+        "hours": request.hours,
+        "tests": tests,
+        "hours_planned": planned.hours,
+        "hours_standard": standard.hours,
+        "hours_left": request.hours - planned.hours,
+        "enough": plan.enough,
+        "targets": targets,
+        "parameters": {name: _reached(errors) for name, *errors in parameter_errors},
+        "stiffness": predicted["stiffness"],
+        "loss_factor": predicted["loss"],
+        "visible": visible,
+        "drift": {"planned": planned.drift, "standard": standard.drift},
+        "rivals": rivals,
+        "check": _checked(check) if check else None,
+        "warnings": list(plan.notes),
+    }
+
+
+def _reached(errors: Iterable[float]) -> Reached:
+    before, planned, standard = map(float, errors)
+    return {"before": before, "planned": planned, "standard": standard}
+
+
+def _checked(check: Check) -> Checked:
+    """Simulations as plan.json has them."""
+    low, high = check.interval
+    return {
+        "campaigns": len(check.deviations) + check.failed,
+        "failed": check.failed,
+        "seed": check.seed,
+        "predicted": dict(zip(check.names, check.predicted.tolist(), strict=True)),
+        "found": dict(zip(check.names, check.observed.tolist(), strict=True)),
+        "ci95": {name: list(ends) for name, *ends in zip(check.names, low.tolist(), high.tolist(), strict=True)},
+    }
